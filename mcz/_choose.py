@@ -1,0 +1,97 @@
+"""Which grids a run of tokens may be on. The choice is an encoder's, nothing here is normative."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mcz._gridrules import FIXED_TEXT, GridFlag, GridKind
+from mcz._tokens import Ints, Tokens, kernels
+
+_SAMPLE = 4096  # tokens that are looked at for candidates; all of them are counted
+_EXCEPTION_BITS = 200  # row, channel and text, a guess
+_DIGIT_BITS = 3.33
+_SIGN_AND_RANGE_BITS = 8.0
+
+Candidate = tuple[float, tuple[GridKind, int, int]]  # bits of an ordinal; kind, digits, flags
+
+
+def cost(n_tokens: int, bits: float, n_exceptions: int) -> float:
+    return bits * n_tokens + _EXCEPTION_BITS * n_exceptions
+
+
+def candidates(tokens: Tokens) -> Iterator[Candidate]:
+    """Grids worth a try."""
+    loops = kernels()
+    mantissa, power, shape = tokens.fields[:: 1 + len(tokens) // _SAMPLE].T
+    known = shape & (loops.BAD | loops.SPECIAL) == 0
+    if not known.any():
+        yield 0.0, (GridKind.FIXED, 0, 0)
+        return
+    shape, mantissa, power = shape[known], mantissa[known], power[known]
+    plain = shape & loops.EXPONENT == 0
+    places = np.minimum(shape >> loops.FRACTION_DIGITS, 63)
+    significant = shape >> loops.SIGNIFICANT & 31
+    sign, tail, exponent = _styles(mantissa, power, shape, places)
+
+    if plain.any():
+        fixed = int(np.bincount(places[plain]).argmax())
+        point = GridFlag.POINT if fixed == 0 and tail == GridFlag.POINT else 0
+        style = sign & ~GridFlag.NO_ZERO | point if fixed == 0 else sign
+        if fixed <= 22:
+            yield _bits(fixed), (GridKind.FIXED, fixed, style)
+        for digits in _ends(places[plain]):
+            if 1 <= digits <= 22:
+                yield _bits(digits) + 1, (GridKind.TRIMMED, digits, sign | tail)
+    flags = sign | tail | exponent
+    for digits in sorted({*_ends(significant), 6}):
+        if 1 <= digits <= 15:
+            yield _bits(digits) + 2, (GridKind.GENERAL, digits, flags)
+    if significant.max() > 6:
+        yield 40.0, (GridKind.TEXT32, 0, flags)
+    if significant.max() > 9:
+        for digits in (0, 1, 16, 17):
+            yield 64.0, (GridKind.TEXT64, digits, flags)
+        if plain.any() and 10 <= fixed <= 40:
+            yield 66.0, (GridKind.TEXT64, FIXED_TEXT + fixed, 0)
+
+
+def _bits(digits: int) -> float:
+    return _SIGN_AND_RANGE_BITS + _DIGIT_BITS * digits
+
+
+def _ends(counts: Ints) -> list[int]:
+    """The largest count, and the one that 99 % do not exceed: a stray long token costs little."""
+    return sorted({int(counts.max()), int(np.sort(counts)[(len(counts) * 99 - 1) // 100])})
+
+
+def _styles(mantissa: Ints, power: Ints, shape: Ints, places: Ints) -> tuple[int, int, int]:
+    """Flags of the sign and the leading zero, of integral numbers, of the exponent: majorities."""
+    loops = kernels()
+
+    def many(chosen: np.ndarray, other: np.ndarray) -> bool:
+        return int(np.count_nonzero(chosen)) > int(np.count_nonzero(other))
+
+    plain = shape & loops.EXPONENT == 0
+    sign = GridFlag.PLUS if many(shape & loops.PLUS, shape & (loops.PLUS | loops.MINUS) == 0) else 0
+    if many(plain & (shape & loops.NO_INTEGER != 0), shape & loops.ZERO_INTEGER):
+        sign |= GridFlag.NO_ZERO
+    point = shape & loops.POINT != 0
+    bare = plain & (places == 0)
+    dot_zero = plain & (places == 1) & (mantissa % 10 == 0)
+    tail = 0
+    if many(bare & point, bare & ~point) and many(bare & point, dot_zero):
+        tail = int(GridFlag.POINT)
+    elif many(dot_zero, bare):
+        tail = int(GridFlag.POINT_ZERO)
+    written = shape >> loops.EXPONENT_DIGITS & 255
+    short = ~plain & (np.abs(power) < 100)
+    exponent = 0
+    if many(short & (written == 3), short & (written == 2)):
+        exponent = int(GridFlag.EXPONENT3)
+    elif many(short & (written == 1), short & (written == 2) & (np.abs(power) < 10)):
+        exponent = int(GridFlag.EXPONENT1)
+    if many(shape & loops.UPPER, ~plain & (shape & loops.UPPER == 0)):
+        exponent |= GridFlag.UPPER
+    return int(sign), tail, int(exponent)

@@ -1,0 +1,317 @@
+"""Loops over decimal numbers in text: read them, compare them with a grid, print them.
+
+A token is described by a row of three int64, from which its text can be told exactly unless LONG:
+
+0. its digits read as one integer, leading zeros dropped (below 10^18)
+1. the number after its ``e``, 0 without one, clamped to +-``HUGE``
+2. shape: the bits below, and ``SIGNIFICANT``, ``EXPONENT_DIGITS``, ``FRACTION_DIGITS`` above them
+
+Everything is int64, because numba turns a mixture of int64 and uint64 into float64.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz._jit import kernel
+
+HUGE = 1_000_000
+
+# Bits of a shape.
+MINUS, PLUS = 1, 2
+POINT = 4
+EXPONENT, UPPER, EXPONENT_SIGN = 8, 16, 32
+NO_INTEGER = 64  # ".5"
+ZERO_INTEGER = 128  # "0.5"
+EXTRA_ZERO = 256  # "00.5", never printed by a grid
+LONG = 512  # more than 18 significant digits: column 0 is not exact
+SPECIAL = 1024  # nan or inf
+BAD = 2048  # not a number
+SIGNIFICANT = 12  # shift; 5 bits: digits from the first to the last nonzero one
+EXPONENT_DIGITS = 17  # shift; 8 bits
+FRACTION_DIGITS = 25  # shift; 16 bits
+
+# Bits of a grid's flags, as in mcz.numbers.GridFlag (numba wants plain integers).
+_POINT_ZERO, _POINT_ONLY, _NO_ZERO, _PLUS, _EXP3, _EXP1, _UPPER = 1, 2, 4, 8, 16, 32, 64
+
+
+@kernel
+def scan(
+    text: NDArray[np.uint8],
+    start: NDArray[np.int64],
+    stop: NDArray[np.int64],
+    fields: NDArray[np.int64],
+) -> None:
+    """Fill ``fields`` (n, 3) from the tokens ``text[start[i]:stop[i]]``."""
+    for token in range(len(start)):
+        at, end = start[token], stop[token]
+        shape = 0
+        if at < end and (text[at] == 45 or text[at] == 43):
+            shape = MINUS if text[at] == 45 else PLUS
+            at += 1
+        first = at
+        point = -1
+        mantissa = 0
+        digits = 0  # of the mantissa, leading zeros left out
+        significant = 0
+        while at < end:
+            digit = int(text[at]) - 48
+            if digit == -2 and point < 0:
+                point = at
+            elif 0 <= digit <= 9:
+                if digit or digits:
+                    digits += 1
+                    if digits <= 18:
+                        mantissa = mantissa * 10 + digit
+                    if digit:
+                        significant = digits
+            else:
+                break
+            at += 1
+        fraction = at - point - 1 if point >= 0 else 0
+        integers = at - first - fraction - (1 if point >= 0 else 0)
+        shape |= POINT if point >= 0 else 0
+        shape |= LONG if digits > 18 else 0
+        shape |= BAD if integers + fraction == 0 else 0
+        if integers == 0:
+            shape |= NO_INTEGER
+        elif text[first] == 48:
+            shape |= ZERO_INTEGER if integers == 1 else EXTRA_ZERO
+        shape |= min(significant, 31) << SIGNIFICANT
+        shape |= min(fraction, 65535) << FRACTION_DIGITS
+        power = 0
+        if at < end:
+            power, bits = _exponent(text, at, end)
+            shape |= bits
+        fields[token, 0], fields[token, 1], fields[token, 2] = mantissa, power, shape
+
+
+@kernel
+def _exponent(text: NDArray[np.uint8], at: int, end: int) -> tuple[int, int]:
+    """The number after the ``e`` at ``at``, and bits of the shape."""
+    if text[at] != 101 and text[at] != 69:
+        return 0, BAD
+    shape = EXPONENT | UPPER if text[at] == 69 else EXPONENT
+    at += 1
+    negative = False
+    if at < end and (text[at] == 45 or text[at] == 43):
+        shape |= EXPONENT_SIGN
+        negative = text[at] == 45
+        at += 1
+    power = 0
+    digits = 0
+    while at < end and 48 <= text[at] <= 57:
+        power = min(power * 10 + int(text[at]) - 48, HUGE)
+        digits += 1
+        at += 1
+    if digits == 0 or at < end:
+        shape |= BAD
+    return (-power if negative else power), shape | min(digits, 255) << EXPONENT_DIGITS
+
+
+@kernel
+def match(
+    fields: NDArray[np.int64],
+    rule: tuple[int, int, int, int, int, int, int],
+    ordinals: NDArray[np.int64],
+    printed: NDArray[np.bool_],
+) -> int:
+    """Ordinals of the tokens that a decimal grid prints; returns how many it does not print.
+
+    ``rule``: significant digits or 0, decimals, trimmed, low, high, flags, limit. With digits:
+    ``%g``, with an exponent below ``low`` and from ``high`` on. Without: so many decimals,
+    or up to so many where trimmed. Magnitudes above ``limit`` are not printed.
+    """
+    digits, decimals, trim, low, high, flags, limit = rule
+    refused = LONG | SPECIAL | BAD | EXTRA_ZERO | (0 if digits else EXPONENT)
+    misses = 0
+    for token in range(len(fields)):
+        mantissa, power, shape = fields[token, 0], fields[token, 1], fields[token, 2]
+        places = (shape >> FRACTION_DIGITS) & 65535
+        good = shape & refused == 0 and (shape & PLUS != 0) == (
+            flags & _PLUS != 0 and shape & MINUS == 0
+        )
+        if not good:
+            magnitude = 0
+        elif shape & EXPONENT:
+            good = (power < low or power >= high) and _scientific(
+                mantissa, power, shape, places, flags
+            )
+            magnitude = _general(mantissa, power, digits) if good else 0
+        else:
+            good = _positional(mantissa, shape, places, decimals, trim, flags)
+            if digits:
+                index = _length(mantissa) - 1 - places
+                good = good and (mantissa == 0 or low <= index < high)
+                magnitude = _general(mantissa, index, digits) if good else 0
+            else:
+                magnitude = _scaled(mantissa, decimals - places, limit)
+        if digits and mantissa and (shape >> SIGNIFICANT) & 31 > digits:
+            good = False
+        if not good or magnitude < 0 or magnitude > limit:
+            good = False
+            magnitude = 0
+            misses += 1
+        ordinals[token] = -1 - magnitude if good and shape & MINUS else magnitude
+        printed[token] = good
+    return misses
+
+
+@kernel
+def _length(mantissa: int) -> int:
+    """Decimal digits of ``mantissa``, 0 for 0."""
+    length = 0
+    while mantissa:
+        mantissa //= 10
+        length += 1
+    return length
+
+
+@kernel
+def _general(mantissa: int, power: int, digits: int) -> int:
+    """Magnitude of d.ddd * 10^power among the numbers of ``digits`` digits; -1 if there is none."""
+    if mantissa == 0 or digits > 15:
+        return 0
+    if abs(power) > 307:
+        return -1
+    block = 10 ** (digits - 1)
+    while mantissa >= block * 10:
+        mantissa //= 10
+    while mantissa < block:
+        mantissa *= 10
+    return (power + 307) * 9 * block + 1 + mantissa - block
+
+
+@kernel
+def _scaled(mantissa: int, shift: int, limit: int) -> int:
+    """``mantissa * 10^shift``, limit + 1 if it is greater than limit."""
+    for _ in range(shift):
+        if mantissa > limit:
+            break
+        mantissa *= 10
+    for _ in range(-shift):  # a ".0" where the grid has no decimals
+        mantissa //= 10
+    return min(mantissa, limit + 1)
+
+
+@kernel
+def _scientific(mantissa: int, power: int, shape: int, places: int, flags: int) -> bool:
+    """Whether a token with an exponent is in the one form that is printed."""
+    size = abs(power)
+    width = 3 if flags & _EXP3 or size >= 100 else 1 if flags & _EXP1 and size < 10 else 2
+    return (
+        shape & (NO_INTEGER | ZERO_INTEGER) == 0
+        and _length(mantissa) == places + 1
+        and (places == 0 or mantissa % 10 != 0)
+        and (shape & POINT != 0) == (places > 0)
+        and shape & EXPONENT_SIGN != 0
+        and (shape & UPPER != 0) == (flags & _UPPER != 0)
+        and (shape >> EXPONENT_DIGITS) & 255 == width
+    )
+
+
+@kernel
+def _positional(
+    mantissa: int, shape: int, places: int, decimals: int, trim: int, flags: int
+) -> bool:
+    """Whether a token without an exponent is in the one form that is printed."""
+    point = shape & POINT != 0
+    if trim and (places > 1 or (places == 1 and mantissa % 10 != 0)):
+        good = mantissa % 10 != 0 and places <= decimals
+        fractional = True
+    elif trim:  # integral
+        good = places == (1 if flags & _POINT_ZERO else 0)
+        good = good and point == (flags & (_POINT_ZERO | _POINT_ONLY) != 0)
+        fractional = False
+    else:
+        good = places == decimals and point == (places > 0 or flags & _POINT_ONLY != 0)
+        fractional = places > 0
+    if flags & _NO_ZERO and fractional:
+        return good and shape & ZERO_INTEGER == 0
+    return good and shape & NO_INTEGER == 0
+
+
+@kernel
+def write(
+    negative: NDArray[np.bool_],
+    mantissas: NDArray[np.int64],
+    fractions: NDArray[np.int64],
+    rule: tuple[int, int, int, int],
+    out: NDArray[np.uint8],
+    offsets: NDArray[np.int64],
+) -> None:
+    """Print ``mantissa * 10^-fraction`` for every i at ``out[offsets[i]:offsets[i + 1]]``.
+
+    ``rule``: trimmed, low, high, flags. Trimming drops trailing zeros of the fraction; an
+    exponent is printed below ``low`` and from ``high`` on.
+    """
+    trim, low, high, flags = rule
+    at = 0
+    for i in range(len(mantissas)):
+        mantissa, fraction = mantissas[i], fractions[i]
+        if trim and mantissa == 0:
+            fraction = 0
+        while trim and mantissa != 0 and mantissa % 10 == 0:
+            mantissa //= 10
+            fraction -= 1
+        count = _length(mantissa)
+        power = count - 1 - fraction
+        scientific = mantissa != 0 and (power < low or power >= high)
+        if scientific:
+            fraction = count - 1
+        if negative[i] or flags & _PLUS:
+            out[at] = 45 if negative[i] else 43
+            at += 1
+        at = _digits(mantissa, count, fraction, flags, out, at)
+        if scientific:
+            at = _power(power, flags, out, at)
+        elif fraction <= 0:
+            if flags & (_POINT_ZERO | _POINT_ONLY):
+                out[at] = 46
+                at += 1
+            if flags & _POINT_ZERO:
+                out[at] = 48
+                at += 1
+        offsets[i + 1] = at
+
+
+@kernel
+def _digits(
+    mantissa: int, count: int, fraction: int, flags: int, out: NDArray[np.uint8], at: int
+) -> int:
+    """Print ``mantissa * 10^-fraction`` without sign or exponent; return where it ends."""
+    integers = count - fraction
+    if integers < 1:
+        integers = 0 if flags & _NO_ZERO and fraction > 0 else 1
+    end = at + integers + (fraction + 1 if fraction > 0 else 0)
+    place = end - 1
+    for _ in range(fraction):
+        out[place] = 48 + mantissa % 10
+        mantissa //= 10
+        place -= 1
+    if fraction > 0:
+        out[place] = 46
+        place -= 1
+    while place >= at:
+        if end - 1 - place < -fraction:
+            out[place] = 48
+        else:
+            out[place] = 48 + mantissa % 10
+            mantissa //= 10
+        place -= 1
+    return end
+
+
+@kernel
+def _power(power: int, flags: int, out: NDArray[np.uint8], at: int) -> int:
+    """Print ``e``, sign and digits of an exponent; return where it ends."""
+    out[at] = 69 if flags & _UPPER else 101
+    out[at + 1] = 45 if power < 0 else 43
+    power = abs(power)
+    width = 3 if flags & _EXP3 or power >= 100 else 1 if flags & _EXP1 and power < 10 else 2
+    end = at + 2 + width
+    for place in range(end - 1, at + 1, -1):
+        out[place] = 48 + power % 10
+        power //= 10
+    return end

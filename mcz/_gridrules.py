@@ -1,0 +1,90 @@
+"""The kinds of number grids, their flags, digits and limits. SPEC.md, "Number grids"."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from enum import IntEnum, IntFlag
+
+import numpy as np
+
+DECIMAL_LIMIT = 2**51 - 1  # below it, neighbours on a decimal grid are different binary64
+INTEGER_LIMIT = 2**53
+MIN_POWER, MAX_POWER = -307, 307  # of %g numbers: normal binary64, which 15 digits tell apart
+FIXED_TEXT = 64  # digits of a TEXT64 grid from here on: %.nf with n = digits - 64
+FIXED_TEXT_LIMIT = int(np.float64(1e21).view(np.int64)) - 1  # where JavaScript's toFixed ends
+MIN_SCALE, MAX_SCALE = 2.0**-200, 2.0**200  # products with ordinals are normal binary64
+
+
+class GridKind(IntEnum):
+    FIXED = 1  # printf %.nf
+    TRIMMED = 2  # printf %.nf without trailing zeros
+    GENERAL = 3  # printf %g
+    TEXT64 = 4  # text printed from a binary64 (shortest, %.17g, %.nf of many digits)
+    TEXT32 = 5  # shortest text of a binary32
+    INTEGER = 6  # two's complement integers, value = ordinal
+    SCALED = 7  # integers, value = ordinal * scale
+    BINARY32 = 8  # IEEE bits
+    BINARY64 = 9
+    VAX_F = 10  # 32-bit VAX F floating
+
+
+class GridFlag(IntFlag):
+    """How a text grid prints, where printf leaves a choice; the bits of ``Grid.flags``."""
+
+    POINT_ZERO = 1  # an integral number without exponent ends in ".0"
+    POINT = 2  # an integral number without exponent ends in "."
+    NO_ZERO = 4  # no zero before the point where digits follow it: ".5"
+    PLUS = 8  # numbers without a minus sign have a plus sign
+    EXPONENT3 = 16  # at least 3 digits in an exponent (else 2)
+    EXPONENT1 = 32  # at least 1 digit in an exponent
+    UPPER = 64  # "E" instead of "e"
+
+
+TEXT_KINDS = (GridKind.FIXED, GridKind.TRIMMED, GridKind.GENERAL, GridKind.TEXT64, GridKind.TEXT32)
+_STYLE = int(sum(GridFlag))
+_TEXT64_DIGITS = (0, 1, 16, 17, *range(FIXED_TEXT + 10, FIXED_TEXT + 41))
+# kind: allowed digits, allowed flags
+_ALLOWED: dict[GridKind, tuple[Collection[int], int]] = {
+    GridKind.FIXED: (range(23), GridFlag.POINT | GridFlag.NO_ZERO | GridFlag.PLUS),
+    GridKind.TRIMMED: (range(1, 23), _STYLE & 15),
+    GridKind.GENERAL: (range(1, 16), _STYLE),
+    GridKind.TEXT64: (_TEXT64_DIGITS, _STYLE),
+    GridKind.TEXT32: ((0,), _STYLE),
+}
+_CLASHES = (GridFlag.POINT_ZERO | GridFlag.POINT, GridFlag.EXPONENT3 | GridFlag.EXPONENT1)
+_LIMITS = {
+    GridKind.FIXED: DECIMAL_LIMIT,
+    GridKind.TRIMMED: DECIMAL_LIMIT,
+    GridKind.TEXT64: 0x7FEFFFFFFFFFFFFF,
+    GridKind.TEXT32: 0x7F7FFFFF,
+    GridKind.INTEGER: INTEGER_LIMIT,
+    GridKind.SCALED: DECIMAL_LIMIT,
+    GridKind.BINARY32: 0x7FFFFFFF,
+    GridKind.BINARY64: 0x7FFFFFFFFFFFFFFF,
+    GridKind.VAX_F: 0x7FFFFFFF,
+}
+
+
+def fault(kind: GridKind, digits: int, flags: int, scale: float) -> str | None:
+    """What is wrong with a grid, or None."""
+    allowed, style = _ALLOWED.get(kind, ((0,), 0))
+    if digits not in allowed:
+        return f"{digits} digits"
+    if flags & ~style or any(flags & both == both for both in _CLASHES):
+        return f"flags {flags}"
+    if kind == GridKind.TEXT64 and digits >= FIXED_TEXT and flags:
+        return f"flags {flags} with {digits} digits"
+    if kind == GridKind.FIXED and flags & (GridFlag.NO_ZERO if digits == 0 else GridFlag.POINT):
+        return f"flags {flags} with {digits} digits"
+    if not (MIN_SCALE <= scale <= MAX_SCALE if kind == GridKind.SCALED else scale == 1.0):
+        return f"scale {scale}"
+    return None
+
+
+def limit(kind: GridKind, digits: int) -> int:
+    """The largest magnitude index of a grid."""
+    if kind == GridKind.GENERAL:
+        return (MAX_POWER - MIN_POWER + 1) * 9 * int(10 ** (digits - 1))
+    if kind == GridKind.TEXT64 and digits >= FIXED_TEXT:
+        return FIXED_TEXT_LIMIT
+    return _LIMITS[kind]

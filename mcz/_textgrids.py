@@ -1,0 +1,140 @@
+"""Text grids: tokens to ordinals and ordinals to text. SPEC.md, "Number grids"."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz._gridrules import FIXED_TEXT, GridKind, limit
+from mcz._magnitudes import binary32_magnitudes, general_split
+from mcz._tokens import Bools, Floats, Ints, Tokens, kernels, scan_texts
+
+_UNLIMITED = 1_000_000  # more decimals, and a larger exponent, than any number has
+_WIDEST = 48  # bytes of a number from ``write``; the longest has 17 digits after "-0.00000"
+_JAVASCRIPT = 1  # digits of a TEXT64 grid
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Texts:
+    """Texts one after the other: text i is ``buffer[offsets[i]:offsets[i + 1]]``."""
+
+    buffer: NDArray[np.uint8]
+    offsets: Ints
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    def __getitem__(self, index: int) -> bytes:
+        return self.buffer[self.offsets[index] : self.offsets[index + 1]].tobytes()
+
+    def tolist(self) -> list[bytes]:
+        whole = self.buffer.tobytes()
+        edges = self.offsets.tolist()
+        return [whole[a:b] for a, b in pairwise(edges)]
+
+
+def _exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:
+    """(digits, low, high): exponents X < low and X >= high are printed; digits 0 for none."""
+    match kind:
+        case GridKind.FIXED | GridKind.TRIMMED:
+            return 0, -_UNLIMITED, _UNLIMITED
+        case GridKind.GENERAL:
+            return digits, -4, digits
+        case GridKind.TEXT32:
+            return 9, -4, 16
+    if digits >= FIXED_TEXT:
+        return 0, -_UNLIMITED, _UNLIMITED
+    if digits >= 16:
+        return digits, -4, digits
+    return (17, -6, 21) if digits == _JAVASCRIPT else (17, -4, 16)
+
+
+def match(tokens: Tokens, kind: GridKind, digits: int, flags: int) -> tuple[Ints, Bools, int]:
+    """(ordinals, printed, number not printed); of TEXT grids only the shape is checked."""
+    general, low, high = _exponents(kind, digits)
+    trim = kind != GridKind.FIXED and digits < FIXED_TEXT
+    decimals = digits % FIXED_TEXT if general == 0 else _UNLIMITED
+    text = kind in (GridKind.TEXT64, GridKind.TEXT32)
+    largest = 2**62 if text else limit(kind, digits)
+    rule = general, decimals, int(trim), low, high, flags, largest
+    ordinals = np.empty(len(tokens), np.int64)
+    printed = np.empty(len(tokens), np.bool_)
+    misses = kernels().match(tokens.fields, rule, ordinals, printed)
+    return ordinals, printed, misses
+
+
+def uncertain(tokens: Tokens, kind: GridKind, digits: int, printed: Bools) -> Bools:
+    """Which tokens a TEXT grid may print or not, ``printed`` being those of the right shape.
+
+    A number of 15 digits (6 in binary32) that is no subnormal is its own shortest text.
+    """
+    loops = kernels()
+    power, shape = tokens.fields[:, 1], tokens.fields[:, 2]
+    digits_kept, far = (6, 30) if kind == GridKind.TEXT32 else (15, 290)
+    if digits > _JAVASCRIPT:
+        return printed | long(tokens)
+    many = (shape >> loops.SIGNIFICANT & 31) > digits_kept
+    return (printed & (many | (np.abs(power) > far))) | long(tokens)
+
+
+def long(tokens: Tokens) -> Bools:
+    """Which tokens are numbers of more digits than a match looks at."""
+    loops = kernels()
+    found: Bools = tokens.fields[:, 2] & (loops.LONG | loops.BAD | loops.SPECIAL) == loops.LONG
+    return found
+
+
+def token_ordinals32(tokens: Tokens) -> Ints:
+    """Ordinals of the binary32 nearest to tokens."""
+    values = tokens.values()
+    magnitudes = np.minimum(binary32_magnitudes(np.abs(values)), limit(GridKind.TEXT32, 0))
+    return magnitudes ^ -np.signbit(values).astype(np.int64)
+
+
+def texts(kind: GridKind, digits: int, flags: int, magnitudes: Ints, negative: Bools) -> Texts:
+    """Print the numbers of these magnitudes; they have been checked against the limit."""
+    general, low, high = _exponents(kind, digits)
+    if kind == GridKind.TEXT64 and digits >= FIXED_TEXT:
+        return _joined(magnitudes.view(np.float64), negative, digits - FIXED_TEXT)
+    if general == 0:
+        mantissas, fractions = magnitudes, np.full(len(magnitudes), digits)
+    elif kind == GridKind.GENERAL:
+        mantissas, powers = general_split(magnitudes, digits)
+        fractions = -powers
+    else:
+        mantissas, fractions = float_digits(kind, digits, magnitudes)
+    out = np.empty(len(magnitudes) * _WIDEST, np.uint8)
+    offsets = np.zeros(len(magnitudes) + 1, np.int64)
+    rule = int(kind != GridKind.FIXED), low, high, flags
+    kernels().write(negative, np.ascontiguousarray(mantissas), fractions, rule, out, offsets)
+    return Texts(out[: offsets[-1]].copy(), offsets)
+
+
+def float_digits(kind: GridKind, digits: int, magnitudes: Ints) -> tuple[Ints, Ints]:
+    """(mantissas, decimals) of the text of binary floats: shortest, or so many digits."""
+    if kind == GridKind.TEXT32:
+        words = magnitudes.astype(np.uint32).view(np.float32)
+        tokens = scan_texts([str(value) for value in words])
+    elif digits >= 16:
+        tokens = scan_texts([f"{x:.{digits - 1}e}" for x in magnitudes.view(np.float64).tolist()])
+    else:
+        tokens = scan_texts([repr(x) for x in magnitudes.view(np.float64).tolist()])
+    mantissa, power, shape = tokens.fields.T
+    return mantissa, (shape >> kernels().FRACTION_DIGITS) - power
+
+
+def text32_values(magnitudes: Ints) -> Floats:
+    """The binary64 nearest to the shortest text of a binary32, not that binary32 itself."""
+    words = magnitudes.astype(np.uint32).view(np.float32)
+    values = [float(str(value)) for value in words.ravel()]
+    return np.array(values, np.float64).reshape(magnitudes.shape)
+
+
+def _joined(values: NDArray[np.float64], negative: Bools, decimals: int) -> Texts:
+    pairs = zip(values.tolist(), negative.tolist(), strict=True)
+    lines = [f"-{x:.{decimals}f}" if minus else f"{x:.{decimals}f}" for x, minus in pairs]
+    offsets = np.concatenate(([0], np.cumsum([len(line) for line in lines], dtype=np.int64)))
+    return Texts(np.frombuffer("".join(lines).encode(), np.uint8), offsets.astype(np.int64))

@@ -1,0 +1,154 @@
+"""Numbers in text: where they stand, how they are written, which binary64 they are.
+
+SPEC.md, "Decimal and binary64", is normative for ``nearest``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import SourceError
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+NAN = np.int64(0x7FF8000000000000).view(np.float64)  # the one NaN that values hold
+EXACT_POWER = 22  # 10^22 is the last power of ten that a binary64 holds exactly
+TENS = np.array([float(f"1e{power}") for power in range(EXACT_POWER + 1)])
+
+_NAN_TEXT = re.compile(rb"[-+]?(nan(\(\w*\))?|\d\.#(q?nan|snan|ind)\d*)", re.IGNORECASE)
+_INF_TEXT = re.compile(rb"[-+]?(inf(inity)?|\d\.#inf\d*)", re.IGNORECASE)
+
+
+def kernels() -> Any:
+    """The compiled loops; numba is imported here, on first use."""
+    return importlib.import_module("mcz._decimal")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tokens:
+    """Tokens ``text[start[i]:stop[i]]`` and, in ``fields`` (n, 3), how each is written.
+
+    Indexing with a slice, a mask or an array of indices gives the Tokens chosen.
+    """
+
+    text: NDArray[np.uint8]
+    start: Ints
+    stop: Ints
+    fields: Ints  # columns as in mcz._decimal
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def __getitem__(self, index: Any) -> Tokens:
+        if isinstance(index, int | np.integer):
+            raise TypeError("a single token is a slice of one, or token(i)")
+        chosen = (np.ascontiguousarray(a[index]) for a in (self.start, self.stop, self.fields))
+        return Tokens(self.text, *chosen)
+
+    def token(self, index: int) -> bytes:
+        """The text of one token."""
+        return self.text[self.start[index] : self.stop[index]].tobytes()
+
+    def texts(self) -> Iterator[bytes]:
+        """The text of every token."""
+        whole = memoryview(self.text.data)
+        for start, stop in zip(self.start.tolist(), self.stop.tolist(), strict=True):
+            yield bytes(whole[start:stop])
+
+    def bad(self) -> Bools:
+        """Which tokens are no numbers at all; nan and inf are numbers here."""
+        bad: Bools = (self.fields[:, 2] & kernels().BAD) != 0
+        return bad
+
+    def values(self) -> Floats:
+        """The nearest binary64 of each token; SourceError names the first that is no number."""
+        loops = kernels()
+        mantissa, power, shape = self.fields.T
+        odd = shape & (loops.BAD | loops.SPECIAL | loops.LONG)
+        if (odd & loops.BAD).any():
+            first = int(np.flatnonzero(odd & loops.BAD)[0])
+            raise SourceError(
+                f"offset {self.start[first]}: {self.token(first)[:40]!r} is not a number"
+            )
+        out, slow = scale(mantissa, power - (shape >> loops.FRACTION_DIGITS))
+        slow |= (odd & loops.LONG) != 0
+        np.negative(out, where=(shape & loops.MINUS) != 0, out=out)
+        special = (odd & loops.SPECIAL) != 0
+        if special.any():
+            out[special] = [_value(text) for text in self[special].texts()]
+            slow &= ~special
+        if slow.any():
+            out[slow] = [float(text) for text in self[slow].texts()]
+        return out
+
+
+def scan(
+    text: bytes | memoryview | NDArray[np.uint8],
+    start: Sequence[int] | Ints,
+    stop: Sequence[int] | Ints,
+) -> Tokens:
+    """Describe the tokens ``text[start[i]:stop[i]]`` of a buffer; a view of it is kept."""
+    whole = text.view() if isinstance(text, np.ndarray) else np.frombuffer(text, np.uint8)
+    whole.flags.writeable = False  # one array type, so that numba compiles once
+    start = np.ascontiguousarray(start, np.int64)
+    stop = np.ascontiguousarray(stop, np.int64)
+    if len(start) != len(stop) or (
+        len(start) and not (0 <= start.min() and (start <= stop).all() and stop.max() <= len(whole))
+    ):
+        raise IndexError(f"tokens outside of a text of {len(whole)} bytes")
+    loops = kernels()
+    fields = np.empty((len(start), 3), np.int64)
+    loops.scan(whole, start, stop, fields)
+    tokens = Tokens(whole, start, stop, fields)
+    for index in np.flatnonzero(fields[:, 2] & loops.BAD).tolist():
+        if not np.isfinite(_value(tokens.token(index), fallback=0.0)):
+            fields[index, 2] = loops.SPECIAL
+    return tokens
+
+
+def scan_texts(texts: Sequence[str]) -> Tokens:
+    """Tokens of texts that stand by themselves."""
+    stop = np.cumsum([len(text) + 1 for text in texts], dtype=np.int64)
+    start = np.concatenate(([0], stop))[:-1]
+    return scan(" ".join((*texts, "")).encode(), start, stop - 1)
+
+
+def _value(text: bytes, fallback: float | None = None) -> float:
+    """The binary64 of one token, by exact conversion; ``fallback`` for what is no number."""
+    if _NAN_TEXT.fullmatch(text):
+        return float(NAN)
+    if _INF_TEXT.fullmatch(text):
+        return float("-inf" if text[:1] == b"-" else "inf")
+    return float(text) if fallback is None else fallback
+
+
+def nearest(mantissa: Ints, power: Ints) -> Floats:
+    """The binary64 nearest to ``mantissa * 10^power``, mantissa >= 0; ties to even."""
+    out, slow = scale(mantissa, power)
+    if slow.any():
+        pairs = zip(mantissa[slow].tolist(), power[slow].tolist(), strict=True)
+        out[slow] = [float(f"{m}e{p}") for m, p in pairs]
+    return out
+
+
+def scale(mantissa: Ints, power: Ints) -> tuple[Floats, Bools]:
+    """``mantissa * 10^power`` in binary64, and where that may not be the nearest.
+
+    One product or quotient of two exact factors is correctly rounded: they are exact where the
+    mantissa is at most 2^53 and the power at most 22 either way.
+    """
+    out = mantissa.astype(np.float64)
+    np.divide(out, TENS[np.clip(-power, 0, EXACT_POWER)], out=out)
+    if power.max(initial=0) > 0:
+        np.multiply(out, TENS[np.clip(power, 0, EXACT_POWER)], out=out)
+    slow = (mantissa > 2**53) | (np.abs(power) > EXACT_POWER)
+    return out, slow & (mantissa != 0)

@@ -1,0 +1,62 @@
+"""Every error that MCZ raises on purpose.
+
+::
+
+    MczError
+    ├── MotionError          the motion, skeleton or signal itself is not acceptable
+    ├── OptionError          a parameter or an argument is out of its range
+    ├── SourceError          a source file (ASF, AMC, BVH, C3D) cannot be parsed
+    └── FormatError          the bytes are not a valid MCZ file
+        ├── TruncatedError   they end too early
+        ├── ChecksumError    a stored checksum does not match them
+        ├── UnsupportedError they need a codec, version or chunk that this reader lacks
+        └── LimitError       they ask for more than the reader is willing to give
+
+A message says where (file, chunk, offset, line) and shows the value that was found.
+"""
+
+from __future__ import annotations
+
+
+class MczError(Exception):
+    """Base of all errors of this package; catching it catches every one of them."""
+
+
+class MotionError(MczError):
+    """A motion, skeleton or signal breaks a rule of the data model."""
+
+
+class OptionError(MczError):
+    """A parameter or an argument is unknown or out of its range."""
+
+
+class SourceError(MczError):
+    """A source file cannot be parsed; the message names the line or the offset."""
+
+
+class FormatError(MczError):
+    """Bytes that are not a valid MCZ file, chunk or payload."""
+
+
+class TruncatedError(FormatError):
+    """The bytes end before the structure that they began.
+
+    ``last_foot`` is the end offset of the last valid FOOT, or None where there is none:
+    everything up to it can be read with ``salvage=True``.
+    """
+
+    def __init__(self, message: str, last_foot: int | None = None) -> None:
+        super().__init__(message)
+        self.last_foot = last_foot
+
+
+class ChecksumError(FormatError):
+    """A stored CRC or hash differs from that of the bytes."""
+
+
+class UnsupportedError(FormatError):
+    """Well-formed, but needs a codec, version or chunk that this reader does not have."""
+
+
+class LimitError(FormatError):
+    """The file asks for more channels, memory or output than the profile or caller allows."""

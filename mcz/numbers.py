@@ -1,0 +1,273 @@
+"""Number grids: what a number of a source file is, as an integer.
+
+A *grid* is a countable set of numbers together with one way of printing each of them.
+The *ordinal* of a number is its place on the grid: an integer that grows with the number.
+Codecs work on ordinals, formats print them, and ``values`` turns them into binary64.
+SPEC.md, "Number grids", is normative.
+
+For every text grid and every IEEE or VAX grid the ordinal of a number with a plus sign is its
+magnitude index m >= 0 and that of a number with a minus sign is -1 - m, so that -0 is the
+ordinal -1 and nothing is an exception only because of its sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from construct import Adapter, Container, If, Int8ul, Struct
+from numpy.typing import NDArray
+
+from mcz import _choose, _gridrules, _textgrids
+from mcz._gridrules import TEXT_KINDS, GridFlag, GridKind
+from mcz._magnitudes import (
+    binary32_magnitudes,
+    binary32_values,
+    binary64_values,
+    general_magnitudes,
+    general_split,
+    scaled_magnitudes,
+    vax_magnitudes,
+    vax_swap,
+    vax_values,
+)
+from mcz._textgrids import Texts
+from mcz._tokens import NAN, TENS, Bools, Floats, Ints, Tokens, nearest, scan
+from mcz.errors import FormatError, OptionError
+from mcz.schema import FINITE
+
+__all__ = ["GRID", "Grid", "GridFlag", "GridKind", "Texts", "Tokens", "choose_grid", "fit", "scan"]
+
+_CHECKED = (GridKind.TEXT64, GridKind.TEXT32)  # printed or not is more than shape
+_IEEE = (GridKind.BINARY32, GridKind.BINARY64)
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A number grid. ``digits`` and ``flags`` mean what SPEC.md, "Number grids", says per kind.
+
+    Arrays of ordinals and values may have any shape. Every int64 is an ordinal of a number or is
+    refused with FormatError. Raises OptionError for digits, flags or a scale out of range.
+    """
+
+    kind: GridKind
+    digits: int = 0
+    flags: int = 0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kind", GridKind(self.kind))
+        object.__setattr__(self, "flags", int(self.flags))
+        fault = _gridrules.fault(self.kind, self.digits, self.flags, self.scale)
+        if fault:
+            raise OptionError(f"a {self.kind.name} grid cannot have {fault}")
+
+    @property
+    def is_text(self) -> bool:
+        return self.kind in TEXT_KINDS
+
+    @property
+    def signed_magnitude(self) -> bool:
+        """Whether ordinal -1 - m stands for minus the number of ordinal m."""
+        return self.kind not in (GridKind.INTEGER, GridKind.SCALED)
+
+    @property
+    def limit(self) -> int:
+        """The largest magnitude index; ordinals run from -1 - limit (or -limit) to limit."""
+        return _gridrules.limit(self.kind, self.digits)
+
+    def magnitudes(self, ordinals: Ints) -> Ints:
+        """Magnitude indices; FormatError for an ordinal that is no number's."""
+        ordinals = np.ascontiguousarray(ordinals, np.int64)
+        limit = self.limit
+        low = -1 - limit if self.signed_magnitude else -limit
+        if ordinals.size and not (low <= ordinals.min() and ordinals.max() <= limit):
+            wrong = ordinals.max() if ordinals.max() > limit else ordinals.min()
+            raise FormatError(f"{wrong} is not an ordinal of {self}: {low} to {limit}")
+        return ordinals ^ (ordinals >> 63) if self.signed_magnitude else np.abs(ordinals)
+
+    def values(self, ordinals: Ints) -> Floats:
+        """The binary64 of each ordinal; every NaN is 0x7FF8000000000000."""
+        ordinals = np.ascontiguousarray(ordinals, np.int64)
+        magnitudes = self.magnitudes(ordinals)
+        values: Floats
+        match self.kind:
+            case GridKind.FIXED | GridKind.TRIMMED:
+                values = np.divide(magnitudes, TENS[self.digits])
+            case GridKind.GENERAL:
+                values = nearest(*general_split(magnitudes, self.digits))
+            case GridKind.TEXT64 | GridKind.BINARY64:
+                values = binary64_values(magnitudes)
+            case GridKind.TEXT32:
+                values = _textgrids.text32_values(magnitudes)
+            case GridKind.BINARY32:
+                values = binary32_values(magnitudes)
+            case GridKind.VAX_F:
+                values = vax_values(magnitudes)
+            case _:
+                values = np.multiply(magnitudes, self.scale, dtype=np.float64)
+        negative = ordinals < 0
+        if self.kind == GridKind.VAX_F:
+            values = np.where(negative & (values == 0), NAN, values)
+        np.negative(values, where=negative & (values == values), out=values)
+        return values
+
+    def ordinals(self, values: Floats) -> tuple[Ints, Bools]:
+        """The ordinal of each value, and whether ``values`` gives exactly these bits back.
+
+        Where the grid does not have a value: the ordinal of a nearest one, the last one beyond
+        the end; 0 for NaN. On IEEE grids infinities and the canonical NaN are numbers too.
+        """
+        values = np.ascontiguousarray(values, np.float64)
+        negative = np.signbit(values)
+        magnitudes = np.where(np.isnan(values), 0.0, np.abs(values))
+        if self.kind not in (GridKind.BINARY32, GridKind.BINARY64):
+            magnitudes = np.minimum(magnitudes, np.finfo(np.float64).max)
+        indices = np.minimum(self._indices(magnitudes), self.limit)
+        ordinals = indices ^ -negative.astype(np.int64)
+        if not self.signed_magnitude:
+            ordinals = np.where(negative, -indices, indices)
+        if self.kind == GridKind.VAX_F:  # its only zero has a plus sign
+            ordinals = np.where(indices == 0, 0, ordinals)
+        if self.kind in (GridKind.BINARY32, GridKind.BINARY64):
+            nan = 0x7FC00000 if self.kind == GridKind.BINARY32 else 0x7FF8000000000000
+            ordinals = np.where(np.isnan(values), nan, ordinals)
+        exact = self.values(ordinals).view(np.int64) == values.view(np.int64)
+        return ordinals, exact
+
+    def _indices(self, values: Floats) -> Ints:
+        """Magnitude indices of values >= 0 that are not NaN."""
+        match self.kind:
+            case GridKind.FIXED | GridKind.TRIMMED:
+                return scaled_magnitudes(values, TENS[self.digits], False, self.limit)
+            case GridKind.GENERAL:
+                return general_magnitudes(values.ravel(), self.digits).reshape(values.shape)
+            case GridKind.TEXT64 | GridKind.BINARY64:
+                return values.view(np.int64)
+            case GridKind.TEXT32 | GridKind.BINARY32:
+                return binary32_magnitudes(values)
+            case GridKind.VAX_F:
+                return vax_magnitudes(values)
+            case _:
+                return scaled_magnitudes(values, self.scale, True, self.limit)
+
+    def bits(self, ordinals: Ints) -> NDArray[Any]:
+        """The words of a BINARY32, BINARY64 or VAX_F grid as a file stores them, "<u4" or "<u8"."""
+        wide = self._word_type() == "<u8"
+        sign = np.int64(-(2**63)) if wide else np.int64(2**31)
+        words = self.magnitudes(ordinals) | np.where(np.asarray(ordinals) < 0, sign, np.int64(0))
+        if self.kind == GridKind.VAX_F:
+            words = vax_swap(words)
+        return words.view("<u8") if wide else words.astype("<u4")
+
+    def ordinals_of_bits(self, words: NDArray[Any]) -> Ints:
+        """The inverse of ``bits``: words as stored, read as little-endian u4 or u8."""
+        kind = self._word_type()
+        words = np.ascontiguousarray(words, kind)
+        if kind == "<u8":
+            signed = words.view("<i8").astype(np.int64)
+            return np.where(signed < 0, ~(signed & np.int64(2**63 - 1)), signed)
+        signed = words.astype(np.int64)
+        if self.kind == GridKind.VAX_F:
+            signed = vax_swap(signed)
+        return np.where(signed >> 31, ~(signed & 0x7FFFFFFF), signed)
+
+    def _word_type(self) -> str:
+        if self.kind not in (*_IEEE, GridKind.VAX_F):
+            raise OptionError(f"a {self.kind.name} grid has no bits")
+        return "<u8" if self.kind == GridKind.BINARY64 else "<u4"
+
+    def ordinals_of_tokens(self, tokens: Tokens) -> tuple[Ints, Bools]:
+        """The ordinal of each token, and whether ``texts`` gives exactly its text back.
+
+        Where it does not (an exception), the ordinal is 0.
+        """
+        self._check_text()
+        ordinals, printed, _ = _textgrids.match(tokens, self.kind, self.digits, self.flags)
+        if self.kind not in _CHECKED:
+            return ordinals, printed
+        unsure = _textgrids.uncertain(tokens, self.kind, self.digits, printed)
+        printed |= unsure
+        chosen = tokens[printed]
+        if self.kind == GridKind.TEXT32:
+            ordinals[printed] = _textgrids.token_ordinals32(chosen)
+        else:
+            ordinals[printed] = self.ordinals(chosen.values())[0]
+        printed_texts = self.texts(ordinals[unsure]).tolist()
+        pairs = zip(printed_texts, tokens[unsure].texts(), strict=True)
+        printed[unsure] = [a == b for a, b in pairs]
+        ordinals[~printed] = 0
+        return ordinals, printed
+
+    def exceptions(self, tokens: Tokens) -> int:
+        """How many of the tokens this grid does not print."""
+        return len(tokens) - int(np.count_nonzero(self.ordinals_of_tokens(tokens)[1]))
+
+    def texts(self, ordinals: Ints) -> Texts:
+        """The text of each ordinal; FormatError for one out of range."""
+        self._check_text()
+        ordinals = np.ascontiguousarray(ordinals, np.int64).ravel()
+        return _textgrids.texts(
+            self.kind, self.digits, self.flags, self.magnitudes(ordinals), ordinals < 0
+        )
+
+    def _check_text(self) -> None:
+        if not self.is_text:
+            raise OptionError(f"a {self.kind.name} grid has no text")
+
+
+class _GridAdapter(Adapter):
+    def _decode(self, obj: Container, context: Any, path: str) -> Grid:
+        try:
+            return Grid(obj.kind, obj.digits, obj.flags, 1.0 if obj.scale is None else obj.scale)
+        except (ValueError, OptionError) as error:
+            raise FormatError(f"{path}: {error}") from None
+
+    def _encode(self, obj: Grid, context: Any, path: str) -> dict[str, Any]:
+        return {"kind": obj.kind, "digits": obj.digits, "flags": obj.flags, "scale": obj.scale}
+
+
+GRID_FIELDS = Struct(
+    "kind" / Int8ul * "kind of grid",
+    "digits" / Int8ul * "digits, by kind",
+    "flags" / Int8ul * "print style, by kind",
+    "scale" / If(lambda fields: fields.kind == GridKind.SCALED, FINITE) * "SCALED only: the unit",
+)
+GRID = _GridAdapter(GRID_FIELDS)
+
+
+def choose_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> Grid:
+    """The grid of ``fit``, for who needs no ordinals yet."""
+    return fit(tokens, prefer)[0]
+
+
+def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]:
+    """The text grid that needs the fewest bytes for ``tokens``, exceptions counted.
+
+    With it, what its ``ordinals_of_tokens`` gives. The first of ``prefer`` without exceptions is
+    taken at once, and the first that has no more exceptions than the best of all others.
+    """
+    wanted = []
+    for grid in prefer:
+        wanted.append((grid, *grid.ordinals_of_tokens(tokens)))
+        if wanted[-1][2].all():
+            return wanted[-1]
+    least = float("inf")
+    for bits, (kind, digits, flags) in sorted(_choose.candidates(tokens)):
+        if _choose.cost(len(tokens), bits, 0) >= least:
+            continue
+        # Shape alone gives a lower bound, which spares TEXT grids where they cannot win.
+        bound = _textgrids.match(tokens, kind, digits, flags)[2]
+        if kind in _CHECKED and bound:
+            bound -= int(np.count_nonzero(_textgrids.long(tokens)))
+        if _choose.cost(len(tokens), bits, bound) >= least:
+            continue
+        grid = Grid(kind, digits, flags)
+        ordinals, printed = grid.ordinals_of_tokens(tokens)
+        misses = len(tokens) - int(np.count_nonzero(printed))
+        price = _choose.cost(len(tokens), bits, misses)
+        if price < least:
+            least, fewest, best = price, misses, (grid, ordinals, printed)
+    return next((fitted for fitted in wanted if np.count_nonzero(~fitted[2]) <= fewest), best)

@@ -1,0 +1,180 @@
+"""Shared field types and the only doorway to construct.
+
+``parse`` and ``build`` add the end-of-data check, turn every foreign exception into one of ours
+and keep the path of the field at fault. SPEC.md, "Conventions", is normative.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+from construct import (
+    Adapter,
+    Bytes,
+    Construct,
+    ConstructError,
+    Container,
+    ExprValidator,
+    Float64l,
+    GreedyBytes,
+    PrefixedArray,
+    StreamError,
+    Struct,
+    Terminated,
+    stream_read,
+    stream_write,
+)
+
+from mcz.errors import FormatError, LimitError, MczError, TruncatedError
+
+MAX_COUNT = 2**53 - 1  # every count, size and offset; JavaScript's largest exact integer
+
+
+class Varint(Construct):
+    """Unsigned integer up to ``MAX_COUNT``: 7 bits a byte, least significant first, shortest form."""
+
+    def _parse(self, stream: Any, context: Any, path: str) -> int:
+        value = shift = 0
+        while True:
+            byte = stream_read(stream, 1, path)[0]
+            value |= (byte & 0x7F) << shift
+            if value > MAX_COUNT:
+                raise FormatError(f"{path}: varint beyond 2^53 - 1")
+            if byte < 0x80:
+                if byte == 0 and shift:
+                    raise FormatError(f"{path}: varint {value} in a form that is not the shortest")
+                return value
+            shift += 7
+
+    def _build(self, obj: Any, stream: Any, context: Any, path: str) -> Any:
+        _write(stream, varint(obj), path)
+        return obj
+
+
+def _write(stream: Any, data: bytes, path: str) -> None:
+    stream_write(stream, data, len(data), path)
+
+
+def varint(value: int) -> bytes:
+    """The bytes of ``value``, 0 <= value <= 2^53 - 1."""
+    if not 0 <= value <= MAX_COUNT:
+        raise LimitError(f"{value} is not between 0 and 2^53 - 1")
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)
+
+
+def read_varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
+    """The varint at offset ``at`` of ``data`` and the offset after it."""
+    value = shift = 0
+    while True:
+        if at >= len(data):
+            raise TruncatedError(f"a varint runs past the end at {at}")
+        byte = data[at]
+        value |= (byte & 0x7F) << shift
+        at += 1
+        if value > MAX_COUNT:
+            raise FormatError(f"varint beyond 2^53 - 1 before offset {at}")
+        if byte < 0x80:
+            if byte == 0 and shift:
+                raise FormatError(f"varint {value} before offset {at} is not in its shortest form")
+            return value, at
+        shift += 7
+
+
+class _Zigzag(Adapter):
+    def _decode(self, obj: int, context: Any, path: str) -> int:
+        return (obj >> 1) ^ -(obj & 1)
+
+    def _encode(self, obj: int, context: Any, path: str) -> int:
+        return obj << 1 if obj >= 0 else (-obj << 1) - 1
+
+
+class _Utf8(Adapter):
+    def _decode(self, obj: bytes, context: Any, path: str) -> str:
+        try:
+            return obj.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise FormatError(f"{path}: not UTF-8: {error}") from None
+
+    def _encode(self, obj: str, context: Any, path: str) -> bytes:
+        return obj.encode("utf-8")
+
+
+class Sized(Construct):
+    """A varint length, then that many bytes."""
+
+    def _parse(self, stream: Any, context: Any, path: str) -> bytes:
+        return Bytes(UVARINT._parse(stream, context, path))._parse(stream, context, path)
+
+    def _build(self, obj: bytes, stream: Any, context: Any, path: str) -> Any:
+        _write(stream, varint(len(obj)) + bytes(obj), path)
+        return obj
+
+
+UVARINT = Varint()
+SVARINT = _Zigzag(UVARINT)
+SIZED = Sized()
+TEXT = _Utf8(SIZED)
+EXTENSION = GreedyBytes  # the end of an open structure: ignored by readers, kept on rewriting
+FINITE = ExprValidator(Float64l, lambda obj, ctx: obj - obj == 0)
+
+
+def counted(item: Construct) -> Construct:
+    """A varint count, then that many items."""
+    return PrefixedArray(UVARINT, item)
+
+
+def parse(schema: Struct, data: bytes, where: str) -> Container:
+    """The fields of ``data``, all of which ``schema`` must consume.
+
+    Raises TruncatedError or FormatError; ``where`` opens the message.
+    """
+    try:
+        whole = Struct("fields" / schema, Terminated).parse(data)
+    except MczError as error:
+        error.args = (f"{where}: {error}",)
+        raise
+    except StreamError as error:
+        raise TruncatedError(f"{where}: {_plain(error)}") from None
+    except (ConstructError, KeyError, IndexError, ValueError, OverflowError, zlib.error) as error:
+        raise FormatError(f"{where}: {_plain(error)}") from None
+    return whole.fields
+
+
+def build(schema: Struct, fields: Mapping[str, Any], where: str) -> bytes:
+    """The bytes of ``fields``; raises FormatError where ``schema`` does not admit them."""
+    try:
+        return bytes(schema.build(dict(fields)))
+    except MczError as error:
+        error.args = (f"{where}: {error}",)
+        raise
+    except (ConstructError, KeyError, IndexError, ValueError, TypeError, AttributeError) as error:
+        raise FormatError(f"{where}: {_plain(error)}") from None
+
+
+def _plain(error: Exception) -> str:
+    """construct's message on one line, without its own indentation."""
+    return " ".join(str(error).split()).replace("(parsing) -> ", "") or type(error).__name__
+
+
+def inflate(data: bytes, size: int, where: str) -> bytes:
+    """The ``size`` bytes whose raw deflate is ``data``; never more memory than ``size`` + 1."""
+    inflater = zlib.decompressobj(-15)
+    try:
+        out = inflater.decompress(data, size + 1)
+    except zlib.error as error:
+        raise FormatError(f"{where}: {error}") from None
+    if len(out) != size or not inflater.eof or inflater.unused_data:
+        raise FormatError(f"{where}: deflate of {len(data)} bytes does not give {size} bytes")
+    return out
+
+
+def deflate(data: bytes) -> bytes:
+    deflater = zlib.compressobj(9, zlib.DEFLATED, -15, 9)
+    return deflater.compress(data) + deflater.flush()
