@@ -1,0 +1,185 @@
+"""The codec contract: what a codec is given, what it gives back, what it declares.
+
+SPEC.md, "Codecs", is normative. A codec knows neither the container nor any source format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import OptionError
+from mcz.motion import Skeleton
+from mcz.numbers import Grid
+
+Domain = Literal["ordinals", "values"]
+Grouping = Literal["all", "joint", "channel"]
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A run of frames, coded; ``streams`` lie coarsest resolution first, in it group by group.
+
+    The segment bears upon frames first - lead to first + n_frames + tail - 1.
+    ``fresh``: it decodes without the segment before.
+    """
+
+    first: int
+    n_frames: int
+    streams: tuple[bytes, ...]
+    lead: int = 0
+    tail: int = 0
+    fresh: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """What a decoder knows of a segment before it fetches a stream."""
+
+    first: int
+    n_frames: int
+    lead: int = 0
+    tail: int = 0
+    fresh: bool = True
+
+    @property
+    def stop(self) -> int:
+        return self.first + self.n_frames
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What encoder and decoder both know of a signal.
+
+    ``groups`` lists the channels of each group; ``samples_per_frame`` rows make a frame.
+    """
+
+    n_frames: int
+    groups: tuple[tuple[int, ...], ...]
+    samples_per_frame: int = 1
+    skeleton: Skeleton | None = None
+    frame_rate: Fraction | None = None
+    grids: tuple[Grid, ...] = ()
+
+    @property
+    def n_channels(self) -> int:
+        return sum(len(group) for group in self.groups)
+
+
+class SignalSource(Protocol):
+    """The encoder's view of a signal, read by frames, so that it need not be in memory."""
+
+    layout: Layout
+    breaks: Sequence[int]  # frames at which a segment of a codec of ordinals must begin
+
+    def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
+        """Grid ordinals of frames start <= f < stop, (rows, n_channels)."""
+        ...
+
+    def values(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Values of these frames in source units, (rows, n_channels)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """Frames start <= f < stop of some groups; the finest ``resolution`` details left out."""
+
+    start: int
+    stop: int
+    groups: tuple[int, ...]
+    resolution: int = 0
+
+
+Fetch = Callable[[int, int, int], bytes]  # (segment, stored resolution, group) -> stream
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter of a codec, as ``--param name=value`` gives it."""
+
+    name: str
+    default: Any
+    help: str
+    parse: Callable[[Any], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Encoded:
+    """An encoded signal: what goes into CLIP, then the segments as they are made."""
+
+    header: bytes
+    segments: Iterator[Segment]
+    n_resolutions: int = 1
+
+
+Encode = Callable[[SignalSource, Mapping[str, Any]], Encoded]
+Decode = Callable[[bytes, Layout, Sequence[Span], Request, Fetch], NDArray[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Codec:
+    """One row of the codec table.
+
+    ``decode`` returns int64 ordinals or binary64 values, as ``domain`` says, of shape
+    (rows, channels of the requested groups in the order requested).
+    ``segmented``: memory is bounded by a segment. ``delay``: frames a live encoder holds back,
+    None where it cannot work live.
+    """
+
+    id: int
+    name: str
+    version: int
+    domain: Domain
+    lossless: bool
+    encode: Encode
+    decode: Decode
+    grouping: Grouping = "joint"
+    segmented: bool = True
+    delay: int | None = None
+    parameters: tuple[Parameter, ...] = field(default=())
+
+    def options(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """All parameters, those given checked; raises OptionError for an unknown or bad one."""
+        known = {p.name: p for p in self.parameters}
+        unknown = sorted(set(given) - set(known))
+        if unknown:
+            raise OptionError(
+                f"codec {self.name} has no parameter {unknown[0]!r}; it has "
+                f"{', '.join(known) or 'none'}"
+            )
+        return {
+            name: parameter.parse(given[name]) if name in given else parameter.default
+            for name, parameter in known.items()
+        }
+
+
+def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
+    """A parser of integers from ``low`` to ``high``."""
+
+    def parse(text: Any) -> int:
+        try:
+            value = int(text)
+        except (TypeError, ValueError):
+            raise OptionError(f"{name} is {text!r}, not an integer") from None
+        if not low <= value <= high:
+            raise OptionError(f"{name} is {value}, not from {low} to {high}")
+        return value
+
+    return parse
+
+
+def choice(name: str, options: Sequence[str]) -> Callable[[Any], str]:
+    """A parser that admits one of ``options``."""
+
+    def parse(text: Any) -> str:
+        if text not in options:
+            raise OptionError(f"{name} is {text!r}, not one of {', '.join(options)}")
+        return str(text)
+
+    return parse

@@ -1,0 +1,221 @@
+"""Chunks, the signature and the FOOT: the outermost grammar of a file.
+
+SPEC.md, "Chunks" and "FOOT", are normative.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from mcz.container.source import ByteSource
+from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError
+from mcz.schema import MAX_COUNT
+
+SIGNATURE = b"\x89MCZ\r\n\x1a\n"
+END_MAGIC = b"\x89ZCM\r\n\x1a\n"
+HEADER = struct.Struct("<4sBBHQ")  # type, flags, reserved, header_check, length
+CRC = struct.Struct("<I")
+FRAMING = HEADER.size + CRC.size
+FOOT = struct.Struct("<IIQQ8s")  # flags, crc, index offset, index length, end magic
+OPEN_LENGTH = 2**64 - 1
+
+ANCILLARY = 1  # a reader that does not know the type skips the chunk
+SAFE_TO_COPY = 2  # a rewriter that does not know the type keeps the chunk
+KNOWN_FLAGS = ANCILLARY | SAFE_TO_COPY
+
+_CANDIDATE = re.compile(rb"(?=[A-Za-z]{4}[\x00-\x03]\x00)")  # looks like the start of a header
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Where a chunk lies; ``length`` is that of its payload, None while it is open."""
+
+    type: bytes
+    flags: int = field(compare=False)
+    offset: int
+    length: int | None
+
+    @property
+    def payload_offset(self) -> int:
+        return self.offset + HEADER.size
+
+    @property
+    def size(self) -> int:
+        """Bytes of the whole chunk, framing included."""
+        if self.length is None:
+            raise FormatError(f"open chunk {self.label} has no length")
+        return self.length + FRAMING
+
+    @property
+    def label(self) -> str:
+        return f"{self.type.decode('latin-1')} at {self.offset}"
+
+
+@dataclass(frozen=True, slots=True)
+class Foot:
+    """The trailer; ``index_offset`` and ``index_length`` span the whole INDX chunk, 0, 0 if none."""
+
+    index_offset: int
+    index_length: int
+
+
+def _header_check(kind: bytes, flags: int, length: int) -> int:
+    return zlib.crc32(kind + bytes((flags, 0)) + struct.pack("<Q", length)) & 0xFFFF
+
+
+def build_header(kind: bytes, flags: int, length: int) -> bytes:
+    return HEADER.pack(kind, flags, 0, _header_check(kind, flags, length), length)
+
+
+def build_chunk(kind: bytes, payload: bytes, flags: int = 0) -> bytes:
+    """The whole chunk: header, payload, crc."""
+    header = build_header(kind, flags, len(payload))
+    return header + payload + CRC.pack(zlib.crc32(payload, zlib.crc32(header)))
+
+
+def parse_header(data: bytes, offset: int) -> Chunk:
+    """The chunk whose header is ``data``, which was read at ``offset``."""
+    if len(data) < HEADER.size:
+        raise TruncatedError(f"a chunk header at {offset} ends after {len(data)} of 16 bytes")
+    kind, flags, reserved, check, length = HEADER.unpack(data[: HEADER.size])
+    if check != zlib.crc32(data[:6] + data[8:16]) & 0xFFFF:
+        raise ChecksumError(
+            f"header_check of the chunk at {offset} is {check:#06x}, which is wrong"
+        )
+    if not (kind.isalpha() and kind.isascii()):
+        raise FormatError(f"chunk type {kind!r} at {offset} is not four ASCII letters")
+    if reserved or flags & ~KNOWN_FLAGS:
+        raise FormatError(
+            f"chunk {kind.decode()} at {offset}: flags {flags:#x}, reserved {reserved}"
+        )
+    if length == OPEN_LENGTH:
+        if kind != b"DATA":
+            raise FormatError(f"chunk {kind.decode()} at {offset} is open; only DATA may be")
+        return Chunk(kind, flags, offset, None)
+    if length > MAX_COUNT:
+        raise FormatError(f"chunk {kind.decode()} at {offset}: length {length} is beyond 2^53 - 1")
+    return Chunk(kind, flags, offset, length)
+
+
+def read_chunk(source: ByteSource, offset: int) -> Chunk:
+    """The chunk at ``offset``, its payload not read; raises TruncatedError past the file's end."""
+    if offset + HEADER.size > source.size:
+        raise TruncatedError(f"the file ends at {source.size}, in a chunk header at {offset}")
+    chunk = parse_header(source.read(offset, HEADER.size), offset)
+    if chunk.length is not None and chunk.offset + chunk.size > source.size:
+        raise TruncatedError(
+            f"chunk {chunk.label} ends at {chunk.offset + chunk.size}, the file at {source.size}"
+        )
+    return chunk
+
+
+def read_payload(source: ByteSource, chunk: Chunk, limit: int) -> bytes:
+    """The checked payload of ``chunk``; raises ChecksumError, or LimitError beyond ``limit``."""
+    if chunk.length is None:
+        raise FormatError(f"chunk {chunk.label} is open")
+    if chunk.length > limit:
+        raise LimitError(f"chunk {chunk.label}: {chunk.length} bytes are over the limit of {limit}")
+    return check_chunk(source.read(chunk.offset, chunk.size), chunk)
+
+
+def check_chunk(data: bytes, chunk: Chunk) -> bytes:
+    """The payload in ``data``, the bytes of the whole ``chunk``, after its crc was checked."""
+    found = parse_header(data, chunk.offset)
+    if (found.type, found.length) != (chunk.type, chunk.length):
+        raise FormatError(f"chunk {chunk.label} is not what the index says")
+    (stored,) = CRC.unpack(data[-CRC.size :])
+    computed = zlib.crc32(memoryview(data)[: -CRC.size])
+    if stored != computed:
+        raise ChecksumError(
+            f"crc of chunk {chunk.label} is {computed:#010x}, stored is {stored:#010x}"
+        )
+    return data[HEADER.size : -CRC.size]
+
+
+def build_foot(index_offset: int, index_length: int) -> bytes:
+    flags = 0
+    rest = struct.pack("<QQ", index_offset, index_length) + END_MAGIC
+    return struct.pack("<II", flags, zlib.crc32(struct.pack("<I", flags) + rest)) + rest
+
+
+def parse_foot(data: bytes, offset: int) -> Foot | None:
+    """The FOOT whose 32 bytes are ``data``, or None where they are not one.
+
+    Raises ChecksumError where the magic is there and the crc is wrong, FormatError where a field is.
+    """
+    if len(data) != FOOT.size or data[24:] != END_MAGIC:
+        return None
+    flags, crc, index_offset, index_length, _ = FOOT.unpack(data)
+    if crc != zlib.crc32(data[:4] + data[8:]):
+        raise ChecksumError(f"crc of FOOT at {offset} is {crc:#010x}, which is wrong")
+    if flags:
+        raise FormatError(f"FOOT at {offset}: flags {flags:#x}, of which none is defined")
+    if index_length and (
+        index_offset > MAX_COUNT
+        or index_length > MAX_COUNT
+        or index_offset + index_length != offset
+    ):
+        raise FormatError(f"FOOT at {offset}: index of {index_length} bytes at {index_offset}")
+    if not index_length and index_offset:
+        raise FormatError(f"FOOT at {offset}: index offset {index_offset} without an index")
+    return Foot(index_offset, index_length)
+
+
+def check_signature(source: ByteSource) -> None:
+    data = source.read(0, min(len(SIGNATURE), source.size))
+    if data != SIGNATURE[: len(data)]:
+        raise FormatError(f"not an MCZ file: it begins with {data!r}")
+    if len(data) < len(SIGNATURE):
+        raise TruncatedError(f"the file ends at {len(data)}, in its signature")
+
+
+def is_foot_at(source: ByteSource, offset: int) -> bool:
+    """Whether a FOOT begins at ``offset``: a chunk begins with a letter, a FOOT never does."""
+    if source.read(offset, 1).isalpha():
+        return False
+    if offset + FOOT.size > source.size:
+        raise TruncatedError(f"the file ends at {source.size}, in a FOOT at {offset}")
+    if parse_foot(source.read(offset, FOOT.size), offset) is None:
+        raise FormatError(f"at {offset} there is neither a chunk nor a FOOT")
+    return True
+
+
+def resynchronize(source: ByteSource, start: int, limit: int) -> int | None:
+    """The offset of the next valid chunk or FOOT at or after ``start``, None where there is none.
+
+    A chunk counts when both its header_check and its crc are right.
+    """
+    window = 4 * 1024 * 1024
+    overlap = FOOT.size - 1
+    while start < source.size:
+        data = source.read(start, min(window, source.size - start))
+        for at in _candidates(data):
+            if _is_valid(source, start + at, limit):
+                return start + at
+        if start + len(data) == source.size:
+            return None
+        start += len(data) - overlap
+    return None
+
+
+def _candidates(data: bytes) -> Iterator[int]:
+    """Offsets where the header of a chunk, or a FOOT, may begin, in order."""
+    chunks = [m.start() for m in _CANDIDATE.finditer(data)]
+    feet = [m.start() - 24 for m in re.finditer(re.escape(END_MAGIC), data) if m.start() >= 24]
+    return iter(sorted(chunks + feet))
+
+
+def _is_valid(source: ByteSource, offset: int, limit: int) -> bool:
+    try:
+        if is_foot_at(source, offset):
+            return True
+        chunk = read_chunk(source, offset)
+        if chunk.length is not None:
+            read_payload(source, chunk, limit)
+        return True
+    except FormatError:
+        return False

@@ -1,0 +1,217 @@
+"""What a file holds and where: built by the writer, by a scan, or from INDX.
+
+SPEC.md, "INDX", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.chunks import HEADER, Chunk, build_chunk
+from mcz.container.limits import check
+from mcz.container.segments import SegmentHeader
+from mcz.errors import FormatError, LimitError
+from mcz.schema import build, deflate, inflate, parse, read_varint, varint
+
+PACKET = 128  # set in the indexed flags of a segment that is a packet of an open DATA
+
+# Each segment in the "segments" field of an indexed clip: (name, type, meaning).
+SEGMENT_FIELDS = (
+    ("gap", "varint", "bytes between the end of the chunk or packet before and this payload"),
+    ("size", "varint", "bytes of the payload"),
+    ("signal", "varint", "index of the signal"),
+    ("n_frames", "varint", "frames"),
+    ("lead", "varint", "as in DATA"),
+    ("tail", "varint", "as in DATA"),
+    ("flags", "varint", "as in DATA; 128 more where it is a packet of an open DATA"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentRow:
+    """One segment: where its payload lies, and what it covers."""
+
+    offset: int
+    size: int
+    header: SegmentHeader
+    packet: bool = False
+
+    @property
+    def stop(self) -> int:
+        return self.offset + self.size
+
+    def chunk(self) -> Chunk:
+        """The closed DATA chunk around the payload."""
+        if self.packet:
+            raise FormatError(f"the segment at {self.offset} is a packet, not a chunk")
+        return Chunk(b"DATA", 0, self.offset - HEADER.size, self.size)
+
+
+@dataclass(frozen=True, slots=True)
+class SignalRow:
+    n_channels: int
+    samples_per_frame: int
+    codec: int
+    codec_version: int
+
+
+@dataclass(slots=True)
+class ClipRow:
+    """A clip as a listing shows it; its CLIP and CEND say more."""
+
+    name: str
+    skeleton: bytes
+    n_frames: int
+    rate_numerator: int
+    rate_denominator: int
+    signals: tuple[SignalRow, ...]
+    clip: Chunk
+    segments: list[SegmentRow] = field(default_factory=list)
+    cend: Chunk | None = None
+    ancillary: list[Chunk] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class AttachmentRow:
+    name: str
+    size: int
+    parts: list[Chunk]
+
+
+@dataclass(slots=True)
+class Directory:
+    """Everything in a file by name or id. ``end`` is the offset after the last FOOT."""
+
+    head: bytes = b""
+    shared: dict[tuple[bytes, bytes], Chunk] = field(default_factory=dict)
+    attachments: dict[str, AttachmentRow] = field(default_factory=dict)
+    aliases: dict[str, tuple[int, bytes]] = field(default_factory=dict)
+    clips: dict[str, ClipRow] = field(default_factory=dict)
+    end: int = 0
+
+
+def build_index(directory: Directory) -> bytes:
+    """The whole INDX chunk."""
+    content = build(payloads.INDEX, _index_fields(directory), "INDX")
+    fields = {"size": len(content), "data": deflate(content)}
+    return build_chunk(b"INDX", build(payloads.INDX, fields, "INDX"))
+
+
+def _index_fields(directory: Directory) -> dict[str, Any]:
+    return {
+        "head": directory.head,
+        "shared": [
+            {"type": kind, "id": id_, **_place(chunk)}
+            for (kind, id_), chunk in directory.shared.items()
+        ],
+        "attachments": [
+            {"name": a.name, "size": a.size, "parts": [_place(part) for part in a.parts]}
+            for a in directory.attachments.values()
+        ],
+        "aliases": [
+            {"name": name, "of": of, "target": target}
+            for name, (of, target) in directory.aliases.items()
+        ],
+        "clips": [_clip_fields(clip) for clip in directory.clips.values()],
+        "extension": b"",
+    }
+
+
+def _place(chunk: Chunk) -> dict[str, int | None]:
+    return {"offset": chunk.offset, "length": chunk.length}
+
+
+def _clip_fields(clip: ClipRow) -> dict[str, Any]:
+    if clip.cend is None:
+        raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
+    segments, end = bytearray(), clip.clip.offset + clip.clip.size
+    for row in clip.segments:
+        header = row.header
+        fields = (row.offset - end, row.size, header.signal, header.n_frames)
+        flags = header.flags | (PACKET if row.packet else 0)
+        segments += b"".join(map(varint, (*fields, header.lead, header.tail, flags)))
+        end = row.stop
+    return {
+        "name": clip.name,
+        "skeleton": clip.skeleton,
+        "n_frames": clip.n_frames,
+        "rate_numerator": clip.rate_numerator,
+        "rate_denominator": clip.rate_denominator,
+        "signals": [
+            {
+                "n_channels": s.n_channels,
+                "samples_per_frame": s.samples_per_frame,
+                "codec": s.codec,
+                "codec_version": s.codec_version,
+            }
+            for s in clip.signals
+        ],
+        **_place(clip.clip),
+        "segments": bytes(segments),
+        "cend_gap": clip.cend.offset - end,
+        "cend_length": clip.cend.length,
+        "ancillary": [{"type": chunk.type, **_place(chunk)} for chunk in clip.ancillary],
+    }
+
+
+def parse_index(payload: bytes, limit: int) -> Directory:
+    """The Directory in the payload of an INDX; ``limit`` bounds its inflated size."""
+    outer = parse(payloads.INDX, payload, "INDX")
+    check("INDX: inflated size", outer.size, limit)
+    if outer.size > 1032 * (len(outer.data) + 1):  # deflate's greatest ratio
+        raise LimitError(f"INDX: {outer.size} bytes cannot come of {len(outer.data)}")
+    fields = parse(payloads.INDEX, inflate(outer.data, outer.size, "INDX"), "INDX")
+    directory = Directory(head=fields.head)
+    for row in fields.shared:
+        directory.shared[row.type, row.id] = Chunk(row.type, 0, row.offset, row.length)
+    for row in fields.attachments:
+        parts = [Chunk(b"ATTA", 0, part.offset, part.length) for part in row.parts]
+        _add(directory.attachments, row.name, AttachmentRow(row.name, row.size, parts))
+    for row in fields.aliases:
+        _add(directory.aliases, row.name, (row.of, row.target))
+    for row in fields.clips:
+        _add(directory.clips, row.name, _parse_clip(row))
+    return directory
+
+
+def _add(table: dict[str, Any], name: str, row: Any) -> None:
+    if name in table:
+        raise FormatError(f"INDX: two entries are named {name!r}")
+    table[name] = row
+
+
+def _parse_clip(row: Any) -> ClipRow:
+    clip = Chunk(b"CLIP", 0, row.offset, row.length)
+    signals = tuple(
+        SignalRow(s.n_channels, s.samples_per_frame, s.codec, s.codec_version) for s in row.signals
+    )
+    if not signals:
+        raise FormatError(f"INDX: clip {row.name!r} has no signal")
+    segments = list(_parse_segments(row.segments, clip.offset + clip.size, len(signals), row.name))
+    end = segments[-1].stop if segments else clip.offset + clip.size
+    cend = Chunk(b"CEND", 0, end + row.cend_gap, row.cend_length)
+    rate = row.rate_numerator, row.rate_denominator
+    ancillary = [Chunk(a.type, 1, a.offset, a.length) for a in row.ancillary]
+    return ClipRow(
+        row.name, row.skeleton, row.n_frames, *rate, signals, clip, segments, cend, ancillary
+    )
+
+
+def _parse_segments(data: bytes, end: int, n_signals: int, name: str) -> Iterable[SegmentRow]:
+    at, first = 0, [0] * n_signals
+    while at < len(data):
+        fields = []
+        for _ in SEGMENT_FIELDS:
+            value, at = read_varint(data, at)
+            fields.append(value)
+        gap, size, signal, n_frames, lead, tail, flags = fields
+        if signal >= n_signals:
+            raise FormatError(f"INDX: clip {name!r} has a segment of signal {signal}")
+        header = SegmentHeader(signal, first[signal], n_frames, lead, tail, flags & ~PACKET)
+        yield SegmentRow(end + gap, size, header, bool(flags & PACKET))
+        first[signal] += n_frames
+        end += gap + size

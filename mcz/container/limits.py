@@ -1,0 +1,44 @@
+"""Profiles: the limits that a file promises to keep and a reader promises to handle.
+
+SPEC.md, "Limits and profiles", is normative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mcz.errors import LimitError
+
+MIB = 2**20
+SEGMENT_TARGET = 64 * 1024  # writers keep a DATA chunk of a segmented codec at most this long
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Upper bounds; bytes are decoded bytes unless the name says otherwise."""
+
+    id: int
+    name: str
+    channels: int
+    joints: int
+    segment_bytes: int
+    model_bytes: int
+    chunk_bytes: int
+    packet_bytes: int
+    text_bytes: int
+
+
+BASE = Profile(0, "base", 16_384, 4_096, 64 * MIB, 64 * MIB, 2**31, 64 * 1024, 64 * MIB)
+ARCHIVE = Profile(1, "archive", 2**20, 2**18, 2**34, 2**31, 2**40, MIB, 2**31)
+PROFILES = {profile.id: profile for profile in (BASE, ARCHIVE)}
+
+
+def check(what: str, value: int, limit: int) -> None:
+    """Raise LimitError where ``value`` exceeds ``limit``."""
+    if value > limit:
+        raise LimitError(f"{what}: {value} is over the limit of {limit}")
+
+
+def output_limit(file_bytes: int) -> int:
+    """The bytes that a reader decodes from one file unless its caller allows more."""
+    return max(64 * MIB, 4096 * file_bytes)

@@ -1,0 +1,95 @@
+"""Packets: the contents of an open DATA chunk.
+
+SPEC.md, "Open DATA and packets", is normative.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from mcz.container.limits import check
+from mcz.errors import ChecksumError, FormatError
+from mcz.schema import varint
+
+END, SEGMENT, CODEC = 0, 1, 2  # kinds, bits 0 to 3 of the first byte
+FRESH = 0x80  # the packet needs none before it
+
+FIELDS = (
+    ("kind", "u8", "bits 0-3: 0 end, 1 segment, 2 codec's own; bit 7: starts fresh; others 0"),
+    ("sequence", "varint", "number of the packet in its chunk, from 0"),
+    ("length", "varint", "bytes of the body"),
+    ("head_check", "u16", "low 16 bits of the CRC-32 of the three fields before"),
+    ("body", "bytes", "kind 1: a segment, as in a closed DATA; kind 2: the codec's"),
+    ("body_check", "u16", "low 16 bits of the CRC-32 of the body"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    kind: int
+    sequence: int
+    body: bytes
+    fresh: bool = True
+
+
+def _check16(data: bytes) -> bytes:
+    return struct.pack("<H", zlib.crc32(data) & 0xFFFF)
+
+
+def build_packet(packet: Packet) -> bytes:
+    first = packet.kind | (FRESH if packet.fresh else 0)
+    head = bytes((first,)) + varint(packet.sequence) + varint(len(packet.body))
+    return head + _check16(head) + packet.body + _check16(packet.body)
+
+
+def read_packets(read: Callable[[int], bytes], limit: int) -> Iterator[Packet]:
+    """The packets of an open DATA up to its end packet, which is not yielded.
+
+    ``read(n)`` returns exactly n bytes or raises TruncatedError. Raises ChecksumError or
+    FormatError at the first packet that is damaged or out of order.
+    """
+    sequence = 0
+    while True:
+        packet = _read_packet(read, limit)
+        if packet.sequence != sequence:
+            raise FormatError(f"packet {packet.sequence} where {sequence} is due")
+        if packet.kind == END:
+            if packet.body:
+                raise FormatError(f"end packet with {len(packet.body)} bytes")
+            return
+        yield packet
+        sequence += 1
+
+
+def _read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
+    head = bytearray(read(1))
+    values = [_stream_varint(read, head) for _ in range(2)]
+    if read(2) != _check16(bytes(head)):
+        raise ChecksumError(f"head_check of packet {values[0]} is wrong")
+    kind = head[0] & 0x0F
+    if kind > CODEC or head[0] & 0x70:
+        raise FormatError(f"packet {values[0]}: kind {head[0]:#04x}")
+    check(f"packet {values[0]}", values[1], limit)
+    body = read(values[1])
+    if read(2) != _check16(body):
+        raise ChecksumError(f"body_check of packet {values[0]} is wrong")
+    return Packet(kind, values[0], body, bool(head[0] & FRESH))
+
+
+def _stream_varint(read: Callable[[int], bytes], seen: bytearray) -> int:
+    """The next varint, its bytes also appended to ``seen``."""
+    value = shift = 0
+    while True:
+        byte = read(1)[0]
+        seen.append(byte)
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if value >= 2**53 or shift > 56:
+            raise FormatError("packet: varint beyond 2^53 - 1")
+        if byte < 0x80:
+            if byte == 0 and shift > 7:
+                raise FormatError("packet: varint not in its shortest form")
+            return value

@@ -1,0 +1,264 @@
+"""Random access to the parts of a file through its Directory.
+
+Opening reads the end of the file and no more than it must; a file without INDX is scanned.
+SPEC.md, "Strict reading" and "Salvage", are normative.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import zlib
+from collections.abc import Sequence
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.chunks import (
+    CRC,
+    FOOT,
+    HEADER,
+    SIGNATURE,
+    Chunk,
+    Foot,
+    check_chunk,
+    check_signature,
+    parse_foot,
+)
+from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, parse_index
+from mcz.container.limits import Profile, check, output_limit
+from mcz.container.scan import parse_head, scan, signal_row
+from mcz.container.segments import SegmentHeader, StreamCounts, StreamTable, parse_table
+from mcz.container.source import ByteSource
+from mcz.container.writer import payload_id
+from mcz.errors import ChecksumError, FormatError, TruncatedError
+from mcz.schema import inflate, parse
+
+TABLE_PEEK = 256  # bytes of a segment that are read to find its table
+
+
+class Container:
+    """An open file. ``unverified`` counts chunks of which only a part was read and checked."""
+
+    def __init__(
+        self, source: ByteSource, *, salvage: bool = False, max_decoded: int | None = None
+    ) -> None:
+        self.source = source
+        self.salvage = salvage
+        self.max_decoded = output_limit(source.size) if max_decoded is None else max_decoded
+        self.damage: list[str] = []
+        self.unverified = 0
+        self.index: Foot | None = None
+        self.directory = self._salvage() if salvage else self._open()
+        self.profile: Profile = parse_head(self.directory.head)
+
+    def _salvage(self) -> Directory:
+        found = scan(self.source, salvage=True)
+        self.damage = found.damage
+        if not found.chunks:
+            raise FormatError("nothing can be salvaged: no chunk is whole")
+        return found.directory
+
+    def _open(self) -> Directory:
+        tail_size = min(self.source.size, self.source.tail)
+        tail = self.source.read(self.source.size - tail_size, tail_size)
+        if not self.source.remote:  # where requests cost, INDX's copy of HEAD must do
+            check_signature(self.source)
+        foot = self._foot(tail)
+        if not foot.index_length:
+            return scan(self.source).directory
+        self.index = foot
+        directory = self._index(foot, tail)
+        directory.end = self.source.size
+        return directory
+
+    def _foot(self, tail: bytes) -> Foot:
+        foot = None
+        at = self.source.size - FOOT.size
+        if at >= len(SIGNATURE):
+            foot = parse_foot(tail[-FOOT.size :], at)
+        if foot is None:
+            check_signature(self.source)
+            scan(self.source)  # finds the place and the last FOOT, and raises
+            raise TruncatedError(f"the file ends at {self.source.size} without a FOOT")
+        return foot
+
+    def _index(self, foot: Foot, tail: bytes) -> Directory:
+        start = foot.index_offset - (self.source.size - len(tail))
+        stop = start + foot.index_length
+        length = foot.index_length - HEADER.size - CRC.size
+        if length < 0:
+            raise FormatError(f"FOOT: an index of {foot.index_length} bytes")
+        chunk = Chunk(b"INDX", 0, foot.index_offset, length)
+        data = tail[start:stop] if start >= 0 else self._outside(foot, tail, -start)
+        return parse_index(check_chunk(data, chunk), self.max_decoded)
+
+    def _outside(self, foot: Foot, tail: bytes, missing: int) -> bytes:
+        """The INDX chunk, its first ``missing`` bytes read now, the others from ``tail``."""
+        head = self.source.read(foot.index_offset, min(missing, foot.index_length))
+        return head + tail[: foot.index_length - len(head)]
+
+    def payload(self, chunk: Chunk) -> bytes:
+        """The checked payload of ``chunk``."""
+        assert chunk.length is not None
+        check(f"chunk {chunk.label}: bytes", chunk.length, self.profile.chunk_bytes)
+        return check_chunk(self.source.read(chunk.offset, chunk.size), chunk)
+
+    def shared(self, kind: bytes, id_: bytes, schema: Any) -> Any:
+        """The fields of the SKEL, MODL or SRCE with this id, its hash checked."""
+        chunk = self.directory.shared.get((kind, id_))
+        if chunk is None:
+            raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
+        payload = self.payload(chunk)
+        if payload_id(payload) != id_:
+            raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
+        return parse(schema, payload, chunk.label)
+
+    def template(self, id_: bytes, format_id: int) -> bytes:
+        """The template in the SRCE with this id."""
+        fields = self.shared(b"SRCE", id_, payloads.SRCE)
+        if fields.format != format_id:
+            raise FormatError(f"SRCE {id_.hex()} is of format {fields.format}, not {format_id}")
+        check(
+            f"SRCE {id_.hex()}: bytes", fields.size, min(self.profile.text_bytes, self.max_decoded)
+        )
+        return _decoded(fields.data, fields.encoding, fields.size, f"SRCE {id_.hex()}")
+
+    def clip(self, row: ClipRow) -> Any:
+        """The fields of CLIP, compared with what the index says of them."""
+        fields = parse(payloads.CLIP, self.payload(row.clip), row.clip.label)
+        signals = [signal_row(signal) for signal in fields.signals]
+        rate = fields.rate_numerator, fields.rate_denominator
+        n_frames = row.n_frames if fields.flags & payloads.OPEN_CLIP else fields.n_frames
+        found = (fields.name, fields.skeleton, n_frames, *rate, signals)
+        listed = (row.name, row.skeleton, row.n_frames, row.rate_numerator, row.rate_denominator)
+        if found != (*listed, list(row.signals)) and not (self.salvage and row.damage):
+            raise FormatError(f"clip {row.name!r} is {found}, but the index says {listed}")
+        return fields
+
+    def cend(self, row: ClipRow) -> Any:
+        """The fields of CEND; None where a salvaged clip has none."""
+        if row.cend is None:
+            return None
+        fields = parse(payloads.CEND, self.payload(row.cend), row.cend.label)
+        if fields.n_frames != row.n_frames:
+            raise FormatError(f"{row.cend.label}: {fields.n_frames} frames, not {row.n_frames}")
+        return fields
+
+    def attachment(self, row: AttachmentRow) -> bytes:
+        """The bytes of an attached file, its hash checked."""
+        check(f"attachment {row.name!r}: bytes", row.size, self.max_decoded)
+        parts = []
+        left, digest = row.size, b""
+        for number, chunk in enumerate(row.parts):
+            fields = parse(payloads.ATTA, self.payload(chunk), chunk.label)
+            expected = (row.name, number, len(row.parts), row.size)
+            if (fields.name, fields.part, fields.n_parts, fields.size) != expected:
+                raise FormatError(f"chunk {chunk.label}: not part {number} of {row.name!r}")
+            if fields.part_size > left:
+                raise FormatError(
+                    f"chunk {chunk.label}: more than the {row.size} bytes of the file"
+                )
+            parts.append(_decoded(fields.data, fields.encoding, fields.part_size, chunk.label))
+            left, digest = left - fields.part_size, fields.sha256
+        data = b"".join(parts)
+        if left or hashlib.sha256(data).digest() != digest:
+            raise ChecksumError(
+                f"attachment {row.name!r}: {len(data)} bytes, hash or size is wrong"
+            )
+        return data
+
+    def table(self, row: SegmentRow, counts: StreamCounts) -> StreamTable:
+        """The stream table of a segment, with as little read as will do."""
+        self._check_row(row)
+        size = min(row.size, TABLE_PEEK)
+        while True:
+            try:
+                table = parse_table(self.source.read(row.offset, size), counts)
+                break
+            except TruncatedError as error:
+                if size == row.size:
+                    raise FormatError(f"DATA payload at {row.offset}: {error}") from None
+                size = min(row.size, 4 * size)
+        _check_table(table, row)
+        return table
+
+    def streams(
+        self, row: SegmentRow, counts: StreamCounts, wanted: Sequence[int] | None
+    ) -> tuple[StreamTable, dict[int, bytes]]:
+        """The streams with the indices ``wanted`` (None: all), read together where they are near.
+
+        A chunk that is read whole is checked by its crc; otherwise it counts as unverified.
+        """
+        self._check_row(row)
+        if wanted is None or self.source.remote:
+            return self._all_streams(row, counts)
+        table = self.table(row, counts)
+        self.unverified += 1
+        got: dict[int, bytes] = {}
+        for run in _runs(table, sorted(wanted), self.source.gap):
+            start = table.offsets[run[0]]
+            stop = table.offsets[run[-1]] + table.lengths[run[-1]]
+            data = self.source.read(row.offset + start, stop - start)
+            for index in run:
+                at = table.offsets[index] - start
+                got[index] = data[at : at + table.lengths[index]]
+        return table, got
+
+    def _all_streams(
+        self, row: SegmentRow, counts: StreamCounts
+    ) -> tuple[StreamTable, dict[int, bytes]]:
+        if row.packet:
+            payload = self._packet(row)
+        else:
+            payload = self.payload(row.chunk())
+        try:
+            table = parse_table(payload, counts)
+        except TruncatedError as error:
+            raise FormatError(f"DATA payload at {row.offset}: {error}") from None
+        _check_table(table, row)
+        return table, {
+            index: payload[offset : offset + length]
+            for index, (offset, length) in enumerate(zip(table.offsets, table.lengths, strict=True))
+        }
+
+    def _packet(self, row: SegmentRow) -> bytes:
+
+        data = self.source.read(row.offset, row.size + 2)
+        if zlib.crc32(data[:-2]) & 0xFFFF != int.from_bytes(data[-2:], "little"):
+            raise ChecksumError(f"body_check of the packet at {row.offset} is wrong")
+        return data[:-2]
+
+    def _check_row(self, row: SegmentRow) -> None:
+        if row.stop > self.source.size:
+            raise FormatError(f"a segment is said to lie at {row.offset}, past the end of the file")
+        check(f"DATA at {row.offset}: bytes", row.size, self.profile.chunk_bytes)
+
+
+def _check_table(table: StreamTable, row: SegmentRow) -> None:
+    header: SegmentHeader = table.header
+    if header != row.header:
+        raise FormatError(f"segment at {row.offset} is {header}, but the index says {row.header}")
+    if table.payload_size != row.size:
+        raise FormatError(
+            f"segment at {row.offset}: its streams end at {table.payload_size} of {row.size} bytes"
+        )
+
+
+def _decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
+    if encoding == payloads.DEFLATED:
+        return inflate(data, size, where)
+    if len(data) != size:
+        raise FormatError(f"{where}: {len(data)} bytes stored, {size} stated")
+    return bytes(data)
+
+
+def _runs(table: StreamTable, wanted: Sequence[int], gap: int) -> list[list[int]]:
+    """``wanted`` streams in runs that are read at once; empty streams join any run."""
+    runs: list[list[int]] = []
+    end = 0
+    for index in wanted:
+        if runs and table.offsets[index] - end <= gap:
+            runs[-1].append(index)
+        else:
+            runs.append([index])
+        end = table.offsets[index] + table.lengths[index]
+    return runs

@@ -1,0 +1,334 @@
+"""Walking a file chunk by chunk: the way to a Directory without, or in spite of, INDX.
+
+A strict scan raises at the first fault. A salvaging scan writes it down, looks for the next
+valid chunk and goes on. SPEC.md, "Grammar" and "Salvage", are normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.chunks import (
+    ANCILLARY,
+    FOOT,
+    HEADER,
+    SIGNATURE,
+    Chunk,
+    check_signature,
+    is_foot_at,
+    parse_foot,
+    read_chunk,
+    read_payload,
+    resynchronize,
+)
+from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, SignalRow
+from mcz.container.limits import BASE, PROFILES, Profile
+from mcz.container.packets import SEGMENT, read_packets
+from mcz.container.segments import parse_header
+from mcz.container.source import ByteSource
+from mcz.container.writer import build_head, payload_id
+from mcz.errors import FormatError, TruncatedError, UnsupportedError
+from mcz.schema import parse
+
+SHARED = (b"SKEL", b"MODL", b"SRCE")
+PEEK = 64  # enough for the fields of a segment before its table
+
+
+@dataclass(slots=True)
+class Found:
+    """The result of a scan."""
+
+    directory: Directory = field(default_factory=Directory)
+    chunks: list[Chunk] = field(default_factory=list)
+    feet: list[int] = field(default_factory=list)  # offsets of the FOOTs
+    damage: list[str] = field(default_factory=list)
+    truncated: TruncatedError | None = None
+
+
+def parse_head(payload: bytes) -> Profile:
+    """The profile of the file; raises UnsupportedError where it needs a newer reader."""
+    head = parse(payloads.HEAD, payload, "HEAD")
+    ours = payloads.FORMAT_MAJOR, payloads.FORMAT_MINOR
+    if (head.needs_major, head.needs_minor) > ours or head.needs_major != ours[0]:
+        raise UnsupportedError(
+            f"HEAD: the file needs format {head.needs_major}.{head.needs_minor}, "
+            f"this reader knows {ours[0]}.{ours[1]}"
+        )
+    if head.profile not in PROFILES:
+        raise UnsupportedError(f"HEAD: profile {head.profile} is unknown")
+    return PROFILES[head.profile]
+
+
+def scan(source: ByteSource, *, salvage: bool = False, whole: bool = False) -> Found:
+    """Walk the file. ``whole`` also checks the crc of every chunk (salvage always does).
+
+    Raises FormatError at the first fault unless ``salvage``; a TruncatedError carries the end
+    of the last valid FOOT.
+    """
+    walker = _Walker(source, salvage, whole or salvage)
+    try:
+        walker.walk()
+    except TruncatedError as error:
+        feet = walker.found.feet
+        error.last_foot = feet[-1] + FOOT.size if feet else None
+        raise
+    return walker.found
+
+
+def signal_row(fields: Any) -> SignalRow:
+    """What the index says of a signal, from its fields in CLIP."""
+    n_channels = sum(run.n_channels for run in fields.grids)
+    return SignalRow(n_channels, fields.samples_per_frame, fields.codec, fields.codec_version)
+
+
+class _Walker:
+    def __init__(self, source: ByteSource, salvage: bool, whole: bool) -> None:
+        self.source = source
+        self.salvage = salvage
+        self.whole = whole
+        self.found = Found()
+        self.profile = PROFILES[0]
+        self.clip: ClipRow | None = None
+        self.first: list[int] = []  # the next frame of each signal of the open clip
+        self.index: Chunk | None = None  # an INDX that waits for its FOOT
+
+    def walk(self) -> None:
+        try:
+            check_signature(self.source)
+        except FormatError as error:
+            if not self.salvage:
+                raise
+            self._note(error)
+        at: int | None = len(SIGNATURE)
+        while at is not None and at != self._whole_until():
+            try:
+                at = self._step(at)
+            except FormatError as error:
+                if not self.salvage:
+                    raise
+                self._note(error)
+                at = self._skip(at)
+        self._finish()
+
+    def _whole_until(self) -> int | None:
+        """The end of the file once a FOOT has closed it, else None."""
+        closed = self.found.directory.end == self.source.size and self.clip is None
+        return self.source.size if closed else None
+
+    def _step(self, at: int) -> int:
+        """Take in what begins at ``at`` and return where the next thing begins."""
+        if at >= self.source.size:
+            raise TruncatedError(f"the file ends at {at} without a FOOT")
+        if is_foot_at(self.source, at):
+            return self._foot(at)
+        chunk = read_chunk(self.source, at)
+        if self.index is not None:
+            raise FormatError(f"INDX is followed by {chunk.label}, not by a FOOT")
+        if not (self.found.directory.head or self.salvage) and chunk.type != b"HEAD":
+            raise FormatError(f"the first chunk is {chunk.label}, not HEAD")
+        end = self._take(chunk)
+        self.found.chunks.append(chunk)
+        return end
+
+    def _take(self, chunk: Chunk) -> int:
+        if chunk.length is None:
+            return self._open_data(chunk)
+        handlers: dict[bytes, Callable[[Chunk], None]] = {
+            b"HEAD": self._head,
+            b"SKEL": self._shared,
+            b"MODL": self._shared,
+            b"SRCE": self._shared,
+            b"ATTA": self._attachment,
+            b"ALIA": self._alias,
+            b"CLIP": self._begin_clip,
+            b"DATA": self._data,
+            b"CEND": self._end_clip,
+            b"INDX": self._index,
+        }
+        handler = handlers.get(chunk.type)
+        if handler is not None:
+            if chunk.flags:
+                raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x} on a critical type")
+            handler(chunk)
+        elif chunk.flags & ANCILLARY:
+            self._ancillary(chunk)
+        else:
+            raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")
+        return chunk.offset + chunk.size
+
+    def _payload(self, chunk: Chunk) -> bytes:
+        return read_payload(self.source, chunk, self.profile.chunk_bytes)
+
+    def _head(self, chunk: Chunk) -> None:
+        if self.found.directory.head:
+            raise FormatError(f"a second HEAD at {chunk.offset}")
+        payload = self._payload(chunk)
+        self.profile = parse_head(payload)
+        self.found.directory.head = payload
+
+    def _shared(self, chunk: Chunk) -> None:
+        self._outside(chunk)
+        key = chunk.type, payload_id(self._payload(chunk))
+        self.found.directory.shared.setdefault(key, chunk)
+
+    def _attachment(self, chunk: Chunk) -> None:
+        self._outside(chunk)
+        fields = parse(payloads.ATTA, self._payload(chunk), chunk.label)
+        rows = self.found.directory.attachments
+        row = rows.get(fields.name) or AttachmentRow(fields.name, fields.size, [])
+        last = self.found.chunks[-1]
+        follows = row.parts and row.parts[-1] == last
+        if (
+            fields.part != len(row.parts)
+            or fields.size != row.size
+            or (fields.part and not follows)
+        ):
+            raise FormatError(f"chunk {chunk.label}: part {fields.part} is out of order")
+        if fields.part >= fields.n_parts:
+            raise FormatError(f"chunk {chunk.label}: part {fields.part} of {fields.n_parts}")
+        row.parts.append(chunk)
+        rows[fields.name] = row
+
+    def _alias(self, chunk: Chunk) -> None:
+        self._outside(chunk)
+        fields = parse(payloads.ALIA, self._payload(chunk), chunk.label)
+        if fields.name in self.found.directory.aliases:
+            raise FormatError(f"chunk {chunk.label}: a second alias {fields.name!r}")
+        self.found.directory.aliases[fields.name] = (fields.of, fields.target)
+
+    def _begin_clip(self, chunk: Chunk) -> None:
+        self._outside(chunk)
+        self.clip, self.first = None, []
+        fields = parse(payloads.CLIP, self._payload(chunk), chunk.label)
+        if not fields.name or fields.name in self.found.directory.clips:
+            raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
+        if not fields.signals:
+            raise FormatError(f"chunk {chunk.label}: a clip without a signal")
+        signals = tuple(map(signal_row, fields.signals))
+        rate = fields.rate_numerator, fields.rate_denominator
+        self.clip = ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, signals, chunk)
+        self.first = [0] * len(signals)
+
+    def _data(self, chunk: Chunk) -> None:
+        assert chunk.length is not None
+        if self.whole:
+            payload = self._payload(chunk)
+        else:
+            payload = self.source.read(chunk.payload_offset, min(chunk.length, PEEK))
+        self._segment(payload, chunk.payload_offset, chunk.length, packet=False)
+
+    def _open_data(self, chunk: Chunk) -> int:
+        at = chunk.payload_offset
+
+        def read(size: int) -> bytes:
+            nonlocal at
+            if at + size > self.source.size:
+                raise TruncatedError(f"the file ends at {self.source.size}, in a packet at {at}")
+            at += size
+            return self.source.read(at - size, size)
+
+        for packet in read_packets(read, self.profile.packet_bytes):
+            if packet.kind == SEGMENT:
+                start = at - 2 - len(packet.body)
+                self._segment(packet.body, start, len(packet.body), packet=True)
+            elif self.clip is None:
+                raise FormatError(f"chunk {chunk.label} is outside a clip")
+        return at
+
+    def _segment(self, payload: bytes, offset: int, size: int, packet: bool) -> None:
+        if self.clip is None:
+            raise FormatError(f"DATA at {offset - HEADER.size} is outside a clip")
+        header, _ = parse_header(payload)
+        if header.signal >= len(self.first):
+            raise FormatError(f"DATA at {offset - HEADER.size}: signal {header.signal}")
+        due = self.first[header.signal]
+        if header.first != due and not (self.salvage and header.first > due):
+            raise FormatError(
+                f"DATA at {offset - HEADER.size}: first frame {header.first}, {due} is due"
+            )
+        self.first[header.signal] = header.stop
+        self.clip.segments.append(SegmentRow(offset, size, header, packet))
+
+    def _end_clip(self, chunk: Chunk) -> None:
+        if self.clip is None:
+            raise FormatError(f"{chunk.label} is outside a clip")
+        fields = parse(payloads.CEND, self._payload(chunk), chunk.label)
+        self.clip.n_frames, self.clip.cend = fields.n_frames, chunk
+        self._close_clip()
+
+    def _close_clip(self) -> None:
+        if self.clip is None:
+            return
+        clip, self.clip = self.clip, None
+        if clip.cend is None:
+            clip.damage.append(f"clip {clip.name!r} has no CEND")
+            clip.n_frames = max(self.first, default=0)
+        for signal, frames in enumerate(self.first):
+            if frames != clip.n_frames:
+                error = FormatError(
+                    f"clip {clip.name!r}: signal {signal} has {frames} of {clip.n_frames} frames"
+                )
+                if not self.salvage:
+                    raise error
+                clip.damage.append(str(error))
+        self.found.directory.clips[clip.name] = clip
+
+    def _index(self, chunk: Chunk) -> None:
+        self._outside(chunk)
+        self._payload(chunk)
+        self.index = chunk
+
+    def _ancillary(self, chunk: Chunk) -> None:
+        if self.whole:
+            self._payload(chunk)
+        if self.clip is None and self.found.directory.clips:
+            last = next(reversed(self.found.directory.clips))
+            self.found.directory.clips[last].ancillary.append(chunk)
+
+    def _foot(self, at: int) -> int:
+        self._outside(Chunk(b"FOOT", 0, at, 0))
+        foot = parse_foot(self.source.read(at, FOOT.size), at)
+        index = (self.index.offset, self.index.size) if self.index else (0, 0)
+        if foot is None or (foot.index_offset, foot.index_length) != index:
+            raise FormatError(f"FOOT at {at} points to {foot}, the index is at {index}")
+        if not (self.found.directory.head or self.salvage):
+            raise FormatError(f"FOOT at {at} comes before HEAD")
+        self.index = None
+        self.found.feet.append(at)
+        self.found.directory.end = at + FOOT.size
+        return at + FOOT.size
+
+    def _outside(self, chunk: Chunk) -> None:
+        if self.clip is not None:
+            if not self.salvage:
+                raise FormatError(f"chunk {chunk.label} is inside the clip {self.clip.name!r}")
+            self._close_clip()
+
+    def _note(self, error: FormatError) -> None:
+        self.found.damage.append(str(error))
+        if self.clip is not None:
+            self.clip.damage.append(str(error))
+        if isinstance(error, TruncatedError):
+            self.found.truncated = error
+
+    def _skip(self, at: int) -> int | None:
+        """Where to go on after a fault in what begins at ``at``."""
+        self.index = None
+        try:
+            chunk = read_chunk(self.source, at)
+            if chunk.length is not None:
+                return chunk.offset + chunk.size  # its header is sound, so its end is known
+        except FormatError:
+            pass
+        return resynchronize(self.source, at + 1, self.profile.chunk_bytes)
+
+    def _finish(self) -> None:
+        self._close_clip()
+        if self.salvage and not self.found.feet:
+            self.found.damage.append("the file has no valid FOOT")
+        if self.salvage and not self.found.directory.head:
+            self.found.damage.append("no HEAD; the file is read as one of this version")
+            self.found.directory.head = build_head(BASE)

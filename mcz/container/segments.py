@@ -1,0 +1,174 @@
+"""The payload of DATA: one segment, its stream table first.
+
+SPEC.md, "DATA", is normative. Tables are bulk data, so they are read and written by hand.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mcz.errors import ChecksumError, FormatError, TruncatedError
+from mcz.schema import MAX_COUNT, read_varint, varint
+
+FRESH, FRAME_NOTES, GROUP_NOTES, MASKS = 1, 2, 4, 8
+KNOWN_FLAGS = 15
+
+# The fields before the table, as SPEC.md's table has them: (name, type, meaning).
+FIELDS = (
+    ("signal", "varint", "index of the signal in CLIP"),
+    ("first_frame", "varint", "first frame of the segment"),
+    ("n_frames", "varint", "frames of the segment, at least 1"),
+    ("lead", "varint", "frames before first_frame that the segment also bears upon"),
+    ("tail", "varint", "frames after its last that the segment also bears upon"),
+    ("flags", "u8", "bit 0: starts fresh; 1: frame notes; 2: group notes; 3: masks"),
+    ("present", "bitmap", "one bit a stream, bit 0 of byte 0 first: 1 where it is not empty"),
+    ("lengths", "varint each", "bytes of each stream that is not empty, at least 1"),
+    ("table_crc", "u32", "CRC-32 of the payload up to here"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class StreamCounts:
+    """What CLIP says about the streams of one signal."""
+
+    n_groups: int
+    n_resolutions: int
+
+    def total(self, flags: int) -> int:
+        """Streams of a segment with ``flags``."""
+        notes = bool(flags & FRAME_NOTES) + self.n_groups * bool(flags & GROUP_NOTES)
+        return notes + self.n_groups * (bool(flags & MASKS) + self.n_resolutions)
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentHeader:
+    """The fields of a segment before its table."""
+
+    signal: int
+    first: int
+    n_frames: int
+    lead: int = 0
+    tail: int = 0
+    flags: int = FRESH
+
+    @property
+    def stop(self) -> int:
+        return self.first + self.n_frames
+
+
+@dataclass(frozen=True, slots=True)
+class StreamTable:
+    """Where each stream lies in the payload; an empty one has length 0.
+
+    ``size`` is the offset of the first stream.
+    """
+
+    header: SegmentHeader
+    counts: StreamCounts
+    size: int
+    offsets: tuple[int, ...]
+    lengths: tuple[int, ...]
+
+    @property
+    def payload_size(self) -> int:
+        return self.size + sum(self.lengths)
+
+    def frame_notes(self) -> int | None:
+        """Index of the frame notes, None where the segment has none."""
+        return 0 if self.header.flags & FRAME_NOTES else None
+
+    def group_notes(self, group: int) -> int | None:
+        if not self.header.flags & GROUP_NOTES:
+            return None
+        return bool(self.header.flags & FRAME_NOTES) + group
+
+    def mask(self, group: int) -> int | None:
+        if not self.header.flags & MASKS:
+            return None
+        return self._codec_start() - self.counts.n_groups + group
+
+    def codec(self, resolution: int, group: int) -> int:
+        """Index of the codec's stream; resolution 0 is the coarsest here, as stored."""
+        return self._codec_start() + resolution * self.counts.n_groups + group
+
+    def _codec_start(self) -> int:
+        return self.counts.total(self.header.flags) - (
+            self.counts.n_groups * self.counts.n_resolutions
+        )
+
+
+def build_segment(header: SegmentHeader, streams: Sequence[bytes]) -> bytes:
+    """The DATA payload; ``streams`` in stored order, absent kinds left out."""
+    present = bytearray((len(streams) + 7) // 8)
+    for index, stream in enumerate(streams):
+        if stream:
+            present[index // 8] |= 1 << index % 8
+    table = b"".join(
+        (
+            *map(
+                varint,
+                (header.signal, header.first, header.n_frames, header.lead, header.tail),
+            ),
+            bytes((header.flags,)),
+            bytes(present),
+            *(varint(len(stream)) for stream in streams if stream),
+        )
+    )
+    return b"".join((table, struct.pack("<I", zlib.crc32(table)), *streams))
+
+
+def parse_header(data: bytes) -> tuple[SegmentHeader, int]:
+    """The fields before the table and the offset after them, not yet covered by a checksum."""
+    at, fields = 0, []
+    for _ in range(5):
+        value, at = read_varint(data, at)
+        fields.append(value)
+    if at >= len(data):
+        raise TruncatedError(f"a segment header ends at {at}")
+    flags = data[at]
+    if flags & ~KNOWN_FLAGS:
+        raise FormatError(
+            f"segment flags {flags:#x}, of which {flags & ~KNOWN_FLAGS:#x} is reserved"
+        )
+    if fields[2] == 0:
+        raise FormatError("a segment of no frames")
+    if fields[1] + fields[2] + fields[4] > MAX_COUNT or fields[3] > fields[1]:
+        raise FormatError(f"a segment of frames {fields[1]} + {fields[2]}, support {fields[3:]}")
+    return SegmentHeader(*fields, flags), at + 1
+
+
+def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
+    """The table at the start of ``data``, which may be cut after it.
+
+    Raises TruncatedError where ``data`` ends inside the table.
+    """
+    header, at = parse_header(data)
+    n_streams = counts.total(header.flags)
+    bitmap_size = (n_streams + 7) // 8
+    if at + bitmap_size > len(data):
+        raise TruncatedError(f"a stream table ends at {len(data)}, in its bitmap")
+    bitmap = int.from_bytes(data[at : at + bitmap_size], "little")
+    if bitmap >> n_streams:
+        raise FormatError(f"stream bitmap has bits beyond its {n_streams} streams")
+    at += bitmap_size
+    lengths = []
+    for index in range(n_streams):
+        length = 0
+        if bitmap >> index & 1:
+            length, at = read_varint(data, at)
+            if length == 0:
+                raise FormatError(f"stream {index} is marked as present and has no bytes")
+        lengths.append(length)
+    if at + 4 > len(data):
+        raise TruncatedError(f"a stream table ends at {len(data)}")
+    (stored,) = struct.unpack_from("<I", data, at)
+    if stored != zlib.crc32(data[:at]):
+        raise ChecksumError(f"table_crc of a segment is {stored:#010x}, which is wrong")
+    offsets, offset = [], at + 4
+    for length in lengths:
+        offsets.append(offset)
+        offset += length
+    return StreamTable(header, counts, at + 4, tuple(offsets), tuple(lengths))

@@ -1,0 +1,106 @@
+"""Random access to the bytes of a file: on disk, in memory or far away."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterable
+from typing import Any, BinaryIO
+
+from mcz.errors import OptionError, TruncatedError
+
+
+class ByteSource:
+    """Reads ranges of a seekable binary stream and counts what it read.
+
+    ``gap``: two wanted ranges that lie at most this far apart are read as one. Zero suits a disk;
+    over a network a request costs more than the bytes between. ``tail``: how many bytes at the end
+    are read at once when the file is opened.
+    """
+
+    def __init__(
+        self, stream: BinaryIO, *, remote: bool = False, name: str = "", size: int | None = None
+    ) -> None:
+        self._stream = stream
+        self.gap = 64 * 1024 if remote else 0
+        self.tail = 128 * 1024 if remote else 4 * 1024
+        self.remote = remote
+        self.name = name
+        self.n_requests = 0
+        self.n_bytes = 0
+        self.size = stream.seek(0, os.SEEK_END) if size is None else size
+        self._held: list[tuple[int, bytes]] = []  # blocks read ahead, newest last
+
+    def read(self, offset: int, size: int) -> bytes:
+        """The ``size`` bytes at ``offset``; raises TruncatedError where the file ends before."""
+        if offset + size > self.size:
+            raise TruncatedError(
+                f"bytes {offset} to {offset + size} are wanted, but the file ends at {self.size}"
+            )
+        if size == 0:
+            return b""
+        for start, block in reversed(self._held):
+            if start <= offset and offset + size <= start + len(block):
+                return block[offset - start : offset - start + size]
+        return self._request(offset, size)
+
+    def read_ahead(self, ranges: Iterable[tuple[int, int]]) -> None:
+        """Over a network, read the (offset, size) ranges now, near ones in one request."""
+        if not self.remote:
+            return
+        self._held = self._held[-1:]
+        start = stop = -1
+        for offset, size in sorted(ranges):
+            if start >= 0 and offset - stop <= self.gap:
+                stop = max(stop, offset + size)
+                continue
+            self._hold(start, stop)
+            start, stop = offset, offset + size
+        self._hold(start, stop)
+
+    def _hold(self, start: int, stop: int) -> None:
+        stop = min(stop, self.size)
+        if 0 <= start < stop:
+            self._held.append((start, self._request(start, stop - start)))
+
+    def _request(self, offset: int, size: int) -> bytes:
+        self._stream.seek(offset)
+        data: bytes = self._stream.read(size)
+        while len(data) < size:  # raw streams may return less than was asked for
+            more = self._stream.read(size - len(data))
+            if not more:
+                raise TruncatedError(f"the file ended at {offset + len(data)} while it was read")
+            data += more
+        self.n_requests += 1
+        self.n_bytes += size
+        return data
+
+    def close(self) -> None:
+        self._stream.close()
+
+
+def open_source(target: Any) -> ByteSource:
+    """A ByteSource of a path, an fsspec target such as "https://...", or a binary stream.
+
+    A stream that cannot seek is read to its end first.
+    """
+    if isinstance(target, (bytes, bytearray, memoryview)):
+        return ByteSource(io.BytesIO(target), name="bytes")
+    if hasattr(target, "read"):
+        name = str(getattr(target, "name", "stream"))
+        if not target.seekable():
+            return ByteSource(io.BytesIO(target.read()), name=name)
+        return ByteSource(target, remote=_is_remote(target), name=name)
+    if "://" in str(target) or "::" in str(target):
+        import fsspec
+
+        stream = fsspec.open(str(target), "rb", cache_type="none").open()
+        return ByteSource(stream, remote=_is_remote(stream), name=str(target))
+    if not isinstance(target, (str, os.PathLike)):
+        raise OptionError(f"cannot open {target!r}: neither a path nor a binary stream")
+    return ByteSource(open(target, "rb"), name=os.fspath(target))  # noqa: SIM115 - closed by close()
+
+
+def _is_remote(stream: Any) -> bool:
+    """Whether ``stream`` is an fsspec file whose every read is a request."""
+    return hasattr(stream, "fs") and not isinstance(getattr(stream, "f", None), io.IOBase)

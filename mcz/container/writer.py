@@ -1,0 +1,243 @@
+"""Writing a file front to back: nothing is ever sought, so a pipe will do.
+
+The writer keeps the Directory of what it wrote and ends with INDX and FOOT.
+SPEC.md, "Grammar", is normative.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from mcz.container import payloads
+from mcz.container.chunks import (
+    ANCILLARY,
+    OPEN_LENGTH,
+    SAFE_TO_COPY,
+    SIGNATURE,
+    Chunk,
+    build_chunk,
+    build_foot,
+    build_header,
+)
+from mcz.container.directory import (
+    AttachmentRow,
+    ClipRow,
+    Directory,
+    SegmentRow,
+    SignalRow,
+    build_index,
+)
+from mcz.container.limits import BASE, MIB, Profile, check
+from mcz.container.packets import END, SEGMENT, Packet, build_packet
+from mcz.container.segments import SegmentHeader, build_segment
+from mcz.errors import FormatError, MotionError
+from mcz.schema import build, deflate
+
+ATTACHMENT_PART = MIB  # decoded bytes of one ATTA
+
+
+class Sink(Protocol):
+    def write(self, data: bytes, /) -> Any: ...
+
+
+def payload_id(payload: bytes) -> bytes:
+    """The id of a shared chunk: the first 16 bytes of its payload's SHA-256."""
+    return hashlib.sha256(payload).digest()[:16]
+
+
+def build_head(profile: Profile) -> bytes:
+    """The payload of a HEAD that this writer writes."""
+    version = payloads.FORMAT_MAJOR, payloads.FORMAT_MINOR
+    names = ("major", "minor", "needs_major", "needs_minor")
+    fields = dict(zip(names, version * 2, strict=True))
+    return build(payloads.HEAD, fields | {"profile": profile.id, "extension": b""}, "HEAD")
+
+
+class Writer:
+    """Appends chunks to ``sink``; ``directory`` and ``offset`` continue an existing file."""
+
+    def __init__(
+        self,
+        sink: Sink,
+        *,
+        profile: Profile = BASE,
+        directory: Directory | None = None,
+        offset: int = 0,
+    ) -> None:
+        self._sink = sink
+        self.profile = profile
+        self.offset = offset
+        self.directory = directory or Directory()
+        self._clip: ClipRow | None = None
+        self._next_packet: int | None = None  # while a DATA is open
+        if offset == 0:
+            self._write_head()
+
+    def _write_head(self) -> None:
+        self._write(SIGNATURE)
+        self.directory.head = build_head(self.profile)
+        self.chunk(b"HEAD", self.directory.head)
+
+    def _write(self, data: bytes) -> None:
+        self._sink.write(data)
+        self.offset += len(data)
+
+    def chunk(self, kind: bytes, payload: bytes, flags: int = 0) -> Chunk:
+        """Write one closed chunk and return its place."""
+        check(f"chunk {kind.decode()}: bytes", len(payload), self.profile.chunk_bytes)
+        chunk = Chunk(kind, flags, self.offset, len(payload))
+        self._write(build_chunk(kind, payload, flags))
+        return chunk
+
+    def shared(self, kind: bytes, payload: bytes) -> bytes:
+        """Write a SKEL, MODL or SRCE unless the file has it already; return its id."""
+        id_ = payload_id(payload)
+        if (kind, id_) not in self.directory.shared:
+            self._between_clips(kind.decode())
+            self.directory.shared[kind, id_] = self.chunk(kind, payload)
+        return id_
+
+    def template(self, format_id: int, template: bytes) -> bytes:
+        """Write a SRCE and return its id."""
+        packed = deflate(template)
+        encoding = payloads.DEFLATED if len(packed) < len(template) else payloads.STORED
+        fields = {
+            "format": format_id,
+            "encoding": encoding,
+            "size": len(template),
+            "data": packed if encoding else template,
+        }
+        return self.shared(b"SRCE", build(payloads.SRCE, fields, "SRCE"))
+
+    def attachment(self, name: str, data: bytes) -> None:
+        """Write a whole file, opaque, in parts of 1 MiB."""
+        self._between_clips("ATTA")
+        self._new_name(name, self.directory.attachments)
+        n_parts = max(1, -(-len(data) // ATTACHMENT_PART))
+        common = {
+            "name": name,
+            "n_parts": n_parts,
+            "size": len(data),
+            "sha256": hashlib.sha256(data).digest(),
+        }
+        row = AttachmentRow(name, len(data), [])
+        for part in range(n_parts):
+            piece = data[part * ATTACHMENT_PART :][:ATTACHMENT_PART]
+            packed = deflate(piece)
+            encoding = payloads.DEFLATED if len(packed) < len(piece) else payloads.STORED
+            fields = common | {
+                "part": part,
+                "encoding": encoding,
+                "part_size": len(piece),
+                "data": packed if encoding else piece,
+            }
+            row.parts.append(self.chunk(b"ATTA", build(payloads.ATTA, fields, "ATTA")))
+        self.directory.attachments[name] = row
+
+    def alias(self, name: str, of: int, target: bytes) -> None:
+        """Write that the file ``name`` is identical to something that this file holds."""
+        self._between_clips("ALIA")
+        self._new_name(name, self.directory.aliases)
+        fields = {"name": name, "of": of, "target": target}
+        self.chunk(b"ALIA", build(payloads.ALIA, fields, "ALIA"))
+        self.directory.aliases[name] = (of, target)
+
+    def ancillary(self, kind: bytes, payload: bytes, *, safe_to_copy: bool = True) -> None:
+        """Write an ancillary chunk; between clips it belongs to the clip before."""
+        flags = ANCILLARY | (SAFE_TO_COPY if safe_to_copy else 0)
+        chunk = self.chunk(kind, payload, flags)
+        if self._clip is None and self.directory.clips:
+            self.directory.clips[next(reversed(self.directory.clips))].ancillary.append(chunk)
+
+    def begin_clip(self, fields: Mapping[str, Any], n_channels: Sequence[int]) -> None:
+        """Write CLIP from its fields; ``n_channels`` of each signal is for the index."""
+        self._between_clips("CLIP")
+        name = fields["name"]
+        if not name:
+            raise MotionError("a clip needs a name")
+        self._new_name(name, self.directory.clips)
+        chunk = self.chunk(b"CLIP", build(payloads.CLIP, fields, f"clip {name!r}"))
+        signals = tuple(
+            SignalRow(n, s["samples_per_frame"], s["codec"], s["codec_version"])
+            for n, s in zip(n_channels, fields["signals"], strict=True)
+        )
+        rate = fields["rate_numerator"], fields["rate_denominator"]
+        self._clip = ClipRow(name, fields["skeleton"], 0, *rate, signals, chunk)
+
+    def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
+        """Write one segment as a closed DATA, or as a packet while a DATA is open."""
+        clip = self._in_clip("DATA")
+        payload = build_segment(header, streams)
+        if self._next_packet is None:
+            chunk = self.chunk(b"DATA", payload)
+            clip.segments.append(SegmentRow(chunk.payload_offset, len(payload), header))
+        else:
+            check("packet: bytes", len(payload), self.profile.packet_bytes)
+            fresh = bool(header.flags & 1)
+            packet = build_packet(Packet(SEGMENT, self._next_packet, payload, fresh))
+            start = self.offset + len(packet) - 2 - len(payload)
+            self._write(packet)
+            self._next_packet += 1
+            clip.segments.append(SegmentRow(start, len(payload), header, packet=True))
+
+    def open_data(self) -> None:
+        """Begin an open DATA: until ``close_data``, each segment is one packet."""
+        self._in_clip("DATA")
+        if self._next_packet is not None:
+            raise FormatError("a DATA is open already")
+        self._write(build_header(b"DATA", 0, OPEN_LENGTH))
+        self._next_packet = 0
+
+    def close_data(self) -> None:
+        if self._next_packet is None:
+            raise FormatError("no DATA is open")
+        self._write(build_packet(Packet(END, self._next_packet, b"")))
+        self._next_packet = None
+
+    def end_clip(self, n_frames: int, source_sha256: bytes, value_sha256: Sequence[bytes]) -> None:
+        """Write CEND; an empty ``source_sha256`` means that there is no source."""
+        clip = self._in_clip("CEND")
+        if self._next_packet is not None:
+            self.close_data()
+        fields = {
+            "n_frames": n_frames,
+            "source_sha256": [source_sha256] if source_sha256 else [],
+            "value_sha256": list(value_sha256),
+            "extension": b"",
+        }
+        clip.n_frames = n_frames
+        clip.cend = self.chunk(b"CEND", build(payloads.CEND, fields, "CEND"))
+        self.directory.clips[clip.name] = clip
+        self._clip = None
+
+    def finish(self, *, index: bool = True) -> None:
+        """Write INDX, unless told otherwise, and FOOT."""
+        self._between_clips("FOOT")
+        start, length = 0, 0
+        if index:
+            chunk = build_index(self.directory)
+            check("INDX: bytes", len(chunk), self.profile.chunk_bytes)
+            start, length = self.offset, len(chunk)
+            self._write(chunk)
+        self._write(build_foot(start, length))
+        self.directory.end = self.offset
+
+    def rewind(self, directory: Directory, offset: int) -> None:
+        """Forget what was written since, which the caller has kept from the sink."""
+        self.directory, self.offset = directory, offset
+        self._clip = self._next_packet = None
+
+    def _between_clips(self, what: str) -> None:
+        if self._clip is not None:
+            raise FormatError(f"{what} inside the clip {self._clip.name!r}")
+
+    def _in_clip(self, what: str) -> ClipRow:
+        if self._clip is None:
+            raise FormatError(f"{what} outside a clip")
+        return self._clip
+
+    def _new_name(self, name: str, table: Mapping[str, Any]) -> None:
+        if name in table:
+            raise MotionError(f"the file already has {name!r}")
