@@ -1,0 +1,66 @@
+"""Source formats: bytes -> Motion or Skeleton, and back, byte for byte.
+
+``FORMATS`` is the explicit table; SPEC.md, "Registries", has the ids.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mcz.errors import SourceError, UnsupportedError
+from mcz.formats import amc, asf, bvh
+from mcz.formats.find import find_asf
+from mcz.formats.notes import join_notes
+from mcz.motion import FrameNotes
+
+__all__ = ["FORMATS", "Format", "find_asf", "format_by_id", "format_of"]
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A source format.
+
+    ``read(data, name)`` gives a Motion, a Skeleton where ``is_skeleton``, and takes the Skeleton or
+    None as a third argument where ``wants_skeleton``; it raises SourceError. ``write`` is its
+    inverse; it raises MotionError or FormatError. ``join_notes`` is the inverse of the notes' cut.
+    """
+
+    name: str
+    id: int
+    suffixes: tuple[str, ...]
+    read: Callable[..., Any]
+    write: Callable[[Any], bytes]
+    join_notes: Callable[[Sequence[tuple[int, int, bytes]]], FrameNotes] | None = None
+    is_skeleton: bool = False
+    wants_skeleton: bool = False
+
+
+FORMATS: dict[str, Format] = {
+    f.name: f
+    for f in (
+        Format("asf", 1, (".asf",), asf.read, asf.write, is_skeleton=True),
+        Format("amc", 2, (".amc",), amc.read, amc.write, join_notes, wants_skeleton=True),
+        Format("bvh", 3, (".bvh",), bvh.read, bvh.write, join_notes),
+    )
+}
+
+
+def format_of(path: str | Path) -> Format:
+    """The format of a file by its suffix, in any case; raises SourceError."""
+    suffix = Path(path).suffix.lower()
+    for source_format in FORMATS.values():
+        if suffix in source_format.suffixes:
+            return source_format
+    known = ", ".join(s for f in FORMATS.values() for s in f.suffixes)
+    raise SourceError(f"{Path(path).name}: no source format has the suffix {suffix!r}, but {known}")
+
+
+def format_by_id(format_id: int) -> Format:
+    """The format with this id; raises UnsupportedError."""
+    for source_format in FORMATS.values():
+        if source_format.id == format_id:
+            return source_format
+    raise UnsupportedError(f"source format {format_id} is unknown")

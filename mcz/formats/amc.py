@@ -1,0 +1,212 @@
+"""AMC (Acclaim motion capture data): bytes -> Motion, and back.
+
+SPEC.md, "Source reconstruction", is normative for the way back. A frame is a line with its number
+and then a line for each bone: its name and its values. Bones may come in any order and may be
+missing, from the file or from some frames.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+
+from mcz.errors import MotionError, SourceError
+from mcz.formats.bones import flat, fit
+from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
+from mcz.formats.notes import RowNotes
+from mcz.formats.restore import restore
+from mcz.formats.rows import Rows, Token, line_of, read_rows, tail_end
+from mcz.formats.signals import read_signal
+from mcz.formats.sources import source_of, text_encoding
+from mcz.motion import Motion, Skeleton, Source
+
+_BLANK = rb"[\x00-\x09\x0b-\x20]"
+_FIRST_FRAME = re.compile(rb"(?m)^" + _BLANK + rb"*+[-+]?[0-9]++" + _BLANK + rb"*+$")
+_LINES = re.compile(rb"[^\n]+")
+_WORDS = re.compile(rb"[^\x00-\x20]+")
+_NUMBER = re.compile(rb"[-+]?[0-9]+")
+NO_SKELETON = "no ASF: a flat list of bones with plain scalar channels, without kinematics"
+DERIVED = "the channels of the AMC differ from those of its ASF"
+
+
+def read(data: bytes, name: str = "motion", skeleton: Skeleton | None = None) -> Motion:
+    """The motion in an AMC file; ``name`` becomes its name; the frame rate is unknown.
+
+    Where the bones do not fit ``skeleton``, the motion's skeleton is derived from it (``bones.fit``)
+    with ``base`` b"", to be replaced with the id of ``skeleton``; the metadata say so. Raises
+    SourceError, with the number of the line.
+    """
+    match = _FIRST_FRAME.search(data)
+    if match is None:
+        raise SourceError("no line with a frame number; not an AMC file, or without frames")
+    begin = match.start()
+    encoding = text_encoding(data)
+    try:
+        frames = _Frames(data, _first_bones(data, begin))
+        fitted, rows = _read_frames(data, begin, skeleton, frames, encoding)
+    except _UnknownBone:
+        frames = _Frames(data, _all_bones(data, begin))
+        fitted, rows = _read_frames(data, begin, skeleton, frames, encoding)
+    metadata = {"name-encoding": encoding} if encoding != "utf-8" else {}
+    if fitted is not skeleton:
+        metadata["skeleton-note"] = NO_SKELETON if skeleton is None else DERIVED
+    return Motion(
+        fitted,
+        (read_signal(data, rows),),
+        name=name,
+        metadata=metadata,
+        source=source_of("amc", data, (data[:begin],), rows),
+        frame_numbers=rows.numbers,
+    )
+
+
+def _read_frames(
+    data: bytes, begin: int, skeleton: Skeleton | None, frames: _Frames, encoding: str
+) -> tuple[Skeleton, Rows]:
+    """The skeleton that fits the bones, and all frames."""
+    counts = {bone.decode(encoding): count for bone, count in frames.counts.items()}
+    if len(counts) < len(frames.counts):
+        raise SourceError("two bones of one name")
+    radians = re.search(rb"(?im)^\s*:RADIANS\b", data[:begin]) is not None
+    unit = "rad" if radians else "deg"
+    if skeleton is None:
+        fitted, columns = flat(counts, unit)
+    else:
+        fitted, columns = fit(skeleton, counts, unit)
+    frames.columns = {bone: columns[bone.decode(encoding)] for bone in frames.counts}
+    return fitted, read_rows(data, begin, fitted.n_channels, frames)
+
+
+class _UnknownBone(Exception):
+    """A bone that did not come in the first frame; the whole file must be searched for bones."""
+
+
+class _Frames:
+    """The tokens of the frame that begins at an offset; see ``rows.Frames``.
+
+    ``counts``: how many values each bone has; ``columns``: the column of its first one.
+    """
+
+    def __init__(self, data: bytes, counts: Mapping[bytes, int]) -> None:
+        self.data, self.counts = data, counts
+        self.columns: Mapping[bytes, int] = {}
+
+    def __call__(self, at: int) -> tuple[list[Token], int] | None:
+        tokens: list[Token] = []
+        seen: set[bytes] = set()
+        end = at
+        for words in _word_lines(self.data, at):
+            start, stop = words[0].span()
+            if len(words) == 1 and _NUMBER.fullmatch(words[0][0]):
+                if tokens:
+                    break
+                tokens.append((start, stop, FRAME_NUMBER))
+            else:
+                if not tokens:
+                    raise self._error(start, f"{words[0][0][:40]!r}, not a frame number")
+                if words[0][0] in seen:
+                    raise self._error(start, f"bone {words[0][0][:40]!r} twice in a frame")
+                seen.add(words[0][0])
+                tokens += self._bone(words)
+            end = words[-1].end()
+        return (tokens, tail_end(self.data, end)) if tokens else None
+
+    def _bone(self, words: list[re.Match[bytes]]) -> list[Token]:
+        bone, count = words[0][0], len(words) - 1
+        if bone not in self.counts:
+            raise _UnknownBone
+        if count != self.counts[bone]:
+            raise self._error(
+                words[0].start(),
+                f"{count} values for bone {bone[:40]!r}, which has {self.counts[bone]} elsewhere",
+            )
+        column = self.columns[bone]
+        return [(*word.span(), column + k) for k, word in enumerate(words[1:])]
+
+    def _error(self, at: int, message: str) -> SourceError:
+        return SourceError(f"line {line_of(self.data, at)}: {message}")
+
+
+def _word_lines(data: bytes, at: int):
+    """The words of every line from ``at`` on that is neither blank nor a comment."""
+    for line in _LINES.finditer(data, at):
+        words = list(_WORDS.finditer(data, *line.span()))
+        if words and not words[0][0].startswith(b"#"):
+            yield words
+
+
+def _first_bones(data: bytes, begin: int) -> dict[bytes, int]:
+    """The bones of the first frame with their numbers of values, in order."""
+    bones: dict[bytes, int] = {}
+    numbers = 0
+    for words in _word_lines(data, begin):
+        if len(words) == 1 and _NUMBER.fullmatch(words[0][0]):
+            numbers += 1
+            if numbers > 1:
+                break
+        else:
+            bones.setdefault(words[0][0], len(words) - 1)
+    return bones
+
+
+def _all_bones(data: bytes, begin: int) -> dict[bytes, int]:
+    """All bones of the file with the number of values that they have first, in order."""
+    bones: dict[bytes, int] = {}
+    for words in _word_lines(data, begin):
+        if len(words) > 1 or not _NUMBER.fullmatch(words[0][0]):
+            bones.setdefault(words[0][0], len(words) - 1)
+    return bones
+
+
+def write(motion: Motion) -> bytes:
+    """The AMC file of ``motion``: its own source with its values, or a plain one.
+
+    Raises MotionError for names with blanks, and for joints that are valid only in part.
+    """
+    source = motion.source
+    if source is None or source.format != "amc":
+        source = _plain_source(motion)
+    return restore(motion, source)
+
+
+def _plain_source(motion: Motion) -> Source:
+    """The source of a file in CMU's style; a frame leaves out the joints without valid values."""
+    skeleton = motion.skeleton
+    mask = motion.signals[0].mask
+    present = np.ones((motion.n_frames, skeleton.n_joints), np.bool_)
+    for index, joint in enumerate(skeleton.joints):
+        if _WORDS.fullmatch(joint.name.encode()) is None or joint.name[0] in "#:":
+            raise MotionError(f"AMC cannot hold the joint name {joint.name!r}")
+        columns = skeleton.columns(index)
+        if mask is not None and len(columns):
+            valid = mask[:, columns.start : columns.stop]
+            present[:, index] = valid.all(axis=1)
+            if (valid.any(axis=1) != present[:, index]).any():
+                raise MotionError(f"AMC cannot leave out a part of joint {joint.name!r}")
+    if len(set(skeleton.addresses())) != len({joint.name for joint in skeleton.joints}):
+        raise MotionError("AMC needs joint names that differ")
+    unit = "RADIANS" if skeleton.angle_unit == "rad" else "DEGREES"
+    if not motion.n_frames:
+        return _source(unit, (), None)
+    rows, numbers = np.unique(present, axis=0, return_inverse=True)
+    patterns = tuple(_plain_pattern(skeleton, row) for row in rows)
+    return _source(unit, patterns, RowNotes(numbers.ravel().astype(np.int64)))
+
+
+def _source(unit: str, patterns: tuple[Pattern, ...], notes: RowNotes | None) -> Source:
+    header = f":FULLY-SPECIFIED\n:{unit}\n".encode()
+    template, detail = Layout((header,), patterns).build()
+    return Source("amc", template, detail, notes)
+
+
+def _plain_pattern(skeleton: Skeleton, present: np.ndarray) -> Pattern:
+    items = [(b"", FRAME_NUMBER, 0)]
+    for index, joint in enumerate(skeleton.joints):
+        if present[index]:
+            items += [
+                (b" " if k else b"\n" + joint.name.encode() + b" ", column, 0)
+                for k, column in enumerate(skeleton.columns(index))
+            ]
+    return Pattern(runs_of(items), b"\n")

@@ -1,0 +1,151 @@
+"""BVH: bytes -> Motion, and back.
+
+SPEC.md, "Source reconstruction", is normative for the way back. Values are a stream of numbers in
+the order of the hierarchy; how many there are counts, not what ``Frames:`` says.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError, SourceError
+from mcz.formats.hierarchy import read_hierarchy, write_hierarchy
+from mcz.formats.layout import Layout, Pattern, runs_of
+from mcz.formats.rates import frame_rate, frame_time
+from mcz.formats.restore import restore
+from mcz.formats.rows import Rows, Token, line_of, read_rows, tail_end
+from mcz.formats.signals import read_signal
+from mcz.formats.sources import source_of, text_encoding
+from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton, Source
+
+_FRAMES = re.compile(rb"\s*Frames\s*:\s*([^\s]+)", re.IGNORECASE)
+_FRAME_TIME = re.compile(rb"\s*Frame\s+Time\s*:\s*([^\s]+)", re.IGNORECASE)
+_BLANKS = re.compile(rb"[\x00-\x20]*")
+_TOKENS = re.compile(rb"#[^\n]*|[^\x00-\x20]+")
+
+
+def read(data: bytes, name: str = "motion") -> Motion:
+    """The motion in a BVH file; ``name`` becomes its name.
+
+    Length unit and up axis are unknown. Raises SourceError, with the number of the line.
+    """
+    encoding = text_encoding(data)
+    joints, at = read_hierarchy(data, encoding)
+    count, time, body = _motion_section(data, at, sum(len(j.channels) for j in joints))
+    n_columns = sum(len(joint.channels) for joint in joints)
+    rows = read_rows(data, body, n_columns, _Frames(data, n_columns))
+    signal = read_signal(data, rows)
+    skeleton = Skeleton(_with_positions(joints, signal.values), unit_cm=None)
+    rate, exact = frame_rate(data[slice(*time)].decode("latin-1"))
+    header = (data[: count[0]], data[count[1] : body])
+    return Motion(
+        skeleton,
+        (signal,),
+        rate,
+        exact,
+        name,
+        {"name-encoding": "latin-1"} if encoding != "utf-8" else {},
+        source_of("bvh", data, header, rows, data[slice(*count)]),
+    )
+
+
+def _motion_section(
+    data: bytes, at: int, n_columns: int
+) -> tuple[tuple[int, int], tuple[int, int], int]:
+    """Where the frame count and the frame time stand, and the offset of the first frame."""
+    frames = _FRAMES.match(data, at)
+    if frames is None:
+        raise SourceError(f"line {line_of(data, at)}: no 'Frames:' after MOTION")
+    time = _FRAME_TIME.match(data, frames.end())
+    if time is None:
+        raise SourceError(f"line {line_of(data, frames.end())}: no 'Frame Time:' after 'Frames:'")
+    blanks = _BLANKS.match(data, time.end())
+    stop = blanks.end() if blanks else time.end()
+    if n_columns and stop < len(data):
+        line = data.rfind(b"\n", time.end(), stop) + 1
+    else:
+        line = data.find(b"\n", time.end(), stop) + 1
+    return frames.span(1), time.span(1), line or stop
+
+
+class _Frames:
+    """The tokens of the frame that begins at an offset; see ``rows.Frames``."""
+
+    def __init__(self, data: bytes, n_columns: int) -> None:
+        self.data, self.n_columns = data, n_columns
+
+    def __call__(self, at: int) -> tuple[list[Token], int] | None:
+        tokens: list[Token] = []
+        for match in _TOKENS.finditer(self.data, at):
+            if match[0][:1] == b"#":
+                continue
+            if not self.n_columns:
+                raise SourceError(f"line {line_of(self.data, match.start())}: no joint has channels")
+            tokens.append((*match.span(), len(tokens)))
+            if len(tokens) == self.n_columns:
+                return tokens, tail_end(self.data, match.end())
+        if tokens:
+            raise SourceError(
+                f"line {line_of(self.data, tokens[0][0])}: the last frame has {len(tokens)} of "
+                f"{self.n_columns} values"
+            )
+        line_end = self.data.find(b"\n", at) + 1
+        return ([], line_end) if line_end and not self.n_columns else None
+
+
+def _with_positions(joints: list[Joint], values: NDArray[np.float64]) -> tuple[Joint, ...]:
+    """The joints, with what their position channels do to the offset.
+
+    BVH does not say it, and programs differ, so the values decide: positions replace the offset
+    where they lie nearer to it than to zero. A root goes by its first frame, all other joints
+    together by the majority of them, each by all frames. Ties, such as a zero offset, mean "add".
+    """
+    decided = list(joints)
+    votes, others = 0, []
+    column = 0
+    for index, joint in enumerate(joints):
+        kinds = [channel.kind for channel in joint.channels]
+        columns = [column + k for k, kind in enumerate(kinds) if kind in POSITION_KINDS]
+        offset = [joint.offset[POSITION_KINDS.index(kind)] for kind in kinds if kind in POSITION_KINDS]
+        column += len(kinds)
+        if not columns or not len(values):
+            continue
+        positions = values[:1, columns] if joint.parent < 0 else values[:, columns]
+        replaces = float(np.abs(positions - offset).sum() - np.abs(positions).sum())
+        if joint.parent < 0:
+            decided[index] = replace(joint, adds_to_offset=not replaces < 0)
+        else:
+            others.append(index)
+            votes += (replaces < 0) - (replaces > 0)
+    for index in others:
+        decided[index] = replace(joints[index], adds_to_offset=votes <= 0)
+    return tuple(decided)
+
+
+def write(motion: Motion) -> bytes:
+    """The BVH file of ``motion``: its own source with its values, or a plain one.
+
+    Raises MotionError for what BVH cannot say; see ``write_hierarchy``.
+    """
+    source = motion.source
+    if source is None or source.format != "bvh":
+        source = _plain_source(motion)
+    return restore(motion, source)
+
+
+def _plain_source(motion: Motion) -> Source:
+    """The source of a file in one plain style."""
+    mask = motion.signals[0].mask
+    if mask is not None and not mask.all():
+        raise MotionError("BVH cannot leave out values, and some are invalid")
+    text, order = write_hierarchy(motion.skeleton)
+    columns = [column for joint in order for column in motion.skeleton.columns(joint)]
+    runs = runs_of([(b" " if k else b"", column, 0) for k, column in enumerate(columns)])
+    time = frame_time(motion.frame_rate)
+    header = (text + "MOTION\nFrames: ").encode(), f"\nFrame Time: {time}\n".encode()
+    template, detail = Layout(header, (Pattern(runs, b"\n"),)).build()
+    return Source("bvh", template, detail)

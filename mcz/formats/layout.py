@@ -1,0 +1,193 @@
+"""How the frames of a text file are laid out: patterns of gaps and columns, and what departs.
+
+The text of a frame follows a *pattern*: runs of columns, each token behind the run's gap, and a
+tail. AMC and BVH share this; SPEC.md, "Source reconstruction", is normative and has the tables of
+TEMPLATE, DETAIL and NOTES.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from construct import ExprValidator, Struct
+from numpy.typing import NDArray
+
+from mcz.errors import FormatError, LimitError
+from mcz.schema import SIZED, SVARINT, UVARINT, build, counted, parse
+
+FRAME_NUMBER = -1  # the column of the frame number
+MAX_PATTERNS = 1024
+MAX_WIDTH = 255
+MAX_ROW_GAPS = 2**20  # bytes of the gaps and the tail of one frame
+
+Ints = NDArray[np.int64]
+
+_WIDTH = ExprValidator(SVARINT, lambda obj, ctx: -MAX_WIDTH <= obj <= MAX_WIDTH and obj != -1)
+_BIT = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)
+
+RUN = Struct(
+    "gap" / UVARINT * "number of the gap that precedes every token of the run",
+    "column" / UVARINT * "first column: 0 the frame number, c + 1 channel c",
+    "n_columns" / UVARINT * "columns of the run, at least 1; 1 where column is 0",
+    "width" / _WIDTH * "padding: 0 none, 1 blank for no sign, w > 1 right, w < -1 left justified",
+)
+PATTERN = Struct(
+    "runs" / counted(RUN) * "the tokens of a frame, in order",
+    "tail" / UVARINT * "number of the gap that ends the frame",
+)
+TEMPLATE = Struct(
+    "header" / counted(SIZED) * "text before the frames; the frame count stands between 2 parts",
+    "gaps" / counted(SIZED) * "gaps, numbered from 0",
+    "patterns" / counted(PATTERN) * "none, or the most common pattern, which is number 0",
+)
+DETAIL = Struct(
+    "count" / SIZED * "frame count as printed; empty: the number of rows in decimal",
+    "rows" / UVARINT * "number of rows for which count holds; 0 where count is empty",
+    "gaps" / counted(SIZED) * "further gaps, numbered on from the template's",
+    "patterns" / counted(PATTERN) * "further patterns, numbered on from the template's",
+    "ends" / _BIT * "1: ending stands in place of the last row's tail; 0: the tail does",
+    "ending" / SIZED * "what follows the last token; empty where ends is 0",
+)
+@dataclass(frozen=True, slots=True)
+class Run:
+    """``n_columns`` columns from ``column`` on; their tokens follow ``gap``, padded to ``width``."""
+
+    gap: bytes
+    column: int
+    n_columns: int = 1
+    width: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    runs: tuple[Run, ...]
+    tail: bytes
+
+    @property
+    def gap_size(self) -> int:
+        """Bytes of all gaps and the tail."""
+        return sum(run.n_columns * len(run.gap) for run in self.runs) + len(self.tail)
+
+    def arrays(self) -> tuple[NDArray[np.uint8], Ints, Ints, Ints, Ints]:
+        """Gaps, start and stop of each item's gap and of the tail, columns, widths."""
+        repeats = [run.n_columns for run in self.runs]
+        sizes = np.array([*(len(run.gap) for run in self.runs), len(self.tail)], dtype=np.int64)
+        stops = np.cumsum(sizes)
+        per_item = np.repeat(np.arange(len(sizes)), [*repeats, 1])
+        ranges = [np.arange(run.column, run.column + run.n_columns) for run in self.runs]
+        return (
+            np.frombuffer(b"".join(run.gap for run in self.runs) + self.tail, np.uint8),
+            (stops - sizes)[per_item],
+            stops[per_item],
+            np.concatenate([np.empty(0, np.int64), *ranges]),
+            np.repeat(np.array([run.width for run in self.runs], dtype=np.int64), repeats),
+        )
+
+
+def runs_of(items: Iterable[tuple[bytes, int, int]]) -> tuple[Run, ...]:
+    """The runs of items (gap, column, width)."""
+    runs: list[Run] = []
+    for gap, column, width in items:
+        last = runs[-1] if runs else None
+        if last and column > 0 and (gap, column, width) == (
+            last.gap, last.column + last.n_columns, last.width,
+        ):  # fmt: skip
+            runs[-1] = Run(gap, last.column, last.n_columns + 1, width)
+        else:
+            runs.append(Run(gap, column, 1, width))
+    return tuple(runs)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A template and a detail, parsed: see TEMPLATE and DETAIL; ``ending`` None: the usual tail."""
+
+    header: tuple[bytes, ...]
+    patterns: tuple[Pattern, ...] = ()
+    count: bytes = b""
+    rows: int = 0
+    ending: bytes | None = None
+
+    def build(self) -> tuple[bytes, bytes]:
+        """The bytes of the template and of the detail."""
+        gaps: dict[bytes, int] = {}
+        fields = []
+        n_shared = 0
+        for pattern in self.patterns:
+            fields.append(_pattern_fields(pattern, gaps))
+            n_shared = n_shared or len(gaps)
+        numbered = list(gaps)
+        template = {
+            "header": self.header,
+            "gaps": numbered[:n_shared],
+            "patterns": fields[:1],
+        }
+        detail = {
+            "count": self.count,
+            "rows": self.rows,
+            "gaps": numbered[n_shared:],
+            "patterns": fields[1:],
+            "ends": int(self.ending is not None),
+            "ending": self.ending or b"",
+        }
+        return build(TEMPLATE, template, "source template"), build(DETAIL, detail, "source detail")
+
+
+def _pattern_fields(pattern: Pattern, gaps: dict[bytes, int]) -> dict[str, Any]:
+    """The fields of PATTERN; numbers its gaps in ``gaps``."""
+    runs = [
+        {
+            "gap": gaps.setdefault(run.gap, len(gaps)),
+            "column": run.column + 1,
+            "n_columns": run.n_columns,
+            "width": run.width,
+        }
+        for run in pattern.runs
+    ]
+    return {"runs": runs, "tail": gaps.setdefault(pattern.tail, len(gaps))}
+
+
+def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
+    """The layout of a clip of ``n_channels`` channels; raises FormatError on bad bytes."""
+    shared = parse(TEMPLATE, template, "source template")
+    own = parse(DETAIL, detail, "source detail")
+    if len(shared.header) not in (1, 2) or len(shared.patterns) > 1:
+        raise FormatError(
+            f"source template: {len(shared.header)} parts of a header (1 or 2), "
+            f"{len(shared.patterns)} patterns (0 or 1)"
+        )
+    if len(own.patterns) >= MAX_PATTERNS:
+        raise LimitError(f"source detail: {len(own.patterns)} patterns, limit {MAX_PATTERNS - 1}")
+    if own.patterns and not shared.patterns:
+        raise FormatError("source detail: patterns, though the template has none")
+    if (own.rows and not own.count) or (own.ending and not own.ends):
+        raise FormatError("source detail: rows without count, or ending though ends is 0")
+    gaps = [*shared.gaps, *own.gaps]
+    patterns = [
+        _pattern(fields, gaps, n_channels, f"pattern {number}")
+        for number, fields in enumerate([*shared.patterns, *own.patterns])
+    ]
+    ending = own.ending if own.ends else None
+    return Layout(tuple(shared.header), tuple(patterns), own.count, own.rows, ending)
+
+
+def _pattern(fields: Any, gaps: Sequence[bytes], n_channels: int, where: str) -> Pattern:
+    """PATTERN with its gaps in place, checked: no column twice, none beyond the channels."""
+    if any(run.gap >= len(gaps) for run in fields.runs) or fields.tail >= len(gaps):
+        raise FormatError(f"{where}: a gap beyond the last, {len(gaps) - 1}")
+    spans = sorted((run.column, run.n_columns) for run in fields.runs)
+    free = 0
+    for column, n_columns in spans:
+        if column < free or n_columns < 1 or (column == 0 and n_columns > 1):
+            raise FormatError(f"{where}: {n_columns} columns from {column}, expected {free} or more")
+        free = column + n_columns
+    if free > n_channels + 1:
+        raise FormatError(f"{where}: channel {free - 2}, but there are {n_channels}")
+    runs = [Run(gaps[r.gap], r.column - 1, r.n_columns, r.width) for r in fields.runs]
+    pattern = Pattern(tuple(runs), gaps[fields.tail])
+    if pattern.gap_size > MAX_ROW_GAPS:
+        raise LimitError(f"{where}: {pattern.gap_size} bytes of gaps a row, limit {MAX_ROW_GAPS}")
+    return pattern

@@ -1,0 +1,119 @@
+"""What departs frame by frame in the layout of a text file: the notes of AMC and BVH sources.
+
+SPEC.md, "Source reconstruction", is normative and has the table of NOTES.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+from construct import Struct
+from numpy.typing import NDArray
+
+from mcz.errors import FormatError
+from mcz.formats.layout import MAX_PATTERNS
+from mcz.schema import SIZED, UVARINT, build, counted, parse
+
+Ints = NDArray[np.int64]
+
+FRAME_NUMBER_TEXT = re.compile(rb"[-+]?[0-9]{1,32}")
+
+PATTERN_RUN = Struct(
+    "n_rows" / UVARINT * "rows one after the other, at least 1",
+    "pattern" / UVARINT * "number of their pattern",
+)
+NUMBER_TEXT = Struct(
+    "row" / UVARINT * "rows after the text before, or after the segment's first row",
+    "text" / SIZED * "the frame number as printed",
+)
+NOTES = Struct(
+    "patterns" / counted(PATTERN_RUN) * "patterns of the rows; all rows after them have pattern 0",
+    "texts" / counted(NUMBER_TEXT) * "frame numbers printed in another way than as plain decimal",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RowNotes:
+    """What departs row by row: pattern numbers (n_rows,), and odd texts of the frame number.
+
+    ``texts`` are (row, text), sorted.
+    """
+
+    patterns: Ints
+    texts: tuple[tuple[int, bytes], ...] = ()
+
+    def cut(self, start: int, stop: int) -> bytes:
+        """NOTES of rows start <= r < stop; b"" where all of them are usual."""
+        patterns = self.patterns[start:stop]
+        low, high = bisect_left(self.texts, (start,)), bisect_left(self.texts, (stop,))
+        texts = [(row - start, text) for row, text in self.texts[low:high]]
+        if not (patterns.any() or texts):
+            return b""
+        runs = [(b - a, int(patterns[a])) for a, b in _runs(patterns)]
+        if runs[-1][1] == 0:
+            runs.pop()
+        fields = {
+            "patterns": [{"n_rows": n, "pattern": pattern} for n, pattern in runs],
+            "texts": _spaced(texts),
+        }
+        return build(NOTES, fields, "source notes")
+
+
+def _runs(values: Ints) -> list[tuple[int, int]]:
+    """Start and stop of each run of equal values."""
+    edges = [0, *(np.flatnonzero(np.diff(values)) + 1).tolist(), len(values)]
+    return list(pairwise(edges))
+
+
+def _spaced(texts: Sequence[tuple[int, bytes]]) -> list[dict[str, Any]]:
+    """Fields with the distance of each row to the one before."""
+    fields = []
+    before = 0
+    for row, text in texts:
+        fields.append({"row": row - before, "text": text})
+        before = row
+    return fields
+
+
+def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
+    """The notes of (start, stop, NOTES) parts, the inverse of ``cut``; rows between are usual.
+
+    Raises FormatError where a part is not NOTES of ``stop - start`` rows.
+    """
+    n_rows = max((stop for _, stop, _ in parts), default=0)
+    patterns = np.zeros(n_rows, np.int64)
+    texts: list[tuple[int, bytes]] = []
+    for start, stop, data in sorted(parts):
+        if not data:
+            continue
+        where = f"source notes of rows {start} to {stop}"
+        fields = parse(NOTES, data, where)
+        _fill_patterns(patterns[start:stop], fields.patterns, where)
+        rows = _rows([entry.row for entry in fields.texts], stop - start, where)
+        texts += [(start + row, e.text) for row, e in zip(rows, fields.texts, strict=True)]
+    wrong = [text for _, text in texts if not FRAME_NUMBER_TEXT.fullmatch(text)]
+    if wrong:
+        raise FormatError(f"source notes: {wrong[0][:40]!r} is not a frame number")
+    return RowNotes(patterns, tuple(texts))
+
+
+def _fill_patterns(patterns: Ints, runs: Sequence[Any], where: str) -> None:
+    row = 0
+    for run in runs:
+        if run.n_rows < 1 or run.n_rows > len(patterns) - row or run.pattern >= MAX_PATTERNS:
+            raise FormatError(f"{where}: pattern {run.pattern} for {run.n_rows} rows from {row} on")
+        patterns[row : row + run.n_rows] = run.pattern
+        row += run.n_rows
+
+
+def _rows(distances: Sequence[int], n_rows: int, where: str) -> list[int]:
+    """The rows from their distances, checked: each later than the one before, and below n_rows."""
+    if 0 in distances[1:] or (distances and sum(distances) >= n_rows):
+        raise FormatError(f"{where}: rows {distances[:8]} of {n_rows}")
+    return list(accumulate(distances))

@@ -1,0 +1,88 @@
+"""Values, number grids, template, detail and notes -> the text of an AMC or BVH file.
+
+SPEC.md, "Source reconstruction", is normative.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import FormatError, LimitError
+from mcz.formats.cells import Cells
+from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, parse_layout
+from mcz.formats.notes import RowNotes
+from mcz.motion import FrameNotes, Motion, Source
+
+Ints = NDArray[np.int64]
+
+TEXT_LIMIT = 2**26  # a text may always be that large,
+TEXT_PER_CELL = 512  # or that large for each row and channel, plus one
+
+
+def restore(motion: Motion, source: Source) -> bytes:
+    """The text that ``source`` and the values of ``motion`` make.
+
+    Rows beyond the notes are laid out as usual. Values that their grid does not have are printed as its nearest number.
+
+    Raises FormatError where the source does not belong to such a motion, and LimitError for a text
+    that is larger than both limits above.
+    """
+    signal = motion.signals[0]
+    layout = parse_layout(source.template, source.detail, signal.n_channels)
+    runs = _pattern_runs(layout, source.notes, signal.n_rows)
+    numbered = any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
+    numbers = motion.frame_numbers
+    if numbers is None:
+        numbers = np.arange(1, signal.n_rows + 1)
+    cells = Cells(signal, numbers if numbered else None)
+    if numbered and isinstance(source.notes, RowNotes):
+        texts = [(r, t) for r, t in source.notes.texts if r < len(numbers) and int(t) == numbers[r]]
+        rows = np.array([row for row, _ in texts], dtype=np.int64)
+        cells.set(rows, np.full_like(rows, -1), [text for _, text in texts])
+    body = _body(cells, runs, max(TEXT_LIMIT, TEXT_PER_CELL * cells.start.size))
+    count = layout.count if layout.count and layout.rows == signal.n_rows else b"%d" % signal.n_rows
+    header = count.join(layout.header) if len(layout.header) > 1 else layout.header[0]
+    if layout.ending is None:
+        return header + body
+    return header + body[: len(body) - (len(runs[-1][0].tail) if runs else 0)] + layout.ending
+
+
+def _pattern_runs(
+    layout: Layout, notes: FrameNotes | None, n_rows: int
+) -> list[tuple[Pattern, int, int]]:
+    """(pattern, start, stop) of each run of rows."""
+    numbers = np.zeros(n_rows, np.int64)
+    if isinstance(notes, RowNotes):
+        numbers[: len(notes.patterns)] = notes.patterns[:n_rows]
+    if not n_rows:
+        return []
+    if numbers.max() >= len(layout.patterns):
+        raise FormatError(f"source notes: pattern {numbers.max()} of {len(layout.patterns)}")
+    edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), n_rows]
+    return [(layout.patterns[numbers[a]], a, b) for a, b in pairwise(edges)]
+
+
+def _body(cells: Cells, runs: list[tuple[Pattern, int, int]], limit: int) -> bytes:
+    """The text of all rows; its size is known before any of it is written."""
+    from mcz.formats import _kernels
+
+    texts = cells.texts()
+    arrays = {id(pattern): pattern.arrays() for pattern, _, _ in runs}
+    size = 0
+    for pattern, a, b in runs:
+        _, _, _, columns, widths = arrays[id(pattern)]
+        size += _kernels.measure_rows(
+            columns, widths, pattern.gap_size, texts, cells.start[a:b], cells.size[a:b]
+        )
+    if size > limit:
+        raise LimitError(f"source template: a text of {size} bytes, limit {limit}")
+    out = np.empty(size, np.uint8)
+    at = 0
+    for pattern, a, b in runs:
+        at = _kernels.fill_rows(
+            out, at, *arrays[id(pattern)], texts, cells.start[a:b], cells.size[a:b]
+        )
+    return out.tobytes()
