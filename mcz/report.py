@@ -1,0 +1,349 @@
+"""What a file says of itself: the ``info`` document, its layout byte by byte, its faults.
+
+Everything that ``mcz info`` and ``mcz verify`` print is computed here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from mcz.clip import Clip
+from mcz.container import payloads
+from mcz.container.chunks import CRC, FOOT, FRAMING, HEADER, SIGNATURE, Chunk
+from mcz.container.directory import ClipRow
+from mcz.container.reader import Container
+from mcz.container.scan import scan
+from mcz.container.segments import StreamTable
+from mcz.errors import ChecksumError, MczError, UnsupportedError
+from mcz.file import File
+from mcz.motion import Skeleton
+from mcz.schema import build
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One fault: where, under which heading of SPEC.md, and what."""
+
+    offset: int
+    heading: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """The bytes of one clip by part; see SPEC.md, "Sizes and ratios"."""
+
+    payload: int = 0
+    overhead: int = 0
+    source: int = 0
+    hashes: int = 0
+    quality: int = 0
+
+
+def info(file: File) -> dict[str, Any]:
+    """The document that ``mcz info --json`` prints; its keys are stable."""
+    container = file.container
+    clips = [_clip_info(file, clip) for clip in file.clips.values()]
+    sources = [c["source_bytes"] for c in clips if c["source_bytes"]]
+    return {
+        "format_version": file.header["format_version"],
+        "needs_version": file.header["needs_version"],
+        "profile": file.header["profile"],
+        "file_bytes": file.size,
+        "index_bytes": container.index.index_length if container.index else 0,
+        "skeletons": [_skeleton_info(container, id_, s) for id_, s in file.skeletons],
+        "clips": clips,
+        "attachments": [{"name": a.name, "bytes": a.size} for a in file.attachments.values()],
+        "aliases": sorted(file.aliases),
+        "cr_file": sum(sources) / file.size if sources else None,
+        "damage": list(file.damage),
+    }
+
+
+def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> dict[str, Any]:
+    chunk = container.directory.shared[b"SKEL", id_]
+    return {
+        "id": id_.hex(),
+        "name": skeleton.name,
+        "n_joints": skeleton.n_joints,
+        "n_channels": skeleton.n_channels,
+        "unit_cm": skeleton.unit_cm,
+        "angle_unit": skeleton.angle_unit,
+        "up_axis": skeleton.up_axis,
+        "base": skeleton.base.hex() if skeleton.base else None,
+        "chunk_bytes": chunk.size,
+        "joints": [
+            {
+                "name": joint.name,
+                "parent": joint.parent,
+                "channels": [channel.label for channel in joint.channels],
+            }
+            for joint in skeleton.joints
+        ],
+    }
+
+
+def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
+    rate = clip.frame_rate
+    sizes = clip_sizes(file.container, clip)
+    document = {
+        "name": clip.name,
+        "codec": clip.codec,
+        "codecs": [
+            {
+                "signal": s.name,
+                "id": s.codec_id,
+                "version": s.codec_version,
+                "header": s.header.hex(),
+                "segments": len(s.rows),
+                "groups": s.counts.n_groups,
+                "resolutions": s.counts.n_resolutions,
+            }
+            for s in clip.signals
+        ],
+        "skeleton": clip.skeleton_id.hex(),
+        "n_frames": clip.n_frames,
+        "n_channels": clip.n_channels,
+        "n_joints": clip.skeleton.n_joints,
+        "frame_rate": float(rate) if rate is not None else None,
+        "frame_rate_exact": clip.frame_rate_exact,
+        "metadata": dict(clip.metadata),
+        "payload_bytes": sizes.payload,
+        "overhead_bytes": sizes.overhead,
+        "source_chunk_bytes": sizes.source,
+        "hash_bytes": sizes.hashes,
+        "quality_bytes": sizes.quality,
+        **_source_info(clip),
+        **exceptions_info(file.container, clip),
+        "quality": clip.quality,
+        "damage": list(clip.damage),
+    }
+    return document | _ratios(file, clip, sizes)
+
+
+def _source_info(clip: Clip) -> dict[str, Any]:
+    source = clip.source
+    if source is None:
+        return {
+            "source_mode": "none",
+            "source_format": None,
+            "source_path": None,
+            "source_bytes": None,
+            "source_sha256": None,
+        }
+    return {
+        "source_mode": "parsed",
+        "source_format": source.format,
+        "source_path": source.path,
+        "source_bytes": source.size,
+        "source_sha256": source.sha256.hex(),
+    }
+
+
+def _ratios(file: File, clip: Clip, sizes: Sizes) -> dict[str, float | None]:
+    """The compression ratios of SPEC.md's registry; None where the numerator is unknown."""
+    coded = sizes.payload + sizes.overhead
+    try:
+        lossless = all(signal.codec.lossless for signal in clip.signals)
+    except UnsupportedError:
+        lossless = False
+    restored = coded + sizes.source + sizes.hashes if lossless else coded
+    source = clip.source.size if clip.source else 0
+    rows = sum(
+        s.layout.n_frames * s.layout.samples_per_frame * s.layout.n_channels for s in clip.signals
+    )
+    return {
+        "cr_source": source / restored if source else None,
+        "cr_float32": 4 * rows / coded if rows else None,
+        "cr_40B": 40 * clip.n_frames * clip.skeleton.n_joints / coded if rows else None,
+        "cr_file": source / file.size if source and len(file.clips) == 1 else None,
+    }
+
+
+def clip_sizes(container: Container, clip: Clip) -> Sizes:
+    """The bytes of a clip's own chunks, and of the template that it needs, by part."""
+    row = container.directory.clips[clip.name]
+    fields = clip._fields
+    payload = sum(signal_row.size for signal in clip.signals for signal_row in signal.rows)
+    tables = sum(
+        container.table(segment, signal.counts).size
+        for signal in clip.signals
+        for segment in signal.rows
+    )
+    n_chunks = 2 + sum(not segment.packet for segment in row.segments)
+    source = _source_fields_size(fields)
+    template = 0
+    if fields.source:
+        chunk = container.directory.shared.get((b"SRCE", bytes(fields.source[0].template)))
+        template = chunk.size if chunk else 0
+    cend = row.cend.length or 0 if row.cend else 0
+    hashes = 16 + 32 * (len(clip.signals) + len(fields.source))
+    clip_length = row.clip.length or 0
+    overhead = n_chunks * FRAMING + tables + clip_length - source - 16 + cend - (hashes - 16)
+    quality = sum(chunk.size for chunk in row.ancillary if chunk.type == b"QUAL")
+    return Sizes(payload - tables, overhead, template + source, hashes, quality)
+
+
+def _source_fields_size(fields: Any) -> int:
+    if not fields.source:
+        return 0
+    return len(build(payloads.CLIP_SOURCE, fields.source[0], "source"))
+
+
+def exceptions_info(container: Container, clip: Clip) -> dict[str, Any]:
+    """How many tokens are coded as exceptions, and their share."""
+    n_exceptions = n_tokens = 0
+    for signal in clip.signals:
+        n_tokens += (
+            signal.layout.n_frames * signal.layout.samples_per_frame * (signal.layout.n_channels)
+        )
+        for row in signal.rows:
+            table = container.table(row, signal.counts)
+            wanted = [
+                i
+                for g in range(signal.counts.n_groups)
+                if (i := table.group_notes(g)) is not None and table.lengths[i]
+            ]
+            if wanted:
+                _, streams = container.streams(row, signal.counts, wanted)
+                n_exceptions += sum(_count(streams[i]) for i in wanted)
+    share = n_exceptions / n_tokens if n_tokens else 0.0
+    return {"n_exceptions": n_exceptions, "exceptions_share": share}
+
+
+def _count(notes: bytes) -> int:
+    from mcz.schema import parse
+
+    return len(parse(payloads.GROUP_NOTES, notes, "group notes").exceptions)
+
+
+def layout(file: File) -> list[tuple[int, int, str]]:
+    """(offset, size, meaning) of every byte range of the file, in order, without gaps."""
+    container = file.container
+    found = scan(container.source, salvage=container.salvage)
+    places: list[tuple[int, int, str]] = [(0, len(SIGNATURE), "signature")]
+    tables = dict(_segment_tables(file))
+    for chunk in found.chunks:
+        places += _chunk_places(chunk, tables)
+    places += [(at, FOOT.size, "FOOT") for at in found.feet]
+    for at, (table, text) in tables.items():
+        if text == "packet":
+            places += _segment_places(at, table)
+    return _filled(sorted(places), file.size)
+
+
+def _filled(places: list[tuple[int, int, str]], size: int) -> list[tuple[int, int, str]]:
+    """``places`` with the ranges between them named too."""
+    filled, at = [], 0
+    for offset, length, text in [*places, (size, 0, "")]:
+        if offset > at:
+            filled.append((at, offset - at, "packet framing or damage"))
+        if length:
+            filled.append((offset, length, text))
+        at = max(at, offset + length)
+    return filled
+
+
+def _segment_tables(file: File) -> Iterator[tuple[int, tuple[StreamTable, str]]]:
+    for clip in file.clips.values():
+        for signal in clip.signals:
+            for row in signal.rows:
+                table = file.container.table(row, signal.counts)
+                yield row.offset, (table, "packet" if row.packet else "chunk")
+
+
+def _chunk_places(
+    chunk: Chunk, tables: dict[int, tuple[StreamTable, str]]
+) -> Iterator[tuple[int, int, str]]:
+    name = chunk.type.decode("latin-1")
+    yield chunk.offset, HEADER.size, f"{name} header"
+    if chunk.length is None:
+        return
+    if chunk.payload_offset in tables:
+        yield from _segment_places(chunk.payload_offset, tables[chunk.payload_offset][0])
+    elif chunk.length:
+        yield chunk.payload_offset, chunk.length, f"{name} payload"
+    yield chunk.payload_offset + chunk.length, CRC.size, f"{name} crc"
+
+
+def _segment_places(at: int, table: StreamTable) -> Iterator[tuple[int, int, str]]:
+    header = table.header
+    what = f"signal {header.signal}, frames {header.first}:{header.stop}"
+    yield at, table.size, f"stream table, {what}"
+    names = {table.frame_notes(): "frame notes"}
+    for group in range(table.counts.n_groups):
+        names[table.group_notes(group)] = f"notes of group {group}"
+        names[table.mask(group)] = f"mask of group {group}"
+        for resolution in range(table.counts.n_resolutions):
+            text = f"group {group}"
+            if table.counts.n_resolutions > 1:
+                text += f", stored resolution {resolution}"
+            names[table.codec(resolution, group)] = text
+    for index, (offset, length) in enumerate(zip(table.offsets, table.lengths, strict=True)):
+        if length:
+            yield at + offset, length, names[index]
+
+
+def validate(file: File) -> list[Problem]:
+    """Every fault of the file: structure, checksums, values, sources, index."""
+    problems = []
+    source = file.container.source
+    try:
+        found = scan(source, whole=True)
+        if file.container.index is not None and found.directory.clips.keys() != file.clips.keys():
+            problems.append(
+                Problem(
+                    file.container.index.index_offset,
+                    "INDX",
+                    "the index does not list the clips of the file",
+                )
+            )
+    except MczError as error:
+        problems.append(Problem(0, "Grammar", str(error)))
+    for id_, _ in _guarded(problems, file):
+        _check(problems, file, id_)
+    for clip in file.clips.values():
+        problems += clip_problems(file, clip)
+    for attachment in file.attachments.values():
+        try:
+            attachment.read()
+        except MczError as error:
+            offset = file.container.directory.attachments[attachment.name].parts[0].offset
+            problems.append(Problem(offset, "ATTA", str(error)))
+    return problems
+
+
+def _guarded(problems: list[Problem], file: File) -> list[tuple[bytes, Skeleton]]:
+    try:
+        return file.skeletons
+    except MczError as error:
+        problems.append(Problem(0, "SKEL", str(error)))
+        return []
+
+
+def _check(problems: list[Problem], file: File, id_: bytes) -> None:
+    try:
+        if file.skeleton(id_, with_source=True).source is not None:
+            file.skeleton_bytes(id_)
+    except MczError as error:
+        offset = file.container.directory.shared[b"SKEL", id_].offset
+        problems.append(Problem(offset, "SKEL", str(error)))
+
+
+def clip_problems(file: File, clip: Clip) -> list[Problem]:
+    """The faults of one clip: its values and its restored source."""
+    row: ClipRow = file.container.directory.clips[clip.name]
+    try:
+        for signal in clip.signals:
+            clip.read_masked(signal=signal.index)
+        if clip.source is not None:
+            clip.source_bytes()
+    except UnsupportedError as error:
+        return [Problem(row.clip.offset, "Codecs", str(error))]
+    except ChecksumError as error:
+        return [Problem(row.clip.offset, "CEND", str(error))]
+    except MczError as error:
+        return [Problem(row.clip.offset, "CLIP", str(error))]
+    return []

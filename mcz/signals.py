@@ -1,0 +1,366 @@
+"""One signal of a clip: its description, and decoding a range of its frames.
+
+Part of the joint between motion, codec and container (see ``file.py``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import by_id
+from mcz.codecs.base import Codec, Layout, Request, Span
+from mcz.container import payloads
+from mcz.container.directory import SegmentRow
+from mcz.container.limits import check
+from mcz.container.reader import Container
+from mcz.container.segments import FRESH, StreamCounts, StreamTable
+from mcz.encoding import MASK_BITS, grid_blocks
+from mcz.errors import FormatError, UnsupportedError
+from mcz.motion import Channel, Exceptions, Signal, Skeleton
+from mcz.numbers import Grid, GridKind, scan
+from mcz.schema import parse
+
+
+@dataclass(frozen=True, slots=True)
+class SignalInfo:
+    """What CLIP says of one signal, and where its segments lie."""
+
+    index: int
+    name: str
+    channels: tuple[Channel, ...] | None
+    grids: tuple[Grid, ...]
+    codec_id: int
+    codec_version: int
+    header: bytes
+    layout: Layout
+    counts: StreamCounts
+    rows: tuple[SegmentRow, ...]
+
+    @property
+    def codec(self) -> Codec:
+        """Raises UnsupportedError where this reader lacks the codec."""
+        return by_id(self.codec_id, self.codec_version)
+
+    @property
+    def is_integer(self) -> bool:
+        return bool(self.grids) and all(grid.kind == GridKind.INTEGER for grid in self.grids)
+
+    @property
+    def decoded_bytes(self) -> int:
+        return self.layout.n_frames * self.layout.samples_per_frame * self.layout.n_channels * 8
+
+
+def parse_groups(
+    fields: Any, skeleton: Skeleton | None, n_channels: int, where: str
+) -> tuple[tuple[int, ...], ...]:
+    """The channels of each group, as the ``kind`` of GROUPS defines them."""
+    if fields.kind == payloads.GROUP_ALL:
+        return (tuple(range(n_channels)),) if n_channels else ()
+    if fields.kind == payloads.GROUP_JOINT:
+        if skeleton is None:
+            raise FormatError(f"{where}: groups per joint, but the channels have no joints")
+        sizes = [len(joint.channels) for joint in skeleton.joints]
+    elif fields.kind == payloads.GROUP_CHANNEL:
+        sizes = [1] * n_channels
+    else:
+        sizes = list(fields.sizes)
+        if 0 in sizes or sum(sizes) != n_channels:
+            raise FormatError(f"{where}: groups of {sizes} channels do not make {n_channels}")
+    groups, at = [], 0
+    for size in sizes:
+        if size:
+            groups.append(tuple(range(at, at + size)))
+        at += size
+    return tuple(groups)
+
+
+def parse_grids(runs: Any, n_channels: int, where: str) -> tuple[Grid, ...]:
+    grids: list[Grid] = []
+    for run in runs:
+        if not 1 <= run.n_channels <= n_channels - len(grids):
+            raise FormatError(f"{where}: grids for more than its {n_channels} channels")
+        grids += [run.grid] * run.n_channels
+    if len(grids) != n_channels:
+        raise FormatError(f"{where}: grids for {len(grids)} of {n_channels} channels")
+    return tuple(grids)
+
+
+class SignalReader:
+    """Decodes a range of frames of some groups, each stream fetched once."""
+
+    def __init__(
+        self,
+        container: Container,
+        info: SignalInfo,
+        groups: tuple[int, ...],
+        resolution: int,
+        name: str,
+    ) -> None:
+        self.container = container
+        self.info = info
+        self.groups = groups
+        self.resolution = resolution
+        self.name = name
+        self._cache: dict[int, tuple[StreamTable, dict[int, bytes]]] = {}
+
+    def read(self, start: int, stop: int) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+        """Values and mask of frames start <= f < stop, groups side by side."""
+        info, layout = self.info, self.info.layout
+        n_columns = sum(len(layout.groups[g]) for g in self.groups)
+        n_rows = (stop - start) * layout.samples_per_frame
+        check(
+            f"clip {self.name!r}: decoded bytes",
+            n_rows * max(1, n_columns) * 8,
+            self.container.max_decoded,
+        )
+        spans = [
+            Span(
+                r.header.first,
+                r.header.n_frames,
+                r.header.lead,
+                r.header.tail,
+                bool(r.header.flags & FRESH),
+            )
+            for r in info.rows
+        ]
+        covering = self._covering(start, stop)
+        self.container.source.read_ahead(
+            (info.rows[i].chunk().offset, info.rows[i].chunk().size)
+            for i in covering
+            if not info.rows[i].packet
+        )
+        if self.container.salvage:
+            return self._salvage(spans, start, stop, n_columns)
+        coded = info.codec.decode(
+            info.header,
+            layout,
+            spans,
+            Request(start, stop, self.groups, self.resolution),
+            self._fetch,
+        )
+        return self._finish(coded, start, stop)
+
+    def _covering(self, start: int, stop: int) -> list[int]:
+        """Segments whose frames meet the range."""
+        return [
+            i
+            for i, row in enumerate(self.info.rows)
+            if row.header.first < stop and start < row.header.stop
+        ]
+
+    def _salvage(
+        self, spans: Sequence[Span], start: int, stop: int, n_columns: int
+    ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """What can be decoded segment by segment; the rest is invalid."""
+        per_frame = self.info.layout.samples_per_frame
+        values = np.full(((stop - start) * per_frame, n_columns), np.nan)
+        mask = np.zeros(values.shape, np.bool_)
+        for index in self._covering(start, stop):
+            a, b = max(start, spans[index].first), min(stop, spans[index].stop)
+            request = Request(a, b, self.groups, self.resolution)
+            try:
+                coded = self.info.codec.decode(
+                    self.info.header, self.info.layout, spans, request, self._fetch
+                )
+                part, valid = self._finish(coded, a, b)
+            except UnsupportedError:
+                raise
+            except FormatError as error:
+                self.container.damage.append(f"clip {self.name!r}, frames {a}:{b}: {error}")
+                continue
+            rows = slice((a - start) * per_frame, (b - start) * per_frame)
+            values[rows], mask[rows] = part, True if valid is None else valid
+        return values, mask
+
+    def _fetch(self, segment: int, resolution: int, group: int) -> bytes:
+        table, streams = self._streams(segment)
+        index = table.codec(resolution, group)
+        if index not in streams:  # a group that another depends upon
+            streams.update(
+                self.container.streams(self.info.rows[segment], table.counts, [index])[1]
+            )
+        return streams[index]
+
+    def _streams(self, segment: int) -> tuple[StreamTable, dict[int, bytes]]:
+        if segment not in self._cache:
+            row, counts = self.info.rows[segment], self.info.counts
+            everything = len(self.groups) == counts.n_groups and not self.resolution
+            wanted = None
+            if not everything:
+                wanted = self._wanted(self.container.table(row, counts))
+            self._cache[segment] = self.container.streams(row, counts, wanted)
+            while len(self._cache) > 4:  # neighbors only: memory is bounded by segments
+                self._cache.pop(next(iter(self._cache)))
+        return self._cache[segment]
+
+    def _wanted(self, table: StreamTable) -> list[int]:
+        stored = range(table.counts.n_resolutions - self.resolution)
+        wanted = [table.codec(r, g) for r in stored for g in self.groups]
+        for place in (table.group_notes, table.mask):
+            wanted += [i for i in map(place, self.groups) if i is not None]
+        return wanted
+
+    def _finish(
+        self, coded: NDArray[Any], start: int, stop: int
+    ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+        """Ordinals to values, exceptions and masks put in."""
+        layout = self.info.layout
+        columns = [c for g in self.groups for c in layout.groups[g]]
+        exceptions, changes = self.exceptions(start, stop, columns)
+        values = coded
+        if self.info.codec.domain == "ordinals" and not self.info.is_integer:
+            shown = (
+                Signal(
+                    np.empty(coded.shape),
+                    tuple(layout.grids[c] for c in columns),
+                    grid_changes=changes,
+                )
+                if coded.size
+                else None
+            )
+            values = _values_of(coded, shown)
+        if len(exceptions):
+            values[exceptions.rows, exceptions.channels] = _values_of_texts(
+                exceptions.texts, self.name
+            )
+        return values, self._mask(start, stop, columns)
+
+    def exceptions(
+        self, start: int, stop: int, columns: Sequence[int] | None = None
+    ) -> tuple[Exceptions, tuple[tuple[int, int, Grid], ...]]:
+        """Exceptions and grid changes of the range, rows from its start.
+
+        Channels are numbered as in ``columns``, by default as in the signal.
+        """
+        layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
+        place = {
+            c: i for i, c in enumerate(columns if columns is not None else range(layout.n_channels))
+        }
+        found: list[tuple[int, int, bytes]] = []
+        changes: dict[int, dict[int, Grid]] = {}
+        for index in self._covering(start, stop):
+            header = self.info.rows[index].header
+            table, streams = self._streams(index)
+            shift = (header.first - start) * per_frame
+            n_rows = header.n_frames * per_frame
+            row = max(0, shift)
+            for group in self.groups:
+                at = table.group_notes(group)
+                notes = _notes(
+                    streams[at] if at is not None else b"",
+                    n_rows,
+                    len(layout.groups[group]),
+                    self.name,
+                )
+                channels = [place[c] for c in layout.groups[group]]
+                for change in notes[0]:
+                    changes.setdefault(row, {})[channels[change[0]]] = change[1]
+                found += [
+                    (shift + r, channels[c], text)
+                    for r, c, text in notes[1]
+                    if 0 <= shift + r < (stop - start) * per_frame
+                ]
+            changes.setdefault(row, {})
+        found.sort()
+        exceptions = Exceptions(
+            np.array([f[0] for f in found], np.int64),
+            np.array([f[1] for f in found], np.int64),
+            tuple(f[2] for f in found),
+        )
+        baseline = [layout.grids[c] for c in place]
+        return exceptions, _as_changes(changes, baseline)
+
+    def _mask(self, start: int, stop: int, columns: Sequence[int]) -> NDArray[np.bool_] | None:
+        layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
+        mask: NDArray[np.bool_] | None = None
+        for index in self._covering(start, stop):
+            header = self.info.rows[index].header
+            table, streams = self._streams(index)
+            if table.mask(0) is None:
+                continue
+            a, b = max(start, header.first), min(stop, header.stop)
+            rows = slice((a - start) * per_frame, (b - start) * per_frame)
+            cut = slice((a - header.first) * per_frame, (b - header.first) * per_frame)
+            at = 0
+            for group in self.groups:
+                n = len(layout.groups[group])
+                data = streams[table.mask(group) or 0]
+                if data:
+                    if mask is None:
+                        mask = np.ones(((stop - start) * per_frame, len(columns)), np.bool_)
+                    bits = _unpack_mask(data, header.n_frames * per_frame, n, self.name)
+                    mask[rows, at : at + n] = bits[cut]
+                at += n
+        return mask
+
+
+def _values_of(ordinals: NDArray[np.int64], shown: Signal | None) -> NDArray[np.float64]:
+    values = np.empty(ordinals.shape)
+    if shown is not None:
+        for rows, columns, grid in grid_blocks(shown):
+            block = np.ascontiguousarray(ordinals[rows][:, columns])
+            values[rows, columns] = grid.values(block.reshape(-1)).reshape(block.shape)
+    return values
+
+
+def _as_changes(
+    rows: Mapping[int, Mapping[int, Grid]], baseline: Sequence[Grid]
+) -> tuple[tuple[int, int, Grid], ...]:
+    """Grids stated segment by segment as changes from the row before."""
+    current = list(baseline)
+    changes = []
+    for row in sorted(rows):
+        for channel, grid in enumerate(baseline):
+            wanted = rows[row].get(channel, grid)
+            if wanted != current[channel]:
+                changes.append((row, channel, wanted))
+                current[channel] = wanted
+    return tuple(changes)
+
+
+def _notes(
+    data: bytes, n_rows: int, n_channels: int, name: str
+) -> tuple[list[tuple[int, Grid]], list[tuple[int, int, bytes]]]:
+    """Grid changes (channel, grid) and exceptions (row, channel, text) of one group."""
+    if not data:
+        return [], []
+    where = f"clip {name!r}, group notes"
+    fields = parse(payloads.GROUP_NOTES, data, where)
+    row, last, exceptions = 0, (-1, -1), []
+    for e in fields.exceptions:
+        row += e.row
+        if row >= n_rows or e.channel >= n_channels or (row, e.channel) <= last:
+            raise FormatError(f"{where}: exception at row {row}, channel {e.channel}")
+        last = row, e.channel
+        exceptions.append((row, e.channel, bytes(e.text)))
+    changes = [(c.channel, c.grid) for c in fields.grid_changes]
+    channels = [channel for channel, _ in changes]
+    if channels != sorted(set(channels)) or any(c >= n_channels for c in channels):
+        raise FormatError(f"{where}: grid changes of channels {channels}")
+    return changes, exceptions
+
+
+def _unpack_mask(data: bytes, n_rows: int, n_channels: int, name: str) -> NDArray[np.bool_]:
+    size = (n_rows * n_channels + 7) // 8
+    if len(data) != size:
+        raise FormatError(f"clip {name!r}: a mask of {len(data)} bytes, not {size}")
+    bits = np.unpackbits(np.frombuffer(data, "u1"), bitorder=MASK_BITS)
+    if bits[n_rows * n_channels :].any():
+        raise FormatError(f"clip {name!r}: a mask has bits after its last")
+    return bits[: n_rows * n_channels].astype(np.bool_).reshape(n_rows, n_channels)
+
+
+def _values_of_texts(texts: Sequence[bytes], name: str) -> NDArray[np.float64]:
+    """The numbers that exceptions spell; raises FormatError where one is none."""
+    stops = np.cumsum([len(text) + 1 for text in texts]) - 1
+    starts = stops - [len(text) for text in texts]
+    tokens = scan(b" ".join(texts), starts, stops)
+    bad = np.flatnonzero(tokens.bad())
+    if len(bad):
+        raise FormatError(f"clip {name!r}: exception {texts[bad[0]][:40]!r} is not a number")
+    return tokens.values()
