@@ -146,7 +146,7 @@ def match(
                 good = good and (mantissa == 0 or low <= index < high)
                 magnitude = _general(mantissa, index, digits) if good else 0
             else:
-                magnitude = _scaled(mantissa, decimals - places, limit)
+                magnitude = _scaled(mantissa, decimals - places, limit) if good else 0
         if digits and mantissa and (shape >> SIGNIFICANT) & 31 > digits:
             good = False
         if not good or magnitude < 0 or magnitude > limit:

@@ -76,8 +76,9 @@ def uncertain(tokens: Tokens, kind: GridKind, digits: int, printed: Bools) -> Bo
     digits_kept, far = (6, 30) if kind == GridKind.TEXT32 else (15, 290)
     if digits > _JAVASCRIPT:
         return printed | long(tokens)
-    many = (shape >> loops.SIGNIFICANT & 31) > digits_kept
-    return (printed & (many | (np.abs(power) > far))) | long(tokens)
+    many: Bools = (shape >> loops.SIGNIFICANT & 31) > digits_kept
+    many |= np.abs(power) > far
+    return (printed & many) | long(tokens)
 
 
 def long(tokens: Tokens) -> Bools:

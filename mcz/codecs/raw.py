@@ -32,7 +32,7 @@ TARGET_BYTES = 60_000  # of a segment: under the 64 KiB that DATA should have, t
 MAX_ROWS = 2**20
 
 # Each channel of a stream, as SPEC.md's table has it: (name, type, meaning).
-FIELDS = (
+RAW_FIELDS = (
     ("least", "8 bytes", "least ordinal, two's complement: low u32, then high u32"),
     ("width", "u8", "bytes of each offset, 0 to 8"),
     ("offsets", "width bytes each", "ordinal - least of every row, modulo 2^64"),

@@ -19,7 +19,7 @@ from mcz.schema import build, deflate, inflate, parse, read_varint, varint
 PACKET = 128  # set in the indexed flags of a segment that is a packet of an open DATA
 
 # Each segment in the "segments" field of an indexed clip: (name, type, meaning).
-SEGMENT_FIELDS = (
+INDEXED_SEGMENT_FIELDS = (
     ("gap", "varint", "bytes between the end of the chunk or packet before and this payload"),
     ("size", "varint", "bytes of the payload"),
     ("signal", "varint", "index of the signal"),
@@ -205,7 +205,7 @@ def _parse_segments(data: bytes, end: int, n_signals: int, name: str) -> Iterabl
     at, first = 0, [0] * n_signals
     while at < len(data):
         fields = []
-        for _ in SEGMENT_FIELDS:
+        for _ in INDEXED_SEGMENT_FIELDS:
             value, at = read_varint(data, at)
             fields.append(value)
         gap, size, signal, n_frames, lead, tail, flags = fields

@@ -17,7 +17,7 @@ from mcz.schema import varint
 END, SEGMENT, CODEC = 0, 1, 2  # kinds, bits 0 to 3 of the first byte
 FRESH = 0x80  # the packet needs none before it
 
-FIELDS = (
+PACKET_FIELDS = (
     ("kind", "u8", "bits 0-3: 0 end, 1 segment, 2 codec's own; bit 7: starts fresh; others 0"),
     ("sequence", "varint", "number of the packet in its chunk, from 0"),
     ("length", "varint", "bytes of the body"),

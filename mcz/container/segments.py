@@ -17,7 +17,7 @@ FRESH, FRAME_NOTES, GROUP_NOTES, MASKS = 1, 2, 4, 8
 KNOWN_FLAGS = 15
 
 # The fields before the table, as SPEC.md's table has them: (name, type, meaning).
-FIELDS = (
+SEGMENT_HEADER_FIELDS = (
     ("signal", "varint", "index of the signal in CLIP"),
     ("first_frame", "varint", "first frame of the segment"),
     ("n_frames", "varint", "frames of the segment, at least 1"),

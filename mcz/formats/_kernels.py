@@ -54,7 +54,7 @@ def _number(text: Bytes, start: int, stop: int) -> int:
     for k in range(start, stop):
         if text[k] < ZERO or text[k] > NINE:
             return -1
-        value = value * 10 + (np.int64(text[k]) - ZERO)
+        value = value * 10 + (int(text[k]) - ZERO)
     return value
 
 
@@ -77,7 +77,7 @@ def _begins_frame(text: Bytes, at: int) -> bool:
 
 @kernel
 def _match_token(text: Bytes, at: int, width: int) -> tuple[int, int, int]:
-    """Start and stop of the token at ``at`` and the offset after its padding; start -1: no match."""
+    """Start and stop of the token at ``at`` and the offset after its padding; start -1: none."""
     fail = (-1, -1, -1)
     blanks = 0
     if width > 0:
@@ -158,13 +158,13 @@ def measure_rows(
     columns: Ints, widths: Ints, gap_size: int, texts: Bytes, start: Ints, size: Ints
 ) -> int:
     """Bytes of rows of one pattern whose gaps and tail take ``gap_size``; see ``fill_rows``."""
-    total = gap_size * start.shape[0]
+    total = gap_size * len(start)
     for k in range(len(columns)):
         column = columns[k]
         for row in range(start.shape[0]):
-            total += size[row, column]
+            total += int(size[row, column])
             if widths[k]:
-                total += _pad(texts[start[row, column]], size[row, column], widths[k])
+                total += int(_pad(texts[start[row, column]], size[row, column], widths[k]))
     return total
 
 

@@ -166,23 +166,23 @@ def _joints(reader: _Reader) -> tuple[Joint, ...]:
         if bone is None or (parent != "root" and parent not in reader.bones):
             raise SourceError(f"hierarchy: {parent} {child}: no such bone")
         if bone.parent is not None:
-            raise SourceError(f"hierarchy: bone {child} has two parents, {bone.parent} and {parent}")
+            raise SourceError(
+                f"hierarchy: bone {child} has two parents, {bone.parent} and {parent}"
+            )
         bone.parent = parent
     root = reader.root
     channels = tuple(dof_channel(dof) for dof in root.dofs)
-    joints = [
-        Joint("root", -1, reader.position, (), root.axis, root.axis_order, channels)
-    ]
+    joints = [Joint("root", -1, reader.position, (), root.axis, root.axis_order, channels)]
     indices = {"root": 0}
     for bone in _parents_first(list(reader.bones.values())):
-        parent = indices[bone.parent] if bone.parent is not None else -1
-        offset = joints[parent].tails[0] if parent > 0 else ORIGIN
+        above = indices[bone.parent] if bone.parent is not None else -1
+        offset = joints[above].tails[0] if above > 0 else ORIGIN
         x, y, z = bone.direction
         tail = (x * bone.length, y * bone.length, z * bone.length)
         channels = tuple(dof_channel(dof) for dof in bone.dofs)
         indices[bone.name] = len(joints)
         joints.append(
-            Joint(bone.name, parent, offset, (tail,), bone.axis, bone.axis_order, channels)
+            Joint(bone.name, above, offset, (tail,), bone.axis, bone.axis_order, channels)
         )
     return tuple(joints)
 

@@ -8,12 +8,12 @@ missing, from the file or from some frames.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from mcz.errors import MotionError, SourceError
-from mcz.formats.bones import flat, fit
+from mcz.formats.bones import fit, flat
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.notes import RowNotes
 from mcz.formats.restore import restore
@@ -129,7 +129,7 @@ class _Frames:
         return SourceError(f"line {line_of(self.data, at)}: {message}")
 
 
-def _word_lines(data: bytes, at: int):
+def _word_lines(data: bytes, at: int) -> Iterator[list[re.Match[bytes]]]:
     """The words of every line from ``at`` on that is neither blank nor a comment."""
     for line in _LINES.finditer(data, at):
         words = list(_WORDS.finditer(data, *line.span()))

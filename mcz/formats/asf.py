@@ -115,5 +115,7 @@ def _checked(skeleton: Skeleton) -> tuple[Joint, ...]:
     for joint in joints[1:]:
         tails = joints[joint.parent].tails if joint.parent > 0 else (ORIGIN,)
         if len(joint.tails) != 1 or joint.offset != tails[0]:
-            raise MotionError(f"ASF needs joint {joint.name!r} at its parent's tail, with one of its own")
+            raise MotionError(
+                f"ASF needs joint {joint.name!r} at its parent's tail, with one of its own"
+            )
     return joints

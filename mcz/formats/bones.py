@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import degrees, radians
 
-from mcz.motion import ROTATION_KINDS, Channel, Joint, Skeleton, Vector
+from mcz.motion import ROTATION_KINDS, Channel, Joint, Skeleton
 
 Columns = dict[str, int]  # bone -> column of its first value
 
@@ -18,13 +18,11 @@ def flat(counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]
     return skeleton, _columns(skeleton, {name: name for name in counts})
 
 
-def fit(
-    skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str
-) -> tuple[Skeleton, Columns]:
+def fit(skeleton: Skeleton, counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]:
     """``skeleton``, or one derived from it where its channels are not those of the bones."""
     names = match_names(skeleton, counts)
-    channels = {joint.name: len(joint.channels) for joint in skeleton.joints}
-    fits = all(names[bone] is not None and channels[names[bone]] == n for bone, n in counts.items())
+    channels: dict[str | None, int] = {j.name: len(j.channels) for j in skeleton.joints}
+    fits = all(channels.get(names[bone]) == count for bone, count in counts.items())
     if not fits or angle_unit != skeleton.angle_unit:
         skeleton = derive(skeleton, counts, angle_unit)
         names = match_names(skeleton, counts)
@@ -37,12 +35,12 @@ def match_names(skeleton: Skeleton, bones: Mapping[str, int]) -> dict[str, str |
     folded: dict[str, list[str]] = {}
     for name in joints:
         folded.setdefault(name.casefold(), []).append(name)
-    taken = joints & bones.keys()
+    taken: set[str | None] = {*(joints & bones.keys())}
     result: dict[str, str | None] = {}
     for bone in bones:
         alike = [name for name in folded.get(bone.casefold(), []) if name not in taken]
         result[bone] = bone if bone in joints else alike[0] if len(alike) == 1 else None
-        taken = taken | {result[bone]} - {None}
+        taken.add(result[bone])
     return result
 
 

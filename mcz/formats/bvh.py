@@ -17,7 +17,7 @@ from mcz.formats.hierarchy import read_hierarchy, write_hierarchy
 from mcz.formats.layout import Layout, Pattern, runs_of
 from mcz.formats.rates import frame_rate, frame_time
 from mcz.formats.restore import restore
-from mcz.formats.rows import Rows, Token, line_of, read_rows, tail_end
+from mcz.formats.rows import Token, line_of, read_rows, tail_end
 from mcz.formats.signals import read_signal
 from mcz.formats.sources import source_of, text_encoding
 from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton, Source
@@ -34,9 +34,9 @@ def read(data: bytes, name: str = "motion") -> Motion:
     Length unit and up axis are unknown. Raises SourceError, with the number of the line.
     """
     encoding = text_encoding(data)
-    joints, at = read_hierarchy(data, encoding)
-    count, time, body = _motion_section(data, at, sum(len(j.channels) for j in joints))
+    joints, at, n_strays = read_hierarchy(data, encoding)
     n_columns = sum(len(joint.channels) for joint in joints)
+    count, time, body = _motion_section(data, at, n_columns)
     rows = read_rows(data, body, n_columns, _Frames(data, n_columns))
     signal = read_signal(data, rows)
     skeleton = Skeleton(_with_positions(joints, signal.values), unit_cm=None)
@@ -48,9 +48,22 @@ def read(data: bytes, name: str = "motion") -> Motion:
         rate,
         exact,
         name,
-        {"name-encoding": "latin-1"} if encoding != "utf-8" else {},
+        _notes(encoding, n_strays, data[slice(*count)], rows.n_rows),
         source_of("bvh", data, header, rows, data[slice(*count)]),
     )
+
+
+def _notes(encoding: str, n_strays: int, count: bytes, n_rows: int) -> dict[str, str]:
+    """What is odd about the file, as metadata."""
+    metadata = {"name-encoding": encoding} if encoding != "utf-8" else {}
+    notes = []
+    if (count.lstrip(b"0") or b"0") != b"%d" % n_rows:
+        notes.append(f"{count[:40].decode('latin-1')} frames are declared, {n_rows} are there")
+    if n_strays:
+        notes.append(f"{n_strays} words that belong nowhere follow the joints")
+    if notes:
+        metadata["source-note"] = "; ".join(notes)
+    return metadata
 
 
 def _motion_section(
@@ -84,7 +97,9 @@ class _Frames:
             if match[0][:1] == b"#":
                 continue
             if not self.n_columns:
-                raise SourceError(f"line {line_of(self.data, match.start())}: no joint has channels")
+                raise SourceError(
+                    f"line {line_of(self.data, match.start())}: no joint has channels"
+                )
             tokens.append((*match.span(), len(tokens)))
             if len(tokens) == self.n_columns:
                 return tokens, tail_end(self.data, match.end())
@@ -110,7 +125,9 @@ def _with_positions(joints: list[Joint], values: NDArray[np.float64]) -> tuple[J
     for index, joint in enumerate(joints):
         kinds = [channel.kind for channel in joint.channels]
         columns = [column + k for k, kind in enumerate(kinds) if kind in POSITION_KINDS]
-        offset = [joint.offset[POSITION_KINDS.index(kind)] for kind in kinds if kind in POSITION_KINDS]
+        offset = [
+            joint.offset[POSITION_KINDS.index(kind)] for kind in kinds if kind in POSITION_KINDS
+        ]
         column += len(kinds)
         if not columns or not len(values):
             continue

@@ -64,7 +64,9 @@ class Cells:
         self.size[rows, columns] = np.diff(texts.offsets).reshape(shape)
         self._append(texts.buffer)
 
-    def _print(self, grid: Grid, values: NDArray[np.float64], rows: slice, columns: Columns) -> None:
+    def _print(
+        self, grid: Grid, values: NDArray[np.float64], rows: slice, columns: Columns
+    ) -> None:
         """Print values by the nearest number of their grid, and by repr where they lie beyond it."""
         if not grid.is_text:
             grid = SHORTEST

@@ -40,6 +40,7 @@ class _Reader:
     data: bytes
     at: int = 0
     joints: list[_Node] = field(default_factory=list)
+    strays: int = 0
 
     def word(self) -> bytes:
         """The next word or brace, b"" at the end."""
@@ -61,8 +62,10 @@ class _Reader:
         while (word := self.word().upper()) != b"MOTION" or open_nodes:
             if word in (b"ROOT", b"JOINT", b"END"):
                 open_nodes.append(self._begin(word, open_nodes[-1][0] if open_nodes else -1))
+            elif not word:
+                raise self.error("the file ends within the HIERARCHY section")
             elif not open_nodes:
-                raise self.error(f"{word[:40]!r}, where ROOT or MOTION was expected")
+                self.strays += 1  # remains of a longer file that was written over
             elif word == b"OFFSET":
                 open_nodes[-1][1].offset = self._vector()
             elif word == b"CHANNELS" and not open_nodes[-1][1].end:
@@ -106,14 +109,22 @@ class _Reader:
             raise self.error(f"CHANNELS {count[:40]!r}: not a count")
         for k in range(int(count)):
             word = self.word()
-            known = word.upper() in (b"", b"{", b"}", b"ROOT", b"JOINT", b"END", b"OFFSET", b"MOTION")
+            known = word.upper() in (
+                b"",
+                b"{",
+                b"}",
+                b"ROOT",
+                b"JOINT",
+                b"END",
+                b"OFFSET",
+                b"MOTION",
+            )
             if known:
                 raise self.error(f"CHANNELS {int(count)}, but {k} channels are named")
             yield channel(word.decode("latin-1"))
         after = self.at
-        word = self.word().decode("latin-1")
-        if channel(word).kind:
-            raise self.error(f"CHANNELS {int(count)}, but more are named: {word}")
+        if channel(self.word().decode("latin-1")).kind:
+            raise self.error(f"CHANNELS {int(count)}, but more are named")
         self.at = after
 
 
@@ -123,10 +134,11 @@ def channel(name: str) -> Channel:
     return Channel(kind) if kind in _NAMES else Channel("", name)
 
 
-def read_hierarchy(data: bytes, encoding: str) -> tuple[list[Joint], int]:
-    """The joints, in definition order, and the offset after the word MOTION.
+def read_hierarchy(data: bytes, encoding: str) -> tuple[list[Joint], int, int]:
+    """The joints, in definition order, the offset after MOTION, and the number of stray words.
 
-    Position channels are taken to add to the offset: only the values can tell.
+    These stand where the joints of all roots are closed and nothing belongs. Position channels
+    are taken to add to the offset: only the values can tell.
     """
     reader = _Reader(data)
     reader.read()
@@ -140,7 +152,7 @@ def read_hierarchy(data: bytes, encoding: str) -> tuple[list[Joint], int]:
         )
         for node in reader.joints
     ]
-    return joints, reader.at
+    return joints, reader.at, reader.strays
 
 
 def write_hierarchy(skeleton: Skeleton) -> tuple[str, list[int]]:
@@ -195,8 +207,9 @@ def _check(skeleton: Skeleton, joint: Joint) -> None:
     if any(joint.axis):
         raise MotionError(f"BVH has no axis, as joint {name!r} has: {joint.axis}")
     for c in joint.channels:
-        if channel(_NAMES.get(c.kind, c.name)) != c:
+        word = _NAMES.get(c.kind, c.name)
+        if channel(word) != c or _WORD.fullmatch(word.encode()) is None:
             raise MotionError(f"BVH cannot hold channel {c.label!r} of joint {name!r}")
     turns = sum(c.kind in ("rx", "ry", "rz") for c in joint.channels)
-    if turns and skeleton.angle_unit == "rad" or turns > 1 and not skeleton.intrinsic:
+    if (turns and skeleton.angle_unit == "rad") or (turns > 1 and not skeleton.intrinsic):
         raise MotionError(f"BVH rotates in degrees about turned axes; joint {name!r} does not")

@@ -51,6 +51,8 @@ DETAIL = Struct(
     "ends" / _BIT * "1: ending stands in place of the last row's tail; 0: the tail does",
     "ending" / SIZED * "what follows the last token; empty where ends is 0",
 )
+
+
 @dataclass(frozen=True, slots=True)
 class Run:
     """``n_columns`` columns from ``column`` on; their tokens follow ``gap``, padded to ``width``."""
@@ -182,7 +184,9 @@ def _pattern(fields: Any, gaps: Sequence[bytes], n_channels: int, where: str) ->
     free = 0
     for column, n_columns in spans:
         if column < free or n_columns < 1 or (column == 0 and n_columns > 1):
-            raise FormatError(f"{where}: {n_columns} columns from {column}, expected {free} or more")
+            raise FormatError(
+                f"{where}: {n_columns} columns from {column}, expected {free} or more"
+            )
         free = column + n_columns
     if free > n_channels + 1:
         raise FormatError(f"{where}: channel {free - 2}, but there are {n_channels}")

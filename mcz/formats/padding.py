@@ -53,6 +53,8 @@ def _width(tokens: Sequence[bytes], blanks: Sequence[int]) -> int:
         width = max(n - fixed + len(token) for token, n in zip(tokens, blanks, strict=True))
         for guess in (width, 1):
             pads = [padding(token, guess) for token in tokens]
-            if guess <= MAX_WIDTH and all(n - fixed == p for n, p in zip(blanks, pads, strict=True)):
+            if guess <= MAX_WIDTH and all(
+                n - fixed == p for n, p in zip(blanks, pads, strict=True)
+            ):
                 return guess
     return 0

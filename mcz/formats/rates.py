@@ -38,5 +38,5 @@ def frame_rate(frame_time: str) -> tuple[Fraction | None, bool]:
 
 
 def frame_time(rate: Fraction | None) -> str:
-    """The seconds a frame takes, as the shortest decimal that gives the same binary64; 0: unknown."""
+    """The seconds a frame takes, as the shortest decimal of its binary64; 0 where unknown."""
     return "0" if rate is None else repr(float(1 / rate))

@@ -25,7 +25,8 @@ TEXT_PER_CELL = 512  # or that large for each row and channel, plus one
 def restore(motion: Motion, source: Source) -> bytes:
     """The text that ``source`` and the values of ``motion`` make.
 
-    Rows beyond the notes are laid out as usual. Values that their grid does not have are printed as its nearest number.
+    Rows beyond the notes are laid out as usual. A value that its grid does not have is printed as
+    the nearest number of the grid.
 
     Raises FormatError where the source does not belong to such a motion, and LimitError for a text
     that is larger than both limits above.
@@ -39,7 +40,8 @@ def restore(motion: Motion, source: Source) -> bytes:
         numbers = np.arange(1, signal.n_rows + 1)
     cells = Cells(signal, numbers if numbered else None)
     if numbered and isinstance(source.notes, RowNotes):
-        texts = [(r, t) for r, t in source.notes.texts if r < len(numbers) and int(t) == numbers[r]]
+        odd = (entry for entry in source.notes.texts if entry[0] < signal.n_rows)
+        texts = [(row, text) for row, text in odd if int(text) == numbers[row]]
         rows = np.array([row for row, _ in texts], dtype=np.int64)
         cells.set(rows, np.full_like(rows, -1), [text for _, text in texts])
     body = _body(cells, runs, max(TEXT_LIMIT, TEXT_PER_CELL * cells.start.size))

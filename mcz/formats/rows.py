@@ -93,7 +93,9 @@ class _Reader:
     numbers: Ints = field(init=False)
     row: int = 0
     patterns: list[Pattern] = field(default_factory=list)
-    arrays: list[tuple[Ints, ...]] = field(default_factory=list)  # of each pattern
+    arrays: list[tuple[NDArray[np.uint8], Ints, Ints, Ints, Ints]] = field(
+        default_factory=list
+    )  # of each pattern
     ids: dict[object, int] = field(default_factory=dict)  # of items and tail, and of items alone
     used: list[tuple[int, int]] = field(default_factory=list)  # (first row, pattern) of each run
     number_texts: list[tuple[int, bytes]] = field(default_factory=list)
@@ -144,7 +146,7 @@ class _Reader:
             new[: len(array)] = array
 
     def _learn(self, at: int, tokens: list[Token], end: int) -> int:
-        """Note the row's tokens and its pattern, a new one if need be; returns its last token's end."""
+        """Note the tokens of a row and its pattern; returns where its last token ends."""
         for start, stop, column in tokens:
             if column == FRAME_NUMBER:
                 self._number(self.data[start:stop])

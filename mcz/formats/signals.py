@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +16,7 @@ from mcz.numbers import Grid, Tokens, choose_grid, scan
 
 Bools = NDArray[np.bool_]
 
+CANDIDATES = 8  # grids of single columns that are tried on all of them
 BLOCK = 512  # rows that may have a grid of their own
 WORTH = 32  # exceptions that a change of grid must save
 
@@ -58,21 +63,29 @@ def _grids(
     tokens: Tokens, column: NDArray[np.int64], row: NDArray[np.int64], n_columns: int
 ) -> tuple[tuple[Grid, ...], tuple[tuple[int, int, Grid], ...], Bools]:
     """The grid of every column, its changes, and which tokens the grids print."""
-    if len(tokens) == 0:
-        return (choose_grid(tokens),) * n_columns, (), np.ones(0, np.bool_)
-    grid = choose_grid(tokens)
-    printed = grid.ordinals_of_tokens(tokens)[1]
+    common = choose_grid(tokens)
+    printed = common.ordinals_of_tokens(tokens)[1]
     if printed.all():
-        return (grid,) * n_columns, (), printed
+        return (common,) * n_columns, (), printed
     order = np.argsort(column, kind="stable")  # column by column, rows in order
     edges = np.searchsorted(column[order], np.arange(n_columns + 1))
+    mine = [order[a:b] for a, b in pairwise(edges)]
+    common = _common_grid(tokens, [choose_grid(tokens[chosen]) for chosen in mine], common)
     grids, changes = [], []
-    for c in range(n_columns):
-        mine = order[edges[c] : edges[c + 1]]
-        first, more, printed[mine] = _column(tokens[mine], row[mine], grid)
-        grids.append(first)
+    for c, chosen in enumerate(mine):
+        grid, more, printed[chosen] = _column(tokens[chosen], row[chosen], common)
+        grids.append(grid)
         changes += [(at, c, change) for at, change in more]
     return tuple(grids), tuple(sorted(changes, key=lambda change: change[:2])), printed
+
+
+def _common_grid(tokens: Tokens, grids: Sequence[Grid], guess: Grid) -> Grid:
+    """The grid that prints most tokens, of ``guess`` and the most frequent of ``grids``."""
+    frequent = [grid for grid, _ in Counter(grids).most_common(CANDIDATES)]
+    return max(
+        (guess, *frequent),
+        key=lambda grid: np.count_nonzero(grid.ordinals_of_tokens(tokens)[1]),
+    )
 
 
 def _column(
@@ -80,15 +93,11 @@ def _column(
 ) -> tuple[Grid, list[tuple[int, Grid]], Bools]:
     """The grid of one column, its changes (row, grid), and which tokens are printed.
 
-    ``common`` is kept where it prints them all, so that columns share a grid where they can.
+    ``common`` is kept where no grid does better, so that columns share a grid where they can.
     """
-    printed = common.ordinals_of_tokens(tokens)[1]
-    if printed.all():
-        return common, [], printed
-    grid = choose_grid(tokens)
+    grid = choose_grid(tokens, prefer=(common,))
     printed = grid.ordinals_of_tokens(tokens)[1]
-    n_odd = np.count_nonzero(~printed)
-    if n_odd < WORTH:
+    if np.count_nonzero(~printed) < WORTH:
         return grid, [], printed
     return _by_blocks(tokens, row, grid, printed)
 

@@ -1,4 +1,4 @@
-"""What AMC and BVH share beside the frames: the Source of a file that was read, and its encoding."""
+"""The Source of a text file that was read, and its encoding."""
 
 from __future__ import annotations
 

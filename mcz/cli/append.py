@@ -1,0 +1,43 @@
+"""``mcz append``: more source files into an .mcz file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from mcz.cli.common import Exit, Failure, about, existing
+from mcz.cli.options import chosen, encoding_options, json_option
+from mcz.cli.outcomes import conclude
+from mcz.cli.progress import Progress
+
+
+@click.command()
+@click.argument("sources", metavar="SRC...", nargs=-1, required=True, type=click.Path())
+@click.argument("target", metavar="FILE.mcz", type=click.Path())
+@click.option("--skeleton", metavar="FILE.asf", type=click.Path(), help="The ASF of the AMCs.")
+@encoding_options
+@json_option
+def command(
+    sources: tuple[str, ...], target: str, skeleton: str | None, as_json: bool, **options: Any
+) -> Exit:
+    """Append SRC... to FILE.mcz; when one of them cannot be added, none is.
+
+    What the file held stays readable at every moment, even if the computer stops in between.
+    """
+    import mcz
+
+    for path in (*sources, target):
+        existing(path)
+    if "-" in sources:
+        raise Failure("append reads files, not standard input", Exit.USAGE)
+    with about(target, *sources), Progress() as progress:
+        report = mcz.append(
+            sources, target, skeleton=skeleton, progress=progress, **_known(chosen(**options))
+        )
+    return conclude(report, target, as_json)
+
+
+def _known(options: dict[str, Any]) -> dict[str, Any]:
+    """Without --archive: the file's own profile stays."""
+    return {key: value for key, value in options.items() if key != "archive"}

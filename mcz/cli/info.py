@@ -1,0 +1,228 @@
+"""``mcz info`` and ``mcz-info``: what a file holds and what each part of it costs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import click
+
+from mcz.cli.common import (
+    EXIT_CODES,
+    Exit,
+    opened,
+    plural,
+    print_json,
+    printable,
+    run,
+    say,
+    table,
+)
+from mcz.cli.options import json_option
+
+FEW = 4  # clips that are shown in full; more are shown as a table
+PARTS = ("payload", "overhead", "source_chunk", "hash", "quality")
+RATIOS = (
+    ("cr_source", "source file"),
+    ("cr_float32", "float32 a channel"),
+    ("cr_40B", "40 bytes a joint-frame"),
+    ("cr_file", "source file / whole file"),
+)
+
+
+@click.command(epilog=EXIT_CODES)
+@click.argument("file", metavar="FILE.mcz", type=click.Path())
+@json_option
+@click.option("--layout", "show_layout", is_flag=True, help="What every range of bytes means.")
+@click.option(
+    "--validate",
+    "check",
+    is_flag=True,
+    help="Check everything; name the offset and SPEC.md's heading of each fault.",
+)
+def command(file: str, as_json: bool, show_layout: bool, check: bool) -> Exit:
+    """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz."""
+    from mcz import report
+
+    with opened(file) as held:
+        if check:
+            problems = report.validate(held)
+            return _say_problems(file, held.size, problems, as_json)
+        if show_layout:
+            places = report.layout(held)
+        else:
+            document = report.info(held)
+    if show_layout:
+        _print_layout(places, as_json)
+    elif as_json:
+        print_json(document)
+    else:
+        click.echo("\n".join(printable(line) for line in lines(file, document)))
+    return Exit.FINE
+
+
+def _say_problems(file: str, size: int, problems: list[Any], as_json: bool) -> Exit:
+    if as_json:
+        rows = [{"offset": p.offset, "heading": p.heading, "message": p.message} for p in problems]
+        print_json({"valid": not problems, "problems": rows})
+    elif not problems:
+        click.echo(printable(f"{file}: valid, {size:,} bytes"))
+    else:
+        for p in problems:
+            say(f'{file}: at {p.offset}: {p.message} (SPEC.md, "{p.heading}")')
+    return Exit.NOT_VERIFIED if problems else Exit.FINE
+
+
+def _print_layout(places: list[tuple[int, int, str]], as_json: bool) -> None:
+    if as_json:
+        print_json([{"offset": at, "bytes": n, "meaning": text} for at, n, text in places])
+        return
+    rows = [[f"{at}", f"{n}", printable(text)] for at, n, text in places]
+    click.echo(table([["offset", "bytes", "meaning"], *rows], "rrl"))
+
+
+def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
+    """The text that people read, without line ends."""
+    held = [plural(len(document["clips"]), "clip"), plural(len(document["skeletons"]), "skeleton")]
+    if document["attachments"]:
+        held.append(plural(len(document["attachments"]), "attachment"))
+    yield (
+        f"{file}: MCZ {document['format_version']} (readers of {document['needs_version']} on), "
+        f"{document['profile']} profile, {document['file_bytes']:,} bytes"
+    )
+    yield f"  {', '.join(held)}; index {document['index_bytes']:,} bytes"
+    for skeleton in document["skeletons"][:FEW]:
+        yield from _skeleton(skeleton)
+    if len(document["skeletons"]) > FEW:
+        yield f"\n{len(document['skeletons']) - FEW:,} more skeletons; --json lists them"
+    if len(document["clips"]) <= FEW:
+        for clip in document["clips"]:
+            yield from _clip(clip)
+    else:
+        yield from ("", *_clips(document["clips"]).split("\n"))
+    for attachment in document["attachments"]:
+        yield f"\nattachment {attachment['name']}: {attachment['bytes']:,} bytes, verbatim"
+
+
+def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:
+    yield ""
+    unit = skeleton["unit_cm"]
+    facts = [
+        plural(skeleton["n_joints"], "joint"),
+        plural(skeleton["n_channels"], "channel"),
+        "unit unknown" if unit is None else f"1 unit = {unit:.6g} cm",
+        f"angles in {skeleton['angle_unit'] or 'an unknown unit'}",
+    ]
+    name = f" {skeleton['name']}" if skeleton["name"] else ""
+    yield f"skeleton{name} ({skeleton['id'][:8]}): {', '.join(facts)}"
+    if skeleton["base"]:
+        yield f"  derived from {skeleton['base'][:8]}"
+    yield from _tree(skeleton["joints"])
+
+
+def _tree(joints: list[dict[str, Any]]) -> Iterator[str]:
+    """The joints as a tree; a stack instead of recursion, since files choose the depth."""
+    children: dict[int, list[int]] = {}
+    for index, joint in enumerate(joints):
+        children.setdefault(joint["parent"], []).append(index)
+    stack = [(root, "  ", "  ") for root in reversed(children.get(-1, []))]
+    while stack:
+        index, own, below = stack.pop()
+        yield f"{own}{joints[index]['name']}  {' '.join(joints[index]['channels'])}".rstrip()
+        for place, child in enumerate(reversed(children.get(index, []))):
+            last = place == 0
+            stack.append(
+                (child, below + ("└─ " if last else "├─ "), below + ("   " if last else "│  "))
+            )
+
+
+def _clip(clip: dict[str, Any]) -> Iterator[str]:
+    yield ""
+    yield (
+        f"clip {clip['name']}: {plural(clip['n_frames'], 'frame')} {_rate(clip)}, "
+        f"{plural(clip['n_channels'], 'channel')}, {plural(clip['n_joints'], 'joint')}"
+    )
+    yield f"  skeleton   {clip['skeleton'][:8]}"
+    yield from (_codec(clip["codec"], signal) for signal in clip["codecs"])
+    yield from _source(clip)
+    for key, value in clip["metadata"].items():
+        yield f"  {key}  {value[:80]}"
+    for metric, value in (clip["quality"] or {}).items():
+        yield f"  quality    {metric} {value}"
+    total = sum(clip[f"{part}_bytes"] for part in PARTS)
+    rows = [
+        [
+            part.replace("_", " "),
+            f"{clip[f'{part}_bytes']:,}",
+            _percent(clip[f"{part}_bytes"], total),
+        ]
+        for part in PARTS
+    ]
+    yield from (
+        "  " + line for line in table([["part", "bytes", "share"], *rows], "lrr").split("\n")
+    )
+    for key, against in RATIOS:
+        if clip[key] is not None:
+            yield f"  {clip[key]:7.2f} : 1 against {against}"
+    yield from (f"  damage: {line}" for line in clip["damage"])
+
+
+def _codec(name: str, signal: dict[str, Any]) -> str:
+    header = f", header {signal['header']}" if signal["header"] else ""
+    counts = ", ".join(
+        plural(signal[key], key.removesuffix("s")) for key in ("segments", "groups", "resolutions")
+    )
+    return f"  codec      {name} version {signal['version']}{header}, {signal['signal']}: {counts}"
+
+
+def _source(clip: dict[str, Any]) -> Iterator[str]:
+    if clip["source_mode"] == "none":
+        yield "  source     none"
+        return
+    yield (
+        f"  source     {clip['source_path']} ({clip['source_format']}, {clip['source_mode']}), "
+        f"{clip['source_bytes']:,} bytes"
+    )
+    yield f"  sha256     {clip['source_sha256']}"
+    share = 100 * clip["exceptions_share"]
+    yield f"  exceptions {clip['n_exceptions']:,} numbers off their grid ({share:.3g} %)"
+
+
+def _clips(clips: list[dict[str, Any]]) -> str:
+    heading = ["clip", "codec", "frames", "rate", "channels", "source", "payload", "other", "ratio"]
+    rows = [
+        [
+            clip["name"],
+            clip["codec"],
+            f"{clip['n_frames']:,}",
+            "?" if clip["frame_rate"] is None else f"{clip['frame_rate']:g}",
+            f"{clip['n_channels']}",
+            f"{clip['source_bytes'] or 0:,}",
+            f"{clip['payload_bytes']:,}",
+            f"{sum(clip[f'{part}_bytes'] for part in PARTS[1:]):,}",
+            "" if clip["cr_source"] is None else f"{clip['cr_source']:.2f}",
+        ]
+        for clip in clips
+    ]
+    return table([heading, *rows], "llrrrrrrr")
+
+
+def _rate(clip: dict[str, Any]) -> str:
+    rate = clip["frame_rate"]
+    if rate is None:
+        return "at an unknown rate"
+    about = "" if clip["frame_rate_exact"] else "about "
+    return f"at {about}{rate:g} Hz ({clip['n_frames'] / rate:.2f} s)"
+
+
+def _percent(part: int, total: int) -> str:
+    return f"{100 * part / total:.1f} %" if total else ""
+
+
+def main() -> None:
+    sys.exit(run(command, "mcz-info"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,49 @@
+"""``mcz list``: the names in a file, from its index alone."""
+
+from __future__ import annotations
+
+import click
+
+from mcz.cli.common import Exit, opened, print_json, printable, table
+from mcz.cli.options import json_option
+
+
+@click.command()
+@click.argument("file", metavar="FILE.mcz", type=click.Path())
+@json_option
+def command(file: str, as_json: bool) -> Exit:
+    """List the clips and attachments of FILE.mcz; only its index is read."""
+    with opened(file) as held:
+        clips = [
+            {
+                "name": clip.name,
+                "codec": clip.codec,
+                "n_frames": clip.n_frames,
+                "n_channels": clip.n_channels,
+                "frame_rate": None if clip.frame_rate is None else float(clip.frame_rate),
+                "skeleton": clip.skeleton_id.hex(),
+            }
+            for clip in held.clips.values()
+        ]
+        attachments = [{"name": a.name, "bytes": a.size} for a in held.attachments.values()]
+        aliases = sorted(held.aliases)
+    if as_json:
+        print_json({"clips": clips, "attachments": attachments, "aliases": aliases})
+        return Exit.FINE
+    rows = [
+        [
+            printable(str(clip["name"])),
+            str(clip["codec"]),
+            f"{clip['n_frames']:,}",
+            f"{clip['n_channels']}",
+            "?" if clip["frame_rate"] is None else f"{clip['frame_rate']:g}",
+        ]
+        for clip in clips
+    ]
+    if rows:
+        click.echo(table([["clip", "codec", "frames", "channels", "rate"], *rows], "llrrr"))
+    for attachment in attachments:
+        click.echo(printable(f"{attachment['name']}  attachment, {attachment['bytes']:,} bytes"))
+    for alias in aliases:
+        click.echo(printable(f"{alias}  same content as another"))
+    return Exit.FINE

@@ -1,0 +1,67 @@
+"""``mcz``: the table of commands; each is loaded when it is called."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+import click
+
+from mcz.cli.common import EXIT_CODES, run
+
+COMMANDS = (
+    "sample",
+    "encode",
+    "decode",
+    "info",
+    "verify",
+    "pack",
+    "append",
+    "unpack",
+    "list",
+)
+
+
+class _Commands(click.Group):
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f"mcz.cli.{cmd_name}").command
+        return command
+
+
+def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    if value:
+        from importlib.metadata import version
+
+        click.echo(f"mcz {version('mcz')}")
+        ctx.exit()
+
+
+@click.command(
+    cls=_Commands,
+    help="Motion capture files (ASF, AMC, BVH), compressed and given back byte for byte.\n\n"
+    "Every command has its own --help. Nothing is overwritten without --force.",
+    epilog=EXIT_CODES,
+)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Print the version and leave.",
+)
+def cli() -> None:
+    pass
+
+
+def main() -> None:
+    sys.exit(run(cli, "mcz"))
+
+
+if __name__ == "__main__":
+    main()

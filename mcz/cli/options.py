@@ -1,0 +1,55 @@
+"""Options that several commands share, declared once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from mcz.cli.common import to_params, to_rate
+
+UNITS = ("mm", "cm", "dm", "m", "in", "ft")
+Function = Callable[..., Any]
+
+
+def json_option(function: Function) -> Function:
+    return click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")(
+        function
+    )
+
+
+def force_option(function: Function) -> Function:
+    return click.option("--force", is_flag=True, help="Overwrite what exists.")(function)
+
+
+def encoding_options(function: Function) -> Function:
+    """``--codec --param --rate --unit --verbatim --archive``, as the arguments of those names."""
+    options = (
+        click.option("--codec", metavar="NAME", help="Default: the best lossless codec there is."),
+        click.option(
+            "--param",
+            "params",
+            metavar="KEY=VALUE",
+            multiple=True,
+            callback=to_params,
+            help="A parameter of the codec; may be repeated.",
+        ),
+        click.option(
+            "--rate",
+            metavar="R",
+            callback=to_rate,
+            help="Frames a second (120, 29.97, 30000/1001). An AMC does not say its own.",
+        ),
+        click.option("--unit", type=click.Choice(UNITS), help="Length unit of the source."),
+        click.option("--verbatim", is_flag=True, help="Keep what cannot be parsed as attachment."),
+        click.option("--archive", is_flag=True, help="Use the profile of large limits."),
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+def chosen(codec: str | None, **others: Any) -> dict[str, Any]:
+    """The arguments of ``mcz.encode`` and its kin, ``codec`` only where it was given."""
+    return others if codec is None else {"codec": codec, **others}

@@ -1,0 +1,36 @@
+"""``mcz pack``: a folder of motion files to one .mcz file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from mcz.cli.common import Exit, about
+from mcz.cli.options import chosen, encoding_options, force_option, json_option
+from mcz.cli.outcomes import conclude
+from mcz.cli.progress import Progress
+
+
+@click.command()
+@click.argument("folder", metavar="DIR", type=click.Path())
+@click.argument("target", metavar="OUT.mcz", type=click.Path())
+@encoding_options
+@click.option("--keep-all", is_flag=True, help="Keep files of other kinds too, as attachments.")
+@force_option
+@json_option
+def command(
+    folder: str, target: str, keep_all: bool, force: bool, as_json: bool, **options: Any
+) -> Exit:
+    """Pack every motion file below DIR into OUT.mcz, skeletons that are shared only once.
+
+    A file that cannot be parsed is left out, listed at the end, and makes the exit code 1;
+    --verbatim keeps it as an attachment instead.
+    """
+    import mcz
+
+    with about(folder, target), Progress() as progress:
+        report = mcz.pack(
+            folder, target, keep_all=keep_all, force=force, progress=progress, **chosen(**options)
+        )
+    return conclude(report, target, as_json)

@@ -1,0 +1,40 @@
+"""``mcz sample``: write the clips that the package generates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mcz.cli.common import Exit, Failure, about, print_json, write_output
+from mcz.cli.options import force_option, json_option
+
+
+@click.command()
+@click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
+@force_option
+@json_option
+def command(folder: Path, force: bool, as_json: bool) -> Exit:
+    """Write walk.asf, walk.amc and walk.bvh into DIR: two seconds of walking at 120 Hz.
+
+    The AMC and its ASF have 31 joints and 62 channels and say nothing of a rate (encode takes
+    --rate 120); the BVH is the same walk in centimeters (--unit cm). The bytes are the same on
+    every machine.
+    """
+    from mcz.sample import sample_files
+
+    files = sample_files()
+    taken = [folder / name for name in files if (folder / name).exists()]
+    if taken and not force:
+        raise Failure(f"{taken[0]}: exists; --force overwrites it", Exit.USAGE)
+    with about(str(folder)):
+        folder.mkdir(parents=True, exist_ok=True)
+    for name, data in files.items():
+        write_output(folder / name, data, force)
+    outputs = [{"path": str(folder / name), "bytes": len(data)} for name, data in files.items()]
+    if as_json:
+        print_json({"outputs": outputs})
+    else:
+        for output in outputs:
+            click.echo(f"{output['path']}  {output['bytes']:,} bytes")
+    return Exit.FINE

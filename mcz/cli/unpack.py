@@ -1,0 +1,25 @@
+"""``mcz unpack``: every source file out of an .mcz file."""
+
+from __future__ import annotations
+
+import click
+
+from mcz.cli.common import Exit, about, existing
+from mcz.cli.options import force_option, json_option
+from mcz.cli.outcomes import conclude
+from mcz.cli.progress import Progress
+
+
+@click.command()
+@click.argument("file", metavar="FILE.mcz", type=click.Path())
+@click.argument("folder", metavar="DIR", type=click.Path())
+@force_option
+@json_option
+def command(file: str, folder: str, force: bool, as_json: bool) -> Exit:
+    """Write every source file and attachment of FILE.mcz below DIR, under the path it had."""
+    import mcz
+
+    existing(file)
+    with about(file), Progress() as progress:
+        report = mcz.unpack(file, folder, force=force, progress=progress)
+    return conclude(report, folder, as_json)
