@@ -21,8 +21,10 @@ from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
 from mcz.encoding import Progress
 from mcz.errors import FormatError, MczError, OptionError, SourceError, TruncatedError
-from mcz.file import Entry, File, open, profile_of, replacing
+from mcz.file import File, open, profile_of
 from mcz.formats import FORMATS
+from mcz.sources import Entry
+from mcz.targets import replacing
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +136,7 @@ def append(
 def _appending(path: Path) -> Iterator[tuple[BinaryIO, Container]]:
     """The file opened behind its last valid FOOT; put back as it was if the block fails."""
     try:
-        stream = builtins.open(path, "r+b")
+        stream = builtins.open(path, "r+b")  # noqa: SIM115 - closed by the with below
     except OSError as error:
         raise OptionError(f"{path}: {error.strerror or error}") from None
     with stream:
@@ -237,7 +239,7 @@ def unpack(
     """
     root, report = Path(directory), Report()
     with open(target) as file:
-        jobs = list(_jobs(file))
+        jobs = list(named_files(file))
         for done, (name, restore) in enumerate(jobs):
             try:
                 data = restore()
@@ -256,8 +258,8 @@ def unpack(
     return report
 
 
-def _jobs(file: File) -> Iterator[tuple[str, Any]]:
-    """Name and restoring function of every file in the archive."""
+def named_files(file: File) -> Iterator[tuple[str, Any]]:
+    """Path and restoring function of every file that the archive holds under a name."""
     for clip in file.clips.values():
         if clip.source is not None:
             yield clip.source.path, clip.source_bytes

@@ -26,9 +26,11 @@ from mcz.container.skeletons import parse_channels, parse_skeleton
 from mcz.encoding import canonical
 from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
 from mcz.formats import Format, format_by_id
+from mcz.frames import parse_frame_numbers
 from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.schema import parse
 from mcz.signals import SignalInfo, SignalReader, parse_grids, parse_groups
+from mcz.views import ClipValues
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,8 +337,8 @@ class Clip:
             if row.header.first < stop and start < row.header.stop:
                 table, streams = self._container.streams(row, signal.counts, None)
                 index = table.frame_notes()
-                notes = b"" if index is None else streams[index]
-                parts.append((row.header.first, row.header.stop, notes))
+                part = b"" if index is None else streams[index]
+                parts.append((row.header.first, row.header.stop, part))
         notes = source_format.join_notes(parts) if source_format.join_notes else None
         source = Source(
             format=info.format,
@@ -377,40 +379,6 @@ class Clip:
             )
 
 
-class ClipValues:
-    """The motion signal of a clip, sliced by frames like an array of shape ``shape``."""
-
-    dtype = np.dtype("<f8")
-
-    def __init__(self, clip: Clip) -> None:
-        self._clip = clip
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self._clip.n_frames, self._clip.n_channels
-
-    def __len__(self) -> int:
-        return self._clip.n_frames
-
-    def __getitem__(self, key: int | slice) -> NDArray[Any]:
-        if isinstance(key, slice):
-            start, stop, step = key.indices(self._clip.n_frames)
-            if step > 0:
-                return self._clip.read(frames=(start, max(start, stop)))[::step]
-            frames = range(start, stop, step)
-            if not frames:
-                return self._clip.read(frames=(0, 0))
-            return self._clip.read(frames=(frames[-1], frames[0] + 1))[::-1][::-step]
-        index = key + self._clip.n_frames if key < 0 else key
-        if not 0 <= index < self._clip.n_frames:
-            raise IndexError(f"frame {key} of {self._clip.n_frames}")
-        row: NDArray[Any] = self._clip.read(frames=(index, index + 1))[0]
-        return row
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        return np.asarray(self._clip.read(), dtype=dtype)
-
-
 def _groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...], list[int]]:
     """The groups that hold ``columns``, and where each column is among theirs."""
     group_of = {c: g for g, group in enumerate(layout.groups) for c in group}
@@ -434,24 +402,3 @@ def _cut_source(source: Source, source_format: Format, start: int, stop: int) ->
     if notes is not None and source_format.join_notes is not None:
         notes = source_format.join_notes([(0, stop - start, notes.cut(start, stop))])
     return replace(source, notes=notes, size=0, sha256=b"")
-
-
-def parse_frame_numbers(text: str, n_frames: int, name: str) -> NDArray[np.int64]:
-    """The numbers that the registry key ``frame-numbers`` spells."""
-    frame_numbers = np.arange(n_frames, dtype=np.int64)
-    try:
-        first, *jumps = text.split(" ")
-        starts = [(0, int(first)), *(_jump(jump) for jump in jumps)]
-        rows = [row for row, _ in starts]
-        if rows != sorted(set(rows)) or rows[-1] >= max(1, n_frames):
-            raise ValueError("its rows do not ascend within the clip")
-        for (row, number), end in zip(starts, [*rows[1:], n_frames], strict=True):
-            frame_numbers[row:end] += number - row
-    except (ValueError, OverflowError) as error:
-        raise FormatError(f"clip {name!r}: frame-numbers {text[:80]!r}: {error}") from None
-    return frame_numbers
-
-
-def _jump(text: str) -> tuple[int, int]:
-    row, number = text.split(":")
-    return int(row), int(number)

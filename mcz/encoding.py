@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,14 @@ from mcz.container.skeletons import build_skeleton, channel_fields
 from mcz.container.writer import Writer
 from mcz.errors import MotionError
 from mcz.formats import FORMATS
+from mcz.frames import frame_number_metadata
 from mcz.motion import Exceptions, Motion, Signal, Skeleton, Source
 from mcz.numbers import Grid
 from mcz.schema import MAX_COUNT, build
 
 Progress = Callable[[int, int, str], None]
-MASK_BITS = "little"  # bit order of a packed mask
+MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
+MASK_BITS: Literal["little"] = "little"  # bit order of a packed mask
 
 
 def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
@@ -111,6 +113,10 @@ class MemorySource:
     def _place(self) -> NDArray[np.int64]:
         """Ordinals of the whole signal; exceptions repeat the ordinal of the row before."""
         signal = self.signal
+        if signal.values.dtype == np.int64:
+            if signal.values.size and not (abs(signal.values) <= MAX_INTEGER).all():
+                raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
+            return signal.values
         ordinals = np.empty(signal.values.shape, np.int64)
         exact = np.empty(signal.values.shape, np.bool_)
         for rows, columns, grid in grid_blocks(signal):
@@ -240,15 +246,6 @@ def _signal_fields(signal: Signal, codec: Codec, part: Encoded) -> dict[str, Any
         "n_resolutions": part.n_resolutions,
         "extension": b"",
     }
-
-
-def frame_number_metadata(frame_numbers: NDArray[np.int64] | None) -> dict[str, str]:
-    """Registry key ``frame-numbers``: the first number, then row:number after every gap."""
-    if frame_numbers is None or len(frame_numbers) == 0:
-        return {}
-    jumps = np.nonzero(np.diff(frame_numbers) != 1)[0] + 1
-    words = [str(frame_numbers[0]), *(f"{row}:{frame_numbers[row]}" for row in jumps)]
-    return {} if words == ["1"] else {"frame-numbers": " ".join(words)}
 
 
 def _write_segment(

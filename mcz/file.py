@@ -1,38 +1,38 @@
 """The one place where motion, codec and container meet: open, read, write, encode.
 
-``encoding.py`` turns a Motion into chunks, ``clip.py`` turns chunks back into values; this file
-opens and closes the files around them. Archives of many clips are in ``archive.py``.
+``sources.py`` reads source files, ``encoding.py`` turns a Motion into chunks, ``clip.py`` turns
+chunks back into values; this file opens and closes the files around them. Archives of many clips
+are in ``archive.py``, and what a file says of itself in ``report.py``.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO
+from typing import Any
 
 from mcz.clip import Clip
 from mcz.codecs import DEFAULT, by_name
 from mcz.container import payloads
-from mcz.container.directory import AttachmentRow, Directory
+from mcz.container.directory import AttachmentRow
 from mcz.container.limits import ARCHIVE, BASE, Profile
 from mcz.container.reader import Container
 from mcz.container.skeletons import parse_skeleton
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
-from mcz.encoding import Progress, write_clip, write_skeleton
-from mcz.errors import ChecksumError, MczError, OptionError, SourceError
-from mcz.formats import FORMATS, Format, find_asf, format_by_id, format_of
+from mcz.encoding import Progress, write_clip
+from mcz.errors import ChecksumError, MczError, OptionError
+from mcz.formats import FORMATS, format_by_id, format_of
 from mcz.motion import Motion, Skeleton, Source
 from mcz.schema import parse
-
-UNIT_CM = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}
+from mcz.sources import Entry, read_source, skeleton_of, with_facts
+from mcz.targets import replacing
 
 
 class Attachment:
@@ -85,7 +85,7 @@ class File:
 
     @property
     def aliases(self) -> Mapping[str, tuple[int, bytes]]:
-        """Further files with the content of a clip, skeleton or attachment: name -> (of, target)."""
+        """Further names of a clip, skeleton or attachment: name -> (of, target)."""
         return self.container.directory.aliases
 
     @property
@@ -128,8 +128,6 @@ class File:
 
     def skeleton_bytes(self, id_: bytes) -> bytes:
         """The skeleton's own source file (ASF), byte for byte."""
-        import hashlib
-
         skeleton = self.skeleton(id_, with_source=True)
         source = skeleton.source
         if source is None:
@@ -197,127 +195,8 @@ def read(
         source_format = format_of(path)
         if source_format.is_skeleton:
             raise OptionError(f"{path}: a skeleton without motion; use mcz.read_skeleton")
-        motion = _read_source(path, source_format, _skeleton(path, source_format, skeleton))
-    return _with_facts(motion, rate, unit)
-
-
-def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
-    """The skeleton in an ASF file, with its source."""
-    path = Path(path)
-    source_format = format_of(path)
-    if not source_format.is_skeleton:
-        raise OptionError(f"{path}: not a skeleton file")
-    skeleton: Skeleton = _named(path, source_format.read, _bytes(path), path.stem)
-    return skeleton
-
-
-def _skeleton(
-    path: Path, source_format: Format, given: str | os.PathLike[str] | Skeleton | None
-) -> Skeleton | None:
-    if not source_format.wants_skeleton:
-        return None
-    if isinstance(given, Skeleton):
-        return given
-    found = Path(given) if given is not None else find_asf(path)
-    return read_skeleton(found) if found is not None else None
-
-
-def _read_source(path: Path, source_format: Format, skeleton: Skeleton | None) -> Motion:
-    arguments = (skeleton,) if source_format.wants_skeleton else ()
-    motion: Motion = _named(path, source_format.read, _bytes(path), path.stem, *arguments)
-    if motion.source is None:
-        return motion
-    return replace(motion, source=replace(motion.source, path=path.name))
-
-
-def _named(path: Path, reader: Any, data: bytes, *arguments: Any) -> Any:
-    """What ``reader`` makes of ``data``; its errors say which file."""
-    try:
-        return reader(data, *arguments)
-    except MczError as error:
-        error.args = (f"{path}: {error}",)
-        raise
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise SourceError(f"{path}: {error.strerror or error}") from None
-
-
-def _with_facts(motion: Motion, rate: Fraction | float | None, unit: str | None) -> Motion:
-    if rate is not None:
-        try:
-            value = Fraction(rate).limit_denominator(2**52)
-        except (ValueError, ZeroDivisionError, OverflowError):
-            raise OptionError(f"frame rate {rate!r} is not a number") from None
-        if value <= 0:
-            raise OptionError(f"frame rate {rate} is not positive")
-        motion = replace(motion, frame_rate=value, frame_rate_exact=True)
-    if unit is not None:
-        if unit not in UNIT_CM:
-            raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
-        motion = replace(motion, skeleton=replace(motion.skeleton, unit_cm=UNIT_CM[unit]))
-    return motion
-
-
-@contextmanager
-def replacing(target: Any, *, force: bool) -> Iterator[BinaryIO]:
-    """A binary stream whose bytes become ``target`` only when the block ends well.
-
-    On disk that is a temporary file beside the target, synced and renamed; a stream that was
-    given is written as it is. Raises OptionError where the target exists and not ``force``.
-    """
-    if hasattr(target, "write"):
-        yield target
-        return
-    if "://" in str(target):
-        import fsspec
-
-        fs, path = fsspec.core.url_to_fs(str(target))
-        if not force and fs.exists(path):
-            raise OptionError(f"{target} exists; use force to replace it")
-        with fs.transaction, fs.open(path, "wb") as remote:
-            yield remote
-        return
-    path = Path(target)
-    if not force and path.exists():
-        raise OptionError(f"{path} exists; use force to replace it")
-    with _temporary(path) as stream:
-        yield stream
-
-
-@contextmanager
-def _temporary(path: Path) -> Iterator[BinaryIO]:
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
-    except OSError as error:
-        raise OptionError(f"{path}: {error.strerror or error}") from None
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)  # mkstemp made it private
-        os.replace(name, path)
-        _sync_directory(path.parent)
-    except BaseException:
-        with suppress(OSError):
-            os.unlink(name)
-        raise
-
-
-def _sync_directory(path: Path) -> None:
-    """Make the rename itself last; not every system lets a directory be opened."""
-    with suppress(OSError):
-        handle = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        motion = read_source(path, source_format, skeleton_of(path, source_format, skeleton))
+    return with_facts(motion, rate, unit)
 
 
 def write(
@@ -370,80 +249,3 @@ def encode(
         entry = Entry(path, path.name, codec, params or {}, skeleton, rate, unit, verbatim, True)
         entry.write(writer, progress)
         writer.finish()
-
-
-class Entry:
-    """One source file on its way into an MCZ file, under the relative path ``name``."""
-
-    def __init__(
-        self,
-        path: Path,
-        name: str,
-        codec: str = DEFAULT,
-        params: Mapping[str, Any] | None = None,
-        skeleton: str | os.PathLike[str] | None = None,
-        rate: Fraction | float | None = None,
-        unit: str | None = None,
-        verbatim: bool = False,
-        keep_skeleton: bool = False,
-    ) -> None:
-        if unit is not None and unit not in UNIT_CM:
-            raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
-        self.path, self.name = path, name
-        self.codec, self.params = by_name(codec), params or {}
-        self.skeleton, self.rate, self.unit = skeleton, rate, unit
-        self.verbatim = verbatim
-        self.keep_skeleton = keep_skeleton  # under its own name, to be restored as well
-
-    def write(self, writer: Writer, progress: Progress | None = None) -> str:
-        """Write the file; return how: "skeleton", "parsed", "alias" or "verbatim"."""
-        try:
-            return self._parsed(writer, progress)
-        except SourceError:
-            if not self.verbatim:
-                raise
-        writer.attachment(self.name, _bytes(self.path))
-        return "verbatim"
-
-    def _parsed(self, writer: Writer, progress: Progress | None) -> str:
-        source_format = format_of(self.path)
-        if source_format.is_skeleton:
-            id_ = write_skeleton(writer, self._unit(read_skeleton(self.path)))
-            _alias_once(writer, self.name, id_)
-            return "skeleton"
-        skeleton = _skeleton(self.path, source_format, self.skeleton)
-        if skeleton is not None:
-            skeleton = self._unit(skeleton)
-        motion = _read_source(self.path, source_format, skeleton)
-        motion = _with_facts(motion, self.rate, self.unit)
-        if motion.source is not None:
-            motion = replace(motion, source=replace(motion.source, path=self.name))
-        if skeleton is not None:
-            motion = self._based(writer, motion, skeleton)
-        name = clip_name(self.name, writer.directory)
-        write_clip(writer, replace(motion, name=name), self.codec, self.params, progress)
-        return "parsed"
-
-    def _unit(self, skeleton: Skeleton) -> Skeleton:
-        return replace(skeleton, unit_cm=UNIT_CM[self.unit]) if self.unit else skeleton
-
-    def _based(self, writer: Writer, motion: Motion, skeleton: Skeleton) -> Motion:
-        """``motion`` after its ASF was written; a derived skeleton names it as its base."""
-        id_ = write_skeleton(writer, skeleton)
-        if self.keep_skeleton:
-            found = self.skeleton or find_asf(self.path)
-            _alias_once(writer, Path(found).name if found else f"{skeleton.name}.asf", id_)
-        if motion.skeleton.base is None:
-            return motion
-        return replace(motion, skeleton=replace(motion.skeleton, base=id_))
-
-
-def _alias_once(writer: Writer, name: str, id_: bytes) -> None:
-    if name not in writer.directory.aliases:
-        writer.alias(name, payloads.OF_SKELETON, id_)
-
-
-def clip_name(path: str, directory: Directory) -> str:
-    """The relative path without its suffix, or with it where that name is taken."""
-    stem = Path(path).with_suffix("").as_posix()
-    return path if stem in directory.clips else stem

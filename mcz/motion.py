@@ -1,6 +1,6 @@
 """The data model: Joint, Skeleton, Signal, Source and Motion, checked on creation.
 
-Nothing here reads or writes files. SPEC.md, "Data model", is normative.
+Nothing here reads or writes files. SPEC.md, "SKEL" and "CLIP", have the stored form.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ class FrameNotes(Protocol):
     """What a source says about each frame beside its values; a source format defines it."""
 
     def cut(self, start: int, stop: int) -> bytes:
-        """The notes of frames start <= f < stop, as the bytes of a segment; b"" where all is usual."""
+        """The notes of frames start <= f < stop as bytes of a segment, b"" where all is usual."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,6 +230,11 @@ class Signal:
             raise MotionError(
                 f"signal {self.name!r}: {len(self.grids)} grids, {self.n_channels} channels"
             )
+        integers = self.n_channels > 0 and all(g.kind == GridKind.INTEGER for g in self.grids)
+        if integers != (self.values.dtype == np.int64):
+            raise MotionError(
+                f"signal {self.name!r}: {self.values.dtype} values on {self.grids[:1]}"
+            )
         if self.samples_per_frame < 1 or len(self.values) % self.samples_per_frame:
             raise MotionError(
                 f"signal {self.name!r}: {len(self.values)} rows at {self.samples_per_frame} a frame"
@@ -263,7 +268,7 @@ class Motion:
     """A skeleton in motion: the motion signal first, then any others (analog, ...).
 
     ``frame_rate`` in frames a second, None while unknown; ``frame_rate_exact`` is False where the
-    source gave a rounded frame time. ``frame_numbers`` (int64) is None where they count 1, 2, 3, ...
+    source gave a rounded frame time. ``frame_numbers`` (int64) is None for 1, 2, 3, ...
     ``metadata`` maps keys of SPEC.md's registry, or private ``x-`` keys, to text.
     """
 

@@ -288,10 +288,17 @@ def _segment_places(at: int, table: StreamTable) -> Iterator[tuple[int, int, str
 
 def validate(file: File) -> list[Problem]:
     """Every fault of the file: structure, checksums, values, sources, index."""
+    problems = structure_problems(file)
+    for _, _, found in part_problems(file):
+        problems += found
+    return problems
+
+
+def structure_problems(file: File) -> list[Problem]:
+    """The faults of chunks, their order, their checksums and the index."""
     problems = []
-    source = file.container.source
     try:
-        found = scan(source, whole=True)
+        found = scan(file.container.source, whole=True)
         if file.container.index is not None and found.directory.clips.keys() != file.clips.keys():
             problems.append(
                 Problem(
@@ -302,17 +309,28 @@ def validate(file: File) -> list[Problem]:
             )
     except MczError as error:
         problems.append(Problem(0, "Grammar", str(error)))
-    for id_, _ in _guarded(problems, file):
-        _check(problems, file, id_)
+    return problems
+
+
+def part_problems(file: File) -> Iterator[tuple[str, str, list[Problem]]]:
+    """Kind, name and faults of every skeleton, clip and attachment, one after the other."""
+    problems: list[Problem] = []
+    for id_, skeleton in _guarded(problems, file):
+        found: list[Problem] = []
+        _check(found, file, id_)
+        yield "skeleton", skeleton.name or id_.hex(), found
+    if problems:
+        yield "skeletons", "", problems
     for clip in file.clips.values():
-        problems += clip_problems(file, clip)
+        yield "clip", clip.name, clip_problems(file, clip)
     for attachment in file.attachments.values():
+        found = []
         try:
             attachment.read()
         except MczError as error:
             offset = file.container.directory.attachments[attachment.name].parts[0].offset
-            problems.append(Problem(offset, "ATTA", str(error)))
-    return problems
+            found.append(Problem(offset, "ATTA", str(error)))
+        yield "attachment", attachment.name, found
 
 
 def _guarded(problems: list[Problem], file: File) -> list[tuple[bytes, Skeleton]]:

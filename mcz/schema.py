@@ -12,7 +12,6 @@ from typing import Any
 
 from construct import (
     Adapter,
-    Bytes,
     Construct,
     ConstructError,
     Container,
@@ -33,12 +32,12 @@ MAX_COUNT = 2**53 - 1  # every count, size and offset; JavaScript's largest exac
 
 
 class Varint(Construct):
-    """Unsigned integer up to ``MAX_COUNT``: 7 bits a byte, least significant first, shortest form."""
+    """Unsigned, up to ``MAX_COUNT``: 7 bits a byte, least significant first, shortest form."""
 
     def _parse(self, stream: Any, context: Any, path: str) -> int:
         value = shift = 0
         while True:
-            byte = stream_read(stream, 1, path)[0]
+            byte: int = stream_read(stream, 1, path)[0]
             value |= (byte & 0x7F) << shift
             if value > MAX_COUNT:
                 raise FormatError(f"{path}: varint beyond 2^53 - 1")
@@ -110,7 +109,8 @@ class Sized(Construct):
     """A varint length, then that many bytes."""
 
     def _parse(self, stream: Any, context: Any, path: str) -> bytes:
-        return Bytes(UVARINT._parse(stream, context, path))._parse(stream, context, path)
+        data: bytes = stream_read(stream, UVARINT._parse(stream, context, path), path)
+        return data
 
     def _build(self, obj: bytes, stream: Any, context: Any, path: str) -> Any:
         _write(stream, varint(len(obj)) + bytes(obj), path)

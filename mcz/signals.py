@@ -213,6 +213,8 @@ class SignalReader:
         columns = [c for g in self.groups for c in layout.groups[g]]
         exceptions, changes = self.exceptions(start, stop, columns)
         values = coded
+        if self.info.is_integer:
+            Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
         if self.info.codec.domain == "ordinals" and not self.info.is_integer:
             shown = (
                 Signal(
@@ -352,7 +354,8 @@ def _unpack_mask(data: bytes, n_rows: int, n_channels: int, name: str) -> NDArra
     bits = np.unpackbits(np.frombuffer(data, "u1"), bitorder=MASK_BITS)
     if bits[n_rows * n_channels :].any():
         raise FormatError(f"clip {name!r}: a mask has bits after its last")
-    return bits[: n_rows * n_channels].astype(np.bool_).reshape(n_rows, n_channels)
+    valid: NDArray[np.bool_] = bits[: n_rows * n_channels].astype(np.bool_)
+    return valid.reshape(n_rows, n_channels)
 
 
 def _values_of_texts(texts: Sequence[bytes], name: str) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
 
-@click.command()
+@click.command(short_help="More files into an .mcz.")
 @click.argument("sources", metavar="SRC...", nargs=-1, required=True, type=click.Path())
 @click.argument("target", metavar="FILE.mcz", type=click.Path())
 @click.option("--skeleton", metavar="FILE.asf", type=click.Path(), help="The ASF of the AMCs.")

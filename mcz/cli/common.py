@@ -133,9 +133,9 @@ def opened(path: str, *, salvage: bool = False) -> Iterator[File]:
     """The MCZ file at ``path``, or on standard input where that is ``-``; errors name it."""
     import mcz
 
-    target: Any = path
+    target: str | bytes = path
     if path == "-":
-        target = click.get_binary_stream("stdin").read()
+        target = sys.stdin.buffer.read()
     else:
         existing(path)
     with about(path), mcz.open(target, salvage=salvage) as file:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 Output = tuple[str, str, bytes]  # kind, file name, content
 
 
-@click.command()
+@click.command(short_help="The original file again, or its numbers.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path())
 @click.option(
     "-o",
@@ -164,7 +165,7 @@ def _deliver(
 ) -> None:
     """Write the outputs where they belong and say so."""
     if output == "-":
-        click.get_binary_stream("stdout").write(outputs[0][2])
+        sys.stdout.buffer.write(outputs[0][2])
         return
     folder = Path() if file == "-" else Path(file).parent
     if output is not None:

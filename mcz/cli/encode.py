@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import io
+import sys
 from pathlib import Path
 from typing import Any
 
 import click
 
-from mcz.cli.common import Exit, about, existing, opened, plural, print_json, printable
+from mcz.cli.common import Exit, Failure, about, existing, opened, plural, print_json, printable
 from mcz.cli.options import chosen, encoding_options, force_option, json_option
 from mcz.cli.progress import Progress
 
 
-@click.command()
+@click.command(short_help="A .bvh, .amc or .asf file to .mcz.")
 @click.argument("source", metavar="SRC", type=click.Path())
-@click.option("-o", "--output", metavar="OUT.mcz", help="Default: SRC with the suffix .mcz.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT.mcz",
+    help="Default: SRC with the suffix .mcz; - is standard output.",
+)
 @click.option(
     "--skeleton",
     metavar="FILE.asf",
@@ -39,9 +46,21 @@ def command(
 
     target = output or str(Path(source).with_suffix(".mcz"))
     existing(source)
+    if output == "-" and as_json:
+        raise Failure("-o - leaves no room for --json", Exit.USAGE)
+    piped = io.BytesIO()
     with about(source, target), Progress() as progress:
-        arguments = chosen(**options)
-        mcz.encode(source, target, skeleton=skeleton, force=force, progress=progress, **arguments)
+        mcz.encode(
+            source,
+            piped if output == "-" else target,
+            skeleton=skeleton,
+            force=force,
+            progress=progress,
+            **chosen(**options),
+        )
+    if output == "-":
+        sys.stdout.buffer.write(piped.getvalue())
+        return Exit.FINE
     with opened(target) as file:
         document = info(file)
     if as_json:

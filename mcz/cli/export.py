@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -72,4 +73,4 @@ def to_npz(table: Table) -> bytes:
     return buffer.getvalue()
 
 
-EXPORTS = {"csv": to_csv, "npz": to_npz}
+EXPORTS: dict[str, Callable[[Table], bytes]] = {"csv": to_csv, "npz": to_npz}

@@ -31,7 +31,7 @@ RATIOS = (
 )
 
 
-@click.command(epilog=EXIT_CODES)
+@click.command(short_help="What a file holds and what it costs.", epilog=EXIT_CODES)
 @click.argument("file", metavar="FILE.mcz", type=click.Path())
 @json_option
 @click.option("--layout", "show_layout", is_flag=True, help="What every range of bytes means.")

@@ -8,7 +8,7 @@ from mcz.cli.common import Exit, opened, print_json, printable, table
 from mcz.cli.options import json_option
 
 
-@click.command()
+@click.command(short_help="Names of clips, from the index alone.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path())
 @json_option
 def command(file: str, as_json: bool) -> Exit:

@@ -35,9 +35,9 @@ class _Commands(click.Group):
 
 def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     if value:
-        from importlib.metadata import version
+        from mcz import __version__
 
-        click.echo(f"mcz {version('mcz')}")
+        click.echo(f"mcz {__version__}")
         ctx.exit()
 
 

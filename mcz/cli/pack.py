@@ -12,7 +12,7 @@ from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
 
-@click.command()
+@click.command(short_help="A folder of motion files to one .mcz.")
 @click.argument("folder", metavar="DIR", type=click.Path())
 @click.argument("target", metavar="OUT.mcz", type=click.Path())
 @encoding_options

@@ -10,7 +10,7 @@ from mcz.cli.common import Exit, Failure, about, print_json, write_output
 from mcz.cli.options import force_option, json_option
 
 
-@click.command()
+@click.command(short_help="Write a generated walk (ASF/AMC and BVH).")
 @click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
 @force_option
 @json_option

@@ -10,7 +10,7 @@ from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
 
-@click.command()
+@click.command(short_help="Every source file out of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path())
 @click.argument("folder", metavar="DIR", type=click.Path())
 @force_option

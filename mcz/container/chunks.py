@@ -57,7 +57,7 @@ class Chunk:
 
 @dataclass(frozen=True, slots=True)
 class Foot:
-    """The trailer; ``index_offset`` and ``index_length`` span the whole INDX chunk, 0, 0 if none."""
+    """The trailer; the two numbers span the whole INDX chunk and are 0 without one."""
 
     index_offset: int
     index_length: int
@@ -145,7 +145,7 @@ def build_foot(index_offset: int, index_length: int) -> bytes:
 def parse_foot(data: bytes, offset: int) -> Foot | None:
     """The FOOT whose 32 bytes are ``data``, or None where they are not one.
 
-    Raises ChecksumError where the magic is there and the crc is wrong, FormatError where a field is.
+    Raises ChecksumError where the magic is right and the crc wrong, FormatError for a bad field.
     """
     if len(data) != FOOT.size or data[24:] != END_MAGIC:
         return None

@@ -22,6 +22,8 @@ from mcz.container.chunks import (
     check_chunk,
     check_signature,
     parse_foot,
+    read_chunk,
+    read_payload,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, parse_index
 from mcz.container.limits import Profile, check, output_limit
@@ -68,6 +70,13 @@ class Container:
         self.index = foot
         directory = self._index(foot, tail)
         directory.end = self.source.size
+        if not self.source.remote:
+            head = read_chunk(self.source, len(SIGNATURE))
+            if head.type != b"HEAD" or self.source.size < head.offset + head.size:
+                raise FormatError(f"the first chunk is {head.label}, not HEAD")
+            limit = len(directory.head)
+            if read_payload(self.source, head, limit) != directory.head:
+                raise FormatError("HEAD is not what the index says")
         return directory
 
     def _foot(self, tail: bytes) -> Foot:

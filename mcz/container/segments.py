@@ -137,7 +137,8 @@ def parse_header(data: bytes) -> tuple[SegmentHeader, int]:
         raise FormatError("a segment of no frames")
     if fields[1] + fields[2] + fields[4] > MAX_COUNT or fields[3] > fields[1]:
         raise FormatError(f"a segment of frames {fields[1]} + {fields[2]}, support {fields[3:]}")
-    return SegmentHeader(*fields, flags), at + 1
+    signal, first, n_frames, lead, tail = fields
+    return SegmentHeader(signal, first, n_frames, lead, tail, flags), at + 1
 
 
 def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:

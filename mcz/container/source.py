@@ -98,7 +98,7 @@ def open_source(target: Any) -> ByteSource:
         return ByteSource(stream, remote=_is_remote(stream), name=str(target))
     if not isinstance(target, (str, os.PathLike)):
         raise OptionError(f"cannot open {target!r}: neither a path nor a binary stream")
-    return ByteSource(open(target, "rb"), name=os.fspath(target))  # noqa: SIM115 - closed by close()
+    return ByteSource(open(target, "rb"), name=os.fspath(target))
 
 
 def _is_remote(stream: Any) -> bool:

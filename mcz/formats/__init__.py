@@ -1,6 +1,6 @@
 """Source formats: bytes -> Motion or Skeleton, and back, byte for byte.
 
-``FORMATS`` is the explicit table; SPEC.md, "Registries", has the ids.
+``FORMATS`` is the explicit table; SPEC.md, "Registry", has the ids.
 """
 
 from __future__ import annotations

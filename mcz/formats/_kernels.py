@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz._jit import kernel
+from mcz.jit import kernel
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -99,48 +99,54 @@ def _match_token(text: Bytes, at: int, width: int) -> tuple[int, int, int]:
 
 
 @kernel
+def _match_row(
+    text: Bytes, at: int, gaps: Bytes, gap_start: Ints, gap_stop: Ints, columns: Ints, widths: Ints,
+    start: Ints, stop: Ints,
+) -> tuple[int, int]:  # fmt: skip
+    """The offset after a row of the pattern at ``at`` and its frame number; offset -1: no match.
+
+    Fills ``start`` and ``stop`` (n_columns,) of its tokens.
+    """
+    number = 0
+    for k in range(len(columns)):
+        if not _is_at(text, at, gaps, gap_start[k], gap_stop[k]):
+            return -1, 0
+        first, last, at = _match_token(text, at + gap_stop[k] - gap_start[k], widths[k])
+        if first < 0:
+            return -1, 0
+        if columns[k] >= 0:
+            start[columns[k]] = first
+            stop[columns[k]] = last
+        else:
+            number = _number(text, first, last)
+            if number < 0:
+                return -1, 0
+    tail = len(columns)
+    if not _is_at(text, at, gaps, gap_start[tail], gap_stop[tail]):
+        return -1, 0
+    return at + gap_stop[tail] - gap_start[tail], number
+
+
+@kernel
 def match_rows(
-    text: Bytes,
-    at: int,
-    gaps: Bytes,
-    gap_start: Ints,
-    gap_stop: Ints,
-    columns: Ints,
-    widths: Ints,
-    row: int,
-    start: Ints,
-    stop: Ints,
-    numbers: Ints,
-) -> tuple[int, int]:
+    text: Bytes, at: int, gaps: Bytes, gap_start: Ints, gap_stop: Ints, columns: Ints, widths: Ints,
+    row: int, start: Ints, stop: Ints, numbers: Ints,
+) -> tuple[int, int]:  # fmt: skip
     """Match as many rows of one pattern as possible from offset ``at`` and row ``row`` on.
 
     Fills ``start`` and ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,); the last gap is the
     tail. Returns the row and the offset of the first row that does not match, or for which there
     is no room.
     """
-    n_items = len(columns)
-    numbered = n_items > 0 and columns[0] == -1
+    numbered = len(columns) > 0 and columns[0] == -1
     while row < len(numbers):
-        here = at
-        for k in range(n_items):
-            if not _is_at(text, here, gaps, gap_start[k], gap_stop[k]):
-                return row, at
-            first, last, here = _match_token(text, here + gap_stop[k] - gap_start[k], widths[k])
-            if first < 0:
-                return row, at
-            if columns[k] >= 0:
-                start[row, columns[k]] = first
-                stop[row, columns[k]] = last
-            else:
-                numbers[row] = _number(text, first, last)
-                if numbers[row] < 0:
-                    return row, at
-        if not _is_at(text, here, gaps, gap_start[n_items], gap_stop[n_items]):
-            return row, at
-        here += gap_stop[n_items] - gap_start[n_items]
-        if here == at or (numbered and not _begins_frame(text, here)):
-            return row, at
-        at = here
+        end, number = _match_row(
+            text, at, gaps, gap_start, gap_stop, columns, widths, start[row], stop[row]
+        )
+        if end <= at or (numbered and not _begins_frame(text, end)):
+            break
+        numbers[row] = number
+        at = end
         row += 1
     return row, at
 

@@ -34,8 +34,8 @@ DERIVED = "the channels of the AMC differ from those of its ASF"
 def read(data: bytes, name: str = "motion", skeleton: Skeleton | None = None) -> Motion:
     """The motion in an AMC file; ``name`` becomes its name; the frame rate is unknown.
 
-    Where the bones do not fit ``skeleton``, the motion's skeleton is derived from it (``bones.fit``)
-    with ``base`` b"", to be replaced with the id of ``skeleton``; the metadata say so. Raises
+    Where the bones do not fit ``skeleton``, the motion's skeleton is derived from it, with ``base``
+    b"", to be replaced with the id of ``skeleton``; the metadata say so. Raises
     SourceError, with the number of the line.
     """
     match = _FIRST_FRAME.search(data)

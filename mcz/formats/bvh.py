@@ -60,7 +60,7 @@ def _notes(encoding: str, n_strays: int, count: bytes, n_rows: int) -> dict[str,
     if (count.lstrip(b"0") or b"0") != b"%d" % n_rows:
         notes.append(f"{count[:40].decode('latin-1')} frames are declared, {n_rows} are there")
     if n_strays:
-        notes.append(f"{n_strays} words that belong nowhere follow the joints")
+        notes.append(f"{n_strays} words that mean nothing stand among the joints")
     if notes:
         metadata["source-note"] = "; ".join(notes)
     return metadata
@@ -132,12 +132,13 @@ def _with_positions(joints: list[Joint], values: NDArray[np.float64]) -> tuple[J
         if not columns or not len(values):
             continue
         positions = values[:1, columns] if joint.parent < 0 else values[:, columns]
-        replaces = float(np.abs(positions - offset).sum() - np.abs(positions).sum())
+        with np.errstate(over="ignore", invalid="ignore"):
+            to_offset, to_zero = np.abs(positions - offset).sum(), np.abs(positions).sum()
         if joint.parent < 0:
-            decided[index] = replace(joint, adds_to_offset=not replaces < 0)
+            decided[index] = replace(joint, adds_to_offset=not to_offset < to_zero)
         else:
             others.append(index)
-            votes += (replaces < 0) - (replaces > 0)
+            votes += int(to_offset < to_zero) - int(to_zero < to_offset)
     for index in others:
         decided[index] = replace(joints[index], adds_to_offset=votes <= 0)
     return tuple(decided)

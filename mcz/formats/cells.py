@@ -23,7 +23,7 @@ class Cells:
     """Token (row, column) is ``texts[start[row, column]:][:size[row, column]]``.
 
     ``start`` and ``size`` have shape (n_rows, n_channels + 1); the last column holds the frame
-    numbers, if there are any. Raises FormatError for an exception that is no number or lies outside.
+    numbers, if any. Raises FormatError for an exception that is no number or lies outside.
     """
 
     def __init__(self, signal: Signal, numbers: Ints | None) -> None:
@@ -67,7 +67,7 @@ class Cells:
     def _print(
         self, grid: Grid, values: NDArray[np.float64], rows: slice, columns: Columns
     ) -> None:
-        """Print values by the nearest number of their grid, and by repr where they lie beyond it."""
+        """Print values by the nearest number of their grid, by repr where they lie beyond it."""
         if not grid.is_text:
             grid = SHORTEST
         values = values.astype(np.float64, copy=False)

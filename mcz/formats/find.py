@@ -16,8 +16,8 @@ def find_asf(amc_path: str | Path) -> Path | None:
 
     Looked for in this order: an ASF of the same stem beside it; one whose stem is the AMC's up to
     one of its separators (14.asf for 14_02.amc), the longest first; the same two in a sibling
-    folder ``asf``; the only ASF beside it. Case matters in stems, not in ``asf``. Raises SourceError
-    where two files are equally good, naming them.
+    folder ``asf``; the only ASF beside it. Case matters in stems, not in ``asf``. Raises
+    SourceError where two files are equally good, naming them.
     """
     path = Path(amc_path)
     beside = _skeletons(path.parent)

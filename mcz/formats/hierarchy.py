@@ -62,20 +62,24 @@ class _Reader:
         while (word := self.word().upper()) != b"MOTION" or open_nodes:
             if word in (b"ROOT", b"JOINT", b"END"):
                 open_nodes.append(self._begin(word, open_nodes[-1][0] if open_nodes else -1))
-            elif not word:
-                raise self.error("the file ends within the HIERARCHY section")
-            elif not open_nodes:
-                self.strays += 1  # remains of a longer file that was written over
-            elif word == b"OFFSET":
+            elif word == b"OFFSET" and open_nodes:
                 open_nodes[-1][1].offset = self._vector()
-            elif word == b"CHANNELS" and not open_nodes[-1][1].end:
+            elif word == b"CHANNELS" and open_nodes and not open_nodes[-1][1].end:
                 open_nodes[-1][1].channels = tuple(self._channels())
-            elif word == b"}":
+            elif word == b"}" and open_nodes:
                 index, node = open_nodes.pop()
                 if node.end and index >= 0:
                     self.joints[index].tails.append(node.offset)
+            elif self._is_alone(word):
+                self.strays += 1
             else:
                 raise self.error(f"{word[:40]!r} in the HIERARCHY section")
+
+    def _is_alone(self, word: bytes) -> bool:
+        """Whether the word just read is a line of its own, which cannot mean anything then."""
+        line = self.data.rfind(b"\n", 0, self.at) + 1
+        end = self.data.find(b"\n", self.at)
+        return end >= 0 and self.data[line:end].strip(BLANKS).upper() == word != b""
 
     def _begin(self, word: bytes, parent: int) -> tuple[int, _Node]:
         rest = _REST.match(self.data, self.at)
@@ -137,8 +141,8 @@ def channel(name: str) -> Channel:
 def read_hierarchy(data: bytes, encoding: str) -> tuple[list[Joint], int, int]:
     """The joints, in definition order, the offset after MOTION, and the number of stray words.
 
-    These stand where the joints of all roots are closed and nothing belongs. Position channels
-    are taken to add to the offset: only the values can tell.
+    Stray words are alone on their line, remains of another file that was written over. Position
+    channels are taken to add to the offset: only the values can tell.
     """
     reader = _Reader(data)
     reader.read()

@@ -55,7 +55,7 @@ DETAIL = Struct(
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """``n_columns`` columns from ``column`` on; their tokens follow ``gap``, padded to ``width``."""
+    """``n_columns`` columns from ``column`` on; tokens follow ``gap``, padded to ``width``."""
 
     gap: bytes
     column: int

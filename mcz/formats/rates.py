@@ -24,6 +24,7 @@ def frame_rate(frame_time: str) -> tuple[Fraction | None, bool]:
         return None, True
     time = Fraction(frame_time)
     half_digit = Fraction(10) ** int(Decimal(frame_time).as_tuple().exponent) / 2
+    half_digit += time / 2**53  # it may have been a binary64 before, itself rounded
     reciprocal = 1 / time
     spread = half_digit / time * reciprocal  # of the rates that print alike, about
     units = [Fraction(1), Fraction(1000, 1001)]

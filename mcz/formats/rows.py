@@ -26,7 +26,7 @@ Token = tuple[int, int, int]  # start, stop, column
 Frames = Callable[[int], tuple[list[Token], int] | None]
 
 MAX_NUMBER = 10**15  # of a frame, either sign
-ODD_PATTERNS = 16  # after so many patterns it is time to look for padded columns
+LOOK_FOR_PADDING = (8, 64)  # numbers of patterns at which to look for padded columns
 _TAIL = re.compile(rb"[\x00-\x09\x0b-\x20]*\n?")
 
 
@@ -68,11 +68,13 @@ def read_rows(data: bytes, at: int, n_columns: int, frames: Frames) -> Rows:
     Raises SourceError where ``frames`` does, where the layout is too irregular to be worth
     a template, and where rows name so few columns that the table would dwarf the file.
     """
-    reader = _Reader(data, n_columns, frames)
-    try:
-        return reader.read(at)
-    except _Padded as padded:
-        return _Reader(data, n_columns, frames, padded.widths).read(at)
+    widths: dict[int, int] = {}
+    for look_at in LOOK_FOR_PADDING:
+        try:
+            return _Reader(data, n_columns, frames, widths, look_at).read(at)
+        except _Padded as padded:
+            widths = padded.widths
+    return _Reader(data, n_columns, frames, widths).read(at)
 
 
 class _Padded(Exception):
@@ -87,7 +89,8 @@ class _Reader:
     data: bytes
     n_columns: int
     frames: Frames
-    widths: dict[int, int] | None = None
+    widths: dict[int, int]  # of padded columns
+    look_at: int = MAX_PATTERNS
     start: Ints = field(init=False)
     stop: Ints = field(init=False)
     numbers: Ints = field(init=False)
@@ -113,17 +116,16 @@ class _Reader:
                 self._grow(at - begin, len(self.data) - begin)
             last_end = self._learn(at, tokens, end)
             number = self.used[-1][1]
-            row, at = self.row, end
+            first, at = self.row, end
             while True:
-                row, at = _kernels.match_rows(
-                    text, at, *self.arrays[number], row, self.start, self.stop, self.numbers
+                self.row, at = _kernels.match_rows(
+                    text, at, *self.arrays[number], self.row, self.start, self.stop, self.numbers
                 )
-                if row < len(self.numbers):
+                if self.row < len(self.numbers):
                     break
                 self._grow(at - begin, len(self.data) - begin)
-            if row > self.row:
+            if self.row > first:
                 last_end = at - len(self.patterns[number].tail)
-            self.row = row
         return self._finish(last_end)
 
     def _allocate(self, n_rows: int) -> None:
@@ -135,8 +137,8 @@ class _Reader:
         """Make room for as many rows as the file seems to have, going by the ``done`` bytes."""
         if self.row * self.n_columns > 16 * len(self.data) + 2**20:
             raise SourceError(
-                f"frame {self.row}: too few of the {self.n_columns} channels are there in each "
-                f"frame; a table of all of them would dwarf the file"
+                f"frame {self.row}: most of the {self.n_columns} channels are missing from most "
+                f"frames; a table of all of them would dwarf the file"
             )
         expected = int((self.row + 1) * size / max(1, done) * 1.01) + 64
         n_rows = max(min(expected, 4 * len(self.numbers)), len(self.numbers) * 3 // 2)
@@ -147,6 +149,7 @@ class _Reader:
 
     def _learn(self, at: int, tokens: list[Token], end: int) -> int:
         """Note the tokens of a row and its pattern; returns where its last token ends."""
+        self.start[self.row] = self.stop[self.row] = 0  # what a match that failed has left
         for start, stop, column in tokens:
             if column == FRAME_NUMBER:
                 self._number(self.data[start:stop])
@@ -171,9 +174,8 @@ class _Reader:
     ) -> tuple[tuple[tuple[bytes, int, int], ...], int]:
         """(gap, column, width) of each token, and where the last one ends, padding included."""
         items = []
-        widths = self.widths or {}
         for start, stop, column in tokens:
-            gap, width = self.data[at:start], widths.get(column, 0)
+            gap, width = self.data[at:start], self.widths.get(column, 0)
             at = stop
             if width:
                 pad = padding(self.data[start:stop], width)
@@ -189,10 +191,9 @@ class _Reader:
 
     def _add(self, items: tuple[tuple[bytes, int, int], ...], tail: bytes, at: int) -> int:
         number = len(self.patterns)
-        if number == ODD_PATTERNS and self.widths is None:
+        if number in LOOK_FOR_PADDING and number >= self.look_at:
             widths = find_widths(self.data, self.samples)
-            self.widths = {}
-            if widths:
+            if widths and widths != self.widths:
                 raise _Padded(widths)
         pattern = Pattern(runs_of(items), tail)
         if number >= MAX_PATTERNS or pattern.gap_size > MAX_ROW_GAPS:

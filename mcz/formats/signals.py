@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.errors import SourceError
+from mcz.errors import OptionError, SourceError
 from mcz.formats.rows import Rows, line_of
 from mcz.motion import Exceptions, Signal
-from mcz.numbers import Grid, Tokens, choose_grid, scan
+from mcz.numbers import Grid, GridFlag, Tokens, choose_grid, fit, scan
 
 Bools = NDArray[np.bool_]
 
@@ -70,54 +72,50 @@ def _grids(
     order = np.argsort(column, kind="stable")  # column by column, rows in order
     edges = np.searchsorted(column[order], np.arange(n_columns + 1))
     mine = [order[a:b] for a, b in pairwise(edges)]
-    common = _common_grid(tokens, [choose_grid(tokens[chosen]) for chosen in mine], common)
-    grids, changes = [], []
-    for c, chosen in enumerate(mine):
-        grid, more, printed[chosen] = _column(tokens[chosen], row[chosen], common)
-        grids.append(grid)
-        changes += [(at, c, change) for at, change in more]
+    own = {c: fit(tokens[at])[::2] for c, at in enumerate(mine) if not printed[at].all()}
+    common, printed = _common_grid(tokens, [grid for grid, _ in own.values()], common, printed)
+    grids, changes = [common] * n_columns, []
+    for c, (grid, mine_printed) in own.items():
+        at = mine[c]
+        if np.count_nonzero(mine_printed) > np.count_nonzero(printed[at]):
+            grids[c], printed[at] = grid, mine_printed
+        if np.count_nonzero(~printed[at]) >= WORTH:
+            blocks, printed[at] = _by_blocks(tokens[at], row[at], grids[c], printed[at])
+            changes += [(first, c, change) for first, change in blocks]
     return tuple(grids), tuple(sorted(changes, key=lambda change: change[:2])), printed
 
 
-def _common_grid(tokens: Tokens, grids: Sequence[Grid], guess: Grid) -> Grid:
-    """The grid that prints most tokens, of ``guess`` and the most frequent of ``grids``."""
-    frequent = [grid for grid, _ in Counter(grids).most_common(CANDIDATES)]
-    return max(
-        (guess, *frequent),
-        key=lambda grid: np.count_nonzero(grid.ordinals_of_tokens(tokens)[1]),
-    )
+def _common_grid(
+    tokens: Tokens, grids: Sequence[Grid], guess: Grid, printed: Bools
+) -> tuple[Grid, Bools]:
+    """The grid that prints most tokens, and which these are.
 
-
-def _column(
-    tokens: Tokens, row: NDArray[np.int64], common: Grid
-) -> tuple[Grid, list[tuple[int, Grid]], Bools]:
-    """The grid of one column, its changes (row, grid), and which tokens are printed.
-
-    ``common`` is kept where no grid does better, so that columns share a grid where they can.
+    Candidates are ``guess``, which prints ``printed``, the most frequent of the grids of single
+    columns, and ``guess`` with the flags of these.
     """
-    grid = choose_grid(tokens, prefer=(common,))
-    printed = grid.ordinals_of_tokens(tokens)[1]
-    if np.count_nonzero(~printed) < WORTH:
-        return grid, [], printed
-    return _by_blocks(tokens, row, grid, printed)
+    candidates = [grid for grid, _ in Counter(grids).most_common(CANDIDATES)]
+    for flags in sorted({GridFlag.POINT_ZERO, *(grid.flags for grid in grids)}):
+        with suppress(OptionError):
+            candidates.append(replace(guess, flags=flags))
+    for grid in dict.fromkeys(candidates):
+        more = grid.ordinals_of_tokens(tokens)[1]
+        if np.count_nonzero(more) > np.count_nonzero(printed):
+            guess, printed = grid, more
+    return guess, printed
 
 
 def _by_blocks(
     tokens: Tokens, row: NDArray[np.int64], grid: Grid, printed: Bools
-) -> tuple[Grid, list[tuple[int, Grid]], Bools]:
-    """As ``_column``, with another grid for each run of blocks where that saves exceptions."""
-    current, changes = None, []
+) -> tuple[list[tuple[int, Grid]], Bools]:
+    """Changes (row, grid) of a column where another grid saves exceptions; what is printed then."""
+    changes: list[tuple[int, Grid]] = []
     result = printed.copy()
     for start in range(0, len(row), BLOCK):
         block = slice(start, start + BLOCK)
-        some = tokens[block]
-        usual = (current or grid).ordinals_of_tokens(some)[1]
-        best = choose_grid(some)
-        better = best.ordinals_of_tokens(some)[1]
+        usual = grid.ordinals_of_tokens(tokens[block])[1]
+        best, _, better = fit(tokens[block])
         if np.count_nonzero(better) >= np.count_nonzero(usual) + WORTH:
             changes.append((int(row[start]), best))
-            current, usual = best, better
+            grid, usual = best, better
         result[block] = usual
-    if not changes:
-        return grid, [], printed
-    return grid, changes, result
+    return changes, result

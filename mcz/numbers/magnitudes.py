@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz._gridrules import MAX_POWER, MIN_POWER
-from mcz._tokens import EXACT_POWER, NAN, TENS, Floats, Ints, scan_texts
+from mcz.numbers.rules import MAX_POWER, MIN_POWER
+from mcz.numbers.tokens import EXACT_POWER, NAN, TENS, Floats, Ints, scan_texts
 
 FIRST_NAN32 = 0x7F800001
 FIRST_NAN64 = 0x7FF0000000000001

@@ -2,38 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz._gridrules import FIXED_TEXT, GridKind, limit
-from mcz._magnitudes import binary32_magnitudes, general_split
-from mcz._tokens import Bools, Floats, Ints, Tokens, kernels, scan_texts
+from mcz.numbers.magnitudes import binary32_magnitudes, general_split
+from mcz.numbers.rules import FIXED_TEXT, GridKind, limit
+from mcz.numbers.tokens import Bools, Floats, Ints, Texts, Tokens, kernels, scan_texts
 
 _UNLIMITED = 1_000_000  # more decimals, and a larger exponent, than any number has
 _WIDEST = 48  # bytes of a number from ``write``; the longest has 17 digits after "-0.00000"
 _JAVASCRIPT = 1  # digits of a TEXT64 grid
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Texts:
-    """Texts one after the other: text i is ``buffer[offsets[i]:offsets[i + 1]]``."""
-
-    buffer: NDArray[np.uint8]
-    offsets: Ints
-
-    def __len__(self) -> int:
-        return len(self.offsets) - 1
-
-    def __getitem__(self, index: int) -> bytes:
-        return self.buffer[self.offsets[index] : self.offsets[index + 1]].tobytes()
-
-    def tolist(self) -> list[bytes]:
-        whole = self.buffer.tobytes()
-        edges = self.offsets.tolist()
-        return [whole[a:b] for a, b in pairwise(edges)]
 
 
 def _exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:

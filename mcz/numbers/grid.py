@@ -1,18 +1,7 @@
-"""Number grids: what a number of a source file is, as an integer.
-
-A *grid* is a countable set of numbers together with one way of printing each of them.
-The *ordinal* of a number is its place on the grid: an integer that grows with the number.
-Codecs work on ordinals, formats print them, and ``values`` turns them into binary64.
-SPEC.md, "Number grids", is normative.
-
-For every text grid and every IEEE or VAX grid the ordinal of a number with a plus sign is its
-magnitude index m >= 0 and that of a number with a minus sign is -1 - m, so that -0 is the
-ordinal -1 and nothing is an exception only because of its sign.
-"""
+"""Grid: ordinals to values, bits and text, and back. SPEC.md, "Number grids", is normative."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,9 +9,9 @@ import numpy as np
 from construct import Adapter, Container, If, Int8ul, Struct
 from numpy.typing import NDArray
 
-from mcz import _choose, _gridrules, _textgrids
-from mcz._gridrules import TEXT_KINDS, GridFlag, GridKind
-from mcz._magnitudes import (
+from mcz.errors import FormatError, OptionError
+from mcz.numbers import rules, textgrids
+from mcz.numbers.magnitudes import (
     binary32_magnitudes,
     binary32_values,
     binary64_values,
@@ -33,14 +22,10 @@ from mcz._magnitudes import (
     vax_swap,
     vax_values,
 )
-from mcz._textgrids import Texts
-from mcz._tokens import NAN, TENS, Bools, Floats, Ints, Tokens, nearest, scan
-from mcz.errors import FormatError, OptionError
+from mcz.numbers.rules import CHECKED_KINDS, TEXT_KINDS, GridKind
+from mcz.numbers.tokens import NAN, TENS, Bools, Floats, Ints, Texts, Tokens, nearest
 from mcz.schema import FINITE
 
-__all__ = ["GRID", "Grid", "GridFlag", "GridKind", "Texts", "Tokens", "choose_grid", "fit", "scan"]
-
-_CHECKED = (GridKind.TEXT64, GridKind.TEXT32)  # printed or not is more than shape
 _IEEE = (GridKind.BINARY32, GridKind.BINARY64)
 
 
@@ -60,7 +45,7 @@ class Grid:
     def __post_init__(self) -> None:
         object.__setattr__(self, "kind", GridKind(self.kind))
         object.__setattr__(self, "flags", int(self.flags))
-        fault = _gridrules.fault(self.kind, self.digits, self.flags, self.scale)
+        fault = rules.fault(self.kind, self.digits, self.flags, self.scale)
         if fault:
             raise OptionError(f"a {self.kind.name} grid cannot have {fault}")
 
@@ -76,7 +61,7 @@ class Grid:
     @property
     def limit(self) -> int:
         """The largest magnitude index; ordinals run from -1 - limit (or -limit) to limit."""
-        return _gridrules.limit(self.kind, self.digits)
+        return rules.limit(self.kind, self.digits)
 
     def magnitudes(self, ordinals: Ints) -> Ints:
         """Magnitude indices; FormatError for an ordinal that is no number's."""
@@ -101,7 +86,7 @@ class Grid:
             case GridKind.TEXT64 | GridKind.BINARY64:
                 values = binary64_values(magnitudes)
             case GridKind.TEXT32:
-                values = _textgrids.text32_values(magnitudes)
+                values = textgrids.text32_values(magnitudes)
             case GridKind.BINARY32:
                 values = binary32_values(magnitudes)
             case GridKind.VAX_F:
@@ -185,19 +170,17 @@ class Grid:
         Where it does not (an exception), the ordinal is 0.
         """
         self._check_text()
-        ordinals, printed, _ = _textgrids.match(tokens, self.kind, self.digits, self.flags)
-        if self.kind not in _CHECKED:
+        ordinals, printed, _ = textgrids.match(tokens, self.kind, self.digits, self.flags)
+        if self.kind not in CHECKED_KINDS:
             return ordinals, printed
-        unsure = _textgrids.uncertain(tokens, self.kind, self.digits, printed)
+        unsure = textgrids.uncertain(tokens, self.kind, self.digits, printed)
         printed |= unsure
         chosen = tokens[printed]
         if self.kind == GridKind.TEXT32:
-            ordinals[printed] = _textgrids.token_ordinals32(chosen)
+            ordinals[printed] = textgrids.token_ordinals32(chosen)
         else:
             ordinals[printed] = self.ordinals(chosen.values())[0]
-        printed_texts = self.texts(ordinals[unsure]).tolist()
-        pairs = zip(printed_texts, tokens[unsure].texts(), strict=True)
-        printed[unsure] = [a == b for a, b in pairs]
+        printed[unsure] = self.texts(ordinals[unsure]).equal(tokens[unsure].texts())
         ordinals[~printed] = 0
         return ordinals, printed
 
@@ -209,7 +192,7 @@ class Grid:
         """The text of each ordinal; FormatError for one out of range."""
         self._check_text()
         ordinals = np.ascontiguousarray(ordinals, np.int64).ravel()
-        return _textgrids.texts(
+        return textgrids.texts(
             self.kind, self.digits, self.flags, self.magnitudes(ordinals), ordinals < 0
         )
 
@@ -236,38 +219,3 @@ GRID_FIELDS = Struct(
     "scale" / If(lambda fields: fields.kind == GridKind.SCALED, FINITE) * "SCALED only: the unit",
 )
 GRID = _GridAdapter(GRID_FIELDS)
-
-
-def choose_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> Grid:
-    """The grid of ``fit``, for who needs no ordinals yet."""
-    return fit(tokens, prefer)[0]
-
-
-def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]:
-    """The text grid that needs the fewest bytes for ``tokens``, exceptions counted.
-
-    With it, what its ``ordinals_of_tokens`` gives. The first of ``prefer`` without exceptions is
-    taken at once, and the first that has no more exceptions than the best of all others.
-    """
-    wanted = []
-    for grid in prefer:
-        wanted.append((grid, *grid.ordinals_of_tokens(tokens)))
-        if wanted[-1][2].all():
-            return wanted[-1]
-    least = float("inf")
-    for bits, (kind, digits, flags) in sorted(_choose.candidates(tokens)):
-        if _choose.cost(len(tokens), bits, 0) >= least:
-            continue
-        # Shape alone gives a lower bound, which spares TEXT grids where they cannot win.
-        bound = _textgrids.match(tokens, kind, digits, flags)[2]
-        if kind in _CHECKED and bound:
-            bound -= int(np.count_nonzero(_textgrids.long(tokens)))
-        if _choose.cost(len(tokens), bits, bound) >= least:
-            continue
-        grid = Grid(kind, digits, flags)
-        ordinals, printed = grid.ordinals_of_tokens(tokens)
-        misses = len(tokens) - int(np.count_nonzero(printed))
-        price = _choose.cost(len(tokens), bits, misses)
-        if price < least:
-            least, fewest, best = price, misses, (grid, ordinals, printed)
-    return next((fitted for fitted in wanted if np.count_nonzero(~fitted[2]) <= fewest), best)

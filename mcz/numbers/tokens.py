@@ -9,6 +9,7 @@ import importlib
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,37 @@ _INF_TEXT = re.compile(rb"[-+]?(inf(inity)?|\d\.#inf\d*)", re.IGNORECASE)
 
 def kernels() -> Any:
     """The compiled loops; numba is imported here, on first use."""
-    return importlib.import_module("mcz._decimal")
+    return importlib.import_module("mcz.numbers.kernels")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Texts:
+    """Texts one after the other: text i is ``buffer[offsets[i]:offsets[i + 1]]``."""
+
+    buffer: NDArray[np.uint8]
+    offsets: Ints
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    def __getitem__(self, index: int) -> bytes:
+        return self.buffer[self.offsets[index] : self.offsets[index + 1]].tobytes()
+
+    def __iter__(self) -> Iterator[bytes]:
+        return iter(self.tolist())
+
+    def equal(self, other: Texts) -> Bools:
+        """Which texts are the same in both, as many here as there."""
+        same_length = np.array_equal(self.offsets, other.offsets)
+        if same_length and np.array_equal(self.buffer, other.buffer):
+            return np.ones(len(self), np.bool_)
+        pairs = zip(self.tolist(), other.tolist(), strict=True)
+        return np.array([a == b for a, b in pairs], np.bool_)
+
+    def tolist(self) -> list[bytes]:
+        whole = self.buffer.tobytes()
+        edges = self.offsets.tolist()
+        return [whole[a:b] for a, b in pairwise(edges)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +74,7 @@ class Tokens:
     text: NDArray[np.uint8]
     start: Ints
     stop: Ints
-    fields: Ints  # columns as in mcz._decimal
+    fields: Ints  # columns as in mcz.numbers.kernels
 
     def __len__(self) -> int:
         return len(self.start)
@@ -58,11 +89,12 @@ class Tokens:
         """The text of one token."""
         return self.text[self.start[index] : self.stop[index]].tobytes()
 
-    def texts(self) -> Iterator[bytes]:
-        """The text of every token."""
-        whole = memoryview(self.text.data)
-        for start, stop in zip(self.start.tolist(), self.stop.tolist(), strict=True):
-            yield bytes(whole[start:stop])
+    def texts(self) -> Texts:
+        """The texts of all tokens, copied out of the buffer."""
+        sizes = self.stop - self.start
+        offsets = np.concatenate(([0], np.cumsum(sizes)))
+        places = np.arange(offsets[-1]) + np.repeat(self.start - offsets[:-1], sizes)
+        return Texts(self.text[places], offsets)
 
     def bad(self) -> Bools:
         """Which tokens are no numbers at all; nan and inf are numbers here."""
@@ -84,10 +116,10 @@ class Tokens:
         np.negative(out, where=(shape & loops.MINUS) != 0, out=out)
         special = (odd & loops.SPECIAL) != 0
         if special.any():
-            out[special] = [_value(text) for text in self[special].texts()]
+            out[special] = [_value(text) for text in self[special].texts().tolist()]
             slow &= ~special
         if slow.any():
-            out[slow] = [float(text) for text in self[slow].texts()]
+            out[slow] = [float(text) for text in self[slow].texts().tolist()]
         return out
 
 
@@ -102,7 +134,7 @@ def scan(
     start = np.ascontiguousarray(start, np.int64)
     stop = np.ascontiguousarray(stop, np.int64)
     if len(start) != len(stop) or (
-        len(start) and not (0 <= start.min() and (start <= stop).all() and stop.max() <= len(whole))
+        len(start) and not (start.min() >= 0 and (start <= stop).all() and stop.max() <= len(whole))
     ):
         raise IndexError(f"tokens outside of a text of {len(whole)} bytes")
     loops = kernels()

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz._jit import kernel
+from mcz.jit import kernel
 
 HUGE = 1_000_000
 
@@ -175,7 +175,7 @@ def _general(mantissa: int, power: int, digits: int) -> int:
         return 0
     if abs(power) > 307:
         return -1
-    block = 10 ** (digits - 1)
+    block: int = 10 ** (digits - 1)
     while mantissa >= block * 10:
         mantissa //= 10
     while mantissa < block:

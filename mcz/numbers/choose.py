@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mcz._gridrules import FIXED_TEXT, GridFlag, GridKind
-from mcz._tokens import Ints, Tokens, kernels
+from mcz.numbers import textgrids
+from mcz.numbers.grid import Grid
+from mcz.numbers.rules import CHECKED_KINDS, FIXED_TEXT, GridFlag, GridKind
+from mcz.numbers.tokens import Bools, Ints, Tokens, kernels
 
 _SAMPLE = 4096  # tokens that are looked at for candidates; all of them are counted
 _EXCEPTION_BITS = 200  # row, channel and text, a guess
@@ -24,7 +26,10 @@ def cost(n_tokens: int, bits: float, n_exceptions: int) -> float:
 def candidates(tokens: Tokens) -> Iterator[Candidate]:
     """Grids worth a try."""
     loops = kernels()
-    mantissa, power, shape = tokens.fields[:: 1 + len(tokens) // _SAMPLE].T
+    fields = tokens.fields
+    if len(fields) > _SAMPLE:  # a prime step, so that every column of a table is seen
+        fields = fields[np.arange(_SAMPLE) * 2_654_435_761 % len(fields)]
+    mantissa, power, shape = fields.T
     known = shape & (loops.BAD | loops.SPECIAL) == 0
     if not known.any():
         yield 0.0, (GridKind.FIXED, 0, 0)
@@ -95,3 +100,38 @@ def _styles(mantissa: Ints, power: Ints, shape: Ints, places: Ints) -> tuple[int
     if many(shape & loops.UPPER, ~plain & (shape & loops.UPPER == 0)):
         exponent |= GridFlag.UPPER
     return int(sign), tail, int(exponent)
+
+
+def choose_grid(tokens: Tokens, prefer: Sequence[Grid] = ()) -> Grid:
+    """The grid of ``fit``, for who needs no ordinals yet."""
+    return fit(tokens, prefer)[0]
+
+
+def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]:
+    """The text grid that needs the fewest bytes for ``tokens``, exceptions counted.
+
+    With it, what its ``ordinals_of_tokens`` gives. The first of ``prefer`` without exceptions is
+    taken at once, and the first that has no more exceptions than the best of all others.
+    """
+    wanted = []
+    for grid in prefer:
+        wanted.append((grid, *grid.ordinals_of_tokens(tokens)))
+        if wanted[-1][2].all():
+            return wanted[-1]
+    least = float("inf")
+    for bits, (kind, digits, flags) in sorted(candidates(tokens)):
+        if cost(len(tokens), bits, 0) >= least:
+            continue
+        # Shape alone gives a lower bound, which spares TEXT grids where they cannot win.
+        bound = textgrids.match(tokens, kind, digits, flags)[2]
+        if kind in CHECKED_KINDS and bound:
+            bound -= int(np.count_nonzero(textgrids.long(tokens)))
+        if cost(len(tokens), bits, bound) >= least:
+            continue
+        grid = Grid(kind, digits, flags)
+        ordinals, printed = grid.ordinals_of_tokens(tokens)
+        misses = len(tokens) - int(np.count_nonzero(printed))
+        price = cost(len(tokens), bits, misses)
+        if price < least:
+            least, fewest, best = price, misses, (grid, ordinals, printed)
+    return next((fitted for fitted in wanted if np.count_nonzero(~fitted[2]) <= fewest), best)

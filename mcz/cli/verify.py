@@ -1,0 +1,107 @@
+"""``mcz verify``: proof that a file is whole and gives its sources back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mcz.cli.common import Exit, Failure, about, existing, opened, print_json, printable, say
+from mcz.cli.options import json_option
+from mcz.cli.progress import Progress
+from mcz.errors import ChecksumError, TruncatedError
+
+if TYPE_CHECKING:
+    from mcz.file import File
+
+
+@click.command(short_help="Prove that sources come back identical.")
+@click.argument("file", metavar="FILE.mcz", type=click.Path())
+@click.option(
+    "--source", metavar="SRC", type=click.Path(), help="Compare with this source file, too."
+)
+@json_option
+def command(file: str, source: str | None, as_json: bool) -> Exit:
+    """Check every checksum, decode everything, restore every source and compare its SHA-256."""
+    if source is not None:
+        existing(source)
+    try:
+        with opened(file) as held, Progress() as progress:
+            rows = list(_parts(held, progress))
+            if source is not None:
+                rows.append(_compare(held, source))
+    except Failure as failure:
+        if isinstance(failure.__cause__, TruncatedError | ChecksumError):
+            raise Failure(str(failure), Exit.NOT_VERIFIED) from failure
+        raise
+    failed = [row for row in rows if row["problems"]]
+    if as_json:
+        print_json({"verified": not failed, "parts": rows})
+    elif not failed:
+        click.echo(printable(f"{file}: verified, {', '.join(_counts(rows))}"))
+    for row in failed:
+        for problem in row["problems"]:
+            say(f"{file}: {row['kind']} {row['name']}: {problem}".replace(" :", ":"))
+    return Exit.NOT_VERIFIED if failed else Exit.FINE
+
+
+def _parts(held: File, progress: Progress) -> Iterator[dict[str, Any]]:
+    from mcz import report
+
+    total = 1 + len(held.clips) + len(held.attachments)
+    problems = report.structure_problems(held)
+    yield _row("structure", "", [problem.message for problem in problems])
+    for done, (kind, name, found) in enumerate(report.part_problems(held)):
+        progress(min(done, total), total, name)
+        yield _row(kind, name, [problem.message for problem in found])
+
+
+def _row(kind: str, name: str, problems: list[str]) -> dict[str, Any]:
+    return {"kind": kind, "name": name, "problems": problems}
+
+
+def _counts(rows: list[dict[str, Any]]) -> Iterator[str]:
+    kinds = [row["kind"] for row in rows]
+    for kind in dict.fromkeys(kinds):
+        count = kinds.count(kind)
+        if kind == "structure":
+            yield "every chunk checked"
+        elif kind == "source":
+            yield "source identical"
+        else:
+            yield f"{count:,} {kind}{'s' if count > 1 else ''}"
+
+
+def _compare(held: File, source: str) -> dict[str, Any]:
+    """Compare SRC with what is restored under its name, or with the only clip."""
+    restore = _find(held, source)
+    with about(source):
+        wanted = Path(source).read_bytes()
+        restored = restore()
+    if restored == wanted:
+        return _row("source", source, [])
+    same = next(
+        (i for i, (a, b) in enumerate(zip(restored, wanted, strict=False)) if a != b),
+        min(len(restored), len(wanted)),
+    )
+    text = f"differs from byte {same} on; restored {len(restored)} bytes, compared {len(wanted)}"
+    return _row("source", source, [text])
+
+
+def _find(held: File, source: str) -> Callable[[], bytes]:
+    """What restores the file that is called like ``source``."""
+    name = Path(source).name
+    for clip in held.clips.values():
+        if clip.source is not None and PurePosixPath(clip.source.path).name == name:
+            return clip.source_bytes
+    for alias, (_, target) in held.aliases.items():
+        if PurePosixPath(alias).name == name and target in dict(held.skeletons):
+            return lambda: held.skeleton_bytes(target)
+    for attachment in held.attachments.values():
+        if PurePosixPath(attachment.name).name == name:
+            return attachment.read
+    if len(held.clips) != 1:
+        raise Failure(f"{source}: the file holds nothing of this name", Exit.USAGE)
+    return held.only_clip().source_bytes

@@ -1,0 +1,29 @@
+"""Number grids: what a number of a source file is, as an integer.
+
+A *grid* is a countable set of numbers together with one way of printing each of them.
+The *ordinal* of a number is its place on the grid: an integer that grows with the number.
+Codecs work on ordinals, formats print them, and ``values`` turns them into binary64.
+SPEC.md, "Number grids", is normative.
+
+For every text grid and every IEEE or VAX grid the ordinal of a number with a plus sign is its
+magnitude index m >= 0 and that of a number with a minus sign is -1 - m, so that -0 is the
+ordinal -1 and nothing is an exception only because of its sign.
+"""
+
+from mcz.numbers.choose import choose_grid, fit
+from mcz.numbers.grid import GRID, GRID_FIELDS, Grid
+from mcz.numbers.rules import GridFlag, GridKind
+from mcz.numbers.tokens import Texts, Tokens, scan
+
+__all__ = [
+    "GRID",
+    "GRID_FIELDS",
+    "Grid",
+    "GridFlag",
+    "GridKind",
+    "Texts",
+    "Tokens",
+    "choose_grid",
+    "fit",
+    "scan",
+]

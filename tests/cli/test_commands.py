@@ -1,0 +1,410 @@
+"""Every command, run as a user would: what it writes, prints, refuses and returns."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.cli.common import run
+from mcz.cli.info import command as info_command
+from mcz.cli.main import COMMANDS, cli
+
+CLIP_KEYS = {
+    "name",
+    "codec",
+    "n_frames",
+    "n_channels",
+    "n_joints",
+    "frame_rate",
+    "payload_bytes",
+    "overhead_bytes",
+    "source_chunk_bytes",
+    "source_bytes",
+    "cr_source",
+    "cr_float32",
+    "cr_40B",
+    "cr_file",
+    "quality",
+}
+
+
+@dataclass(frozen=True)
+class Result:
+    code: int
+    out: str
+    err: str
+
+    @property
+    def document(self) -> Any:
+        assert self.code == 0, self.err
+        return json.loads(self.out)
+
+
+Call = Callable[..., Result]
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Call:
+    def call(*arguments: object) -> Result:
+        code = run(cli, "mcz", [str(a) for a in arguments])
+        captured = capsys.readouterr()
+        return Result(int(code), captured.out, captured.err)
+
+    return call
+
+
+@pytest.fixture
+def folder(samples: Path, tmp_path: Path) -> Path:
+    """A folder of one's own with the sample files."""
+    for path in samples.iterdir():
+        shutil.copy(path, tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def walk(folder: Path, call: Call) -> Path:
+    """walk.mcz, made of walk.bvh."""
+    result = call("encode", folder / "walk.bvh")
+    assert result.code == 0, result.err
+    return folder / "walk.mcz"
+
+
+def fails(result: Result, code: int, *words: str) -> None:
+    """The command ended with ``code``, one line on stderr that has ``words``, none on stdout."""
+    assert (result.code, result.out) == (code, ""), result
+    assert result.err.startswith("mcz: ")
+    assert result.err.count("\n") == 1
+    for word in words:
+        assert word in result.err
+
+
+def digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_sample(tmp_path: Path, call: Call) -> None:
+    result = call("sample", tmp_path / "new", "--json")
+    names = [Path(o["path"]).name for o in result.document["outputs"]]
+    assert names == ["walk.asf", "walk.amc", "walk.bvh"]
+    fails(call("sample", tmp_path / "new"), 2, "walk.asf", "--force")
+    assert call("sample", tmp_path / "new", "--force").code == 0
+
+
+@pytest.mark.parametrize("name", ["walk.bvh", "walk.amc", "walk.asf"])
+def test_source_comes_back(folder: Path, call: Call, name: str) -> None:
+    assert call("encode", folder / name, "-o", folder / "x.mcz").code == 0
+    result = call("decode", folder / "x.mcz", "-o", folder / "back")
+    assert result.code == 0, result.err
+    assert digest(folder / "back") == digest(folder / name)
+
+
+def test_decode_with_skeleton(folder: Path, call: Call) -> None:
+    call("encode", folder / "walk.amc")
+    (folder / "out").mkdir()
+    result = call("decode", folder / "walk.mcz", "-o", folder / "out", "--with-skeleton", "--json")
+    assert [o["kind"] for o in result.document["outputs"]] == ["source", "skeleton"]
+    for name in ("walk.amc", "walk.asf"):
+        assert digest(folder / "out" / name) == digest(folder / name)
+
+
+def test_default_names_and_no_overwriting(folder: Path, call: Call) -> None:
+    assert call("encode", folder / "walk.bvh").code == 0
+    before = digest(folder / "walk.mcz")
+    fails(call("encode", folder / "walk.amc"), 2, str(folder / "walk.mcz"))
+    fails(call("decode", folder / "walk.mcz"), 2, str(folder / "walk.bvh"), "--force")
+    assert digest(folder / "walk.mcz") == before
+    assert call("decode", folder / "walk.mcz", "--force").code == 0
+    assert call("encode", folder / "walk.amc", "--force").code == 0
+    assert digest(folder / "walk.mcz") != before
+    assert {p.suffix for p in folder.iterdir()} == {".asf", ".amc", ".bvh", ".mcz"}
+
+
+def test_encode_says_what_it_did(folder: Path, call: Call) -> None:
+    shown = call("encode", folder / "walk.bvh").out
+    assert "240 frames of 96 channels" in shown
+    options = ("--force", "--json", "--rate", "30000/1001", "--unit", "cm", "--codec", "raw")
+    document = call("encode", folder / "walk.bvh", *options).document
+    assert document["output"] == str(folder / "walk.mcz")
+    assert document["clips"][0]["frame_rate"] == pytest.approx(30000 / 1001)
+    assert document["skeletons"][0]["unit_cm"] == 1
+
+
+def test_amc_rate_is_unknown_unless_given(folder: Path, call: Call) -> None:
+    document = call("encode", folder / "walk.amc", "--json").document
+    assert document["clips"][0]["frame_rate"] is None
+    document = call("encode", folder / "walk.amc", "--json", "--force", "--rate", 120).document
+    assert document["clips"][0]["frame_rate"] == 120
+
+
+def test_amc_finds_its_asf(folder: Path, call: Call) -> None:
+    (folder / "walk.asf").rename(folder / "elsewhere.ASF")
+    assert call("encode", folder / "walk.amc", "--json").document["clips"][0]["n_joints"] == 31
+    shutil.copy(folder / "elsewhere.ASF", folder / "another.asf")
+    result = call("encode", folder / "walk.amc", "--force")
+    fails(result, 1, "elsewhere.ASF", "another.asf")
+    chosen = ("--skeleton", folder / "another.asf", "--force")
+    assert call("encode", folder / "walk.amc", *chosen).code == 0
+
+
+def test_refused_sources(folder: Path, call: Call) -> None:
+    (folder / "bad.bvh").write_bytes(b"HIERARCHY\nROOT\n")
+    fails(call("encode", folder / "bad.bvh"), 1, "bad.bvh")
+    assert not (folder / "bad.mcz").exists()
+    fails(call("encode", folder / "absent.bvh"), 1, "absent.bvh: no such file")
+    result = call("encode", folder / "bad.bvh", "--verbatim")
+    assert result.code == 0, result.err
+    assert call("decode", folder / "bad.mcz", "-o", folder / "good").code == 0
+    assert digest(folder / "good") == digest(folder / "bad.bvh")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--codec", "none"],
+        ["--param", "frames"],
+        ["--param", "nonsense=1"],
+        ["--rate", "0"],
+        ["--rate", "fast"],
+        ["--unit", "furlong"],
+        ["--bogus"],
+    ],
+)
+def test_wrong_usage(folder: Path, call: Call, options: list[str]) -> None:
+    fails(call("encode", folder / "walk.bvh", *options), 2)
+    assert not (folder / "walk.mcz").exists()
+
+
+def test_csv(walk: Path, call: Call) -> None:
+    out = walk.with_suffix(".csv")
+    chosen = ("--frames", "10:13", "--joints", "Head,Hips")
+    assert call("decode", walk, "--to", "csv", *chosen).code == 0
+    rows = list(csv.reader(out.read_text("utf-8").splitlines()))
+    assert rows[0] == [
+        "frame",
+        *(f"Head.r{a}" for a in "zyx"),
+        *(f"Hips.t{a}" for a in "xyz"),
+        *(f"Hips.r{a}" for a in "zyx"),
+    ]
+    assert [row[0] for row in rows[1:]] == ["11", "12", "13"]
+    with mcz.open(walk) as file:
+        expected = file.clips["walk"].read(frames=(10, 13), joints=["Head", "Hips"])
+    assert (np.array([[float(c) for c in row[1:]] for row in rows[1:]]) == expected).all()
+
+
+def test_npz(walk: Path, call: Call) -> None:
+    assert call("decode", walk, "--to", "npz", "-o", walk.with_name("n.npz")).code == 0
+    with np.load(walk.with_name("n.npz"), allow_pickle=False) as arrays, mcz.open(walk) as file:
+        assert (arrays["values"] == file.clips["walk"].read()).all()
+        assert arrays["mask"].all()
+        assert arrays["mask"].shape == arrays["values"].shape == (240, 96)
+        assert arrays["frame_numbers"].tolist() == list(range(1, 241))
+        assert arrays["frame_rate"] == pytest.approx(120)
+        assert arrays["names"][0] == "Hips.tx"
+        assert len(arrays["names"]) == 96
+
+
+def test_cut_of_the_source(walk: Path, call: Call) -> None:
+    assert call("decode", walk, "--frames", "100:", "-o", walk.with_name("cut.bvh")).code == 0
+    whole, cut = mcz.read(walk), mcz.read(walk.with_name("cut.bvh"))
+    assert cut.n_frames == 140
+    assert (cut.values == whole.values[100:]).all()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--joints", "Head"],
+        ["--resolution", "1"],
+        ["--to", "csv", "--joints", "Tail"],
+        ["--to", "csv", "--resolution", "9"],
+        ["--frames", "9"],
+        ["--frames", "9:3"],
+        ["--frames", "0:999"],
+        ["--clip", "run"],
+        ["--to", "xlsx"],
+        ["-o", "-", "--json"],
+    ],
+)
+def test_decode_refuses(walk: Path, call: Call, options: list[str]) -> None:
+    result = call("decode", walk, *options)
+    fails(result, result.code)
+    assert result.code in (1, 2)
+
+
+def test_damage_and_salvage(walk: Path, call: Call) -> None:
+    data = bytearray(walk.read_bytes())
+    data[len(data) // 2] ^= 1
+    bad = walk.with_name("bad.mcz")
+    bad.write_bytes(data)
+    fails(call("decode", bad, "-o", walk.with_name("x.bvh")), 1, "bad.mcz")
+    assert not walk.with_name("x.bvh").exists()
+    result = call("decode", bad, "--salvage", "--to", "csv", "-o", walk.with_name("x.csv"))
+    assert result.code == 4
+    assert "salvage" in result.err
+    rows = list(csv.reader(walk.with_name("x.csv").read_text().splitlines()))
+    assert 0 < sum(row[1] == "" for row in rows[1:]) < 240
+
+
+def test_info(walk: Path, call: Call) -> None:
+    text = call("info", walk).out
+    for words in ("MCZ 0.1", "31 joints", "96 channels", "codec", "payload", "sha256", "Hips"):
+        assert words in text
+    document = call("info", walk, "--json").document
+    assert document["file_bytes"] == walk.stat().st_size
+    assert document["format_version"] == "0.1"
+    assert set(document["clips"][0]) >= CLIP_KEYS
+    clip = document["clips"][0]
+    readme = Path(mcz.__file__).parents[1].joinpath("README.md").read_text("utf-8")
+    for keys in (document, clip, document["skeletons"][0]):
+        assert all(re.search(rf"\b{key}\b", readme) for key in keys), "README lists them all"
+    assert (clip["n_frames"], clip["n_channels"], clip["n_joints"]) == (240, 96, 31)
+    assert clip["frame_rate"] == pytest.approx(120)
+
+
+def test_layout_covers_every_byte(walk: Path, call: Call) -> None:
+    at = 0
+    for row in call("info", walk, "--layout", "--json").document:
+        assert row["offset"] == at
+        at += row["bytes"]
+    assert at == walk.stat().st_size
+    assert "FOOT" in call("info", walk, "--layout").out
+
+
+def test_validate(walk: Path, call: Call) -> None:
+    assert "valid" in call("info", walk, "--validate").out
+    assert call("info", walk, "--validate", "--json").document == {"valid": True, "problems": []}
+    data = bytearray(walk.read_bytes())
+    data[len(data) // 2] ^= 1
+    walk.write_bytes(data)
+    result = call("info", walk, "--validate")
+    assert result.code == 3
+    assert "SPEC.md" in result.err
+
+
+def test_mcz_info_is_the_same(walk: Path, call: Call, capsys: pytest.CaptureFixture[str]) -> None:
+    expected = call("info", walk).out
+    assert run(info_command, "mcz-info", [str(walk)]) == 0
+    assert capsys.readouterr().out == expected
+
+
+def test_not_an_mcz_file(folder: Path, call: Call) -> None:
+    for name in ("info", "decode", "list", "verify"):
+        fails(call(name, folder / "walk.bvh"), 1, "walk.bvh")
+        fails(call(name, folder / "absent.mcz"), 1, "absent.mcz")
+
+
+def test_list(walk: Path, call: Call) -> None:
+    assert "walk" in call("list", walk).out
+    document = call("list", walk, "--json").document
+    assert document["clips"][0]["name"] == "walk"
+    assert document["clips"][0]["n_frames"] == 240
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help(name: str, call: Call) -> None:
+    result = call(name, "--help")
+    assert result.code == 0
+    assert "Usage: mcz" in result.out
+
+
+def test_help_lists_commands_and_exit_codes(call: Call) -> None:
+    shown = call("--help").out
+    assert all(name in shown for name in COMMANDS)
+    assert "Exit codes" in shown
+    assert call("--version").out == f"mcz {mcz.__version__}\n"
+    fails(call("compress"), 2, "compress")
+
+
+def test_pipes(walk: Path) -> None:
+    """A file on standard input, its source on standard output."""
+    command = [sys.executable, "-m", "mcz.cli.main", "decode", "-", "-o", "-"]
+    done = subprocess.run(command, input=walk.read_bytes(), capture_output=True, check=True)
+    assert done.stdout == walk.with_suffix(".bvh").read_bytes()
+    assert done.stderr == b""
+    command[3:] = ["encode", str(walk.with_suffix(".bvh")), "-o", "-"]
+    done = subprocess.run(command, capture_output=True, check=True)
+    assert done.stdout == walk.read_bytes()
+
+
+def test_verify(walk: Path, call: Call) -> None:
+    assert "verified" in call("verify", walk).out
+    source = walk.with_suffix(".bvh")
+    document = call("verify", walk, "--source", source, "--json").document
+    assert document["verified"]
+    assert {part["kind"] for part in document["parts"]} == {
+        "structure",
+        "skeleton",
+        "clip",
+        "source",
+    }
+    source.write_bytes(source.read_bytes().replace(b"0.0000", b"0.0001", 1))
+    fails(call("verify", walk, "--source", source), 3, "differs from byte")
+
+
+@pytest.mark.parametrize("where", [0.3, 0.5, 0.9])
+def test_verify_finds_damage(walk: Path, call: Call, where: float) -> None:
+    data = bytearray(walk.read_bytes())
+    data[int(where * len(data))] ^= 4
+    walk.write_bytes(data)
+    result = call("verify", walk)
+    assert (result.code, result.out) == (3, "")
+    assert result.err.startswith(f"mcz: {walk}: ")
+    walk.write_bytes(data[:-10])
+    fails(call("verify", walk), 3, "walk.mcz")
+
+
+def test_pack_and_unpack(
+    folder: Path, call: Call, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    elsewhere = tmp_path_factory.mktemp("packed")
+    target = elsewhere / "all.mcz"
+    (folder / "sub").mkdir()
+    shutil.copy(folder / "walk.bvh", folder / "sub" / "walk.bvh")
+    (folder / "sub" / "bad.bvh").write_bytes(b"HIERARCHY")
+    (folder / "notes.txt").write_text("left foot first")
+    result = call("pack", folder, target)
+    assert result.code == 1
+    assert result.err.count("\n") == 1
+    assert "sub/bad.bvh" in result.err
+    assert "1 failed" in result.out
+    fails(call("pack", folder, target), 2, "all.mcz")
+    assert call("pack", folder, target, "--keep-all", "--force").code == 0
+    out = elsewhere / "out"
+    assert call("unpack", target, out).code == 0
+    found = {p.relative_to(out) for p in out.rglob("*") if p.is_file()}
+    assert found == {p.relative_to(folder) for p in folder.rglob("*") if p.is_file()}
+    assert all(digest(out / name) == digest(folder / name) for name in found)
+    refused = call("unpack", target, out)
+    assert refused.code == 1
+    assert refused.err.count("\n") == len(found)
+    assert call("unpack", target, out, "--force").code == 0
+
+
+def test_append(walk: Path, call: Call) -> None:
+    before = walk.read_bytes()
+    bad = walk.with_name("bad.bvh")
+    bad.write_bytes(b"HIERARCHY")
+    result = call("append", walk.with_suffix(".amc"), bad, walk)
+    assert (result.code, result.out) == (1, "")
+    assert "bad.bvh" in result.err
+    assert walk.read_bytes() == before
+    shown = call("append", walk.with_suffix(".amc"), walk, "--json", "--rate", 120).document
+    assert [row["result"] for row in shown["files"]] == ["parsed"]
+    assert walk.read_bytes()[: len(before)] == before
+    document = call("list", walk, "--json").document
+    assert len(document["clips"]) == 2
+    assert call("verify", walk).code == 0
+    fails(call("decode", walk, "-o", "-"), 2, "2 clips")

@@ -1,0 +1,47 @@
+"""Hypothesis profiles, markers and the fixtures that several test files share."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+# No deadlines: the first call of a compiled function takes seconds, later ones microseconds.
+settings.register_profile("dev", max_examples=30, deadline=None)
+settings.register_profile(
+    "ci",
+    max_examples=100,
+    deadline=None,
+    derandomize=True,  # a build must not fail by luck
+    print_blob=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "dev"))
+
+DATA = os.environ.get("MCZ_DATA", "")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if "real" in item.keywords and not DATA:
+            item.add_marker(pytest.mark.skip(reason="MCZ_DATA is not set"))
+        if "long" in item.keywords and not os.environ.get("MCZ_LONG"):
+            item.add_marker(pytest.mark.skip(reason="MCZ_LONG is not set"))
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """The folder of real motion files; only tests marked ``real`` may ask for it."""
+    return Path(DATA)
+
+
+@pytest.fixture(scope="session")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with walk.asf, walk.amc and walk.bvh; tests read it and never write into it."""
+    from mcz.sample import write_samples
+
+    folder = tmp_path_factory.mktemp("samples")
+    write_samples(folder)
+    return folder

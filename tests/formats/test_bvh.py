@@ -1,0 +1,315 @@
+"""BVH files of every shape: bytes -> Motion -> the same bytes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mcz.errors import MotionError, SourceError
+from mcz.formats import bvh
+from mcz.formats.notes import join_notes
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.numbers import Grid, GridKind
+
+SMALL = b"""HIERARCHY
+ROOT Hips
+{
+  OFFSET 0 0 0
+  CHANNELS 3 Xposition Yposition Zposition
+  JOINT left arm
+  {
+    OFFSET 1.5 -2e-1 0
+    CHANNELS 1 Zrotation
+    End Site
+    {
+      OFFSET 0 1 0
+    }
+  }
+}
+MOTION
+Frames: 3
+Frame Time: .0083333
+1.00 2.00 3.00 -4.00
+1.10 2.10 3.10 -4.10
+1.20 2.20 3.20 -4.20
+"""
+
+CHANNELS = (
+    "Xposition",
+    "Yposition",
+    "Zposition",
+    "Zrotation",
+    "Xrotation",
+    "yrotation",
+    "Xscale",
+    "Bend",
+)
+NAMES = ("Hips", "left arm", "Bein#1", "naïve", "{}"[:0], "a\tb", "End", "ROOT")
+TOKENS = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False, width=32).map(lambda x: f"{x:.4f}"),
+    st.floats(-1e3, 1e3).map(lambda x: f"{x:.6g}"),
+    st.sampled_from(
+        ["0", "-0", "-0.0", ".5", "1e-5", "1E+003", "nan", "+7", "0001", "1.", "-1.#IND"]
+    ),
+    st.floats().map(repr),
+)
+
+
+@st.composite
+def hierarchies(draw: st.DrawFn) -> tuple[str, int]:
+    """A HIERARCHY section and its number of channels."""
+    eol = st.sampled_from(["\n", "\r\n", " \n", "\t\r\n"])
+    lines, total, depth = ["HIERARCHY"], 0, 0
+    for _ in range(draw(st.integers(1, 4))):
+        close = draw(st.integers(0, depth))
+        lines += ["}"] * close
+        depth -= close
+        channels = draw(st.lists(st.sampled_from(CHANNELS), max_size=6))
+        total += len(channels)
+        lines += [
+            f"{'JOINT' if depth else 'ROOT'} {draw(st.sampled_from(NAMES))}",
+            "{",
+            f"OFFSET {draw(st.sampled_from(['0 0 0', '1e-3 -2.5 3', '0.0 10 .5']))}",
+            " ".join(["CHANNELS", str(len(channels)), *channels]),
+        ]
+        depth += 1
+        for _ in range(draw(st.integers(0, 2))):
+            lines += ["End Site", "{", "OFFSET 0 1 0", "}"]
+    lines += ["}"] * depth
+    return "".join(line + draw(eol) for line in lines), total
+
+
+@st.composite
+def texts(draw: st.DrawFn) -> bytes:
+    """A BVH file of any layout."""
+    head, n_channels = draw(hierarchies())
+    n_rows = draw(st.integers(0, 6))
+    gap = st.sampled_from([" ", "\t", "  ", " \t"])
+    usual, end = draw(gap), draw(st.sampled_from(["\n", "\r\n", " \n", " "]))
+    irregular = draw(st.booleans())
+    body = ""
+    for _ in range(n_rows if n_channels else 0):
+        body += (
+            draw(st.sampled_from(["", "", "  ", "\n", "# a comment 1 2\n"])) if irregular else ""
+        )
+        row = [draw(TOKENS) for _ in range(n_channels)]
+        gaps = [draw(gap) if irregular else usual for _ in row]
+        body += "".join(
+            g * (k > 0) + token for k, (g, token) in enumerate(zip(gaps, row, strict=True))
+        )
+        body += draw(st.sampled_from(["\n", "\r\n", " \n", " "])) if irregular else end
+    if draw(st.booleans()):
+        body = body.rstrip()
+    count = draw(st.sampled_from([str(n_rows), str(n_rows + 1), "007", "many"]))
+    time = draw(st.sampled_from(["0.008333", ".0083333", "0", "1", "0.04", "1e-2", "x"]))
+    motion = f"MOTION\nFrames: {count}\r\nFrame Time:\t{time}\n"
+    return (head + motion + body).encode()
+
+
+@given(texts())
+def test_any_text_comes_back(data: bytes) -> None:
+    motion = bvh.read(data, "clip")
+    assert bvh.write(motion) == data
+
+
+@given(texts(), st.data())
+def test_a_changed_value_changes_only_its_token(data: bytes, draw: st.DataObject) -> None:
+    motion = bvh.read(data, "clip")
+    signal = motion.signals[0]
+    if signal.values.size == 0:
+        return
+    cell = draw.draw(st.integers(0, signal.values.size - 1))
+    values = signal.values.copy()
+    values.flat[cell] = 3.0 if values.flat[cell] != 3.0 else 4.0
+    changed = bvh.write(motion.with_values(values))
+    at = _only_difference(data, changed)
+    again = bvh.read(changed, "clip")
+    assert np.array_equal(again.signals[0].values, values, equal_nan=True)
+    assert again.source is not None and at is not None
+
+
+def _only_difference(old: bytes, new: bytes) -> int | None:
+    """The offset of the one token that differs; fails if there are more."""
+    a, b = old.split(), new.split()
+    assert len(a) == len(b)
+    differ = [k for k, (x, y) in enumerate(zip(a, b, strict=True)) if x != y]
+    assert len(differ) == 1
+    return differ[0]
+
+
+@given(texts(), st.data())
+def test_a_range_of_frames_can_be_written(data: bytes, draw: st.DataObject) -> None:
+    motion = bvh.read(data, "clip")
+    n_frames = motion.n_frames
+    start = draw.draw(st.integers(0, n_frames))
+    stop = draw.draw(st.integers(start, n_frames))
+    cut = bvh.read(bvh.write(cut_motion(motion, start, stop)), "clip")
+    assert cut.n_frames == stop - start
+    wanted = motion.signals[0].values[start:stop]
+    assert np.array_equal(cut.signals[0].values, wanted, equal_nan=True)
+
+
+def cut_motion(motion: Motion, start: int, stop: int) -> Motion:
+    """Frames start <= f < stop with the parts of the source that belong to them."""
+    signal, source = motion.signals[0], motion.source
+    assert source is not None
+    chosen = (signal.exceptions.rows >= start) & (signal.exceptions.rows < stop)
+    exceptions = type(signal.exceptions)(
+        signal.exceptions.rows[chosen] - start,
+        signal.exceptions.channels[chosen],
+        tuple(t for t, c in zip(signal.exceptions.texts, chosen, strict=True) if c),
+    )
+    notes = source.notes and join_notes([(0, stop - start, source.notes.cut(start, stop))])
+    part = replace(signal, values=signal.values[start:stop], exceptions=exceptions)
+    return replace(motion, signals=(part,), source=replace(source, notes=notes))
+
+
+def test_what_a_file_says() -> None:
+    motion = bvh.read(SMALL, "walk")
+    hips, arm = motion.skeleton.joints
+    assert (hips.name, arm.name, arm.parent) == ("Hips", "left arm", 0)
+    assert arm.offset == (1.5, -0.2, 0.0) and arm.tails == ((0.0, 1.0, 0.0),)
+    assert [c.kind for c in motion.skeleton.channels] == ["tx", "ty", "tz", "rz"]
+    assert motion.frame_rate == 120 and not motion.frame_rate_exact
+    assert motion.values.tolist()[0] == [1, 2, 3, -4]
+    assert motion.skeleton.unit_cm is None and motion.skeleton.intrinsic
+    assert set(motion.signals[0].grids) == {Grid(GridKind.FIXED, 2)}
+    assert motion.signals[0].mask is None and motion.frame_numbers is None
+
+
+def test_clips_that_differ_in_length_share_their_template() -> None:
+    shorter = SMALL.replace(b"Frames: 3", b"Frames: 2")[: SMALL.index(b"1.20") - 0]
+    a, b = bvh.read(SMALL, "a").source, bvh.read(shorter, "b").source
+    assert a is not None and b is not None
+    assert a.template == b.template
+    assert a.detail == b.detail
+
+
+def test_latin_1_names_are_flagged() -> None:
+    data = SMALL.replace(b"Hips", b"H\xfcfte")
+    motion = bvh.read(data, "walk")
+    assert motion.skeleton.joints[0].name == "Hüfte"
+    assert motion.metadata["name-encoding"] == "latin-1"
+    assert bvh.write(motion) == data
+
+
+def test_a_frame_count_that_is_wrong_is_reported() -> None:
+    data = SMALL.replace(b"Frames: 3", b"Frames: 4")
+    motion = bvh.read(data, "walk")
+    assert motion.metadata["source-note"] == "4 frames are declared, 3 are there"
+    assert bvh.write(motion) == data
+    assert b"Frames: 2\n" in bvh.write(cut_motion(motion, 0, 2))
+
+
+def test_a_joint_without_channels_anywhere_has_a_row_a_line() -> None:
+    data = (
+        b"HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n}\nMOTION\nFrames: 2\nFrame Time: 1\n\n\n"
+    )
+    motion = bvh.read(data, "empty")
+    assert motion.signals[0].values.shape == (2, 0)
+    assert bvh.write(motion) == data
+
+
+@pytest.mark.parametrize("width", ["%8.3f", "%-8.3f", "% .3f"])
+def test_padded_columns_need_no_pattern_a_row(width: str) -> None:
+    head, _, _ = SMALL.partition(b"1.00 2.00")
+    values = np.random.default_rng(1).normal(0, 40, (400, 4))
+    body = "".join(" ".join(width % x for x in row) + "\n" for row in values)
+    data = head + body.encode()
+    motion = bvh.read(data, "padded")
+    assert bvh.write(motion) == data
+    assert motion.source is not None
+    assert len(motion.source.detail) < 40 and motion.source.notes is None
+
+
+@pytest.mark.parametrize(
+    ("first", "adds"), [(b"0.5 -1.0 0.0", True), (b"9.0 21.0 0.0", False), (b"0.0 0.0 0.0", True)]
+)
+def test_positions_near_the_offset_replace_it(first: bytes, adds: bool) -> None:
+    data = SMALL.replace(b"OFFSET 0 0 0", b"OFFSET 10 20 0").replace(b"1.00 2.00 3.00", first)
+    assert bvh.read(data, "walk").skeleton.joints[0].adds_to_offset is adds
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (b"HIERARCHY\n", b"", "line 1: no HIERARCHY"),
+        (b"CHANNELS 1", b"CHANNELS 2", "line 10: CHANNELS 2, but 1"),
+        (b"CHANNELS 3", b"CHANNELS 2", "line 5: CHANNELS 2, but more"),
+        (b"CHANNELS 3", b"CHANNELS -3", "line 5: CHANNELS b'-3'"),
+        (b"OFFSET 1.5", b"OFFSET x", "line 8: b'x'"),
+        (b"OFFSET 1.5", b"OFFSET inf", "line 8: b'inf'"),
+        (b"OFFSET 1.5", b"OFFSETS 1.5", "line 8: b'OFFSETS'"),
+        (b"ROOT Hips\n{", b"ROOT Hips\n", "line 4: no { after ROOT"),
+        (b"Frames: 3", b"Frame: 3", "line 16: no 'Frames:'"),
+        (b"Frame Time:", b"Time:", "line 17: no 'Frame Time:'"),
+        (b"2.20", b"2,20", "line 21: b'2,20' is not a number"),
+        (b" -4.20\n", b"\n", "line 21: the last frame has 3 of 4 values"),
+    ],
+)
+def test_what_cannot_be_read_is_refused(old: bytes, new: bytes, message: str) -> None:
+    assert old in SMALL
+    with pytest.raises(SourceError) as error:
+        bvh.read(SMALL.replace(old, new, 1), "bad")
+    assert message in str(error.value)
+
+
+@given(st.integers(0, len(SMALL)))
+def test_every_prefix_is_read_or_refused(size: int) -> None:
+    try:
+        motion = bvh.read(SMALL[:size], "prefix")
+    except SourceError:
+        return
+    assert bvh.write(motion) == SMALL[:size]
+
+
+@given(st.integers(0, len(SMALL) - 1), st.integers(0, 255))
+def test_every_changed_byte_is_read_or_refused(at: int, byte: int) -> None:
+    data = SMALL[:at] + bytes([byte]) + SMALL[at + 1 :]
+    try:
+        motion = bvh.read(data, "changed")
+    except SourceError:
+        return
+    assert bvh.write(motion) == data
+
+
+def plain(skeleton: Skeleton, values: np.ndarray, **more: object) -> Motion:
+    return Motion(skeleton, (Signal(values),), **more)  # type: ignore[arg-type]
+
+
+def test_a_motion_without_source_is_written_plainly_and_comes_back() -> None:
+    joints = (
+        Joint("Hips", -1, channels=(Channel("tx"), Channel("rz"))),
+        Joint("left arm", 0, (1.0, 0.1, -2.5), ((0.0, 1e-7, 3.0),), channels=(Channel("rx"),)),
+        Joint("leg", 0, (0.0, -1.0, 0.0), ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0))),
+        Joint("prop", channels=(Channel("", "Bend"),)),
+    )
+    values = np.array([[0.1, -0.0, 1e-300, 5.0], [1 / 3, 2.0, 3.5, -1e22]])
+    motion = plain(Skeleton(joints), values, frame_rate=Fraction(30000, 1001), name="walk")
+    again = bvh.read(bvh.write(motion), "walk")
+    assert again.skeleton == motion.skeleton
+    assert again.signals[0].values.tobytes() == values.tobytes()
+    assert again.frame_rate == motion.frame_rate
+
+
+@pytest.mark.parametrize(
+    "joint",
+    [
+        Joint("a\nb"),
+        Joint(" a"),
+        Joint("a{"),
+        Joint("a", axis=(0.0, 90.0, 0.0)),
+        Joint("a", channels=(Channel("length"),)),
+        Joint("a", channels=(Channel("", "x y"),)),
+        Joint("a", channels=(Channel("", "Xrotation"),)),
+    ],
+)
+def test_what_bvh_cannot_say_is_refused(joint: Joint) -> None:
+    motion = plain(Skeleton((joint,)), np.zeros((1, len(joint.channels))))
+    with pytest.raises(MotionError):
+        bvh.write(motion)

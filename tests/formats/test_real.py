@@ -1,0 +1,93 @@
+"""The real files of the folder that MCZ_DATA names: every one comes back byte for byte."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mcz.errors import SourceError
+from mcz.formats import FORMATS, asf, find_asf, format_of
+from mcz.motion import Motion, Skeleton
+
+DATA = Path(os.environ.get("MCZ_DATA", "no-data"))
+pytestmark = [
+    pytest.mark.real,
+    pytest.mark.skipif("MCZ_DATA" not in os.environ, reason="MCZ_DATA is not set"),
+]
+SUFFIXES = {suffix for f in FORMATS.values() for suffix in f.suffixes}
+MALFORMED = "malformed-in-the-wild"
+REFUSED = {"no-hierarchy-section.bvh": "line 1: no HIERARCHY section"}
+
+
+def read(path: Path) -> Motion | Skeleton:
+    source_format = format_of(path)
+    data = path.read_bytes()
+    if not source_format.wants_skeleton:
+        return source_format.read(data, path.stem)
+    found = find_asf(path)
+    return source_format.read(data, path.stem, found and asf.read(found.read_bytes(), found.stem))
+
+
+def files(malformed: bool) -> list[Path]:
+    paths = sorted(p for p in DATA.rglob("*") if p.suffix.lower() in SUFFIXES)
+    assert paths
+    return [path for path in paths if (MALFORMED in path.parts) == malformed]
+
+
+def test_every_file_comes_back_byte_for_byte() -> None:
+    counts: Counter[str] = Counter()
+    for path in files(malformed=False):
+        source_format = format_of(path)
+        assert source_format.write(read(path)) == path.read_bytes(), path
+        counts[source_format.name] += 1
+    print(dict(counts))
+
+
+def test_malformed_files_are_read_exactly_or_refused_with_a_reason() -> None:
+    for path in files(malformed=True):
+        if path.name in REFUSED:
+            with pytest.raises(SourceError, match=REFUSED[path.name]):
+                read(path)
+        else:
+            assert format_of(path).write(read(path)) == path.read_bytes(), path
+
+
+def test_clips_of_one_make_share_a_template() -> None:
+    motions = [read(path) for path in sorted((DATA / "cmu/bvh-daz").glob("*.bvh"))]
+    templates = {m.source.template for m in motions if isinstance(m, Motion) and m.source}
+    headers = {p.read_bytes().split(b"MOTION")[0] for p in (DATA / "cmu/bvh-daz").glob("*.bvh")}
+    assert len(templates) == len(headers)
+
+
+def test_exceptions_are_rare() -> None:
+    n_exceptions = n_tokens = 0
+    for path in files(malformed=False):
+        motion = read(path)
+        if isinstance(motion, Motion):
+            n_exceptions += len(motion.signals[0].exceptions)
+            n_tokens += motion.signals[0].values.size
+    print(f"{n_exceptions} exceptions among {n_tokens} tokens")
+    assert n_exceptions < 2e-4 * n_tokens
+
+
+@pytest.mark.parametrize(
+    "name", ["cmu/amc/14_02.amc", "cmu/bvh/01_03.bvh", "cmu/bvh-daz/13_31.bvh"]
+)
+def test_reading_and_writing_are_fast(name: str) -> None:
+    path = DATA / name
+    source_format, size = format_of(path), path.stat().st_size / 1e6
+    best = np.full(2, np.inf)
+    for _ in range(4):
+        begin = time.perf_counter()
+        motion = read(path)
+        middle = time.perf_counter()
+        source_format.write(motion)
+        best = np.minimum(best, [middle - begin, time.perf_counter() - middle])
+    reading, writing = size / best
+    print(f"{name}: read {reading:.0f} MB/s, write {writing:.0f} MB/s")
+    assert reading >= 20 and writing >= 10

@@ -1,0 +1,230 @@
+"""Packing, appending, unpacking; files that were cut off while they grew."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.archive import safe_path
+from mcz.container.chunks import FOOT
+from mcz.motion import joint_columns
+from mcz.sample import write_samples
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("samples")
+    write_samples(folder)
+    return folder
+
+
+@pytest.fixture
+def folder(samples: Path, tmp_path: Path) -> Path:
+    """asf/ and amc/ side by side, a BVH twice, a text, a BVH that is none."""
+    root = tmp_path / "root"
+    for name in ("asf", "amc", "bvh/copy"):
+        (root / name).mkdir(parents=True)
+    (root / "asf/07.asf").write_bytes((samples / "walk.asf").read_bytes())
+    amc = (samples / "walk.amc").read_bytes()
+    (root / "amc/07_01.amc").write_bytes(amc)
+    (root / "amc/07_02.amc").write_bytes(amc)
+    bvh = (samples / "walk.bvh").read_bytes()
+    (root / "bvh/walk.bvh").write_bytes(bvh)
+    (root / "bvh/copy/walk.bvh").write_bytes(bvh)
+    (root / "bvh/broken.bvh").write_bytes(b"HIERARCHY\nROOT")
+    (root / "read me.txt").write_bytes(b"hello\n")
+    return root
+
+
+def tree(root: Path) -> dict[str, bytes]:
+    return {p.relative_to(root).as_posix(): p.read_bytes() for p in root.rglob("*") if p.is_file()}
+
+
+def test_pack_keeps_every_file(folder: Path, tmp_path: Path) -> None:
+    report = mcz.pack(folder, tmp_path / "all.mcz", keep_all=True)
+    results = {outcome.path: outcome.result for outcome in report.outcomes}
+    assert results == {
+        "amc/07_01.amc": "parsed",
+        "amc/07_02.amc": "parsed",
+        "asf/07.asf": "skeleton",
+        "bvh/broken.bvh": "verbatim",
+        "bvh/copy/walk.bvh": "parsed",
+        "bvh/walk.bvh": "alias",
+        "read me.txt": "verbatim",
+    }
+    report = mcz.unpack(tmp_path / "all.mcz", tmp_path / "back")
+    assert not report.failures
+    assert tree(tmp_path / "back") == tree(folder)
+
+
+def test_pack_shares_skeletons_and_templates(folder: Path, tmp_path: Path) -> None:
+    mcz.pack(folder, tmp_path / "all.mcz")
+    with mcz.open(tmp_path / "all.mcz") as file:
+        assert len(file.skeletons) == 2
+        assert list(file.clips) == ["amc/07_01", "amc/07_02", "bvh/copy/walk"]
+        templates = [k for k in file.container.directory.shared if k[0] == b"SRCE"]
+        assert len(templates) == 3
+
+
+def test_a_file_that_fails_leaves_no_trace(folder: Path, tmp_path: Path) -> None:
+    report = mcz.pack(folder, tmp_path / "all.mcz")
+    assert [o.path for o in report.failures] == ["bvh/broken.bvh"]
+    assert "line" in report.failures[0].message
+    with mcz.open(tmp_path / "all.mcz") as file:
+        assert not file.attachments
+        assert "bvh/walk.bvh" in file.aliases
+
+
+def test_two_packs_are_the_same_bytes(folder: Path, tmp_path: Path) -> None:
+    for name in ("one.mcz", "two.mcz"):
+        mcz.pack(folder, tmp_path / name, keep_all=True)
+    assert (tmp_path / "one.mcz").read_bytes() == (tmp_path / "two.mcz").read_bytes()
+
+
+def test_append_adds_and_shares(samples: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    mcz.encode(samples / "walk.bvh", path)
+    size = path.stat().st_size
+    mcz.append([samples / "walk.amc"], path)
+    with mcz.open(path) as file:
+        assert list(file.clips) == ["walk", "walk.amc"]
+        assert file.clips["walk"].source_bytes() == (samples / "walk.bvh").read_bytes()
+        assert file.clips["walk.amc"].source_bytes() == (samples / "walk.amc").read_bytes()
+    assert path.read_bytes()[size - FOOT.size : size].endswith(b"\x89ZCM\r\n\x1a\n")
+
+
+def test_append_that_fails_changes_nothing(samples: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    mcz.encode(samples / "walk.bvh", path)
+    before = path.read_bytes()
+    with pytest.raises(mcz.SourceError, match="none.bvh"):
+        mcz.append([samples / "walk.amc", tmp_path / "none.bvh"], path)
+    assert path.read_bytes() == before
+
+
+def small(tmp_path: Path) -> tuple[Path, Path]:
+    """Two BVH files of a few frames."""
+    text = (
+        "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n  End Site\n  {\n"
+        "    OFFSET 0 1 0\n  }\n}\nMOTION\nFrames: %d\nFrame Time: 0.01\n%s"
+    )
+    paths = tmp_path / "one.bvh", tmp_path / "two.bvh"
+    for n, path in enumerate(paths, 3):
+        path.write_text(text % (n, "".join(f"{v}.25\n" for v in range(n))))
+    return paths
+
+
+def test_append_cut_at_every_byte(tmp_path: Path) -> None:
+    one, two = small(tmp_path)
+    path = tmp_path / "a.mcz"
+    mcz.encode(one, path)
+    old = path.read_bytes()
+    mcz.append([two], path)
+    new = path.read_bytes()
+    assert new.startswith(old)
+    for size in range(len(old) + 1, len(new)):
+        with pytest.raises(mcz.TruncatedError) as error:
+            mcz.open(new[:size])
+        assert error.value.last_foot == len(old)
+        with mcz.open(new[:size], salvage=True) as file:
+            assert file.clips["one"].source_bytes() == one.read_bytes()
+    path.write_bytes(new[: len(new) - 40])
+    mcz.append([two], path)
+    assert path.read_bytes() == new
+
+
+@pytest.mark.parametrize("rounds", [3, pytest.param(50, marks=pytest.mark.long)])
+def test_append_killed(samples: Path, tmp_path: Path, rounds: int) -> None:
+    path = tmp_path / "a.mcz"
+    mcz.encode(samples / "walk.bvh", path)
+    old = path.read_bytes()
+    program = "import sys, mcz\nprint('ready', flush=True)\nmcz.append(sys.argv[2:], sys.argv[1])\n"
+    sources = [str(tmp_path / f"walk{n}.bvh") for n in range(8)]
+    for source in sources:
+        Path(source).write_bytes((samples / "walk.bvh").read_bytes() + b"\n" * len(source))
+    draw = random.Random(rounds)
+    for _ in range(rounds):
+        path.write_bytes(old)
+        command = [sys.executable, "-c", program, str(path), *sources]
+        with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            time.sleep(draw.random() * 0.6)
+            process.send_signal(signal.SIGKILL)
+        assert path.read_bytes().startswith(old)
+        with mcz.open(path, salvage=True) as file:
+            assert file.clips["walk"].source_bytes() == (samples / "walk.bvh").read_bytes()
+        try:
+            mcz.open(path).close()
+        except mcz.TruncatedError as error:
+            assert error.last_foot == len(old)
+
+
+def test_write_killed_leaves_the_old_file(samples: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    mcz.encode(samples / "walk.bvh", path)
+    old = path.read_bytes()
+
+    def explode(done: int, total: int, what: str) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        mcz.encode(samples / "walk.amc", path, force=True, progress=explode)
+    assert path.read_bytes() == old
+    assert os.listdir(tmp_path) == ["a.mcz"]
+
+
+@pytest.mark.parametrize(
+    "name", ["", "/etc/passwd", "../up", "a/../b", "a//b", "./a", "a\\b", "C:/x", "a\0b"]
+)
+def test_unsafe_paths(name: str) -> None:
+    with pytest.raises(mcz.FormatError):
+        safe_path(name)
+
+
+def test_safe_path() -> None:
+    assert str(safe_path("a b/c: d.bvh")) == "a b/c: d.bvh"
+
+
+def test_remote_archive_costs_few_requests(samples: Path) -> None:
+    """DESIGN 3: 2,500 clips, 100 frames of two joints: 4 requests, 300 kB beyond the payload."""
+    import io
+    from dataclasses import replace
+
+    import fsspec
+
+    from mcz.codecs import by_name
+    from mcz.container.writer import Writer
+    from mcz.encoding import write_clip
+
+    out = io.BytesIO()
+    writer = Writer(out)
+    motion = mcz.read(samples / "walk.amc")
+    draw = np.random.default_rng(1)
+    for n in range(2500):
+        frames = int(draw.integers(100, 140))
+        signal_ = replace(motion.signals[0], values=motion.signals[0].values[:frames])
+        clip = replace(motion, signals=(signal_,), source=None, name=f"{n % 144:03d}/take {n}")
+        write_clip(writer, clip, by_name("raw"), {})
+    writer.finish()
+    with fsspec.open("memory://archive.mcz", "wb") as stream:
+        stream.write(out.getvalue())
+    with mcz.open("memory://archive.mcz") as file:
+        source = file.container.source
+        assert len(file.clips) == 2500
+        clip = file.clips["071/take 1223"]
+        values = clip.read((0, 100), ["lfoot", "rfoot"])
+        np.testing.assert_array_equal(
+            values, motion.values[:100, joint_columns(clip.skeleton, ["lfoot", "rfoot"])]
+        )
+        assert source.n_requests <= 4
+        assert source.n_bytes <= 300_000

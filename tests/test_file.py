@@ -1,0 +1,232 @@
+"""Opening, reading in part, writing: the public faces on small motions."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+import mcz
+from mcz.encoding import canonical
+from mcz.frames import frame_number_metadata, parse_frame_numbers
+from mcz.motion import Signal
+from mcz.numbers import Grid, GridKind
+from mcz.report import info
+from tests.motions import motions, skeleton, smooth
+
+
+def written(motion: mcz.Motion, **params: object) -> bytes:
+    out = io.BytesIO()
+    mcz.write(motion, out, **params)
+    return out.getvalue()
+
+
+@given(motions())
+def test_any_motion_comes_back(motion: mcz.Motion) -> None:
+    with mcz.open(written(motion)) as file:
+        back = file.clips[motion.name].motion()
+    assert back.skeleton == motion.skeleton
+    assert (back.name, back.frame_rate) == (motion.name, motion.frame_rate)
+    assert len(back.signals) == len(motion.signals)
+    for one, other in zip(motion.signals, back.signals, strict=True):
+        assert one.values.dtype == other.values.dtype
+        assert canonical(one.values) == canonical(other.values)
+        assert (one.grids, one.channels) == (other.grids, other.channels)
+        all_valid = np.ones(one.values.shape, bool)
+        left = all_valid if one.mask is None else one.mask
+        np.testing.assert_array_equal(left, all_valid if other.mask is None else other.mask)
+
+
+def test_slices_like_an_array() -> None:
+    motion = smooth(50)
+    with mcz.open(written(motion, segment_frames=7)) as file:
+        values = file.clips["smooth"].values
+        assert values.shape == (50, 10)
+        assert len(values) == 50
+        for key in (
+            slice(None),
+            slice(10, 20),
+            slice(45, 99),
+            slice(3, 40, 5),
+            slice(None, None, -3),
+        ):
+            np.testing.assert_array_equal(values[key], motion.values[key])
+        np.testing.assert_array_equal(values[-1], motion.values[-1])
+        np.testing.assert_array_equal(np.asarray(values), motion.values)
+        with pytest.raises(IndexError):
+            values[50]
+
+
+def test_joints_by_name_and_index() -> None:
+    motion = smooth(20)
+    with mcz.open(written(motion)) as file:
+        clip = file.clips["smooth"]
+        np.testing.assert_array_equal(clip.read(joints=["knee"]), motion.values[:, 9:])
+        np.testing.assert_array_equal(
+            clip.read((5, 6), joints=[3, "spine"]), motion.values[5:6, [9, 6, 7, 8]]
+        )
+        assert clip.read(joints=["fixed"]).shape == (20, 0)
+        with pytest.raises(mcz.MotionError, match="no joint 'elbow'"):
+            clip.read(joints=["elbow"])
+
+
+@pytest.mark.parametrize("frames", [(-1, 3), (3, 2), (0, 21)])
+def test_range_outside_the_clip(frames: tuple[int, int]) -> None:
+    with mcz.open(written(smooth(20))) as file, pytest.raises(mcz.OptionError):
+        file.clips["smooth"].read(frames)
+
+
+def test_partial_read_is_counted_as_unverified() -> None:
+    with mcz.open(written(smooth(40), segment_frames=10)) as file:
+        clip = file.clips["smooth"]
+        clip.read((0, 10))
+        assert file.container.unverified == 0
+        clip.read((0, 10), joints=["knee"])
+        assert file.container.unverified == 1
+
+
+def test_invalid_values_are_nan_and_kept_beneath() -> None:
+    motion = smooth(10)
+    mask = np.ones((10, 10), bool)
+    mask[3:5, 2] = False
+    signal = replace(motion.signals[0], mask=mask)
+    with mcz.open(written(replace(motion, signals=(signal,)))) as file:
+        clip = file.clips["smooth"]
+        assert np.isnan(clip.read()[3:5, 2]).all()
+        values, back = clip.read_masked()
+        np.testing.assert_array_equal(values, motion.signals[0].values)
+        np.testing.assert_array_equal(back, mask)
+
+
+def test_values_off_their_grid_become_exceptions() -> None:
+    motion = smooth(10)
+    values = motion.values.copy()
+    values[4, 1], values[5, 9] = 1 / 3, np.nan
+    with mcz.open(written(motion.with_values(values))) as file:
+        clip = file.clips["smooth"]
+        np.testing.assert_array_equal(clip.read(), values)
+        np.testing.assert_array_equal(clip.read((5, 7), ["knee"]), values[5:7, 9:])
+        assert info(file)["clips"][0]["n_exceptions"] == 2
+
+
+def test_values_off_a_binary_grid_are_refused() -> None:
+    signal = Signal(np.full((2, 10), 1 / 3), (Grid(GridKind.BINARY32),) * 10)
+    with pytest.raises(mcz.MotionError, match="row 0, channel 0"):
+        written(replace(smooth(2), signals=(signal,)))
+
+
+def test_grid_changes_begin_a_segment() -> None:
+    motion = smooth(20)
+    values = motion.values.copy()
+    values[8:] = np.round(values[8:], 1)
+    changes = tuple((8, c, Grid(GridKind.FIXED, 1)) for c in range(10))
+    signal = replace(motion.signals[0], values=values, grid_changes=changes)
+    with mcz.open(written(replace(motion, signals=(signal,)))) as file:
+        clip = file.clips["smooth"]
+        assert [row.header.first for row in clip.signals[0].rows] == [0, 8]
+        np.testing.assert_array_equal(clip.read(), values)
+        np.testing.assert_array_equal(clip.read((7, 9), ["spine"]), values[7:9, 6:9])
+        assert clip.motion().signals[0].grid_changes == changes
+
+
+@pytest.mark.parametrize(
+    "numbers", [[5, 6, 7, 8], [1, 2, 10, 11], [4, 3, 2, 1], [1, 2, 3, 4], [0, 0, 0, 0]]
+)
+def test_frame_numbers(numbers: list[int]) -> None:
+    motion = replace(smooth(4), frame_numbers=np.array(numbers))
+    with mcz.open(written(motion)) as file:
+        np.testing.assert_array_equal(file.clips["smooth"].frame_numbers, numbers)
+        cut = file.clips["smooth"].motion((2, 4))
+        assert cut.frame_numbers is None or list(cut.frame_numbers) == numbers[2:]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "x", "1 2", "1 9:4", "1 2:4 2:5", "1 0:3", "1 -1:3", "1  2:2"]
+)
+def test_bad_frame_numbers(text: str) -> None:
+    with pytest.raises(mcz.FormatError):
+        parse_frame_numbers(text, 5, "clip")
+
+
+def test_usual_frame_numbers_cost_nothing() -> None:
+    assert frame_number_metadata(np.arange(1, 9)) == {}
+
+
+def test_output_limit() -> None:
+    with mcz.open(written(smooth(100)), max_decoded=1000) as file:
+        with pytest.raises(mcz.LimitError, match="limit of 1000"):
+            file.clips["smooth"].read()
+        assert file.clips["smooth"].read((0, 12)).shape == (12, 10)
+
+
+def test_writing_replaces_only_by_force(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    mcz.write(smooth(5), path)
+    with pytest.raises(mcz.OptionError, match="exists"):
+        mcz.write(smooth(6), path)
+    mcz.write(smooth(6), path, force=True)
+    assert mcz.read(path).n_frames == 6
+    assert [p.name for p in tmp_path.iterdir()] == ["a.mcz"]
+
+
+def test_failed_write_leaves_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    mcz.write(smooth(5), path)
+    before = path.read_bytes()
+    signal = Signal(np.full((2, 10), 1 / 3), (Grid(GridKind.BINARY32),) * 10)
+    with pytest.raises(mcz.MotionError):
+        mcz.write(replace(smooth(2), signals=(signal,)), path, force=True)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["a.mcz"]
+
+
+def test_limits_of_the_profile() -> None:
+    joints = tuple(mcz.Joint(f"j{i}", channels=(mcz.Channel("rx"),)) for i in range(4097))
+    bones = mcz.Skeleton(joints)
+    motion = mcz.Motion(bones, (Signal(np.zeros((1, 4097))),))
+    with pytest.raises(mcz.LimitError, match="joints: 4097"):
+        written(motion)
+    out = io.BytesIO()
+    mcz.write(motion, out, archive=True)
+    with mcz.open(out.getvalue()) as file:
+        assert file.header["profile"] == "archive"
+        assert file.clips["motion"].read().shape == (1, 4097)
+
+
+def test_unit_and_rate_are_taken_not_guessed(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    mcz.write(replace(smooth(3), frame_rate=None), path)
+    assert mcz.read(path).frame_rate is None
+    motion = mcz.read(path, rate=59.94, unit="m")
+    assert float(motion.frame_rate or 0) == 59.94
+    assert motion.skeleton.unit_cm == 100
+    for arguments in ({"rate": 0}, {"rate": "fast"}, {"rate": float("inf")}, {"unit": "ell"}):
+        with pytest.raises(mcz.OptionError):
+            mcz.read(path, **arguments)
+
+
+def test_missing_file_is_one_plain_error(tmp_path: Path) -> None:
+    with pytest.raises(mcz.OptionError, match="No such file"):
+        mcz.open(tmp_path / "none.mcz")
+    with pytest.raises(mcz.SourceError, match="No such file"):
+        mcz.read(tmp_path / "none.bvh")
+
+
+def test_not_an_mcz_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    path.write_bytes(b"HIERARCHY\nROOT hips\n" * 20)
+    with pytest.raises(mcz.FormatError, match="not an MCZ file"):
+        mcz.open(path)
+
+
+def test_skeleton_comes_back_to_the_bit() -> None:
+    motion = mcz.Motion(skeleton(), (Signal(np.zeros((0, 10))),), frame_rate=Fraction(30000, 1001))
+    with mcz.open(written(motion)) as file:
+        back = file.clips["motion"].motion()
+    assert repr(back.skeleton.joints[0].offset) == "(0.0, 1.0, -0.0)"
+    assert back.frame_rate == Fraction(30000, 1001)

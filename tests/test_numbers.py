@@ -1,0 +1,509 @@
+"""Number grids against Python's own formatting, numpy's binary32 and struct."""
+
+from __future__ import annotations
+
+import math
+import struct
+from decimal import Decimal
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mcz import schema
+from mcz.errors import FormatError, OptionError, SourceError
+from mcz.numbers import GRID, Grid, GridFlag, GridKind, Tokens, choose_grid, fit, scan
+
+INT64 = st.integers(-(2**63), 2**63 - 1)
+PLAIN = [flag for flag in GridFlag if flag not in (GridFlag.POINT, GridFlag.EXPONENT1)]
+DOUBLES = st.floats(allow_nan=False, allow_infinity=False) | st.floats(-400, 400)
+
+
+def tokens_of(*texts: str | bytes) -> Tokens:
+    parts = [text.encode() if isinstance(text, str) else text for text in texts]
+    stop = np.cumsum([len(part) + 1 for part in parts]) - 1
+    start = stop - [len(part) for part in parts]
+    return scan(b" ".join(parts), start, stop)
+
+
+def bits(values: np.ndarray) -> list[int]:
+    return np.asarray(values, np.float64).view(np.int64).tolist()
+
+
+def check_printed(grid: Grid, texts: list[str]) -> np.ndarray:
+    """Each text is one that the grid prints: token -> ordinal -> value -> ordinal -> token."""
+    tokens = tokens_of(*texts)
+    ordinals, printed = grid.ordinals_of_tokens(tokens)
+    assert printed.all(), (grid, [text for text, ok in zip(texts, printed, strict=True) if not ok])
+    assert grid.texts(ordinals).tolist() == [text.encode() for text in texts]
+    values = grid.values(ordinals)
+    assert bits(values) == bits(np.array([float(text) for text in texts]))
+    assert bits(values) == bits(tokens.values())
+    again, exact = grid.ordinals(values)
+    assert exact.all()
+    assert again.tolist() == ordinals.tolist()
+    return ordinals
+
+
+def trimmed(text: str, end: str = "") -> str:
+    """``text`` without the zeros at the end of its fraction; ``end`` if it had nothing else."""
+    head, point, fraction = text.partition(".")
+    fraction = fraction.rstrip("0")
+    return f"{head}.{fraction}" if point and fraction else head + end
+
+
+def restyled(text: str, flags: int) -> str:
+    """A number as C's %g prints it, in the style of ``flags``, POINT and EXPONENT1 left out."""
+    head, e, exponent = text.partition("e")
+    if flags & GridFlag.NO_ZERO and "." in head and abs(float(head)) < 1:
+        head = head.replace("0.", ".", 1)
+    if flags & GridFlag.POINT_ZERO and not e and "." not in head:
+        head += ".0"
+    if flags & GridFlag.PLUS and head[0] != "-":
+        head = "+" + head
+    if e and flags & GridFlag.EXPONENT3:
+        exponent = exponent[0] + exponent[1:].rjust(3, "0")
+    return head + ("E" if flags & GridFlag.UPPER else e) + exponent if e else head
+
+
+@given(st.lists(st.floats(-99999, 99999), min_size=1), st.integers(0, 10))
+def test_fixed_is_printf(values: list[float], digits: int) -> None:
+    check_printed(Grid(GridKind.FIXED, digits), [f"{value:.{digits}f}" for value in values])
+
+
+@given(
+    st.lists(st.floats(-99999, 99999), min_size=1), st.integers(1, 10), st.sampled_from((0, 1, 2))
+)
+def test_trimmed_is_printf_without_zeros(values: list[float], digits: int, flags: int) -> None:
+    texts = [trimmed(f"{value:.{digits}f}", ("", ".0", ".")[flags]) for value in values]
+    check_printed(Grid(GridKind.TRIMMED, digits, flags), texts)
+
+
+@given(
+    st.lists(DOUBLES.filter(lambda x: x == 0 or 1e-306 < abs(x) < 1e307), min_size=1),
+    st.integers(1, 15),
+    st.sets(st.sampled_from(PLAIN)),
+)
+def test_general_is_printf_g(values: list[float], digits: int, chosen: set[GridFlag]) -> None:
+    flags = sum(chosen)
+    texts = [restyled(f"{value:.{digits}g}", flags) for value in values]
+    check_printed(Grid(GridKind.GENERAL, digits, flags), texts)
+
+
+@given(st.lists(DOUBLES, min_size=1))
+def test_text64_is_repr(values: list[float]) -> None:
+    ordinals = check_printed(
+        Grid(GridKind.TEXT64, 0, GridFlag.POINT_ZERO), [repr(value) for value in values]
+    )
+    magnitudes = struct.unpack(
+        f"<{len(values)}Q", struct.pack(f"<{len(values)}d", *map(abs, values))
+    )
+    signs = [math.copysign(1, value) < 0 for value in values]
+    assert ordinals.tolist() == [~m if s else m for m, s in zip(magnitudes, signs, strict=True)]
+
+
+@given(st.lists(DOUBLES, min_size=1), st.sampled_from((16, 17)))
+def test_text64_is_printf_g(values: list[float], digits: int) -> None:
+    texts = [f"{value:.{digits}g}" for value in values]
+    if digits == 16:  # not every binary64 comes back from 16 digits
+        texts = [text for text in texts if f"{float(text):.16g}" == text and float(text) < 1e308]
+    check_printed(Grid(GridKind.TEXT64, digits), texts or ["0"])
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1), st.integers(17, 40))
+def test_text64_is_printf_f(values: list[float], decimals: int) -> None:
+    texts = [f"{value:.{decimals}f}" for value in values]
+    texts = [text for text in texts if f"{float(text):.{decimals}f}" == text]
+    check_printed(Grid(GridKind.TEXT64, 64 + decimals), texts or ["0." + "0" * decimals])
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1e-6, "0.000001"), (1.5e-7, "1.5e-7"), (1e20, "100000000000000000000"), (-1e21, "-1e+21"),
+     (123456789012345680000.0, "123456789012345680000"), (0.1, "0.1"), (5e-324, "5e-324"),
+     (4.35, "4.35"), (0.0, "0"), (2.0**-44, "5.684341886080802e-14")],
+)  # fmt: skip
+def test_text64_is_javascript(value: float, text: str) -> None:
+    grid = Grid(GridKind.TEXT64, 1, GridFlag.EXPONENT1)
+    assert grid.texts(grid.ordinals(np.array([value]))[0])[0] == text.encode()
+    check_printed(grid, [text])
+
+
+@given(st.lists(st.floats(width=32, allow_nan=False, allow_infinity=False), min_size=1))
+def test_text32_is_the_shortest_binary32(values: list[float]) -> None:
+    numbers = np.array(values, np.float32)
+    # numpy's own digits, in Python's layout (numpy's depends on its version)
+    digits = [np.format_float_scientific(x, unique=True, trim="-") for x in numbers]
+    texts = [repr(float(text)) for text in digits]
+    ordinals = check_printed(Grid(GridKind.TEXT32, 0, GridFlag.POINT_ZERO), texts)
+    words = np.abs(numbers).view(np.uint32).astype(np.int64)
+    assert np.array_equal(ordinals, np.where(np.signbit(numbers), ~words, words))
+
+
+@given(INT64, st.integers(1, 15))
+def test_general_ordinals_are_in_order(ordinal: int, digits: int) -> None:
+    """The number of an ordinal is where the specification puts it."""
+    grid = Grid(GridKind.GENERAL, digits)
+    m = ordinal % grid.limit
+    below, above = (Decimal(text.decode()) for text in grid.texts(np.array([m, m + 1])).tolist())
+    power, rest = divmod(m, 9 * 10 ** (digits - 1))
+    expected = Decimal(rest + 10 ** (digits - 1)).scaleb(power - 307 - digits + 1)
+    assert below < above == expected
+    values = grid.values(np.array([m, -1 - m]))
+    assert bits(values) == bits(np.array([float(below), -float(below)]))
+
+
+GRIDS = [
+    Grid(GridKind.FIXED, 0),
+    Grid(GridKind.FIXED, 6),
+    Grid(GridKind.FIXED, 22, GridFlag.NO_ZERO),
+    Grid(GridKind.TRIMMED, 4, GridFlag.POINT_ZERO | GridFlag.NO_ZERO),
+    Grid(GridKind.TRIMMED, 22, GridFlag.POINT | GridFlag.PLUS),
+    Grid(GridKind.GENERAL, 1),
+    Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3),
+    Grid(GridKind.GENERAL, 15, GridFlag.POINT_ZERO | GridFlag.UPPER),
+    Grid(GridKind.TEXT64, 0, GridFlag.POINT_ZERO),
+    Grid(GridKind.TEXT64, 1, GridFlag.EXPONENT1),
+    Grid(GridKind.TEXT64, 17),
+    Grid(GridKind.TEXT64, 64 + 20),
+    Grid(GridKind.TEXT32),
+    Grid(GridKind.INTEGER),
+    Grid(GridKind.SCALED, scale=0.1),
+    Grid(GridKind.SCALED, scale=2.0**-200 * 1.9),
+    Grid(GridKind.SCALED, scale=1.1e60),
+    Grid(GridKind.BINARY32),
+    Grid(GridKind.BINARY64),
+    Grid(GridKind.VAX_F),
+]
+
+
+def edges(grid: Grid) -> list[int]:
+    low = ~grid.limit if grid.signed_magnitude else -grid.limit
+    return [low, low + 1, -2, -1, 0, 1, 2, grid.limit - 1, grid.limit]
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=str)
+@given(st.lists(INT64, max_size=8), st.lists(DOUBLES, max_size=8))
+def test_every_ordinal(grid: Grid, extra: list[int], values: list[float]) -> None:
+    """In range: a value, a text and back. Out of range: FormatError."""
+    low = edges(grid)[0]
+    span = grid.limit - low + 1
+    ordinals = np.array(edges(grid) + [low + x % span for x in extra], np.int64)
+    decoded = grid.values(ordinals)
+    again, exact = grid.ordinals(decoded)
+    kept = ~np.isnan(decoded)
+    if grid.kind == GridKind.VAX_F:
+        kept &= decoded != 0  # a zero may have any fraction
+    assert exact[kept].all()
+    assert again[kept].tolist() == ordinals[kept].tolist()
+    nearest, exact = grid.ordinals(np.array(values))
+    assert (bits(grid.values(nearest)) == np.array(bits(np.array(values))))[exact].all()
+    if grid.is_text:
+        texts = grid.texts(ordinals).tolist()
+        wide = grid.digits >= 16  # their texts may stand for a neighbour
+        if grid.kind != GridKind.TEXT64 or not wide:
+            assert bits(decoded) == bits(tokens_of(*texts).values())
+            tokens = [text for text in texts if len(text) <= 18]  # LONG ones in JavaScript style
+            assert grid.ordinals_of_tokens(tokens_of(*tokens))[1].all()
+    for wild in extra:
+        if not low <= wild <= grid.limit:
+            with pytest.raises(FormatError, match=str(wild)):
+                grid.values(np.array([wild]))
+            if grid.is_text:
+                with pytest.raises(FormatError):
+                    grid.texts(np.array([wild]))
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=str)
+def test_values_that_a_grid_lacks(grid: Grid) -> None:
+    """NaN is 0 and inexact, infinities are the ends, except on IEEE grids."""
+    ordinals, exact = grid.ordinals(np.array([np.nan, np.inf, -np.inf, -0.0]))
+    if grid.kind in (GridKind.BINARY32, GridKind.BINARY64):
+        assert exact.all()
+        return
+    low = edges(grid)[0]
+    assert ordinals[:3].tolist() == [0, grid.limit, low]
+    assert not exact[:3].any()
+    signed_zero = grid.signed_magnitude and grid.kind != GridKind.VAX_F
+    assert (ordinals[3], exact[3]) == ((-1, True) if signed_zero else (0, False))
+
+
+@given(st.floats(-1e9, 1e9), st.integers(0, 6))
+def test_the_nearest_number_of_a_grid(value: float, digits: int) -> None:
+    fixed = Grid(GridKind.FIXED, digits)
+    found = fixed.values(fixed.ordinals(np.array([value]))[0])[0]
+    assert abs(found - value) <= 0.5000001 * 10.0**-digits + abs(value) * 1e-15
+    general = Grid(GridKind.GENERAL, digits + 1)
+    found = general.values(general.ordinals(np.array([value]))[0])[0]
+    assert abs(found - value) <= abs(value) * 10.0**-digits * 0.51 or abs(value) < 1e-306
+
+
+TABLE = [  # grid, text, ordinal: the worked examples of SPEC.md, "Number grids"
+    (Grid(GridKind.FIXED, 4), "9.3722", 93722),
+    (Grid(GridKind.FIXED, 4), "-0.0000", -1),
+    (Grid(GridKind.FIXED, 4, GridFlag.NO_ZERO), "-.0333", -334),
+    (Grid(GridKind.FIXED, 0), "-7", -8),
+    (Grid(GridKind.TRIMMED, 4), "12.313", 123130),
+    (Grid(GridKind.TRIMMED, 4, GridFlag.POINT_ZERO), "-27.0", -270001),
+    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "0", 0),
+    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "1", 276300001),
+    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "17.8693", 277278694),
+    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "-3.39301e-014", -263939303),
+    (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "1e-307", 1),
+    (Grid(GridKind.GENERAL, 6, GridFlag.POINT_ZERO), "24.0", 277340001),
+    (Grid(GridKind.GENERAL, 6, GridFlag.POINT_ZERO), "7e-09", 268800001),
+    (Grid(GridKind.TEXT64, 0, GridFlag.POINT_ZERO), "-0.0", -1),
+    (Grid(GridKind.TEXT64, 0, GridFlag.POINT_ZERO), "0.1", 0x3FB999999999999A),
+    (Grid(GridKind.TEXT64, 17), "0.10000000000000001", 0x3FB999999999999A),
+    (Grid(GridKind.TEXT64, 84), "0.10000000000000000555", 0x3FB999999999999A),
+    (Grid(GridKind.TEXT32), "0.1", 0x3DCCCCCD),
+]
+
+
+@pytest.mark.parametrize(("grid", "text", "ordinal"), TABLE, ids=str)
+def test_worked_examples(grid: Grid, text: str, ordinal: int) -> None:
+    assert check_printed(grid, [text]).tolist() == [ordinal]
+
+
+@pytest.mark.parametrize(
+    ("grid", "texts"),
+    [
+        (Grid(GridKind.FIXED, 2), "1.0 1.000 01.00 +1.00 1.00e0 .50 1. 1 --1.00 -.50 1e2 nan inf"),
+        (Grid(GridKind.FIXED, 0), "1. 1.0 01 +1 00 -00 1e0 99999999999999999999"),
+        (Grid(GridKind.FIXED, 1, GridFlag.PLUS), "1.0 +-1.0 0.0"),
+        (Grid(GridKind.FIXED, 1, GridFlag.NO_ZERO), "0.5 -0.5 0.0"),
+        (Grid(GridKind.FIXED, 4), "225179981368.5248 9999999999999.0000"),
+        (Grid(GridKind.TRIMMED, 4), "1.0 1.50 0.0 1.23456 1. 1e1 0.00 -0.0"),
+        (Grid(GridKind.TRIMMED, 4, 1), "1 1.50 0 1.00 0.00 -0 .0"),
+        (Grid(GridKind.TRIMMED, 4, 2), "1 1.0 1.50 0"),
+        (Grid(GridKind.GENERAL, 6), "1.0 1.50 1234567 0.00001 1e05 1e5 1e+5 1e+05 1.0e-05 1e-005"),
+        (Grid(GridKind.GENERAL, 6), "1E-05 10e-06 0.1e-05 1.234567 0e-05 1.e-05 0.0 100000.0 -00"),
+        (Grid(GridKind.GENERAL, 6), "1e+308 1e-308 1e-5 1e999"),
+        (Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3), "1e-05 1e-0005 1e+06"),
+        (Grid(GridKind.GENERAL, 3), "1234 1000 1e+02"),
+        (Grid(GridKind.TEXT64, 0, 1), "0.10000000000000001 1 1e16 1e+15 0.00001"),
+        (Grid(GridKind.TEXT64, 0, 1), "5e-325 1e400 1e+400 1e-400 4e-324"),
+        (Grid(GridKind.TEXT64, 17), "0.1 0.10000000000000002220"),
+        (Grid(GridKind.TEXT64, 84), "0.10000000000000000556 0.1"),
+        (Grid(GridKind.TEXT32), "0.10000000149 16777217 1e39 1e+39 1e-46"),
+    ],
+)  # fmt: skip
+def test_other_forms_are_exceptions(grid: Grid, texts: str) -> None:
+    ordinals, printed = grid.ordinals_of_tokens(tokens_of(*texts.split()))
+    assert not printed.any(), np.array(texts.split())[printed]
+    assert not ordinals.any()
+
+
+NUMBERISH = st.text("0123456789.-+eE", min_size=1, max_size=24) | st.from_regex(
+    r"\A[-+]?[0-9]{0,9}\.?[0-9]{0,9}(e[-+]?[0-9]{1,4})?\Z"
+).map(str.strip).filter(bool)
+
+
+@given(
+    st.lists(NUMBERISH, min_size=1, max_size=20), st.sampled_from([g for g in GRIDS if g.is_text])
+)
+def test_printed_means_the_same_text(texts: list[str], grid: Grid) -> None:
+    """A token is printed exactly if it is the text of the number that is nearest to it."""
+    good = [is_number(text) for text in texts]
+    tokens = tokens_of(*texts)
+    assert (~tokens.bad()).tolist() == good
+    chosen, fitted, fits = fit(tokens, [grid])
+    assert chosen == choose_grid(tokens, [grid])
+    assert chosen.texts(fitted[fits]).tolist() == tokens[fits].texts().tolist()
+
+    numbers = [text for text, ok in zip(texts, good, strict=True) if ok]
+    tokens = tokens[~tokens.bad()]
+    values = tokens.values()
+    assert bits(values) == bits(np.array([float(text) for text in numbers]))
+    again = grid.texts(grid.ordinals(values)[0]).tolist()
+    ordinals, printed = grid.ordinals_of_tokens(tokens)
+    assert printed.tolist() == [a == b.encode() for a, b in zip(again, numbers, strict=True)]
+    assert not ordinals[~printed].any()
+    assert np.count_nonzero(fits) >= np.count_nonzero(printed) or chosen != grid
+
+
+def is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def test_tokens_that_are_no_finite_numbers() -> None:
+    tokens = tokens_of("nan", "-NaN", "INF", "-infinity", "1.#QNAN", "-1.#IND", "1.#INF00", "1e999")
+    assert not tokens.bad().any()
+    values = tokens.values()
+    assert np.isnan(values[[0, 1, 4, 5]]).all()
+    assert {bits(values)[k] for k in (0, 1, 4, 5)} == {0x7FF8000000000000}
+    assert values[[2, 3, 6, 7]].tolist() == [np.inf, -np.inf, np.inf, np.inf]
+    assert tokens_of("x", "1.2.3", "-", "e5", "1e", "1e+", "0x10", "1_000", "1").bad().sum() == 8
+    with pytest.raises(SourceError, match="offset 4: b'1,5' is not"):
+        tokens_of("1.5", "1,5").values()
+
+
+def test_long_tokens() -> None:
+    texts = ["0" * 400 + "1." + "3" * 400, "1" * 310, "-0." + "0" * 330 + "7", "1e-" + "9" * 30]
+    assert bits(tokens_of(*texts).values()) == bits(np.array([float(text) for text in texts]))
+
+
+def test_tokens_can_be_chosen() -> None:
+    tokens = tokens_of("1", "2.5", "x", "-4")
+    assert tokens[~tokens.bad()].values().tolist() == [1, 2.5, -4]
+    assert tokens[::3].values().tolist() == [1, -4]
+    assert tokens.token(2) == b"x"
+    with pytest.raises(IndexError):
+        scan(b"12", [0], [3])
+
+
+@pytest.mark.parametrize(
+    ("texts", "grid"),
+    [
+        ("0 0 131 -2", Grid(GridKind.FIXED, 0)),
+        ("5.2300 -0.0000 17.1234", Grid(GridKind.FIXED, 4)),
+        ("12.313 0.0 8.9283 -4.5 7.0", Grid(GridKind.TRIMMED, 4, GridFlag.POINT_ZERO)),
+        ("12.313 0 8.9283 -4.5 7", Grid(GridKind.TRIMMED, 4)),
+        (".0083333 -.5000000", Grid(GridKind.FIXED, 7, GridFlag.NO_ZERO)),
+        ("1.23457e-014 -3.4 1.5", Grid(GridKind.GENERAL, 6, GridFlag.EXPONENT3)),
+        ("1.23457e-14 -3.4 24.0", Grid(GridKind.GENERAL, 6, GridFlag.POINT_ZERO)),
+        ("1.234567E-05 -3.4 24", Grid(GridKind.GENERAL, 7, GridFlag.UPPER)),
+        ("9.297450065612793 -0.0 1.5e-06", Grid(GridKind.TEXT64, 0, GridFlag.POINT_ZERO)),
+        ("9.297450065612793 0.0000015 -1e-7", Grid(GridKind.TEXT64, 1, GridFlag.EXPONENT1)),
+        ("0.10000000000000001 0.29999999999999999", Grid(GridKind.TEXT64, 17)),
+        ("0.10000000000000000555 1.50000000000000000000", Grid(GridKind.TEXT64, 84)),
+        ("nan nan", Grid(GridKind.FIXED, 0)),
+    ],
+)  # fmt: skip
+def test_choose_grid(texts: str, grid: Grid) -> None:
+    assert choose_grid(tokens_of(*texts.split())) == grid
+
+
+def test_choose_grid_counts_exceptions() -> None:
+    """One stray token does not give a whole channel 14 decimals; a preferred grid wins ties."""
+    texts = [trimmed(f"{k / 1000:.3f}") for k in range(1001, 3000)]
+    tokens = tokens_of(*texts, "-0.00709999999999")
+    assert choose_grid(tokens) == Grid(GridKind.TRIMMED, 3)
+    general = Grid(GridKind.GENERAL, 6)
+    assert choose_grid(tokens[:-1], [general]) == general
+    assert choose_grid(tokens_of()) == Grid(GridKind.FIXED, 0)
+
+
+def test_choose_grid_sees_every_column() -> None:
+    """``.0`` in one column of a table of 60 is seen, whatever the number of rows."""
+    row = ["0.1234"] * 59 + ["7.0"]
+    assert choose_grid(tokens_of(*row * 4096)) == Grid(GridKind.TRIMMED, 4, GridFlag.POINT_ZERO)
+
+
+@given(st.lists(st.integers(0, 2**64 - 1), min_size=1))
+def test_ieee_bits(words: list[int]) -> None:
+    wide = np.array(words, "<u8")
+    doubles = Grid(GridKind.BINARY64)
+    ordinals = doubles.ordinals_of_bits(wide)
+    assert doubles.bits(ordinals).tolist() == words
+    expected = np.array(struct.unpack(f"<{len(words)}d", wide.tobytes()))
+    expected[np.isnan(expected)] = np.nan
+    assert bits(doubles.values(ordinals)) == bits(np.where(np.isnan(expected), np.nan, expected))
+
+    narrow = (wide & 0xFFFFFFFF).astype("<u4")
+    singles = Grid(GridKind.BINARY32)
+    ordinals = singles.ordinals_of_bits(narrow)
+    assert singles.bits(ordinals).tolist() == narrow.tolist()
+    values = singles.values(ordinals)
+    for word, value in zip(narrow.tolist(), values.tolist(), strict=True):
+        expected_value = struct.unpack("<f", struct.pack("<I", word))[0]
+        assert value == expected_value or (math.isnan(value) and math.isnan(expected_value))
+
+    vax = Grid(GridKind.VAX_F)
+    assert vax.bits(vax.ordinals_of_bits(narrow)).tolist() == narrow.tolist()
+
+
+VAX = [  # stored bytes, value: C3D.org and DEC's manuals
+    ("80400000", 1.0),
+    ("80c00000", -1.0),
+    ("60410000", 3.5),
+    ("60c10000", -3.5),
+    ("00000000", 0.0),
+    ("7f00ffff", 0.0),
+    ("00800000", math.nan),
+    ("80000000", 2.0**-128),
+    ("ff7fffff", 2.0**127 * (1 - 2.0**-24)),
+    ("ffffffff", -(2.0**127) * (1 - 2.0**-24)),
+    ("4941db0f", 3.1415927410125732),
+]
+
+
+@pytest.mark.parametrize(("stored", "value"), VAX, ids=str)
+def test_vax_values(stored: str, value: float) -> None:
+    grid = Grid(GridKind.VAX_F)
+    word = np.frombuffer(bytes.fromhex(stored), "<u4")
+    ordinals = grid.ordinals_of_bits(word)
+    assert grid.bits(ordinals).tobytes().hex() == stored
+    found = grid.values(ordinals)[0]
+    assert found == value or math.isnan(value) == math.isnan(found) is True
+
+
+def test_scaled_and_integer() -> None:
+    grid = Grid(GridKind.SCALED, scale=0.1)
+    assert grid.values(np.array([-3, 0, 7])).tolist() == [-3 * 0.1, 0.0, 7 * 0.1]
+    whole = Grid(GridKind.INTEGER)
+    assert whole.values(np.array([-3, 0, 2**53])).tolist() == [-3.0, 0.0, 2.0**53]
+    with pytest.raises(OptionError):
+        whole.texts(np.array([1]))
+    with pytest.raises(OptionError):
+        Grid(GridKind.FIXED, 4).bits(np.array([1]))
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=str)
+def test_schema(grid: Grid) -> None:
+    fields = {"kind": grid.kind, "digits": grid.digits, "flags": grid.flags}
+    wrapped = schema.Struct("grid" / GRID)
+    data = schema.build(wrapped, {"grid": grid}, "test")
+    assert data[:3] == bytes(fields.values())
+    assert len(data) == (11 if grid.kind == GridKind.SCALED else 3)
+    assert schema.parse(wrapped, data, "test").grid == grid
+    for length in range(len(data)):
+        with pytest.raises(FormatError):
+            schema.parse(wrapped, data[:length], "test")
+
+
+@given(st.binary(min_size=3, max_size=11))
+def test_hostile_grids(data: bytes) -> None:
+    """Bytes are a grid that works at 0 and at its limit, or a FormatError."""
+    try:
+        grid = schema.parse(schema.Struct("grid" / GRID), data, "test").grid
+    except FormatError:
+        return
+    ends = np.array([0, grid.limit])
+    assert np.isfinite(grid.values(ends)[:1]).all()
+    if grid.is_text:
+        assert len(grid.texts(ends)) == 2
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"kind": GridKind.FIXED, "digits": 23},
+        {"kind": GridKind.FIXED, "flags": GridFlag.NO_ZERO},
+        {"kind": GridKind.FIXED, "digits": 2, "flags": GridFlag.POINT},
+        {"kind": GridKind.FIXED, "digits": 2, "flags": GridFlag.UPPER},
+        {"kind": GridKind.TRIMMED},
+        {"kind": GridKind.GENERAL},
+        {"kind": GridKind.GENERAL, "digits": 16},
+        {"kind": GridKind.GENERAL, "digits": 6, "flags": 3},
+        {"kind": GridKind.GENERAL, "digits": 6, "flags": 48},
+        {"kind": GridKind.GENERAL, "digits": 6, "flags": 128},
+        {"kind": GridKind.TEXT64, "digits": 2},
+        {"kind": GridKind.TEXT64, "digits": 73},
+        {"kind": GridKind.TEXT64, "digits": 84, "flags": 1},
+        {"kind": GridKind.TEXT32, "digits": 6},
+        {"kind": GridKind.INTEGER, "scale": 2.0},
+        {"kind": GridKind.SCALED, "scale": 0.0},
+        {"kind": GridKind.SCALED, "scale": math.nan},
+        {"kind": GridKind.BINARY32, "flags": 1},
+    ],
+    ids=str,
+)
+def test_grids_that_cannot_be(fields: dict[str, float]) -> None:
+    with pytest.raises(OptionError):
+        Grid(**fields)
