@@ -249,8 +249,6 @@ class Clip:
         if joints is not None:
             values = values[:, places]
             mask = mask[:, places] if mask is not None else None
-        elif groups:
-            values, mask = _in_column_order(info.layout, values, mask)
         whole = (start, stop) == (0, self.n_frames) and joints is None and resolution == 0
         if whole and not self._container.salvage:
             self._check_hash(info, values, mask)
@@ -314,6 +312,8 @@ class Clip:
         groups = range(len(info.layout.groups))
         reader = SignalReader(self._container, info, tuple(groups), 0, self.name)
         exceptions, changes = reader.exceptions(start, stop)
+        binary = not info.is_integer and any(not grid.is_text for grid in info.grids)
+        keep = binary and info.codec.domain == "ordinals" and not self._container.salvage
         return Signal(
             values=values,
             grids=info.grids,
@@ -323,6 +323,7 @@ class Clip:
             exceptions=exceptions,
             grid_changes=changes,
             channels=info.channels,
+            ordinals=reader.ordinals(start, stop) if keep else None,
         )
 
     def _source(self, start: int, stop: int) -> Source | None:
@@ -385,15 +386,6 @@ def _groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...],
     groups = tuple(dict.fromkeys(sorted(group_of[c] for c in columns)))
     place = {c: i for i, c in enumerate(c for g in groups for c in layout.groups[g])}
     return groups, [place[c] for c in columns]
-
-
-def _in_column_order(
-    layout: Layout, values: NDArray[Any], mask: NDArray[np.bool_] | None
-) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-    order = np.argsort([c for group in layout.groups for c in group], kind="stable")
-    if (order == np.arange(len(order))).all():
-        return values, mask
-    return values[:, order], mask[:, order] if mask is not None else None
 
 
 def _cut_source(source: Source, source_format: Format, start: int, stop: int) -> Source:

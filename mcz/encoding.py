@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -117,13 +117,7 @@ class MemorySource:
             if signal.values.size and not (abs(signal.values) <= MAX_INTEGER).all():
                 raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
             return signal.values
-        ordinals = np.empty(signal.values.shape, np.int64)
-        exact = np.empty(signal.values.shape, np.bool_)
-        for rows, columns, grid in grid_blocks(signal):
-            block = np.ascontiguousarray(signal.values[rows][:, columns])
-            found, on_grid = grid.ordinals(block.reshape(-1))
-            ordinals[rows, columns] = found.reshape(block.shape)
-            exact[rows, columns] = on_grid.reshape(block.shape)
+        ordinals, exact = signal.place()
         known = np.zeros(signal.values.shape, np.bool_)
         known[self.exceptions.rows, self.exceptions.channels] = True
         if not (exact | known).all():
@@ -157,19 +151,6 @@ class MemorySource:
             np.array([m[1] for m in merged], np.int64),
             tuple(m[2] for m in merged),
         )
-
-
-def grid_blocks(signal: Signal) -> Iterator[tuple[slice, list[int], Grid]]:
-    """Blocks (rows, columns, grid) that cover the signal, each of one grid."""
-    cuts = sorted({0, signal.n_rows, *(row for row, _, _ in signal.grid_changes)})
-    grids = list(signal.grids)
-    changes = sorted(signal.grid_changes, key=lambda change: change[0])
-    for start, stop in zip(cuts, cuts[1:], strict=False):
-        for row, channel, grid in changes:
-            if row == start:
-                grids[channel] = grid
-        for grid in dict.fromkeys(grids):
-            yield slice(start, stop), [c for c, g in enumerate(grids) if g == grid], grid
 
 
 def make_groups(skeleton: Skeleton, signal: Signal, grouping: str) -> tuple[tuple[int, ...], ...]:
@@ -351,14 +332,11 @@ def _decoded(
     layout = source.layout
     spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
     n_groups = len(layout.groups)
-    out = np.empty(source.signal.values.shape)
     request = Request(0, layout.n_frames, tuple(range(n_groups)))
-    decoded = codec.decode(
+    return codec.decode(
         part.header,
         layout,
         spans,
         request,
         lambda segment, resolution, group: segments[segment].streams[resolution * n_groups + group],
     )
-    out[:, [c for group in layout.groups for c in group]] = decoded
-    return out

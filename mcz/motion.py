@@ -5,9 +5,10 @@ Nothing here reads or writes files. SPEC.md, "SKEL" and "CLIP", have the stored 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -217,6 +218,7 @@ class Signal:
     exceptions: Exceptions = field(default_factory=Exceptions)
     grid_changes: tuple[tuple[int, int, Grid], ...] = ()
     channels: tuple[Channel, ...] | None = None  # None: those of the skeleton
+    ordinals: NDArray[np.int64] | None = None  # on their grids; see ``place``
 
     def __post_init__(self) -> None:
         if self.values.ndim != 2:
@@ -239,6 +241,8 @@ class Signal:
             raise MotionError(
                 f"signal {self.name!r}: {len(self.values)} rows at {self.samples_per_frame} a frame"
             )
+        if self.ordinals is not None and self.ordinals.shape != self.values.shape:
+            raise MotionError(f"signal {self.name!r}: ordinals do not match the values")
         if self.mask is not None and (
             self.mask.shape != self.values.shape or self.mask.dtype != np.bool_
         ):
@@ -255,6 +259,39 @@ class Signal:
     @property
     def n_frames(self) -> int:
         return self.n_rows // self.samples_per_frame
+
+    def grid_blocks(self) -> Iterator[tuple[slice, list[int], Grid]]:
+        """Blocks (rows, columns, grid) that cover the signal, each of one grid."""
+        cuts = sorted({0, self.n_rows, *(row for row, _, _ in self.grid_changes)})
+        grids = list(self.grids)
+        changes = sorted(self.grid_changes, key=lambda change: change[0])
+        for start, stop in pairwise(cuts):
+            for row, channel, grid in changes:
+                if row == start:
+                    grids[channel] = grid
+            for grid in dict.fromkeys(grids):
+                yield slice(start, stop), [c for c, g in enumerate(grids) if g == grid], grid
+
+    def place(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """The ordinal of every value, and whether it gives exactly this value back.
+
+        A binary grid has many NaNs, of which ``values`` shows only that they are NaN: where
+        ``ordinals`` are given and still mean the value that is there, they are taken.
+        """
+        ordinals = np.empty(self.values.shape, np.int64)
+        exact = np.empty(self.values.shape, np.bool_)
+        for rows, columns, grid in self.grid_blocks():
+            block = np.ascontiguousarray(self.values[rows][:, columns])
+            found, on_grid = grid.ordinals(block)
+            if self.ordinals is not None:
+                given = np.ascontiguousarray(self.ordinals[rows][:, columns])
+                meant = grid.values(given)
+                same = (meant.view(np.int64) == block.view(np.int64)) | (
+                    np.isnan(meant) & np.isnan(block)
+                )
+                found, on_grid = np.where(same, given, found), on_grid | same
+            ordinals[rows, columns], exact[rows, columns] = found, on_grid
+        return ordinals, exact
 
     def masked(self) -> NDArray[np.float64]:
         """The values with NaN where the mask says invalid."""

@@ -19,7 +19,7 @@ from mcz.container.directory import SegmentRow
 from mcz.container.limits import check
 from mcz.container.reader import Container
 from mcz.container.segments import FRESH, StreamCounts, StreamTable
-from mcz.encoding import MASK_BITS, grid_blocks
+from mcz.encoding import MASK_BITS
 from mcz.errors import FormatError, UnsupportedError
 from mcz.motion import Channel, Exceptions, Signal, Skeleton
 from mcz.numbers import Grid, GridKind, scan
@@ -110,6 +110,26 @@ class SignalReader:
 
     def read(self, start: int, stop: int) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
         """Values and mask of frames start <= f < stop, groups side by side."""
+        spans = self._prepare(start, stop)
+        if self.container.salvage:
+            return self._salvage(spans, start, stop)
+        return self._finish(self._decode(spans, start, stop), start, stop)
+
+    def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
+        """What a codec of ordinals decodes, before the grids are applied."""
+        return self._decode(self._prepare(start, stop), start, stop)
+
+    def _decode(self, spans: Sequence[Span], start: int, stop: int) -> NDArray[Any]:
+        return self.info.codec.decode(
+            self.info.header,
+            self.info.layout,
+            spans,
+            Request(start, stop, self.groups, self.resolution),
+            self._fetch,
+        )
+
+    def _prepare(self, start: int, stop: int) -> list[Span]:
+        """The spans of all segments, after the limit was checked and near ones were read."""
         info, layout = self.info, self.info.layout
         n_columns = sum(len(layout.groups[g]) for g in self.groups)
         n_rows = (stop - start) * layout.samples_per_frame
@@ -134,16 +154,7 @@ class SignalReader:
             for i in covering
             if not info.rows[i].packet
         )
-        if self.container.salvage:
-            return self._salvage(spans, start, stop, n_columns)
-        coded = info.codec.decode(
-            info.header,
-            layout,
-            spans,
-            Request(start, stop, self.groups, self.resolution),
-            self._fetch,
-        )
-        return self._finish(coded, start, stop)
+        return spans
 
     def _covering(self, start: int, stop: int) -> list[int]:
         """Segments whose frames meet the range."""
@@ -154,20 +165,17 @@ class SignalReader:
         ]
 
     def _salvage(
-        self, spans: Sequence[Span], start: int, stop: int, n_columns: int
+        self, spans: Sequence[Span], start: int, stop: int
     ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """What can be decoded segment by segment; the rest is invalid."""
         per_frame = self.info.layout.samples_per_frame
+        n_columns = sum(len(self.info.layout.groups[g]) for g in self.groups)
         values = np.full(((stop - start) * per_frame, n_columns), np.nan)
         mask = np.zeros(values.shape, np.bool_)
         for index in self._covering(start, stop):
             a, b = max(start, spans[index].first), min(stop, spans[index].stop)
-            request = Request(a, b, self.groups, self.resolution)
             try:
-                coded = self.info.codec.decode(
-                    self.info.header, self.info.layout, spans, request, self._fetch
-                )
-                part, valid = self._finish(coded, a, b)
+                part, valid = self._finish(self._decode(spans, a, b), a, b)
             except UnsupportedError:
                 raise
             except FormatError as error:
@@ -304,7 +312,7 @@ class SignalReader:
 def _values_of(ordinals: NDArray[np.int64], shown: Signal | None) -> NDArray[np.float64]:
     values = np.empty(ordinals.shape)
     if shown is not None:
-        for rows, columns, grid in grid_blocks(shown):
+        for rows, columns, grid in shown.grid_blocks():
             block = np.ascontiguousarray(ordinals[rows][:, columns])
             values[rows, columns] = grid.values(block.reshape(-1)).reshape(block.shape)
     return values

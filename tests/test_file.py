@@ -230,3 +230,14 @@ def test_skeleton_comes_back_to_the_bit() -> None:
         back = file.clips["motion"].motion()
     assert repr(back.skeleton.joints[0].offset) == "(0.0, 1.0, -0.0)"
     assert back.frame_rate == Fraction(30000, 1001)
+
+
+def test_nan_payloads_survive_in_ordinals() -> None:
+    words = np.array([[0x7FC00000], [0xFFC00000], [0x7F800001], [0x3F800000]], "<u4")
+    grid = Grid(GridKind.BINARY32)
+    ordinals = grid.ordinals_of_bits(words)
+    bones = mcz.Skeleton((mcz.Joint("m", channels=(mcz.Channel("tx"),)),))
+    signal = Signal(grid.values(ordinals), (grid,), ordinals=ordinals)
+    with mcz.open(written(mcz.Motion(bones, (signal,)))) as file:
+        back = file.clips["motion"].motion().signals[0]
+    np.testing.assert_array_equal(grid.bits(back.place()[0]), words)
