@@ -100,6 +100,13 @@ class MemorySource:
         self.exceptions = self.signal.exceptions if codec.lossless else Exceptions()
         self._ordinals: NDArray[np.int64] | None = None
 
+    def grids(self, frame: int) -> tuple[Grid, ...]:
+        grids = list(self.signal.grids)
+        for row, channel, grid in sorted(self.signal.grid_changes, key=_row):
+            if row <= frame * self.signal.samples_per_frame:
+                grids[channel] = grid
+        return tuple(grids)
+
     def values(self, start: int, stop: int) -> NDArray[np.float64]:
         per_frame = self.signal.samples_per_frame
         return self.signal.values[start * per_frame : stop * per_frame]

@@ -262,15 +262,7 @@ class Signal:
 
     def grid_blocks(self) -> Iterator[tuple[slice, list[int], Grid]]:
         """Blocks (rows, columns, grid) that cover the signal, each of one grid."""
-        cuts = sorted({0, self.n_rows, *(row for row, _, _ in self.grid_changes)})
-        grids = list(self.grids)
-        changes = sorted(self.grid_changes, key=lambda change: change[0])
-        for start, stop in pairwise(cuts):
-            for row, channel, grid in changes:
-                if row == start:
-                    grids[channel] = grid
-            for grid in dict.fromkeys(grids):
-                yield slice(start, stop), [c for c, g in enumerate(grids) if g == grid], grid
+        return grid_blocks(self.n_rows, self.grids, self.grid_changes)
 
     def place(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """The ordinal of every value, and whether it gives exactly this value back.
@@ -298,6 +290,21 @@ class Signal:
         if self.mask is None:
             return self.values
         return np.where(self.mask, self.values, np.nan)
+
+
+def grid_blocks(
+    n_rows: int, grids: Sequence[Grid], changes: Sequence[tuple[int, int, Grid]]
+) -> Iterator[tuple[slice, list[int], Grid]]:
+    """Blocks (rows, columns, grid) that cover ``n_rows``; see ``Signal.grid_changes``."""
+    cuts = sorted({0, n_rows, *(row for row, _, _ in changes)})
+    current = list(grids)
+    ordered = sorted(changes, key=lambda change: change[0])
+    for start, stop in pairwise(cuts):
+        for row, channel, grid in ordered:
+            if row == start:
+                current[channel] = grid
+        for grid in dict.fromkeys(current):
+            yield slice(start, stop), [c for c, g in enumerate(current) if g == grid], grid
 
 
 @dataclass(frozen=True, slots=True, eq=False)

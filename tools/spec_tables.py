@@ -26,6 +26,7 @@ MODULES = (
     "mcz.container.packets",
     "mcz.container.directory",
     "mcz.codecs.raw",
+    "mcz.codecs.lossless",
     "mcz.formats.layout",
     "mcz.formats.notes",
     "mcz.numbers",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from mcz.codecs import raw
+from mcz.codecs import lossless, raw
 from mcz.codecs.base import Codec
 from mcz.errors import OptionError, UnsupportedError
 
-CODECS: dict[int, Codec] = {codec.id: codec for codec in (raw.CODEC,)}
-DEFAULT = raw.CODEC.name  # the best lossless one there is
+CODECS: dict[int, Codec] = {codec.id: codec for codec in (raw.CODEC, lossless.CODEC)}
+DEFAULT = lossless.CODEC.name  # the best lossless one there is
 
 
 def by_name(name: str) -> Codec:

@@ -65,6 +65,7 @@ class Layout:
     skeleton: Skeleton | None = None
     frame_rate: Fraction | None = None
     grids: tuple[Grid, ...] = ()
+    n_resolutions: int = 1
 
     @property
     def n_channels(self) -> int:
@@ -79,6 +80,10 @@ class SignalSource(Protocol):
 
     def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
         """Grid ordinals of frames start <= f < stop, (rows, n_channels)."""
+        ...
+
+    def grids(self, frame: int) -> tuple[Grid, ...]:
+        """The grids in force at a frame."""
         ...
 
     def values(self, start: int, stop: int) -> NDArray[np.float64]:

@@ -85,6 +85,8 @@ def decode(
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     if header:
         raise FormatError(f"raw: a header of {len(header)} bytes, which it does not have")
+    if layout.n_resolutions != 1:
+        raise FormatError(f"raw: {layout.n_resolutions} resolutions, it has 1")
     per_frame = layout.samples_per_frame
     n_channels = sum(len(layout.groups[group]) for group in request.groups)
     out = np.empty(((request.stop - request.start) * per_frame, n_channels), np.int64)

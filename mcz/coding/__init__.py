@@ -1,0 +1,1 @@
+"""Entropy coding: integers only, coder state in u32. SPEC.md, "Entropy coding", is normative."""
