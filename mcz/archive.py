@@ -18,6 +18,7 @@ from mcz.container import payloads
 from mcz.container.directory import Directory
 from mcz.container.reader import Container
 from mcz.container.source import ByteSource
+from mcz.container.strict import check_path
 from mcz.container.writer import Writer
 from mcz.encoding import Progress
 from mcz.errors import FormatError, MczError, OptionError, SourceError, TruncatedError
@@ -281,9 +282,5 @@ def _alias_reader(file: File, name: str, of: int, target: bytes) -> Any:
 
 def safe_path(name: str) -> PurePosixPath:
     """``name`` as a relative path; raises FormatError where it would leave the folder."""
-    path = PurePosixPath(name)
-    parts = name.split("/")
-    odd = any(part in ("", ".", "..") for part in parts) or "\\" in name or "\0" in name
-    if path.is_absolute() or odd or ":" in parts[0]:
-        raise FormatError(f"path {name!r} is not relative and plain")
-    return path
+    check_path(name, "archive")
+    return PurePosixPath(name)

@@ -21,7 +21,7 @@ from mcz.container import payloads
 from mcz.container.directory import ClipRow
 from mcz.container.limits import check
 from mcz.container.reader import Container
-from mcz.container.segments import StreamCounts
+from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts
 from mcz.container.skeletons import parse_channels, parse_skeleton
 from mcz.encoding import canonical
 from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
@@ -64,7 +64,10 @@ class Clip:
 
     @cached_property
     def _cend(self) -> Any:
-        return self._container.cend(self._row)
+        fields = self._container.cend(self._row)
+        if fields is not None and len(fields.source_sha256) != len(self._fields.source):
+            raise FormatError(f"clip {self.name!r}: a source without a hash, or a hash without it")
+        return fields
 
     @cached_property
     def skeleton(self) -> Skeleton:
@@ -96,6 +99,8 @@ class Clip:
     @property
     def frame_numbers(self) -> NDArray[np.int64]:
         """The number of every frame; 1, 2, 3, ... unless the metadata say otherwise."""
+        where = f"clip {self.name!r}: bytes of frame numbers"
+        check(where, 8 * self.n_frames, self._container.max_decoded)
         return parse_frame_numbers(
             self.metadata.get("frame-numbers", "1"), self.n_frames, self.name
         )
@@ -119,11 +124,6 @@ class Clip:
             channels = parse_channels(fields.channels, where)
         n_channels = self.skeleton.n_channels if channels is None else len(channels)
         check(f"{where}: channels", n_channels, self._container.profile.channels)
-        if fields.samples_per_frame < 1 or fields.n_resolutions < 1:
-            raise FormatError(
-                f"{where}: {fields.samples_per_frame} samples a frame, "
-                f"{fields.n_resolutions} resolutions"
-            )
         layout = Layout(
             self.n_frames,
             parse_groups(
@@ -133,6 +133,7 @@ class Clip:
             self.skeleton,
             self.frame_rate,
             parse_grids(fields.grids, n_channels, where),
+            fields.n_resolutions,
         )
         counts = StreamCounts(len(layout.groups), fields.n_resolutions)
         rows = tuple(row for row in self._row.segments if row.header.signal == index)
@@ -155,7 +156,12 @@ class Clip:
         limit = self._container.profile.segment_bytes
         per_frame = max(1, info.layout.n_channels) * info.layout.samples_per_frame * 8
         due = 0
+        noted = info.index == 0 and bool(self._fields.source)
         for row in info.rows:
+            if row.header.flags & FRAME_NOTES and not noted:
+                raise FormatError(f"{where}: frame notes, but no source that they belong to")
+            if not (row.header.first or row.header.flags & FRESH):
+                raise FormatError(f"{where}: the first segment needs one before it")
             check(f"{where}: bytes of a segment", row.header.n_frames * per_frame, limit)
             if row.header.first != due and not self._container.salvage:
                 raise FormatError(f"{where}: a segment begins at {row.header.first}, {due} is due")
@@ -283,7 +289,7 @@ class Clip:
                 f"clip {self.name!r}: {len(hashes)} hashes of {len(self.signals)} signals"
             )
         digest = hashlib.sha256(canonical(values))
-        if mask is not None:
+        if mask is not None and not mask.all():
             digest.update(mask.astype("u1").tobytes())
         if digest.digest() != hashes[info.index]:
             raise ChecksumError(

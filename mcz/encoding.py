@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,13 @@ from mcz.container.writer import Writer
 from mcz.errors import MotionError
 from mcz.formats import FORMATS
 from mcz.frames import frame_number_metadata
+from mcz.masks import build_mask
 from mcz.motion import Exceptions, Motion, Signal, Skeleton, Source
 from mcz.numbers import Grid
 from mcz.schema import MAX_COUNT, build
 
 Progress = Callable[[int, int, str], None]
 MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
-MASK_BITS: Literal["little"] = "little"  # bit order of a packed mask
 
 
 def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
@@ -302,13 +302,13 @@ def _row(change: tuple[int, int, Grid]) -> int:
 
 
 def _masks(source: MemorySource, start: int, stop: int) -> list[bytes]:
-    """Packed validity of each group, b"" where all is valid."""
+    """The mask of each group, b"" where all is valid."""
     signal = source.signal
     if signal.mask is None:
         return []
     rows = signal.mask[start * signal.samples_per_frame : stop * signal.samples_per_frame]
     return [
-        b"" if block.all() else np.packbits(block.reshape(-1), bitorder=MASK_BITS).tobytes()
+        b"" if block.all() else build_mask(block)
         for block in (rows[:, list(group)] for group in source.layout.groups)
     ]
 

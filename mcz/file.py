@@ -119,7 +119,7 @@ class File:
         return replace(
             skeleton,
             source=Source(
-                format=format_by_id(source.format).name,
+                format=format_by_id(source.format, of_skeleton=True).name,
                 template=self.container.template(bytes(source.template), source.format),
                 size=source.size,
                 sha256=bytes(source.sha256),

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError
+
+_INTEGER = r"(?:0|-?[1-9][0-9]{0,15})"
+_TEXT = re.compile(rf"{_INTEGER}(?: [1-9][0-9]{{0,15}}:{_INTEGER})*", re.ASCII)
 
 
 def frame_number_metadata(frame_numbers: NDArray[np.int64] | None) -> dict[str, str]:
@@ -21,6 +26,8 @@ def parse_frame_numbers(text: str, n_frames: int, name: str) -> NDArray[np.int64
     """The numbers that the registry key ``frame-numbers`` spells."""
     frame_numbers = np.arange(n_frames, dtype=np.int64)
     try:
+        if not _TEXT.fullmatch(text):
+            raise ValueError("not first row:number row:number ...")
         first, *jumps = text.split(" ")
         starts = [(0, int(first)), *(_jump(jump) for jump in jumps)]
         rows = [row for row, _ in starts]

@@ -3,7 +3,7 @@
 The skeleton has the 31 joints and the bone names that Acclaim files commonly have, with
 proportions of its own. The legs follow rounded textbook curves of level walking, given at each
 tenth of the gait cycle; all else are sines. Every value is rounded to the digits that are printed,
-so the last bits of a machine's sine do not reach the file.
+so the last bits of a machine's sine do not reach the file. Markers sit on the same skeleton.
 """
 
 from __future__ import annotations
@@ -62,6 +62,32 @@ ARM = (
     ("lfingers", "lhand", (0.85, 0, 0), (0, 90, 90), "rx"),
     ("lthumb", "lwrist", (0.6, -0.1, 0.55), (-90, 45, 0), "rx rz"),
 )
+# Markers of the left side, then those in the middle: name, joint, place along the joint's axes.
+SIDE_MARKERS = (
+    ("FHD", "head", (1.2, 1.3, 1.4)),
+    ("BHD", "head", (1.2, 1.3, -1.2)),
+    ("SHO", "lclavicle", (3.15, 1.4, -0.2)),
+    ("ELB", "lhumerus", (5.1, 0, -0.6)),
+    ("WRA", "lradius", (3.9, 0.1, 0.55)),
+    ("WRB", "lradius", (3.9, 0.1, -0.55)),
+    ("FIN", "lhand", (0.8, 0.25, 0)),
+    ("ASI", "root", (2.2, 1.2, 1.8)),
+    ("PSI", "root", (0.9, 1.3, -1.9)),
+    ("THI", "lfemur", (2.1, -4.1, 0.4)),
+    ("KNE", "lfemur", (2.3, -7.5, 0)),
+    ("TIB", "ltibia", (1.6, -3.6, 0.3)),
+    ("ANK", "ltibia", (2.0, -7.2, 0)),
+    ("HEE", "lfoot", (0, -0.5, -0.9)),
+    ("TOE", "lfoot", (0.2, -0.8, 2.3)),
+)
+MIDDLE_MARKERS = (
+    ("C7", "thorax", (0, 2.5, -0.9)),
+    ("T10", "upperback", (0, 0.6, -1.6)),
+    ("CLAV", "thorax", (0, 1.7, 1.5)),
+    ("STRN", "upperback", (0, 1.3, 2.0)),
+)
+# Frames in which no two cameras saw a marker.
+GAPS = (("RWRB", 30, 44), ("LASI", 96, 121), ("RPSI", 150, 153), ("LHEE", 203, 240))
 BVH_NAMES = {
     "root": "Hips",
     "lowerback": "LowerBack",
@@ -88,7 +114,7 @@ BVH_SIDE_NAMES = {
 
 
 def write_samples(folder: Path) -> list[Path]:
-    """Write walk.asf, walk.amc and walk.bvh into ``folder``, replacing what is there."""
+    """Write the sample files into ``folder``, replacing what is there."""
     paths = []
     for name, data in sample_files().items():
         (folder / name).write_bytes(data)
@@ -98,13 +124,14 @@ def write_samples(folder: Path) -> list[Path]:
 
 def sample_files() -> dict[str, bytes]:
     """The bytes of the sample files by name."""
-    from mcz.formats import amc, asf, bvh
+    from mcz.formats import amc, asf, bvh, c3d
 
     walk = acclaim_walk()
     return {
         "walk.asf": asf.write(walk.skeleton),
         "walk.amc": amc.write(walk),
         "walk.bvh": bvh.write(bvh_walk()),
+        "walk.c3d": c3d.write(marker_walk()),
     }
 
 
@@ -151,6 +178,58 @@ def bvh_walk() -> Motion:
     skeleton = Skeleton(tuple(joints), name="walk")
     signal = _signal(values, Grid(GridKind.FIXED, 4))
     return Motion(skeleton, (signal,), Fraction(FRAME_RATE), name="walk")
+
+
+def marker_walk() -> Motion:
+    """The same walk as 34 markers in mm, to 0.01 mm; x ahead, y to the left, z up, with gaps."""
+    walk = acclaim_walk()
+    placed = _placed(walk)
+    labels, columns = [], []
+    for label, joint, (x, y, z) in _markers():
+        origin, turn = placed[joint]
+        point = origin + turn @ np.array((x, y, z))
+        labels.append(label)
+        columns += [point[:, 2], point[:, 0], point[:, 1]]
+    values = np.rint(np.stack(columns, axis=1) * (UNIT_CM * 1000)) / 100
+    mask = np.ones(values.shape, np.bool_)
+    for label, start, stop in GAPS:
+        first = 3 * labels.index(label)
+        mask[start:stop, first : first + 3] = False
+    values[~mask] = 0.0  # as cameras' programs write what they did not see
+    channels = tuple(Channel(kind) for kind in ("tx", "ty", "tz"))
+    joints = tuple(Joint(label, channels=channels) for label in labels)
+    skeleton = Skeleton(joints, name="walk", unit_cm=0.1, angle_unit="", up_axis="z")
+    grid = Grid(GridKind.BINARY32)
+    values = grid.values(grid.ordinals(values + 0.0)[0])
+    signal = Signal(values, (grid,) * values.shape[1], mask=mask)
+    return Motion(skeleton, (signal,), Fraction(FRAME_RATE), name="walk")
+
+
+def _markers() -> Iterator[tuple[str, str, Vector]]:
+    """All markers, the right side mirrored from the left."""
+    for side, mirror in (("L", 1), ("R", -1)):
+        for name, joint, (x, y, z) in SIDE_MARKERS:
+            if side == "R" and joint.startswith("l") and joint != "lowerneck":
+                joint = "r" + joint[1:]
+            yield side + name, joint, (mirror * x, y, z)
+    yield from MIDDLE_MARKERS
+
+
+def _placed(walk: Motion) -> dict[str, tuple[Floats, Floats]]:
+    """Of every joint its origin (n_frames, 3) and its turn (n_frames, 3, 3) in the world."""
+    tracks = iter(walk.values.T)
+    joints = walk.skeleton.joints
+    placed: dict[str, tuple[Floats, Floats]] = {}
+    for joint in joints:
+        track = {channel.kind: next(tracks) for channel in joint.channels}
+        turn = _local_rotation(joint, track)
+        if joint.parent < 0:
+            origin = np.stack([track[kind] for kind in ("tx", "ty", "tz")], axis=1)
+        else:
+            start, above = placed[joints[joint.parent].name]
+            origin, turn = start + above @ np.array(joint.offset), above @ turn
+        placed[joint.name] = origin, turn
+    return placed
 
 
 def _signal(values: Floats, grid: Grid) -> Signal:

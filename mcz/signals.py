@@ -19,9 +19,9 @@ from mcz.container.directory import SegmentRow
 from mcz.container.limits import check
 from mcz.container.reader import Container
 from mcz.container.segments import FRESH, StreamCounts, StreamTable
-from mcz.encoding import MASK_BITS
 from mcz.errors import FormatError, UnsupportedError
-from mcz.motion import Channel, Exceptions, Signal, Skeleton
+from mcz.masks import parse_mask
+from mcz.motion import Channel, Exceptions, Skeleton, grid_blocks
 from mcz.numbers import Grid, GridKind, scan
 from mcz.schema import parse
 
@@ -224,16 +224,7 @@ class SignalReader:
         if self.info.is_integer:
             Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
         if self.info.codec.domain == "ordinals" and not self.info.is_integer:
-            shown = (
-                Signal(
-                    np.empty(coded.shape),
-                    tuple(layout.grids[c] for c in columns),
-                    grid_changes=changes,
-                )
-                if coded.size
-                else None
-            )
-            values = _values_of(coded, shown)
+            values = _values_of(coded, [layout.grids[c] for c in columns], changes)
         if len(exceptions):
             values[exceptions.rows, exceptions.channels] = _values_of_texts(
                 exceptions.texts, self.name
@@ -264,9 +255,11 @@ class SignalReader:
                 notes = _notes(
                     streams[at] if at is not None else b"",
                     n_rows,
-                    len(layout.groups[group]),
+                    [layout.grids[c] for c in layout.groups[group]],
                     self.name,
                 )
+                if self.info.is_integer and any(g.kind != GridKind.INTEGER for _, g in notes[0]):
+                    raise FormatError(f"clip {self.name!r}: another grid in a signal of integers")
                 channels = [place[c] for c in layout.groups[group]]
                 for change in notes[0]:
                     changes.setdefault(row, {})[channels[change[0]]] = change[1]
@@ -303,18 +296,18 @@ class SignalReader:
                 if data:
                     if mask is None:
                         mask = np.ones(((stop - start) * per_frame, len(columns)), np.bool_)
-                    bits = _unpack_mask(data, header.n_frames * per_frame, n, self.name)
+                    bits = parse_mask(data, header.n_frames * per_frame, n, self.name)
                     mask[rows, at : at + n] = bits[cut]
                 at += n
         return mask
 
 
-def _values_of(ordinals: NDArray[np.int64], shown: Signal | None) -> NDArray[np.float64]:
+def _values_of(
+    ordinals: NDArray[np.int64], grids: Sequence[Grid], changes: Sequence[tuple[int, int, Grid]]
+) -> NDArray[np.float64]:
     values = np.empty(ordinals.shape)
-    if shown is not None:
-        for rows, columns, grid in shown.grid_blocks():
-            block = np.ascontiguousarray(ordinals[rows][:, columns])
-            values[rows, columns] = grid.values(block.reshape(-1)).reshape(block.shape)
+    for rows, columns, grid in grid_blocks(len(ordinals), grids, changes):
+        values[rows, columns] = grid.values(ordinals[rows][:, columns])
     return values
 
 
@@ -334,36 +327,32 @@ def _as_changes(
 
 
 def _notes(
-    data: bytes, n_rows: int, n_channels: int, name: str
+    data: bytes, n_rows: int, grids: Sequence[Grid], name: str
 ) -> tuple[list[tuple[int, Grid]], list[tuple[int, int, bytes]]]:
-    """Grid changes (channel, grid) and exceptions (row, channel, text) of one group."""
+    """Grid changes (channel, grid) and exceptions (row, channel, text) of one group.
+
+    ``grids`` are those of its channels in CLIP.
+    """
     if not data:
         return [], []
     where = f"clip {name!r}, group notes"
     fields = parse(payloads.GROUP_NOTES, data, where)
+    n_channels = len(grids)
+    changes = [(c.channel, c.grid) for c in fields.grid_changes]
+    channels = [channel for channel, _ in changes]
+    if channels != sorted(set(channels)) or any(c >= n_channels for c in channels):
+        raise FormatError(f"{where}: grid changes of channels {channels}")
+    current = dict(enumerate(grids)) | dict(changes)
     row, last, exceptions = 0, (-1, -1), []
     for e in fields.exceptions:
         row += e.row
         if row >= n_rows or e.channel >= n_channels or (row, e.channel) <= last:
             raise FormatError(f"{where}: exception at row {row}, channel {e.channel}")
+        if not current[e.channel].is_text:
+            raise FormatError(f"{where}: exception on {current[e.channel]}, which has no text")
         last = row, e.channel
         exceptions.append((row, e.channel, bytes(e.text)))
-    changes = [(c.channel, c.grid) for c in fields.grid_changes]
-    channels = [channel for channel, _ in changes]
-    if channels != sorted(set(channels)) or any(c >= n_channels for c in channels):
-        raise FormatError(f"{where}: grid changes of channels {channels}")
     return changes, exceptions
-
-
-def _unpack_mask(data: bytes, n_rows: int, n_channels: int, name: str) -> NDArray[np.bool_]:
-    size = (n_rows * n_channels + 7) // 8
-    if len(data) != size:
-        raise FormatError(f"clip {name!r}: a mask of {len(data)} bytes, not {size}")
-    bits = np.unpackbits(np.frombuffer(data, "u1"), bitorder=MASK_BITS)
-    if bits[n_rows * n_channels :].any():
-        raise FormatError(f"clip {name!r}: a mask has bits after its last")
-    valid: NDArray[np.bool_] = bits[: n_rows * n_channels].astype(np.bool_)
-    return valid.reshape(n_rows, n_channels)
 
 
 def _values_of_texts(texts: Sequence[bytes], name: str) -> NDArray[np.float64]:

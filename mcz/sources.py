@@ -18,7 +18,7 @@ from mcz.container.directory import Directory
 from mcz.container.writer import Writer
 from mcz.encoding import Progress, write_clip, write_skeleton
 from mcz.errors import MczError, OptionError, SourceError
-from mcz.formats import Format, find_asf, format_of
+from mcz.formats import FORMATS, Format, find_asf, format_of
 from mcz.motion import Motion, Skeleton
 
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}
@@ -83,6 +83,15 @@ def with_facts(motion: Motion, rate: Fraction | float | None, unit: str | None) 
             raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
         motion = replace(motion, skeleton=replace(motion.skeleton, unit_cm=UNIT_CM[unit]))
     return motion
+
+
+def plain_source(motion: Motion, name: str) -> bytes:
+    """The motion as a file of the format ``name``, printed in this package's own style.
+
+    Raises MotionError where that format cannot say what the motion says.
+    """
+    data: bytes = FORMATS[name].write(replace(motion, source=None))
+    return data
 
 
 class Entry:

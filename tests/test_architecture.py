@@ -39,7 +39,8 @@ ALLOWED = {
     "": MODEL | {"kinematics", "metrics", "file"},  # mcz/__init__.py
 }
 FILE_HELPERS = {  # beside file.py, of one part with it
-    *("archive", "clip", "encoding", "frames", "report", "signals", "sources", "targets", "views"),
+    *("archive", "clip", "encoding", "frames", "masks", "report", "signals", "sources", "targets"),
+    "views",
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 

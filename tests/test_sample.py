@@ -18,6 +18,7 @@ SHA256 = {
     "walk.asf": "a5b003043808847baa715e5fa81004882edc8f81ed5154d8e02a0160b7de584a",
     "walk.amc": "2d49b636d6f50ff1a170d403eaa665938e4b88950f3bf27e566312e164201da3",
     "walk.bvh": "e52f6b011fcf0bc5ea89b580c0dd6e5c60d7ef60e765d340c6f449cbdff8887a",
+    "walk.c3d": "1eaf3b2279527bb58d1ba1385bee0b1766981e0b7cebc46dfaa9dbc709f3670d",
 }
 BVH_OF = {"head": "Head", "lfoot": "LeftFoot", "rtoes": "RightToes", "lhand": "LeftHand"}
 

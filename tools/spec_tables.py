@@ -29,6 +29,7 @@ MODULES = (
     "mcz.codecs.lossless",
     "mcz.formats.layout",
     "mcz.formats.notes",
+    "mcz.formats.c3d_layout",
     "mcz.numbers",
 )
 NAMED = {

@@ -10,18 +10,20 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.errors import FormatError, MczError, UnsupportedError
+from mcz.errors import LimitError, MczError, UnsupportedError
 
 if TYPE_CHECKING:
     from mcz.clip import Clip
     from mcz.file import File
 
-OPTIONS = ("--source", "--clip", "--frames", "--joints", "--resolution")
+OPTIONS = ("--clip", "--frames", "--joints", "--resolution")
+MAX_LINE = 2**20
 Part = tuple[dict[str, Any], bytes]  # a row of the listing, and its bytes
 
 
@@ -29,18 +31,15 @@ def main(arguments: list[str] | None = None) -> int:
     """Answer one request; return the exit code."""
     given = _parser().parse_args(arguments)
     if given.capabilities:
-        print(json.dumps(OPTIONS))  # noqa: T201
+        print(json.dumps({"options": OPTIONS}))  # noqa: T201
         return 0
     try:
-        listing, parts = _answer(sys.stdin.buffer.read(), given)
+        answer = b"".join(respond(sys.stdin.buffer.read(), given))
     except UnsupportedError as error:
         return _refuse(3, error)
     except MczError as error:
         return _refuse(1, error)
-    line = json.dumps({listing: [row for row, _ in parts]}, ensure_ascii=False)
-    sys.stdout.buffer.write(line.encode("utf-8") + b"\n")
-    for _, data in parts:
-        sys.stdout.buffer.write(data)
+    sys.stdout.buffer.write(answer)
     sys.stdout.buffer.flush()
     return 0
 
@@ -50,10 +49,19 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--capabilities", action="store_true")
     parser.add_argument("--source", action="store_true")
     parser.add_argument("--clip")
-    parser.add_argument("--frames")
-    parser.add_argument("--joints")
+    parser.add_argument("--frames", type=_range)
+    parser.add_argument("--joints", type=_integers)
     parser.add_argument("--resolution", type=int, default=0)
     return parser
+
+
+def _range(text: str) -> tuple[int, int]:
+    start, stop = map(int, text.split(":"))
+    return start, stop
+
+
+def _integers(text: str) -> list[int]:
+    return [int(word) for word in text.split(",") if word]
 
 
 def _refuse(code: int, error: Exception) -> int:
@@ -61,41 +69,48 @@ def _refuse(code: int, error: Exception) -> int:
     return code
 
 
-def _answer(data: bytes, given: argparse.Namespace) -> tuple[str, list[Part]]:
+def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
+    """The answer to a request about the file ``data``; raises MczError where anything is wrong."""
     import mcz
-    from mcz.report import validate
+    from mcz.container.scan import scan
 
     with mcz.open(data) as file:
-        problems = validate(file)
-        clips = [file.only_clip(given.clip)] if given.clip is not None else file.clips.values()
-        # An unknown codec is no fault of the file, so it is told apart before the faults are.
-        for clip in clips:
-            for signal in clip.signals:
-                _ = signal.codec
-        if problems:
-            raise FormatError(str(problems[0]))
-        if given.source:
-            return "sources", _sources(file, given.clip)
-        return "arrays", [part for clip in clips for part in _arrays(clip, given)]
+        scan(file.container.source, whole=True)
+        listing = "sources" if given.source else "arrays"
+        parts = list(_sources(file) if given.source else _arrays(file, given))
+    line = json.dumps({listing: [row for row, _ in parts]}, ensure_ascii=False).encode("utf-8")
+    if len(line) >= MAX_LINE:
+        raise LimitError(f"a listing of {len(line)} bytes, the contract allows {MAX_LINE}")
+    yield line + b"\n"
+    for _, content in parts:
+        yield content
 
 
-def _arrays(clip: Clip, given: argparse.Namespace) -> list[Part]:
-    """The canonical arrays of a clip: each signal's values, then its mask where it has one."""
-    frames = None
-    if given.frames:
-        start, _, stop = given.frames.partition(":")
-        frames = int(start), int(stop)
-    joints = [int(joint) for joint in given.joints.split(",")] if given.joints else None
-    parts = []
-    for signal in clip.signals[: 1 if joints else None]:
-        values, mask = clip.read_masked(frames, joints, given.resolution, signal=signal.index)
-        parts.append(_part(clip.name, signal.name, values))
-        if mask is not None:
-            parts.append(_part(clip.name, f"{signal.name}.mask", mask))
-    return parts
+def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
+    for attachment in file.attachments.values():
+        attachment.read()
+    clips: Iterable[Clip] = file.clips.values()
+    if given.clip is not None:
+        clips = [file.only_clip(given.clip)]
+    for clip in clips:
+        _ = clip.frame_numbers
+        yield from _clip_arrays(clip, given)
 
 
-def _part(clip: str, signal: str, values: NDArray[Any]) -> Part:
+def _clip_arrays(clip: Clip, given: argparse.Namespace) -> Iterator[Part]:
+    """The canonical array of each signal, then its mask where any value is invalid."""
+    for signal in clip.signals:
+        if given.joints is not None and signal.channels is not None:
+            continue
+        values, mask = clip.read_masked(
+            given.frames, given.joints, given.resolution, signal=signal.index
+        )
+        yield _part(clip.name, signal.name, "values", values)
+        if mask is not None and not mask.all():
+            yield _part(clip.name, signal.name, "mask", mask)
+
+
+def _part(clip: str, signal: str, array: str, values: NDArray[Any]) -> Part:
     if values.dtype == np.bool_:
         dtype, data = "u1", values.astype("u1").tobytes()
     elif values.dtype == np.int64:
@@ -105,6 +120,7 @@ def _part(clip: str, signal: str, values: NDArray[Any]) -> Part:
     row = {
         "clip": clip,
         "signal": signal,
+        "array": array,
         "dtype": dtype,
         "shape": list(values.shape),
         "bytes": len(data),
@@ -112,18 +128,13 @@ def _part(clip: str, signal: str, values: NDArray[Any]) -> Part:
     return row, data
 
 
-def _sources(file: File, clip: str | None) -> list[Part]:
-    """The restored files: of clips, of skeletons, then attachments."""
-    found: list[tuple[str, bytes]] = []
-    for name, held in file.clips.items():
-        if held.source is not None and clip in (None, name):
-            found.append((held.source.path, held.source_bytes()))
-    if clip is None:
-        for name, (_, target) in file.aliases.items():
-            if target in dict(file.skeletons):
-                found.append((name, file.skeleton_bytes(target)))
-        found += [(name, held.read()) for name, held in file.attachments.items()]
-    return [({"path": path, "bytes": len(data)}, data) for path, data in found]
+def _sources(file: File) -> Iterator[Part]:
+    """Every file that is held under a name: of clips, attached, and further names."""
+    from mcz.archive import named_files
+
+    for path, restore in named_files(file):
+        data = restore()
+        yield {"path": path, "bytes": len(data)}, data
 
 
 if __name__ == "__main__":

@@ -49,7 +49,10 @@ Output = tuple[str, str, bytes]  # kind, file name, content
     help="Leave out the K finest details (with --to).",
 )
 @click.option(
-    "--to", "target", type=click.Choice(["csv", "npz"]), help="Numbers instead of the source file."
+    "--to",
+    "target",
+    type=click.Choice(["csv", "npz", "c3d"]),
+    help="Numbers, or the markers as a plain C3D, instead of the source file.",
 )
 @click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
 @click.option("--salvage", is_flag=True, help="Write what a damaged file still holds.")
@@ -68,11 +71,11 @@ def command(
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Write the original file of a clip, byte for byte, or its numbers as CSV or NPZ.
+    """Write the original file of a clip, byte for byte, or its numbers as CSV, NPZ or C3D.
 
     A file without clips gives its skeleton's ASF or its attachment.
     """
-    if target is None and (joints is not None or resolution):
+    if target in (None, "c3d") and (joints is not None or resolution):
         raise Failure("--joints and --resolution need --to csv or --to npz", Exit.USAGE)
     if output == "-" and (as_json or with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
@@ -82,6 +85,8 @@ def command(
             cut = _cut(clip, frames)
             if target is None:
                 outputs = [_source(clip, cut)]
+            elif target == "c3d":
+                outputs = [_markers(clip, cut)]
             else:
                 outputs = [_export(clip, target, cut, joints, resolution)]
             if with_skeleton:
@@ -106,6 +111,13 @@ def _source(clip: Clip, cut: tuple[int, int] | None) -> Output:
     data = clip.source_bytes(cut)
     path = clip.source.path if clip.source else ""
     return "source", PurePosixPath(path).name or f"{_stem(clip)}.out", data
+
+
+def _markers(clip: Clip, cut: tuple[int, int] | None) -> Output:
+    """The clip as a plain C3D; refused where its joints are no markers."""
+    from mcz.sources import plain_source
+
+    return "c3d", f"{_stem(clip)}.c3d", plain_source(clip.motion(cut), "c3d")
 
 
 def _export(

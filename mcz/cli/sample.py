@@ -10,16 +10,16 @@ from mcz.cli.common import Exit, Failure, about, print_json, write_output
 from mcz.cli.options import force_option, json_option
 
 
-@click.command(short_help="Write a generated walk (ASF/AMC and BVH).")
+@click.command(short_help="Write a generated walk (ASF/AMC, BVH and C3D).")
 @click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
 @force_option
 @json_option
 def command(folder: Path, force: bool, as_json: bool) -> Exit:
-    """Write walk.asf, walk.amc and walk.bvh into DIR: two seconds of walking at 120 Hz.
+    """Write walk.asf, walk.amc, walk.bvh and walk.c3d into DIR: two seconds of walking at 120 Hz.
 
     The AMC and its ASF have 31 joints and 62 channels and say nothing of a rate (encode takes
-    --rate 120); the BVH is the same walk in centimeters (--unit cm). The bytes are the same on
-    every machine.
+    --rate 120); the BVH is the same walk in centimeters (--unit cm), the C3D its markers, some of
+    them out of sight for a while. The bytes are the same on every machine.
     """
     from mcz.sample import sample_files
 

@@ -65,6 +65,7 @@ LOSSLESS_FIELDS = (
     ("taps", "zigzag varint each", "coded: as many as bits 3-6 of kind say; bit 2: from_last"),
 )
 MAX_DROP = 19
+MAX_SCALE = 172  # 2^43
 MAX_TAPS = 8
 PLAIN = Grid(GridKind.INTEGER)
 OWN_FORM = 128  # in kind: form and drop are in the stream
@@ -144,7 +145,7 @@ def _coded_head(column: Ints, grid: Grid, clip_grid: Grid) -> tuple[bytes, Ints]
     if shape.base and shape.top > max_top(shape):
         shape = lattice(PLAIN, column)
     from_last, taps, error = choose_predictor(fixed_point(column, shape))
-    scale = next(q for q in range(256) if scale_of(q) >= error)
+    scale = next((q for q in range(MAX_SCALE) if scale_of(q) >= error), MAX_SCALE)
     own_form = shape.drop > 0 or form_of(shape) != form_of_grid(clip_grid)
     kind = CODED | from_last << 2 | len(taps) << 3 | OWN_FORM * own_form
     head = [bytes((kind,)), bytes((form_of(shape), shape.drop)) if own_form else b""]
@@ -164,8 +165,8 @@ def form_of_grid(grid: Grid) -> int:
 
 
 def scale_of(quarters: int) -> int:
-    """The scale that a byte stands for: about 2^(q / 4), at most 2^43."""
-    return min(4 + (quarters & 3) << (quarters >> 2) >> 2, 1 << 43)
+    """The scale that a byte stands for: about 2^(q / 4)."""
+    return 4 + (quarters & 3) << (quarters >> 2) >> 2
 
 
 def _plan(shape: Lattice, scale: int, from_last: int, taps: Sequence[int]) -> Ints:
@@ -316,6 +317,8 @@ def _parse_constant(stream: bytes, at: int, kind: int) -> tuple[int, int]:
     if size > 8 or at + size > len(stream):
         raise FormatError(f"lossless: a constant of {size} bytes at {at}")
     folded = int.from_bytes(stream[at : at + size], "little")
+    if size and stream[at + size - 1] == 0:
+        raise FormatError(f"lossless: a constant of {size} bytes, the last of which is 0")
     return (folded >> 1) ^ -(folded & 1), at + size
 
 
@@ -339,6 +342,8 @@ def _parse_coded(stream: bytes, at: int, kind: int, grid: Grid) -> tuple[Ints, i
         or any(abs(t) > MAX_TAP for t in taps)
     ):
         raise FormatError(f"lossless: greatest class {top}, taps {taps}")
+    if scale > MAX_SCALE:
+        raise FormatError(f"lossless: scale {scale}")
     shape = Lattice(shape.base, shape.digits, drop, top)
     return _plan(shape, scale, kind >> 2 & 1, taps), at
 
@@ -368,7 +373,9 @@ def _uncode(data: bytes, plans: Sequence[Ints], n_rows: int) -> Ints:
     if fault >= 0:
         raise FormatError(f"lossless: row {fault} cannot be decoded")
     if coding.coded_size(state) != len(bits):
-        raise FormatError(f"lossless: {len(bits)} bytes, of which {coding.coded_size(state)} belong")
+        raise FormatError(
+            f"lossless: {len(bits)} bytes, of which {coding.coded_size(state)} belong"
+        )
     return rows
 
 

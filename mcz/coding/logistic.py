@@ -30,7 +30,8 @@ def squash_table() -> Ints:
     x = np.arange(4096)
     node, weight = x >> 7, x & 127
     nodes = np.array(NODES, np.int64)
-    return (nodes[node] * (128 - weight) + nodes[node + 1] * weight + 64) >> 7
+    table: Ints = (nodes[node] * (128 - weight) + nodes[node + 1] * weight + 64) >> 7
+    return table
 
 
 @cache

@@ -24,6 +24,7 @@ from mcz.schema import EXTENSION, FINITE, SIZED, TEXT, UVARINT, counted
 
 FORMAT_MAJOR, FORMAT_MINOR = 0, 1
 
+POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)
 _OPTIONAL = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)
 
 
@@ -110,7 +111,7 @@ MODL = Struct(
 ATTA = Struct(
     "name" / TEXT * "relative path of the attached file",
     "part" / UVARINT * "number of this part, from 0",
-    "n_parts" / UVARINT * "parts of the file, at least 1, all in one run",
+    "n_parts" / POSITIVE * "parts of the file, at least 1, all in one run",
     "size" / UVARINT * "bytes of the whole file",
     "sha256" / SHA256 * "hash of the whole file",
     "encoding" / OneOf(Int8ul, (STORED, DEFLATED)) * "0 stored, 1 raw deflate",
@@ -132,11 +133,11 @@ CLIP_SOURCE = Struct(
     "format" / Int8ul * "source format id",
     "detail" / SIZED * "what the template leaves open for this clip",
     "path" / TEXT * "relative path of the source file, with forward slashes",
-    "size" / UVARINT * "bytes of the source file; 0 where not known in advance",
+    "size" / UVARINT * "bytes of the source file",
 )
 
 GRID_RUN = Struct(
-    "n_channels" / UVARINT * "channels in a row that share the grid, at least 1",
+    "n_channels" / POSITIVE * "channels in a row that share the grid, at least 1",
     "grid" / GRID * "number grid",
 )
 
@@ -155,13 +156,13 @@ SIGNAL = Struct(
     "channels"
     / IfThenElse(this.flags & OWN_CHANNELS, counted(CHANNEL), Pass)
     * "the signal's own channels",
-    "samples_per_frame" / UVARINT * "rows a frame, at least 1",
+    "samples_per_frame" / POSITIVE * "rows a frame, at least 1",
     "grids" / counted(GRID_RUN) * "number grids, in column order",
     "codec" / UVARINT * "codec id",
     "codec_version" / UVARINT * "codec version",
     "header" / SIZED * "the codec's own header",
     "groups" / GROUPS * "partition of the channels",
-    "n_resolutions" / Int8ul * "resolutions, at least 1",
+    "n_resolutions" / ExprValidator(Int8ul, lambda obj, ctx: obj >= 1) * "resolutions, at least 1",
     "extension" / SIZED * "ignored, kept",
 )
 
@@ -174,7 +175,7 @@ CLIP = Struct(
     "skeleton" / ID * "id of the SKEL chunk",
     "n_frames" / UVARINT * "frames; 0 while open",
     "rate_numerator" / UVARINT * "frame rate, numerator; 0: unknown",
-    "rate_denominator" / UVARINT * "frame rate, denominator, at least 1",
+    "rate_denominator" / POSITIVE * "frame rate, denominator, at least 1",
     "metadata" / counted(METADATA) * "pairs of key and value",
     "source" / optional(CLIP_SOURCE) * "0 or 1: how to restore the source file",
     "signals" / counted(SIGNAL) * "the signals, at least 1, the motion first",

@@ -30,9 +30,10 @@ from mcz.container.limits import Profile, check, output_limit
 from mcz.container.scan import parse_head, scan, signal_row
 from mcz.container.segments import SegmentHeader, StreamCounts, StreamTable, parse_table
 from mcz.container.source import ByteSource
+from mcz.container.strict import decoded
 from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, TruncatedError
-from mcz.schema import inflate, parse
+from mcz.schema import parse
 
 TABLE_PEEK = 256  # bytes of a segment that are read to find its table
 
@@ -129,14 +130,18 @@ class Container:
         check(
             f"SRCE {id_.hex()}: bytes", fields.size, min(self.profile.text_bytes, self.max_decoded)
         )
-        return _decoded(fields.data, fields.encoding, fields.size, f"SRCE {id_.hex()}")
+        return decoded(fields.data, fields.encoding, fields.size, f"SRCE {id_.hex()}")
 
     def clip(self, row: ClipRow) -> Any:
         """The fields of CLIP, compared with what the index says of them."""
         fields = parse(payloads.CLIP, self.payload(row.clip), row.clip.label)
         signals = [signal_row(signal) for signal in fields.signals]
         rate = fields.rate_numerator, fields.rate_denominator
-        n_frames = row.n_frames if fields.flags & payloads.OPEN_CLIP else fields.n_frames
+        n_frames = fields.n_frames
+        if fields.flags & payloads.OPEN_CLIP:
+            if n_frames:
+                raise FormatError(f"clip {row.name!r} is open, but has {n_frames} frames")
+            n_frames = row.n_frames
         found = (fields.name, fields.skeleton, n_frames, *rate, signals)
         listed = (row.name, row.skeleton, row.n_frames, row.rate_numerator, row.rate_denominator)
         if found != (*listed, list(row.signals)) and not (self.salvage and row.damage):
@@ -162,11 +167,13 @@ class Container:
             expected = (row.name, number, len(row.parts), row.size)
             if (fields.name, fields.part, fields.n_parts, fields.size) != expected:
                 raise FormatError(f"chunk {chunk.label}: not part {number} of {row.name!r}")
+            if digest not in (b"", fields.sha256):
+                raise FormatError(f"chunk {chunk.label}: another hash than in the part before")
             if fields.part_size > left:
                 raise FormatError(
                     f"chunk {chunk.label}: more than the {row.size} bytes of the file"
                 )
-            parts.append(_decoded(fields.data, fields.encoding, fields.part_size, chunk.label))
+            parts.append(decoded(fields.data, fields.encoding, fields.part_size, chunk.label))
             left, digest = left - fields.part_size, fields.sha256
         data = b"".join(parts)
         if left or hashlib.sha256(data).digest() != digest:
@@ -250,14 +257,6 @@ def _check_table(table: StreamTable, row: SegmentRow) -> None:
         raise FormatError(
             f"segment at {row.offset}: its streams end at {table.payload_size} of {row.size} bytes"
         )
-
-
-def _decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
-    if encoding == payloads.DEFLATED:
-        return inflate(data, size, where)
-    if len(data) != size:
-        raise FormatError(f"{where}: {len(data)} bytes stored, {size} stated")
-    return bytes(data)
 
 
 def _runs(table: StreamTable, wanted: Sequence[int], gap: int) -> list[list[int]]:

@@ -10,11 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from mcz.container import payloads
+from mcz.container import payloads, strict
 from mcz.container.chunks import (
     ANCILLARY,
     FOOT,
     HEADER,
+    SAFE_TO_COPY,
     SIGNATURE,
     Chunk,
     check_signature,
@@ -25,9 +26,9 @@ from mcz.container.chunks import (
     resynchronize,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, SignalRow
-from mcz.container.limits import BASE, PROFILES, Profile
+from mcz.container.limits import BASE, PROFILES, Profile, output_limit
 from mcz.container.packets import SEGMENT, read_packets
-from mcz.container.segments import parse_header
+from mcz.container.segments import FRESH, parse_header
 from mcz.container.source import ByteSource
 from mcz.container.writer import build_head, payload_id
 from mcz.errors import FormatError, TruncatedError, UnsupportedError
@@ -63,7 +64,8 @@ def parse_head(payload: bytes) -> Profile:
 
 
 def scan(source: ByteSource, *, salvage: bool = False, whole: bool = False) -> Found:
-    """Walk the file. ``whole`` also checks the crc of every chunk (salvage always does).
+    """Walk the file. ``whole`` also checks the crc of every chunk (salvage always does) and,
+    unless salvaging, what is in it and whether INDX agrees with it.
 
     Raises FormatError at the first fault unless ``salvage``; a TruncatedError carries the end
     of the last valid FOOT.
@@ -89,11 +91,13 @@ class _Walker:
         self.source = source
         self.salvage = salvage
         self.whole = whole
+        self.strict = whole and not salvage
         self.found = Found()
         self.profile = PROFILES[0]
         self.clip: ClipRow | None = None
         self.first: list[int] = []  # the next frame of each signal of the open clip
         self.index: Chunk | None = None  # an INDX that waits for its FOOT
+        self.sourced: set[tuple[int, bytes]] = set()  # what aliases may stand for
 
     def walk(self) -> None:
         try:
@@ -134,7 +138,7 @@ class _Walker:
         return end
 
     def _take(self, chunk: Chunk) -> int:
-        if chunk.length is None:
+        if chunk.length is None and not chunk.flags:
             return self._open_data(chunk)
         handlers: dict[bytes, Callable[[Chunk], None]] = {
             b"HEAD": self._head,
@@ -153,6 +157,8 @@ class _Walker:
             if chunk.flags:
                 raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x} on a critical type")
             handler(chunk)
+        elif chunk.type == b"QUAL" and chunk.flags != ANCILLARY | SAFE_TO_COPY:
+            raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, QUAL has 3")
         elif chunk.flags & ANCILLARY:
             self._ancillary(chunk)
         else:
@@ -171,13 +177,28 @@ class _Walker:
 
     def _shared(self, chunk: Chunk) -> None:
         self._outside(chunk)
-        key = chunk.type, payload_id(self._payload(chunk))
-        self.found.directory.shared.setdefault(key, chunk)
+        payload = self._payload(chunk)
+        id_ = payload_id(payload)
+        if self.strict:
+            self._check_shared(chunk, id_, payload)
+        self.found.directory.shared.setdefault((chunk.type, id_), chunk)
+
+    def _check_shared(self, chunk: Chunk, id_: bytes, payload: bytes) -> None:
+        if chunk.type == b"SKEL":
+            directory = self.found.directory
+            if strict.check_skeleton(payload, chunk.label, directory, self.profile):
+                self.sourced.add((payloads.OF_SKELETON, id_))
+        elif chunk.type == b"SRCE":
+            strict.check_template(payload, chunk.label, self.profile)
+        else:
+            parse(payloads.MODL, payload, chunk.label)
 
     def _attachment(self, chunk: Chunk) -> None:
         self._outside(chunk)
         fields = parse(payloads.ATTA, self._payload(chunk), chunk.label)
         rows = self.found.directory.attachments
+        if self.strict:
+            strict.check_path(fields.name, chunk.label)
         row = rows.get(fields.name) or AttachmentRow(fields.name, fields.size, [])
         last = self.found.chunks[-1]
         follows = row.parts and row.parts[-1] == last
@@ -191,13 +212,24 @@ class _Walker:
             raise FormatError(f"chunk {chunk.label}: part {fields.part} of {fields.n_parts}")
         row.parts.append(chunk)
         rows[fields.name] = row
+        self.sourced.add((payloads.OF_ATTACHMENT, fields.name.encode()))
 
     def _alias(self, chunk: Chunk) -> None:
         self._outside(chunk)
         fields = parse(payloads.ALIA, self._payload(chunk), chunk.label)
         if fields.name in self.found.directory.aliases:
             raise FormatError(f"chunk {chunk.label}: a second alias {fields.name!r}")
+        if self.strict:
+            strict.check_path(fields.name, chunk.label)
+            self._check_target(chunk, fields)
         self.found.directory.aliases[fields.name] = (fields.of, fields.target)
+
+    def _check_target(self, chunk: Chunk, fields: Any) -> None:
+        """Whether what an alias stands for is there before it, and can be restored."""
+        if (fields.of, bytes(fields.target)) not in self.sourced:
+            raise FormatError(
+                f"chunk {chunk.label}: nothing before it with a source is {fields.target!r}"
+            )
 
     def _begin_clip(self, chunk: Chunk) -> None:
         self._outside(chunk)
@@ -207,6 +239,8 @@ class _Walker:
             raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
         if not fields.signals:
             raise FormatError(f"chunk {chunk.label}: a clip without a signal")
+        if self.strict and strict.check_clip(fields, chunk.label, self.found.directory):
+            self.sourced.add((payloads.OF_CLIP, fields.name.encode()))
         signals = tuple(map(signal_row, fields.signals))
         rate = fields.rate_numerator, fields.rate_denominator
         self.clip = ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, signals, chunk)
@@ -221,6 +255,8 @@ class _Walker:
         self._segment(payload, chunk.payload_offset, chunk.length, packet=False)
 
     def _open_data(self, chunk: Chunk) -> int:
+        if self.clip is None:
+            raise FormatError(f"chunk {chunk.label} is outside a clip")
         at = chunk.payload_offset
 
         def read(size: int) -> bytes:
@@ -231,11 +267,12 @@ class _Walker:
             return self.source.read(at - size, size)
 
         for packet in read_packets(read, self.profile.packet_bytes):
-            if packet.kind == SEGMENT:
-                start = at - 2 - len(packet.body)
-                self._segment(packet.body, start, len(packet.body), packet=True)
-            elif self.clip is None:
-                raise FormatError(f"chunk {chunk.label} is outside a clip")
+            if packet.kind != SEGMENT:
+                raise UnsupportedError(f"chunk {chunk.label}: a packet of kind {packet.kind}")
+            start = at - 2 - len(packet.body)
+            self._segment(packet.body, start, len(packet.body), packet=True)
+            if packet.fresh != bool(self.clip.segments[-1].header.flags & FRESH):
+                raise FormatError(f"packet at {start}: it and its segment differ in starting fresh")
         return at
 
     def _segment(self, payload: bytes, offset: int, size: int, packet: bool) -> None:
@@ -278,12 +315,17 @@ class _Walker:
 
     def _index(self, chunk: Chunk) -> None:
         self._outside(chunk)
-        self._payload(chunk)
+        payload = self._payload(chunk)
+        if self.strict:
+            limit = output_limit(self.source.size)
+            strict.check_index(payload, chunk, self.found.directory, limit)
         self.index = chunk
 
     def _ancillary(self, chunk: Chunk) -> None:
         if self.whole:
-            self._payload(chunk)
+            payload = self._payload(chunk)
+            if self.strict and chunk.type == b"QUAL":
+                parse(payloads.QUAL, payload, chunk.label)
         if self.clip is None and self.found.directory.clips:
             last = next(reversed(self.found.directory.clips))
             self.found.directory.clips[last].ancillary.append(chunk)

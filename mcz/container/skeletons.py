@@ -24,7 +24,7 @@ def build_skeleton(skeleton: Skeleton, source: Mapping[str, Any] | None) -> byte
         "unit_cm": [] if skeleton.unit_cm is None else [skeleton.unit_cm],
         "angle_unit": ANGLE_UNITS.index(skeleton.angle_unit),
         "up_axis": UP_AXES.index(skeleton.up_axis),
-        "base": [] if skeleton.base is None else [skeleton.base],
+        "base": [skeleton.base] if skeleton.base else [],  # b"": derived, from what is not told
         "source": [] if source is None else [source],
         "joints": [_joint_fields(joint) for joint in skeleton.joints],
         "extension": b"",

@@ -23,7 +23,7 @@ class ByteSource:
     ) -> None:
         self._stream = stream
         self.gap = 64 * 1024 if remote else 0
-        self.tail = 128 * 1024 if remote else 4 * 1024
+        self.tail = 128 * 1024 if remote else 512
         self.remote = remote
         self.name = name
         self.n_requests = 0

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcz.errors import SourceError, UnsupportedError
-from mcz.formats import amc, asf, bvh
+from mcz.errors import FormatError, SourceError, UnsupportedError
+from mcz.formats import amc, asf, bvh, c3d
 from mcz.formats.find import find_asf
 from mcz.formats.notes import join_notes
 from mcz.motion import FrameNotes
@@ -44,6 +44,7 @@ FORMATS: dict[str, Format] = {
         Format("asf", 1, (".asf",), asf.read, asf.write, is_skeleton=True),
         Format("amc", 2, (".amc",), amc.read, amc.write, join_notes, wants_skeleton=True),
         Format("bvh", 3, (".bvh",), bvh.read, bvh.write, join_notes),
+        Format("c3d", 4, (".c3d",), c3d.read, c3d.write),
     )
 }
 
@@ -58,9 +59,15 @@ def format_of(path: str | Path) -> Format:
     raise SourceError(f"{Path(path).name}: no source format has the suffix {suffix!r}, but {known}")
 
 
-def format_by_id(format_id: int) -> Format:
-    """The format with this id; raises UnsupportedError."""
+def format_by_id(format_id: int, *, of_skeleton: bool = False) -> Format:
+    """The format with this id, of clips or of skeletons.
+
+    Raises UnsupportedError for an unknown one, FormatError for one of the other sort.
+    """
     for source_format in FORMATS.values():
         if source_format.id == format_id:
+            if source_format.is_skeleton != of_skeleton:
+                sort = "skeletons" if of_skeleton else "clips"
+                raise FormatError(f"source format {source_format.name} is not one of {sort}")
             return source_format
     raise UnsupportedError(f"source format {format_id} is unknown")

@@ -98,7 +98,7 @@ def digest(path: Path) -> str:
 def test_sample(tmp_path: Path, call: Call) -> None:
     result = call("sample", tmp_path / "new", "--json")
     names = [Path(o["path"]).name for o in result.document["outputs"]]
-    assert names == ["walk.asf", "walk.amc", "walk.bvh"]
+    assert names == ["walk.asf", "walk.amc", "walk.bvh", "walk.c3d"]
     fails(call("sample", tmp_path / "new"), 2, "walk.asf", "--force")
     assert call("sample", tmp_path / "new", "--force").code == 0
 
@@ -129,7 +129,7 @@ def test_default_names_and_no_overwriting(folder: Path, call: Call) -> None:
     assert call("decode", folder / "walk.mcz", "--force").code == 0
     assert call("encode", folder / "walk.amc", "--force").code == 0
     assert digest(folder / "walk.mcz") != before
-    assert {p.suffix for p in folder.iterdir()} == {".asf", ".amc", ".bvh", ".mcz"}
+    assert {p.suffix for p in folder.iterdir()} == {".asf", ".amc", ".bvh", ".c3d", ".mcz"}
 
 
 def test_encode_says_what_it_did(folder: Path, call: Call) -> None:
@@ -244,7 +244,10 @@ def test_decode_refuses(walk: Path, call: Call, options: list[str]) -> None:
     assert result.code in (1, 2)
 
 
-def test_damage_and_salvage(walk: Path, call: Call) -> None:
+def test_damage_and_salvage(folder: Path, call: Call) -> None:
+    options = ("--param", "segment_frames=60")
+    assert call("encode", folder / "walk.bvh", *options).code == 0
+    walk = folder / "walk.mcz"
     data = bytearray(walk.read_bytes())
     data[len(data) // 2] ^= 1
     bad = walk.with_name("bad.mcz")
@@ -408,3 +411,12 @@ def test_append(walk: Path, call: Call) -> None:
     assert len(document["clips"]) == 2
     assert call("verify", walk).code == 0
     fails(call("decode", walk, "-o", "-"), 2, "2 clips")
+
+
+def test_markers_as_plain_c3d(folder: Path, call: Call) -> None:
+    assert call("encode", folder / "walk.c3d").code == 0
+    plain = folder / "plain.c3d"
+    assert call("decode", folder / "walk.mcz", "--to", "c3d", "-o", plain).code == 0
+    assert call("encode", plain, "-o", folder / "plain.mcz").code == 0
+    assert call("encode", folder / "walk.bvh", "-o", folder / "bvh.mcz").code == 0
+    fails(call("decode", folder / "bvh.mcz", "--to", "c3d", "-o", folder / "x.c3d"), 1, "marker")

@@ -115,7 +115,9 @@ def test_copies_of_another_group() -> None:
     out = io.BytesIO()
     mcz.write(motion.with_values(values), out, codec="lossless")
     with mcz.open(out.getvalue()) as file:
-        np.testing.assert_array_equal(file.clips["smooth"].read((10, 20), ["knee"]), values[10:20, 9:])
+        np.testing.assert_array_equal(
+            file.clips["smooth"].read((10, 20), ["knee"]), values[10:20, 9:]
+        )
 
 
 def test_copy_of_a_copy_is_refused() -> None:

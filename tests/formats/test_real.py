@@ -21,7 +21,11 @@ pytestmark = [
 ]
 SUFFIXES = {suffix for f in FORMATS.values() for suffix in f.suffixes}
 MALFORMED = "malformed-in-the-wild"
-REFUSED = {"no-hierarchy-section.bvh": "line 1: no HIERARCHY section"}
+REFUSED = {
+    "no-hierarchy-section.bvh": "line 1: no HIERARCHY section",
+    "empty.c3d": "offset 0: the file ends",
+    "zero-filled.c3d": "offset 515: processor 0",
+}
 
 
 def read(path: Path) -> Motion | Skeleton:

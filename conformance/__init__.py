@@ -1,0 +1,1 @@
+"""Vectors, manifest and runner that tell an implementer where a decoder is wrong."""

@@ -1,0 +1,104 @@
+"""What a strict walk checks within the chunks that it passes, beside their grammar.
+
+What only decoding shows is checked where clips are decoded. SPEC.md, "Strict reading".
+"""
+
+from __future__ import annotations
+
+from pathlib import PurePosixPath
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.chunks import Chunk
+from mcz.container.directory import ClipRow, Directory, parse_index
+from mcz.container.limits import Profile, check
+from mcz.container.skeletons import parse_skeleton
+from mcz.errors import FormatError, LimitError
+from mcz.schema import inflate, parse
+
+MAX_RATIO = 1032  # raw deflate never inflates to more than this times its size
+
+
+def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
+    """The ``size`` bytes that SRCE and ATTA hold as ``data``."""
+    if encoding == payloads.STORED:
+        if len(data) != size:
+            raise FormatError(f"{where}: {len(data)} bytes stored, {size} stated")
+        return bytes(data)
+    if size > MAX_RATIO * (len(data) + 1):
+        raise LimitError(f"{where}: {size} bytes cannot come of {len(data)}")
+    return inflate(data, size, where)
+
+
+def is_plain_path(name: str) -> bool:
+    """Whether ``name`` is a relative path that stays below its folder, on every system."""
+    parts = name.split("/")
+    odd = any(part in ("", ".", "..") for part in parts) or "\\" in name or "\0" in name
+    return not (odd or PurePosixPath(name).is_absolute() or ":" in parts[0])
+
+
+def check_path(name: str, where: str) -> None:
+    if not is_plain_path(name):
+        raise FormatError(f"{where}: path {name!r} is not relative and plain")
+
+
+def check_skeleton(payload: bytes, where: str, directory: Directory, profile: Profile) -> bool:
+    """Check a SKEL; return whether it has a source file of its own."""
+    fields = parse(payloads.SKEL, payload, where)
+    parse_skeleton(fields, profile, where)
+    for base in fields.base:
+        _refer(directory, b"SKEL", base, where)
+    for source in fields.source:
+        _refer(directory, b"SRCE", source.template, where)
+    return bool(fields.source)
+
+
+def check_template(payload: bytes, where: str, profile: Profile) -> None:
+    fields = parse(payloads.SRCE, payload, where)
+    check(f"{where}: bytes", fields.size, profile.text_bytes)
+    decoded(fields.data, fields.encoding, fields.size, where)
+
+
+def check_clip(fields: Any, where: str, directory: Directory) -> bool:
+    """Check what CLIP refers to and names; return whether it has a source file."""
+    _refer(directory, b"SKEL", fields.skeleton, where)
+    for source in fields.source:
+        _refer(directory, b"SRCE", source.template, where)
+        if source.path:
+            check_path(source.path, where)
+    keys = [pair.key for pair in fields.metadata]
+    if len(keys) != len(set(keys)):
+        raise FormatError(f"{where}: a key of the metadata occurs twice: {sorted(keys)}")
+    return bool(fields.source)
+
+
+def _refer(directory: Directory, kind: bytes, id_: bytes, where: str) -> None:
+    if (kind, bytes(id_)) not in directory.shared:
+        raise FormatError(f"{where}: no {kind.decode()} before it has the id {bytes(id_).hex()}")
+
+
+def check_index(payload: bytes, chunk: Chunk, directory: Directory, limit: int) -> None:
+    """Compare INDX with what the walk has found."""
+    listed = parse_index(payload, limit)
+    if listed.head != directory.head:
+        raise FormatError(f"chunk {chunk.label}: its copy of HEAD differs from HEAD")
+    for what in ("shared", "attachments", "aliases", "clips"):
+        ours, theirs = getattr(directory, what), getattr(listed, what)
+        if list(ours) != list(theirs) and (what == "clips" or ours.keys() != theirs.keys()):
+            raise FormatError(f"chunk {chunk.label}: it lists other {what} than there are")
+        for key, row in ours.items():
+            if row != theirs[key]:
+                raise FormatError(
+                    f"chunk {chunk.label}: {_name(key)} is {_short(row)}, "
+                    f"but INDX says {_short(theirs[key])}"
+                )
+
+
+def _name(key: Any) -> str:
+    return repr(key) if isinstance(key, str) else f"{key[0].decode('latin-1')} {key[1].hex()}"
+
+
+def _short(row: Any) -> str:
+    if isinstance(row, ClipRow):
+        return f"{row.n_frames} frames in {len(row.segments)} segments, {row.signals}, {row.clip}"
+    return str(row)

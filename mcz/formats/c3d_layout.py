@@ -1,0 +1,178 @@
+"""What a C3D file holds beside its data, as a template and a detail.
+
+SPEC.md, "Source reconstruction", is normative and has the tables of C3D_TEMPLATE, C3D_DETAIL and
+C3D_FIELD.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+from construct import ExprValidator, Int8ul, OneOf, Struct
+
+from mcz.errors import FormatError, LimitError
+from mcz.formats.c3d_parameters import DEC, INTEL, SGI, Order
+from mcz.formats.c3d_shape import COUNTED
+from mcz.schema import SIZED, UVARINT, build, counted, parse
+
+MAX_ZEROS = 2**20  # that a detail counts instead of holding them
+MAX_SHARED_TAIL = 512  # bytes behind the data that are the clip's own; more go into the template
+
+
+class Kind(IntEnum):
+    """What a field counts."""
+
+    COUNT = 0  # frames, in a word
+    COUNT_FLOAT = 1  # frames, in a float
+    FIRST = 2  # number of the first frame, in a word
+    LAST = 3  # of the last
+    FIRST_LONG = 4  # in two words, the low one first
+    LAST_LONG = 5
+    ROTATIONS = 6  # block of the rotations, in a word
+
+    @property
+    def size(self) -> int:
+        return 4 if self in (Kind.COUNT_FLOAT, Kind.FIRST_LONG, Kind.LAST_LONG) else 2
+
+
+_WORD = ExprValidator(UVARINT, lambda obj, ctx: obj <= COUNTED)
+
+C3D_FIELD = Struct(
+    "at" / UVARINT * "offset in head, not before the end of the field before",
+    "kind" / OneOf(Int8ul, tuple(Kind)) * "what the field says",
+)
+C3D_TEMPLATE = Struct(
+    "processor" / OneOf(Int8ul, (INTEL, DEC, SGI)) * "84 Intel, 85 DEC, 86 SGI",
+    "word" / OneOf(Int8ul, (2, 4)) * "bytes of a word of the data: 2 integers, 4 floats",
+    "points" / _WORD * "points",
+    "channels" / _WORD * "analog channels",
+    "subframes" / ExprValidator(_WORD, lambda obj, ctx: obj >= 1) * "analog samples a frame",
+    "unsigned"
+    / ExprValidator(Int8ul, lambda obj, ctx: obj <= 1)
+    * "1: analog words are 0 to 65535; 0: they have a sign, or word is 4",
+    "rotations" / _WORD * "rotations; 0 where word is 2",
+    "ratio" / ExprValidator(_WORD, lambda obj, ctx: obj >= 1) * "samples a frame of a rotation",
+    "head" / SIZED * "the file up to the data section, fields filled with zeros",
+    "fields" / counted(C3D_FIELD) * "the fields of head, in order",
+    "gap" / SIZED * "bytes between the data section and the rotations; empty without rotations",
+    "tail" / SIZED * "bytes behind the data",
+)
+C3D_DETAIL = Struct(
+    "n_frames" / UVARINT * "frames of the source file",
+    "first" / UVARINT * "number of its first frame",
+    "values" / SIZED * "bytes of all fields, one after the other",
+    "tail" / SIZED * "more bytes behind the data",
+    "zeros" / UVARINT * "zero bytes behind all that",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """A template and a detail, parsed; see C3D_TEMPLATE and C3D_DETAIL.
+
+    ``head`` here has the fields in place; ``tail`` is all that lies behind the data.
+    """
+
+    order: Order
+    word: int
+    n_points: int
+    n_channels: int
+    subframes: int
+    unsigned: bool
+    n_frames: int
+    first: int
+    head: bytes
+    fields: tuple[tuple[int, Kind], ...]
+    n_rotations: int = 0
+    ratio: int = 1
+    gap: bytes = b""
+    tail: bytes = b""
+
+    def build(self) -> tuple[bytes, bytes]:
+        """The bytes of the template and of the detail."""
+        head = bytearray(self.head)
+        values = b""
+        for at, kind in self.fields:
+            values += head[at : at + kind.size]
+            head[at : at + kind.size] = bytes(kind.size)
+        tail = self.tail.rstrip(b"\0")
+        tail += bytes(max(0, len(self.tail) - len(tail) - MAX_ZEROS))
+        shared = len(tail) > MAX_SHARED_TAIL
+        template = {
+            "processor": self.order.processor,
+            "word": self.word,
+            "points": self.n_points,
+            "channels": self.n_channels,
+            "subframes": self.subframes,
+            "unsigned": int(self.unsigned),
+            "rotations": self.n_rotations,
+            "ratio": self.ratio,
+            "head": bytes(head),
+            "fields": [{"at": at, "kind": kind} for at, kind in self.fields],
+            "gap": self.gap,
+            "tail": tail if shared else b"",
+        }
+        detail = {
+            "n_frames": self.n_frames,
+            "first": self.first,
+            "values": values,
+            "tail": b"" if shared else tail,
+            "zeros": len(self.tail) - len(tail),
+        }
+        return (
+            build(C3D_TEMPLATE, template, "source template"),
+            build(C3D_DETAIL, detail, "source detail"),
+        )
+
+
+def parse_layout(template: bytes, detail: bytes) -> Layout:
+    """The layout of a clip; raises FormatError on bad bytes."""
+    shared = parse(C3D_TEMPLATE, template, "source template")
+    own = parse(C3D_DETAIL, detail, "source detail")
+    if own.zeros > MAX_ZEROS:
+        raise LimitError(f"source detail: {own.zeros} zeros, limit {MAX_ZEROS}")
+    if shared.word == 4 and shared.unsigned:
+        raise FormatError("source template: unsigned floats")
+    if (shared.rotations and shared.word != 4) or (shared.gap and not shared.rotations):
+        raise FormatError("source template: rotations of integers, or a gap without rotations")
+    head, fields = bytearray(shared.head), []
+    end = taken = 0
+    for entry in shared.fields:
+        kind = Kind(entry.kind)
+        if not end <= entry.at <= len(head) - kind.size:
+            raise FormatError(f"source template: a field at {entry.at}, {end} or more expected")
+        end = entry.at + kind.size
+        head[entry.at : end] = own["values"][taken : taken + kind.size]
+        taken += kind.size
+        fields.append((entry.at, kind))
+    if taken != len(own["values"]) or len(head) != len(shared.head):
+        raise FormatError(f"source detail: {len(own['values'])} bytes of fields, not {taken}")
+    return Layout(
+        Order(shared.processor),
+        shared.word,
+        shared.points,
+        shared.channels,
+        shared.subframes,
+        bool(shared.unsigned),
+        own.n_frames,
+        own.first,
+        bytes(head),
+        tuple(fields),
+        shared.rotations,
+        shared.ratio,
+        shared.gap,
+        shared.tail + own.tail + bytes(own.zeros),
+    )
+
+
+def ordered_fields(fields: Sequence[tuple[int, Kind]], size: int) -> tuple[tuple[int, Kind], ...]:
+    """The fields that lie within ``size`` bytes, sorted, without those that overlap others."""
+    kept: list[tuple[int, Kind]] = []
+    end = 0
+    for at, kind in sorted(fields):
+        if end <= at <= size - kind.size:
+            kept.append((at, kind))
+            end = at + kind.size
+    return tuple(kept)

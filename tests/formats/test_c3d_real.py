@@ -1,0 +1,206 @@
+"""The real C3D files of the folder that MCZ_DATA names: values against others, the whole path."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import struct
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import mcz
+from mcz.errors import SourceError
+from mcz.formats import c3d
+from mcz.motion import Motion
+from tests.formats.c3d_files import DEC, SGI, real_of
+
+DATA = Path(os.environ.get("MCZ_DATA", "no-data"))
+pytestmark = [
+    pytest.mark.real,
+    pytest.mark.skipif("MCZ_DATA" not in os.environ, reason="MCZ_DATA is not set"),
+]
+MALFORMED = {  # what becomes of each: the reason of a refusal, or the note of the clip
+    "Optotrak-header-frame-count-too-large.c3d": "1149 frames are declared, 29 are there",
+    "badParameterOffset.c3d": "the scale is -1 in the header, -0.00999999978 in POINT:SCALE",
+    "empty.c3d": "offset 0: the file ends before",
+    "parameterOverflow.c3d": None,
+    "read_NOTworking2.c3d": None,
+    "zero-filled.c3d": "offset 515: processor 0",
+}
+# Read by neither ezc3d nor c3d, or not rightly; compared with a reading by the header alone.
+HEADER_ONLY = {
+    "MACsample.c3d": "ezc3d: no SGI; c3d: two scales",
+    "mocap36.c3d": "parameters out of form",
+    "badParameterOffset.c3d": "parameters out of form",
+    "bad_parameter_section.c3d": "parameters out of form",
+    "kyowadengyo.c3d": "POINT:USED is wrong, and ezc3d goes by it",
+}
+
+Arrays = tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.float64] | None]
+
+
+def files() -> list[Path]:
+    paths = sorted(p for p in DATA.rglob("*") if p.suffix.lower() == ".c3d")
+    return [path for path in paths if path.name not in ("empty.c3d", "zero-filled.c3d")]
+
+
+def test_malformed_files() -> None:
+    seen = {}
+    for path in (DATA / "malformed-in-the-wild").glob("*.c3d"):
+        data = path.read_bytes()
+        try:
+            motion = c3d.read(data, path.stem)
+        except SourceError as error:
+            seen[path.name] = str(error)
+            continue
+        assert c3d.write(motion) == data
+        seen[path.name] = motion.metadata.get("source-note")
+    assert set(seen) == set(MALFORMED)
+    for name, expected in MALFORMED.items():
+        assert seen[name] == expected or str(seen[name]).startswith(str(expected)), name
+
+
+def ezc3d_arrays(path: Path) -> Arrays:
+    """Points, validity and analog in physical units, by ezc3d."""
+    ezc3d = pytest.importorskip("ezc3d")
+    found = ezc3d.c3d(str(path))
+    points = np.moveaxis(found["data"]["points"][:3], (0, 1, 2), (2, 1, 0))
+    return points, ~np.isnan(points).any(axis=2), found["data"]["analogs"][0].T
+
+
+def physical(motion: Motion, path: Path) -> NDArray[np.float64] | None:
+    """The analog samples in physical units, by the parameters that ezc3d shows.
+
+    Offsets are taken without their sign, as ezc3d does.
+    """
+    ezc3d = pytest.importorskip("ezc3d")
+    analog = next((s for s in motion.signals if s.name == "analog"), None)
+    if analog is None:
+        return None
+    parameters = ezc3d.c3d(str(path))["parameters"]["ANALOG"]
+    n = analog.n_channels
+    scale, offset = np.ones(n), np.zeros(n)
+    for array, name in ((scale, "SCALE"), (offset, "OFFSET")):
+        stated = np.asarray(parameters[name]["value"], np.float64)[:n]
+        array[: len(stated)] = stated
+    general = float(parameters["GEN_SCALE"]["value"][0])
+    return (analog.values - np.abs(offset)) * scale * general
+
+
+def c3d_arrays(path: Path) -> Arrays:
+    """Points and validity by c3d, and no analog."""
+    reader = pytest.importorskip("c3d")
+    with warnings.catch_warnings(), path.open("rb") as stream:
+        warnings.simplefilter("ignore")
+        with contextlib.redirect_stdout(io.StringIO()):
+            frames = [p for _, p, _ in reader.Reader(stream).read_frames(copy=True)]
+    points = np.array(frames, np.float64)
+    return points[:, :, :3], points[:, :, 3] >= 0, None
+
+
+def header_arrays(path: Path) -> Arrays:
+    """Points and validity by the header alone."""
+    data = path.read_bytes()
+    processor = data[512 * (data[0] - 1) + 3]
+    prefix = ">" if processor == SGI else "<"
+    n_points, n_analog, first, last = struct.unpack_from(f"{prefix}4H", data, 2)
+    (block,) = struct.unpack_from(f"{prefix}H", data, 16)
+    n_frames, n_words = last - first + 1, 4 * n_points + n_analog
+    integers = real_of(data[12:16], processor) > 0
+    kind = "i2" if integers else "f4"
+    assert integers or processor != DEC
+    words = np.frombuffer(data, f"{prefix}{kind}", n_frames * n_words, 512 * (block - 1))
+    frames = words.reshape(n_frames, n_words)[:, : 4 * n_points].astype(np.float64)
+    points = frames.reshape(n_frames, n_points, 4)
+    return points[:, :, :3], points[:, :, 3] >= 0, None
+
+
+def test_values_are_what_others_read() -> None:
+    counts = {"ezc3d": 0, "c3d": 0, "header": 0}
+    for path in files():
+        motion = c3d.read(path.read_bytes(), path.stem)
+        signal = motion.signals[0]
+        shape = motion.n_frames, motion.skeleton.n_joints
+        values = signal.values.reshape(*shape, 3)
+        valid = np.ones(shape, np.bool_) if signal.mask is None else signal.mask[:, ::3]
+        how, points, theirs, analog = _oracle(path, shape)
+        counts[how] += 1
+        if how == "header" and signal.grids[0].scale != 1.0:
+            points = points * signal.grids[0].scale
+        assert np.array_equal(theirs, valid), path
+        both = valid & theirs
+        assert np.allclose(values[both], points[both], rtol=1e-6, atol=0), path
+        if analog is not None and analog.size:
+            wanted = physical(motion, path)
+            assert wanted is not None, path
+            tiny = 1e-9 * np.abs(wanted[np.isfinite(wanted)]).max(initial=0)
+            assert np.allclose(wanted, analog, rtol=1e-6, atol=tiny, equal_nan=True), path
+    print(counts)
+    assert counts["ezc3d"] > 60
+
+
+def _oracle(path: Path, shape: tuple[int, int]) -> tuple[str, Any, Any, Any]:
+    if path.name in HEADER_ONLY:
+        return "header", *header_arrays(path)
+    try:
+        arrays = ezc3d_arrays(path)
+        missed = arrays[0].shape[:2] != shape  # ezc3d goes by parameters, which may be missing
+        if not missed and (arrays[2] is None or arrays[2].size or _has_no_analog(path)):
+            return "ezc3d", *arrays
+    except (OSError, RuntimeError, ValueError):
+        pass
+    return "c3d", *c3d_arrays(path)
+
+
+def _has_no_analog(path: Path) -> bool:
+    return path.read_bytes()[4:6] == b"\0\0"
+
+
+def test_rotations_are_what_ezc3d_reads() -> None:
+    ezc3d = pytest.importorskip("ezc3d")
+    path = next(path for path in files() if path.name == "C3DRotationExample.c3d")
+    motion = c3d.read(path.read_bytes(), path.stem)
+    signal = motion.signals[1]
+    assert signal.name == "rotations" and signal.channels is not None
+    assert signal.channels[17].name == "pelvis_4X4 m11"
+    matrices = signal.values.reshape(motion.n_frames, -1, 17)[:, :, :16]
+    theirs = np.moveaxis(ezc3d.c3d(str(path))["data"]["rotations"], (0, 1, 2, 3), (3, 2, 1, 0))
+    assert np.allclose(matrices.reshape(theirs.shape), theirs, rtol=1e-6, equal_nan=True)
+
+
+def test_every_file_goes_through_an_mcz_file(tmp_path: Path) -> None:
+    n = 0
+    for path in files():
+        mcz.encode(path, tmp_path / "clip.mcz", codec="raw", force=True)
+        with mcz.open(tmp_path / "clip.mcz") as file:
+            (clip,) = file.clips.values()
+            assert clip.source_bytes() == path.read_bytes(), path
+            stop = clip.n_frames - 1
+            if stop > 3:
+                again = c3d.read(clip.source_bytes((2, stop)), path.stem)
+                part = clip.motion((2, stop))
+                for one, other in zip(part.signals, again.signals, strict=True):
+                    assert np.array_equal(one.values, other.values, equal_nan=True), path
+        n += 1
+    print(f"{n} files")
+
+
+def test_reading_and_writing_are_fast() -> None:
+    path = next(path for path in files() if path.name == "arthuman-sample.c3d")
+    data = path.read_bytes()
+    best = np.full(2, np.inf)
+    for _ in range(3):
+        begin = time.perf_counter()
+        motion = c3d.read(data, path.stem)
+        middle = time.perf_counter()
+        c3d.write(motion)
+        best = np.minimum(best, [middle - begin, time.perf_counter() - middle])
+    print(f"{len(data) / 1e6:.1f} MB: read {best[0]:.3f} s, write {best[1]:.3f} s")
+    assert best.max() < 1

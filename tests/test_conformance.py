@@ -1,0 +1,230 @@
+"""The vectors, their manifest, the runner, and this package as a decoder under test."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conformance import run
+from mcz.cli import conformance
+from mcz.errors import MczError, UnsupportedError
+from tools import make_vectors
+
+ROOT = Path(run.__file__).parent.parent
+MANIFEST = json.loads((run.HERE / "manifest.json").read_text("utf-8"))
+SCHEMA = json.loads((run.HERE / "manifest.schema.json").read_text("utf-8"))
+VECTORS = MANIFEST["vectors"]
+TYPES = {"object": dict, "array": list, "string": str, "integer": int}
+
+
+def name_of(vector: dict[str, Any]) -> str:
+    return vector["file"].removesuffix(".mcz")
+
+
+def faults(value: Any, schema: dict[str, Any], where: str) -> list[str]:
+    """What is wrong with ``value``, by the part of JSON Schema that our schema uses."""
+    if "$ref" in schema:
+        return faults(value, SCHEMA["$defs"][schema["$ref"].rpartition("/")[2]], where)
+    if "enum" in schema:
+        return [] if value in schema["enum"] else [f"{where}: {value!r}"]
+    if not isinstance(value, TYPES[schema["type"]]):
+        return [f"{where}: {value!r} is no {schema['type']}"]
+    if isinstance(value, str):
+        good = re.search(schema.get("pattern", ""), value)
+        return [] if good else [f"{where}: {value!r} does not match {schema['pattern']}"]
+    found: list[str] = []
+    if isinstance(value, list):
+        found += [f"{where}: too few"] * (len(value) < schema.get("minItems", 0))
+        for index, item in enumerate(value):
+            found += faults(item, schema["items"], f"{where}[{index}]")
+    if isinstance(value, dict):
+        missing = set(schema.get("required", [])) - set(value)
+        found += [f"{where}: without {sorted(missing)}"] * bool(missing)
+        for key, item in value.items():
+            if key in schema["properties"]:
+                found += faults(item, schema["properties"][key], f"{where}.{key}")
+            else:
+                found.append(f"{where}: unknown key {key!r}")
+    return found
+
+
+def test_manifest_follows_its_schema() -> None:
+    assert faults(MANIFEST, SCHEMA, "manifest") == []
+    assert faults({**MANIFEST, "more": 1}, SCHEMA, "m") == ["m: unknown key 'more'"]
+
+
+def test_manifest_and_files_agree() -> None:
+    listed = [vector["file"] for vector in VECTORS]
+    stored = {p.relative_to(run.VECTORS).as_posix() for p in run.VECTORS.rglob("*.*")}
+    assert len(listed) == len(set(listed))
+    assert set(listed) == stored
+    for vector in VECTORS:
+        data = (run.VECTORS / vector["file"]).read_bytes()
+        assert hashlib.sha256(data).hexdigest() == vector["sha256"], vector["file"]
+        assert vector["group"] == vector["file"].partition("/")[0]
+
+
+def test_groups_and_exit_codes() -> None:
+    for vector in VECTORS:
+        allowed = {"valid": [[0]], "uncommon": [[0, 3], [3]], "invalid": [[1]]}[vector["group"]]
+        assert vector["exit"] in allowed, vector["file"]
+        assert ("refusal" in vector["expected"]) == (0 not in vector["exit"]), vector["file"]
+    assert sum(vector["group"] == "invalid" for vector in VECTORS) >= 40
+    assert sum((run.VECTORS / vector["file"]).stat().st_size for vector in VECTORS) < 2**20
+
+
+def test_headings_are_in_the_specification() -> None:
+    text = (ROOT / "SPEC.md").read_text("utf-8")
+    headings = set(re.findall(r"(?m)^#+ (.+)$", text))
+    used = {heading for vector in VECTORS for heading in vector["spec"]}
+    assert used <= headings, used - headings
+
+
+def test_purposes_differ() -> None:
+    said: dict[str, str] = {}
+    for vector in VECTORS:
+        place = vector["file"].rpartition("/")[0]
+        assert said.setdefault(f"{place}: {vector['purpose']}", vector["file"]) == vector["file"]
+
+
+@pytest.mark.skipif(
+    MANIFEST["zlib"] != zlib.ZLIB_RUNTIME_VERSION, reason="another zlib deflates differently"
+)
+def test_regeneration_gives_the_same_files() -> None:
+    for name, data in make_vectors.files().items():
+        assert (run.HERE / name).read_bytes() == data, f"{name}: run tools/make_vectors.py"
+
+
+def answer(request: run.Request) -> tuple[int, bytes]:
+    """Exit code and output of our adapter, without a process."""
+    given = conformance._parser().parse_args(list(request.arguments))
+    try:
+        return 0, b"".join(conformance.respond(request.path.read_bytes(), given))
+    except UnsupportedError:
+        return 3, b""
+    except MczError:
+        return 1, b""
+
+
+@pytest.mark.parametrize("vector", VECTORS, ids=name_of)
+def test_our_decoder(vector: dict[str, Any]) -> None:
+    for request in run.requests(vector, conformance.OPTIONS):
+        assert run.judge(request, *answer(request)) is None, request.arguments
+
+
+def runner(*arguments: str) -> tuple[int, str]:
+    """Exit code and output of the runner, a process of its own."""
+    command = [sys.executable, "-m", "conformance.run", *arguments]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_runner_passes_our_adapter() -> None:
+    ours = f"{sys.executable} -m mcz.cli.conformance"
+    for only in ("valid/notes/m", "uncommon/container/n", "invalid/chunks/t"):
+        code, shown = runner("--decoder", ours, "--only", only)
+        assert code == 0, shown
+        assert re.search(r"(?m)^conformance: (\d+) of \1 passed", shown), shown
+        assert re.search(r"(?m)^\d+ passed, 0 failed$", shown), shown
+
+
+# What may go wrong in a decoder: each edit of ours is caught by the vectors that it names.
+WRONG = {
+    "ignores exceptions": (
+        "mcz.signals._values_of_texts = lambda texts, name: 0.0",
+        ["valid/notes/exceptions"],
+    ),
+    "ignores hashes": ("", ["invalid/clip/value-hash", "invalid/raw/another-value"]),
+    "decodes another order of bytes": (
+        "mcz.codecs.CODECS[0] = replace(raw, decode=lambda *a: raw.decode(*a).byteswap())",
+        ["valid/raw/plain", "valid/numbers/integer"],
+    ),
+}
+LAX = """
+import sys
+from dataclasses import replace
+import mcz.clip, mcz.signals, mcz.codecs
+from mcz.cli import conformance
+raw = mcz.codecs.CODECS[0]
+mcz.clip.Clip._check_hash = lambda *a: None
+{edit}
+sys.exit(conformance.main())
+"""
+
+
+@pytest.mark.parametrize("fault", WRONG)
+def test_runner_catches_a_wrong_decoder(tmp_path: Path, fault: str) -> None:
+    edit, caught = WRONG[fault]
+    script = tmp_path / "decoder.py"
+    script.write_text(LAX.format(edit=edit))
+    for only in caught:
+        code, shown = runner("--decoder", f"{sys.executable} {script}", "--only", only, "--json")
+        assert code == 1, shown
+        failed = [v["file"] for v in json.loads(shown)["vectors"] if not v["passed"]]
+        assert f"{only}.mcz" in failed
+
+
+def test_runner_ends_a_decoder_that_hangs(tmp_path: Path) -> None:
+    script = tmp_path / "decoder.py"
+    script.write_text("import time; time.sleep(60)")
+    only = ("--only", "valid/container/minimal", "--timeout", "0.5")
+    code, shown = runner("--decoder", f"{sys.executable} {script}", *only)
+    assert code == 1
+    assert "no answer in 0.5 s" in shown
+
+
+def test_runner_without_vectors() -> None:
+    assert runner("--decoder", "true", "--only", "no such vector")[0] == 2
+
+
+def of(file: str, mode: str = "arrays") -> run.Request:
+    vector = next(v for v in VECTORS if v["file"] == file)
+    return next(r for r in run.requests(vector, []) if r.listing == mode)
+
+
+def test_judge() -> None:
+    request = of("valid/raw/plain.mcz")
+    code, output = answer(request)
+    assert run.judge(request, code, output) is None
+    line, _, body = output.partition(b"\n")
+    wrong = {
+        "exit 1": (1, output),
+        "3 exits": (3, output),
+        "no line": (0, b""),
+        "no newline": (0, line),
+        "no JSON": (0, b"{\n"),
+        "no list": (0, b'{"arrays": 1}\n'),
+        "no object": (0, b"[]\n"),
+        "not UTF-8": (0, b"\xff\n"),
+        "nothing listed": (0, b'{"arrays": []}\n'),
+        "a short row": (0, b'{"arrays": [{"clip": "dance"}]}\n'),
+        "bytes missing": (0, output[:-1]),
+        "bytes too many": (0, output + b"\0"),
+        "another value": (0, line + b"\n" + bytes((body[0] ^ 1,)) + body[1:]),
+        "another name": (0, output.replace(b"dance", b"dancf", 1)),
+        "another shape": (0, output.replace(b"[4, 6]", b"[6, 4]", 1)),
+        "a long line": (0, line[:-1] + b" " * 2**20 + b"}\n" + body),
+    }
+    for what, (code, changed) in wrong.items():
+        assert run.judge(request, code, changed), what
+    strings = output.replace(b'"shape": [4, 6]', b'"shape": ["4", "6"]')
+    assert run.judge(request, 0, strings.replace(b'"bytes": 192', b'"bytes": "192"')) is None
+    invalid = of("invalid/chunks/crc.mcz")
+    assert run.judge(invalid, 1, b"") is None
+    assert run.judge(invalid, 0, output)
+    assert run.judge(invalid, 139, b"")
+
+
+def test_capabilities(capsys: pytest.CaptureFixture[str]) -> None:
+    assert conformance.main(["--capabilities"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"options": list(conformance.OPTIONS)}
+    assert run.capabilities([sys.executable, "-c", "raise SystemExit(2)"], 30) == []
+    assert run.capabilities([sys.executable, "-c", "print('[]')"], 30) == []

@@ -1,0 +1,1 @@
+"""What tools/make_vectors.py writes: one module a group or a part of the format."""

@@ -1,0 +1,52 @@
+"""The motions that the vectors hold: small, with every number written out or counted."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.numbers import Grid, GridKind
+
+HUNDREDTHS = Grid(GridKind.FIXED, 2)
+
+
+def channels(kinds: str) -> tuple[Channel, ...]:
+    return tuple(map(Channel, kinds.split()))
+
+
+def puppet() -> Skeleton:
+    """Three joints of 4, 2 and 0 channels."""
+    return Skeleton(
+        (
+            Joint("hips", -1, (0.0, 0.9, 0.0), channels=channels("tx ty tz rz")),
+            Joint("spine", 0, (0.0, 0.2, -0.0), channels=channels("rx ry")),
+            Joint("tip", 1, (0.0, 0.3, 0.0), ((0.0, 0.1, 0.0),)),
+        ),
+        name="puppet",
+        up_axis="y",
+    )
+
+
+def numbers(n_rows: int, n_columns: int) -> np.ndarray:
+    """Hundredths from -97 to 102, none twice in a row."""
+    counted = np.arange(n_rows * n_columns) * 37 % 200 - 97
+    return (counted / 100).reshape(n_rows, n_columns)
+
+
+def dance(n_frames: int = 4, **changes: Any) -> Motion:
+    """The motion of most vectors: 6 channels of hundredths at 120 frames a second."""
+    signal = Signal(numbers(n_frames, 6), (HUNDREDTHS,) * 6)
+    fields: dict[str, Any] = {"skeleton": puppet(), "signals": (signal,), "name": "dance"}
+    return Motion(**(fields | {"frame_rate": Fraction(120)} | changes))
+
+
+def column(values: Any, grid: Grid, **changes: Any) -> Motion:
+    """One plain scalar on ``grid``, named after it."""
+    dtype = np.int64 if grid.kind == GridKind.INTEGER else np.float64
+    table = np.array(values, dtype).reshape(-1, 1)
+    skeleton = Skeleton((Joint("dial", channels=(Channel("", "needle", "V"),)),), name="dial")
+    signal = Signal(table, (grid,), **changes)
+    return Motion(skeleton, (signal,), name=grid.kind.name.lower())
