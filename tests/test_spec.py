@@ -128,3 +128,11 @@ def test_metadata_keys_of_the_code_are_registered() -> None:
 @pytest.mark.parametrize("word", ["TBD", "TODO", "see the code", "reference implementation"])
 def test_spec_never_defers(word: str) -> None:
     assert word not in SPEC
+
+
+def test_annex_is_what_the_package_ships_and_the_text_names() -> None:
+    import hashlib
+
+    data = (ROOT / "conformance/annex/lossless_start.json").read_bytes()
+    assert data == (ROOT / "mcz/codecs/lossless_start.json").read_bytes()
+    assert hashlib.sha256(data).hexdigest() in SPEC

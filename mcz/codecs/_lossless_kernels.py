@@ -68,10 +68,10 @@ def beside(value: int, scale: int) -> int:
 
 @inner
 def predict(plan: Ints, track: Ints) -> int:
-    total = 32
+    total = 16
     for tap in range(plan[N_TAPS]):
         total += plan[TAPS + tap] * track[DIFFERENCES + tap]
-    return (track[LAST] if plan[FROM_LAST] else 0) + (total >> 6)
+    return (track[LAST] if plan[FROM_LAST] else 0) + (total >> 5)
 
 
 @inner

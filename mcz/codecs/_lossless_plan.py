@@ -16,9 +16,9 @@ Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
 DECIMAL_WIDTH, BINARY_WIDTH = 13, 44
-TAP_UNIT = 64
+TAP_UNIT = 32
 MAX_TAP = 16 * TAP_UNIT - 1
-FIXED_ORDERS = ((1, ()), (1, (64,)), (1, (128, -64)), (0, ()))  # from_last, taps
+FIXED_ORDERS = ((1, ()), (1, (32,)), (1, (64, -32)), (0, ()))  # from_last, taps
 _FITTED = 4  # taps of a fitted predictor
 _ROUNDS = 3  # of reweighted least squares, so that outliers count less
 
@@ -97,7 +97,7 @@ def choose_predictor(values: Floats) -> tuple[int, tuple[int, ...], int]:
     candidates = [*FIXED_ORDERS, *_fitted(differences, lagged)]
     costs, scales = [], []
     for from_last, taps in candidates:
-        guess = np.floor((lagged[:, : len(taps)] @ np.array(taps, float) + 32) / 64)
+        guess = np.floor((lagged[:, : len(taps)] @ np.array(taps, float) + 16) / 32)
         errors = np.abs(values - guess - (before if from_last else 0.0))
         typical = float(np.median(errors))
         costs.append(float(np.log2(errors + 0.1 * typical + 1).sum()) + 9 * len(taps))
