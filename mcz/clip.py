@@ -23,7 +23,7 @@ from mcz.container.limits import check
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts
 from mcz.container.skeletons import parse_channels, parse_skeleton
-from mcz.encoding import canonical
+from mcz.encoding import value_hash
 from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
 from mcz.formats import Format, format_by_id
 from mcz.frames import parse_frame_numbers
@@ -288,12 +288,10 @@ class Clip:
             raise FormatError(
                 f"clip {self.name!r}: {len(hashes)} hashes of {len(self.signals)} signals"
             )
-        digest = hashlib.sha256(canonical(values))
-        if mask is not None and not mask.all():
-            digest.update(mask.astype("u1").tobytes())
-        if digest.digest() != hashes[info.index]:
+        found = value_hash(values, mask)
+        if found != hashes[info.index]:
             raise ChecksumError(
-                f"clip {self.name!r}, signal {info.index}: value hash is {digest.hexdigest()}, "
+                f"clip {self.name!r}, signal {info.index}: value hash is {found.hex()}, "
                 f"stored is {hashes[info.index].hex()}"
             )
 

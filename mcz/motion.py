@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
+from operator import itemgetter
 from typing import Any, Protocol
 
 import numpy as np
@@ -263,6 +264,30 @@ class Signal:
     def grid_blocks(self) -> Iterator[tuple[slice, list[int], Grid]]:
         """Blocks (rows, columns, grid) that cover the signal, each of one grid."""
         return grid_blocks(self.n_rows, self.grids, self.grid_changes)
+
+    def cut(self, start: int, stop: int) -> Signal:
+        """Frames start <= f < stop alone, with the grids that are in force there."""
+        first, last = start * self.samples_per_frame, stop * self.samples_per_frame
+        grids, changes = list(self.grids), []
+        for row, channel, grid in sorted(self.grid_changes, key=itemgetter(0)):
+            if row <= first:
+                grids[channel] = grid
+            elif row < last:
+                changes.append((row - first, channel, grid))
+        low, high = np.searchsorted(self.exceptions.rows, (first, last)).tolist()
+        return replace(
+            self,
+            values=self.values[first:last],
+            grids=tuple(grids),
+            mask=None if self.mask is None else self.mask[first:last],
+            exceptions=Exceptions(
+                self.exceptions.rows[low:high] - first,
+                self.exceptions.channels[low:high],
+                self.exceptions.texts[low:high],
+            ),
+            grid_changes=tuple(changes),
+            ordinals=None if self.ordinals is None else self.ordinals[first:last],
+        )
 
     def place(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """The ordinal of every value, and whether it gives exactly this value back.

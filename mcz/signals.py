@@ -5,7 +5,7 @@ Part of the joint between motion, codec and container (see ``file.py``).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,8 @@ from mcz.masks import parse_mask
 from mcz.motion import Channel, Exceptions, Skeleton, grid_blocks
 from mcz.numbers import Grid, GridKind, scan
 from mcz.schema import parse
+
+BLOCK_ROWS = 2048  # decoded at a time, at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +115,29 @@ class SignalReader:
         spans = self._prepare(start, stop)
         if self.container.salvage:
             return self._salvage(spans, start, stop)
-        return self._finish(self._decode(spans, start, stop), start, stop)
+        per_frame = self.info.layout.samples_per_frame
+        n_columns = sum(len(self.info.layout.groups[g]) for g in self.groups)
+        dtype = np.int64 if self.info.is_integer else np.float64
+        values = np.empty(((stop - start) * per_frame, n_columns), dtype)
+        mask: NDArray[np.bool_] | None = None
+        for a, b in self._blocks(start, stop):
+            rows = slice((a - start) * per_frame, (b - start) * per_frame)
+            values[rows], valid = self._finish(self._decode(spans, a, b), a, b)
+            if valid is not None:
+                mask = np.ones(values.shape, np.bool_) if mask is None else mask
+                mask[rows] = valid
+        return values, mask
+
+    def _blocks(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
+        """The range in blocks of a few segments, which bound the memory beside the result."""
+        if self.info.codec.segmented:
+            for index in self._covering(start, stop):
+                end = min(self.info.rows[index].header.stop, stop)
+                if (end - start) * self.info.layout.samples_per_frame >= BLOCK_ROWS:
+                    yield start, end
+                    start = end
+        if start < stop:
+            yield start, stop
 
     def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
         """What a codec of ordinals decodes, before the grids are applied."""

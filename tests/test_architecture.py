@@ -40,7 +40,7 @@ ALLOWED = {
 }
 FILE_HELPERS = {  # beside file.py, of one part with it
     *("archive", "clip", "encoding", "frames", "masks", "report", "signals", "sources", "targets"),
-    "views",
+    *("memory", "views"),
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 

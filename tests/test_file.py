@@ -116,7 +116,7 @@ def test_values_off_their_grid_become_exceptions() -> None:
 
 def test_values_off_a_binary_grid_are_refused() -> None:
     signal = Signal(np.full((2, 10), 1 / 3), (Grid(GridKind.BINARY32),) * 10)
-    with pytest.raises(mcz.MotionError, match="row 0, channel 0"):
+    with pytest.raises(mcz.MotionError, match="row 0 of a segment, channel 0"):
         written(replace(smooth(2), signals=(signal,)))
 
 
