@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     )
     from mcz.file import Attachment, File, encode, open, read, write
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
+    from mcz.report import Problem, verify
     from mcz.sources import read_skeleton
 
 __version__ = "0.1.0"
@@ -44,6 +45,7 @@ _HOMES = {
         "UnsupportedError",
     ),
     "mcz.file": ("Attachment", "File", "encode", "open", "read", "write"),
+    "mcz.report": ("Problem", "verify"),
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
     "mcz.sources": ("read_skeleton",),
 }
@@ -64,6 +66,7 @@ __all__ = [
     "MotionError",
     "OptionError",
     "Outcome",
+    "Problem",
     "Report",
     "Signal",
     "Skeleton",
@@ -78,6 +81,7 @@ __all__ = [
     "read",
     "read_skeleton",
     "unpack",
+    "verify",
     "write",
 ]
 

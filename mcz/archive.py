@@ -74,7 +74,7 @@ def pack(
     root = Path(directory)
     if not root.is_dir():
         raise OptionError(f"{root}: not a folder")
-    paths = sorted(p for p in root.rglob("*") if p.is_file() and not p.is_symlink())
+    paths, links = _files_below(root, target)
     known = {suffix for source_format in FORMATS.values() for suffix in source_format.suffixes}
     if not keep_all:
         paths = [path for path in paths if path.suffix.lower() in known]
@@ -96,7 +96,16 @@ def pack(
         report = _write_entries(writer, buffer, entries, progress)
         writer.finish()
         buffer.commit()
+    text = "a symbolic link; only files are packed"
+    report.outcomes += [Outcome(p.relative_to(root).as_posix(), "skipped", 0, text) for p in links]
     return report
+
+
+def _files_below(root: Path, target: Any) -> tuple[list[Path], list[Path]]:
+    """The files below ``root`` but for ``target`` itself, and the symbolic links to files."""
+    own = Path(target).resolve() if isinstance(target, (str, os.PathLike)) else None
+    files = [path for path in root.rglob("*") if path.is_file() and path.resolve() != own]
+    return [p for p in files if not p.is_symlink()], sorted(p for p in files if p.is_symlink())
 
 
 def append(

@@ -35,7 +35,12 @@ class SourceError(MczError):
 
 
 class FormatError(MczError):
-    """Bytes that are not a valid MCZ file, chunk or payload."""
+    """Bytes that are not a valid MCZ file, chunk or payload.
+
+    ``offset`` is where the chunk at fault begins, None where that is not known.
+    """
+
+    offset: int | None = None
 
 
 class TruncatedError(FormatError):

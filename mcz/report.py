@@ -16,8 +16,8 @@ from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import StreamTable
-from mcz.errors import ChecksumError, MczError, UnsupportedError
-from mcz.file import File
+from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
+from mcz.file import File, open
 from mcz.motion import Skeleton
 from mcz.schema import build
 
@@ -286,6 +286,9 @@ def _segment_places(at: int, table: StreamTable) -> Iterator[tuple[int, int, str
             yield at + offset, length, names[index]
 
 
+HEADINGS = ("HEAD", "SKEL", "SRCE", "MODL", "ATTA", "ALIA", "CLIP", "DATA", "CEND", "QUAL", "INDX")
+
+
 def validate(file: File) -> list[Problem]:
     """Every fault of the file: structure, checksums, values, sources, index."""
     problems = structure_problems(file)
@@ -296,20 +299,28 @@ def validate(file: File) -> list[Problem]:
 
 def structure_problems(file: File) -> list[Problem]:
     """The faults of chunks, their order, their checksums and the index."""
-    problems = []
     try:
-        found = scan(file.container.source, whole=True)
-        if file.container.index is not None and found.directory.clips.keys() != file.clips.keys():
-            problems.append(
-                Problem(
-                    file.container.index.index_offset,
-                    "INDX",
-                    "the index does not list the clips of the file",
-                )
-            )
-    except MczError as error:
-        problems.append(Problem(0, "Grammar", str(error)))
-    return problems
+        scan(file.container.source, whole=True)
+    except FormatError as error:
+        offset = error.offset or 0
+        return [Problem(offset, _heading(file, offset), str(error))]
+    return []
+
+
+def _heading(file: File, offset: int) -> str:
+    """The heading of SPEC.md under which the chunk at ``offset`` stands."""
+    source = file.container.source
+    kind = source.read(offset, min(4, source.size - offset)).decode("latin-1")
+    return kind if kind in HEADINGS else "Chunks"
+
+
+def verify(target: Any) -> list[Problem]:
+    """Check every checksum of a file, decode everything, restore every source.
+
+    Returns the faults, none for a sound file; raises FormatError where it cannot even be opened.
+    """
+    with open(target) as file:
+        return validate(file)
 
 
 def part_problems(file: File) -> Iterator[tuple[str, str, list[Problem]]]:

@@ -112,6 +112,7 @@ class _Walker:
                 at = self._step(at)
             except FormatError as error:
                 if not self.salvage:
+                    error.offset = at
                     raise
                 self._note(error)
                 at = self._skip(at)
