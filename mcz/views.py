@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from mcz.clip import Clip
+
+class Readable(Protocol):
+    """What a clip has that its values need."""
+
+    n_frames: int
+
+    @property
+    def n_channels(self) -> int: ...
+
+    def read(self, frames: tuple[int, int] | None = None) -> NDArray[Any]: ...
 
 
 class ClipValues:
@@ -16,7 +24,7 @@ class ClipValues:
 
     dtype = np.dtype("<f8")
 
-    def __init__(self, clip: Clip) -> None:
+    def __init__(self, clip: Readable) -> None:
         self._clip = clip
 
     @property

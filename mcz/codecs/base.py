@@ -164,6 +164,33 @@ class Codec:
         }
 
 
+def gather(
+    layout: Layout,
+    spans: Sequence[Span],
+    request: Request,
+    decode_group: Callable[[int, int], NDArray[np.int64]],
+) -> NDArray[np.int64]:
+    """The requested rows and groups of a codec whose segments do not overlap.
+
+    ``decode_group(segment, group)`` gives all rows of one group in one segment.
+    """
+    per_frame = layout.samples_per_frame
+    n_channels = sum(len(layout.groups[group]) for group in request.groups)
+    out = np.empty(((request.stop - request.start) * per_frame, n_channels), np.int64)
+    for index, span in enumerate(spans):
+        start, stop = max(span.first, request.start), min(span.stop, request.stop)
+        if start >= stop:
+            continue
+        rows = slice((start - request.start) * per_frame, (stop - request.start) * per_frame)
+        cut = slice((start - span.first) * per_frame, (stop - span.first) * per_frame)
+        column = 0
+        for group in request.groups:
+            n = len(layout.groups[group])
+            out[rows, column : column + n] = decode_group(index, group)[cut]
+            column += n
+    return out
+
+
 def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
     """A parser of integers from ``low`` to ``high``."""
 

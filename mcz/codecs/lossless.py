@@ -36,6 +36,7 @@ from mcz.codecs.base import (
     Segment,
     SignalSource,
     Span,
+    gather,
     integer,
 )
 from mcz.coding.logistic import rate_table, squash_table, stretch_table
@@ -237,22 +238,12 @@ def decode(
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     if header:
         raise FormatError(f"lossless: a header of {len(header)} bytes, which it does not have")
-    per_frame = layout.samples_per_frame
-    n_channels = sum(len(layout.groups[group]) for group in request.groups)
-    out = np.empty(((request.stop - request.start) * per_frame, n_channels), np.int64)
-    for index, span in enumerate(spans):
-        start, stop = max(span.first, request.start), min(span.stop, request.stop)
-        if start >= stop:
-            continue
-        rows = slice((start - request.start) * per_frame, (stop - request.start) * per_frame)
-        cut = slice((start - span.first) * per_frame, (stop - span.first) * per_frame)
-        reader = _Segment(layout, span.n_frames * per_frame, partial(fetch, index, 0))
-        column = 0
-        for group in request.groups:
-            n = len(layout.groups[group])
-            out[rows, column : column + n] = reader.group(group)[cut]
-            column += n
-    return out
+    readers = {
+        index: _Segment(layout, span.n_frames * layout.samples_per_frame, partial(fetch, index, 0))
+        for index, span in enumerate(spans)
+        if span.first < request.stop and request.start < span.stop
+    }
+    return gather(layout, spans, request, lambda index, group: readers[index].group(group))
 
 
 class _Segment:

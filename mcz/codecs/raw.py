@@ -24,6 +24,7 @@ from mcz.codecs.base import (
     Segment,
     SignalSource,
     Span,
+    gather,
     integer,
 )
 from mcz.errors import FormatError
@@ -87,22 +88,12 @@ def decode(
         raise FormatError(f"raw: a header of {len(header)} bytes, which it does not have")
     if layout.n_resolutions != 1:
         raise FormatError(f"raw: {layout.n_resolutions} resolutions, it has 1")
-    per_frame = layout.samples_per_frame
-    n_channels = sum(len(layout.groups[group]) for group in request.groups)
-    out = np.empty(((request.stop - request.start) * per_frame, n_channels), np.int64)
-    for index, span in enumerate(spans):
-        start, stop = max(span.first, request.start), min(span.stop, request.stop)
-        if start >= stop:
-            continue
-        rows = slice((start - request.start) * per_frame, (stop - request.start) * per_frame)
-        cut = slice((start - span.first) * per_frame, (stop - span.first) * per_frame)
-        column = 0
-        for group in request.groups:
-            n = len(layout.groups[group])
-            stream = fetch(index, 0, group)
-            out[rows, column : column + n] = _parse(stream, span.n_frames * per_frame, n)[cut]
-            column += n
-    return out
+
+    def rows(index: int, group: int) -> NDArray[np.int64]:
+        n_rows = spans[index].n_frames * layout.samples_per_frame
+        return _parse(fetch(index, 0, group), n_rows, len(layout.groups[group]))
+
+    return gather(layout, spans, request, rows)
 
 
 def _parse(stream: bytes, n_rows: int, n_channels: int) -> NDArray[np.int64]:
