@@ -9,6 +9,7 @@ that are copies of another group's.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
@@ -26,6 +27,7 @@ from mcz.codecs._lossless_plan import (
     lattice,
     max_top,
 )
+from mcz.codecs._lossless_units import find_unit, of_multiples
 from mcz.codecs.base import (
     Codec,
     Encoded,
@@ -59,9 +61,14 @@ LOSSLESS_FIELDS = (
     ("ordinal", "bytes", "constant: the ordinal, zigzag, in as many bytes as bits 2-5 of kind say"),
     ("group", "varint", "copy: group of the channel that this one repeats"),
     ("channel", "varint", "copy: that channel, counted within its group"),
-    ("form", "u8", "coded, bit 7 of kind: 0 plain, 1-15 digits of base 10, 88 or 117 of base 2"),
+    (
+        "form",
+        "u8",
+        "coded, bit 7 of kind: 0 plain, 32 multiples, others classes",
+    ),
     ("drop", "u8", "coded, bit 7 of kind: low bits of an ordinal or magnitude that are apart"),
-    ("top", "varint", "coded, form not plain: the greatest class"),
+    ("unit", "binary64", "coded, form 32: what the coded integers are multiplied by"),
+    ("top", "varint", "coded, form neither 0 nor 32: the greatest class"),
     ("scale", "u8", "coded: first scale, in quarters of an octave"),
     ("taps", "zigzag varint each", "coded: as many as bits 3-6 of kind say; bit 2: from_last"),
 )
@@ -70,6 +77,7 @@ MAX_SCALE = 172  # 2^43
 MAX_TAPS = 8
 PLAIN = Grid(GridKind.INTEGER)
 OWN_FORM = 128  # in kind: form and drop are in the stream
+MULTIPLES = 32  # form: integers that are multiplied by a unit
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
@@ -127,11 +135,11 @@ def _build(
             heads.append(bytes((COPY,)) + b"".join(map(varint, seen[key])))
         else:
             seen[key] = group, channel
-            head, plan = _coded_head(column, *grids[channel])
+            head, plan, numbers = _coded_head(column, *grids[channel])
             heads.append(head)
             plans.append(plan)
-            coded.append(channel)
-    return b"".join(heads) + _code(ordinals[:, coded], plans)
+            coded.append(numbers)
+    return b"".join(heads) + (_code(np.stack(coded, axis=1), plans) if plans else b"")
 
 
 def _constant_head(ordinal: int) -> bytes:
@@ -140,19 +148,23 @@ def _constant_head(ordinal: int) -> bytes:
     return bytes((CONSTANT | size << 2,)) + folded.to_bytes(size, "little")
 
 
-def _coded_head(column: Ints, grid: Grid, clip_grid: Grid) -> tuple[bytes, Ints]:
-    """The head of a coded channel and its plan for the compiled loop."""
-    shape = lattice(grid, column)
+def _coded_head(column: Ints, grid: Grid, clip_grid: Grid) -> tuple[bytes, Ints, Ints]:
+    """The head of a coded channel, its plan for the compiled loop, and the integers to code."""
+    found = find_unit(column) if grid.kind == GridKind.BINARY32 else None
+    unit, column = found if found is not None else (0.0, column)
+    shape = lattice(grid if found is None else PLAIN, column)
     if shape.base and shape.top > max_top(shape):
         shape = lattice(PLAIN, column)
     from_last, taps, error = choose_predictor(fixed_point(column, shape))
     scale = next((q for q in range(MAX_SCALE) if scale_of(q) >= error), MAX_SCALE)
-    own_form = shape.drop > 0 or form_of(shape) != form_of_grid(clip_grid)
+    form = form_of(shape) if found is None else MULTIPLES
+    own_form = shape.drop > 0 or form != form_of_grid(clip_grid)
     kind = CODED | from_last << 2 | len(taps) << 3 | OWN_FORM * own_form
-    head = [bytes((kind,)), bytes((form_of(shape), shape.drop)) if own_form else b""]
+    head = [bytes((kind,)), bytes((form, shape.drop)) if own_form else b""]
+    head += [struct.pack("<d", unit)] if form == MULTIPLES else []
     head += [varint(shape.top)] if shape.base else []
     head += [bytes((scale,)), *(varint(2 * t if t >= 0 else -2 * t - 1) for t in taps)]
-    return b"".join(head), _plan(shape, scale, from_last, taps)
+    return b"".join(head), _plan(shape, scale, from_last, taps), column
 
 
 def form_of(shape: Lattice) -> int:
@@ -213,9 +225,7 @@ def _powers() -> Ints:
 
 
 def _code(ordinals: Ints, plans: Sequence[Ints]) -> bytes:
-    """The bits of the coded channels, b"" where there are none."""
-    if not plans:
-        return b""
+    """The bits of the coded channels, at least one."""
     loops, coding = _kernels()
     rows = np.ascontiguousarray(ordinals)
     size = 4 * rows.size + 1024
@@ -278,11 +288,13 @@ def _parse(
 ) -> tuple[Ints, dict[int, tuple[int, int]]]:
     columns = np.zeros((n_rows, len(grids)), np.int64)
     copies: dict[int, tuple[int, int]] = {}
-    plans, coded, at = [], [], 0
+    plans, coded, units, at = [], [], {}, 0
     for channel, grid in enumerate(grids):
         kind, at = _byte(stream, at)
         if kind & 3 == CODED:
-            plan, at = _parse_coded(stream, at, kind, grid)
+            plan, unit, at = _parse_coded(stream, at, kind, grid)
+            if unit is not None:
+                units[channel] = unit
             plans.append(plan)
             coded.append(channel)
         elif kind & 3 == CONSTANT:
@@ -294,6 +306,8 @@ def _parse(
         else:
             raise FormatError(f"lossless: channel {channel} is of kind {kind:#04x}")
     columns[:, coded] = _uncode(stream[at:], plans, n_rows)
+    for channel, unit in units.items():
+        columns[:, channel] = of_multiples(columns[:, channel], unit)
     return columns, copies
 
 
@@ -313,11 +327,14 @@ def _parse_constant(stream: bytes, at: int, kind: int) -> tuple[int, int]:
     return (folded >> 1) ^ -(folded & 1), at + size
 
 
-def _parse_coded(stream: bytes, at: int, kind: int, grid: Grid) -> tuple[Ints, int]:
-    form, drop = form_of_grid(grid), 0
+def _parse_coded(stream: bytes, at: int, kind: int, grid: Grid) -> tuple[Ints, float | None, int]:
+    """The plan of a coded channel, its unit if it has one, and the offset after its head."""
+    form, drop, unit = form_of_grid(grid), 0, None
     if kind & OWN_FORM:
         form, at = _byte(stream, at)
         drop, at = _byte(stream, at)
+    if form == MULTIPLES:
+        unit, at = _parse_unit(stream, at)
     shape = _shape(form, drop)
     top = 0
     if shape.base:
@@ -336,11 +353,20 @@ def _parse_coded(stream: bytes, at: int, kind: int, grid: Grid) -> tuple[Ints, i
     if scale > MAX_SCALE:
         raise FormatError(f"lossless: scale {scale}")
     shape = Lattice(shape.base, shape.digits, drop, top)
-    return _plan(shape, scale, kind >> 2 & 1, taps), at
+    return _plan(shape, scale, kind >> 2 & 1, taps), unit, at
+
+
+def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
+    if at + 8 > len(stream):
+        raise FormatError(f"lossless: the stream ends at {len(stream)}, in a unit")
+    (unit,) = struct.unpack_from("<d", stream, at)
+    if not 2.0**-200 <= unit <= 2.0**80:
+        raise FormatError(f"lossless: a unit of {unit!r}")
+    return unit, at + 8
 
 
 def _shape(form: int, drop: int) -> Lattice:
-    if form == 0 and drop <= MAX_DROP:
+    if (form == 0 and drop <= MAX_DROP) or (form == MULTIPLES and drop == 0):
         return Lattice(0, 0, drop)
     if 1 <= form <= 15 and drop == 0:
         return Lattice(10, form)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from dataclasses import replace
+import struct
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,11 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import lossless
+from mcz.codecs._lossless_units import find_unit, of_multiples
 from mcz.codecs.base import Layout, Request, Span
 from mcz.coding.logistic import NODES, squash_table, stretch_table
 from mcz.errors import FormatError
+from mcz.formats import FORMATS
 from mcz.motion import Signal
 from mcz.numbers import Grid, GridKind
 from tests.motions import motions, smooth
@@ -199,21 +202,37 @@ def test_logistic_tables() -> None:
     assert (np.abs(middle - (16 * np.arange(64, 4032) + 8)) < 200).all()
 
 
-def test_changed_value_changes_exactly_its_token(samples: Path) -> None:
-    motion = mcz.read(samples / "walk.bvh")
-    values = motion.values.copy()
-    values[17, 40] += 0.0001
-    values = np.round(values, 4)
+@pytest.mark.parametrize("name", ["walk.bvh", "walk.amc"])
+@given(data=st.data())
+def test_one_ordinal_changes_exactly_one_number(
+    name: str, samples: Path, data: st.DataObject
+) -> None:
+    motion = _read_once(samples / name)
+    signal = motion.signals[0]
+    row = data.draw(st.integers(0, signal.n_rows - 1))
+    channel = data.draw(st.integers(0, signal.n_channels - 1))
+    grid, step = signal.grids[channel], data.draw(st.sampled_from([-1, 1]))
+    values = signal.values.copy()
+    ordinal = grid.ordinals(values[row : row + 1, channel])[0] + step
+    values[row, channel] = grid.values(ordinal)[0]
     out = io.BytesIO()
-    mcz.write(replace(motion.with_values(values), name="walk"), out, codec="lossless")
+    mcz.write(motion.with_values(values), out, codec="lossless")
     with mcz.open(out.getvalue()) as file:
-        from mcz.formats import FORMATS
+        after = plain_write(file.only_clip().motion()).split()
+    before = (samples / name).read_bytes().split()
+    changed = [(a, b) for a, b in zip(before, after, strict=True) if a != b]
+    assert [b for _, b in changed] == grid.texts(ordinal).tolist()
 
-        after = FORMATS["bvh"].write(file.clips["walk"].motion()).split()
-    before = (samples / "walk.bvh").read_bytes().split()
-    changed = [i for i, (a, b) in enumerate(zip(before, after, strict=True)) if a != b]
-    assert len(changed) == 1
-    assert float(after[changed[0]]) == values[17, 40]
+
+@cache
+def _read_once(path: Path) -> mcz.Motion:
+    return mcz.read(path)
+
+
+def plain_write(motion: mcz.Motion) -> bytes:
+    """The source file with the values that the motion has now."""
+    assert motion.source is not None
+    return FORMATS[motion.source.format].write(motion)
 
 
 def test_integers_beyond_any_float() -> None:
@@ -223,3 +242,38 @@ def test_integers_beyond_any_float() -> None:
     mcz.write(mcz.Motion(bones, (Signal(values),)), out, codec="lossless")
     with mcz.open(out.getvalue()) as file:
         np.testing.assert_array_equal(file.clips["motion"].read(), values)
+
+
+@given(
+    st.floats(2.0**-20, 2.0**20),
+    st.lists(st.integers(-(2**18), 2**18), min_size=3, max_size=60),
+)
+def test_multiples_of_a_unit(unit: float, counts: list[int]) -> None:
+    multiples = np.array(counts, np.int64)
+    ordinals = of_multiples(multiples, unit)
+    if len(set(counts) - {0}) < 2:
+        return
+    found = find_unit(ordinals)
+    if found is not None:
+        np.testing.assert_array_equal(of_multiples(found[1], found[0]), ordinals)
+    stream = coded(ordinals[:, None], Grid(GridKind.BINARY32))
+    out = decoded(stream, len(counts), 1, Grid(GridKind.BINARY32))
+    np.testing.assert_array_equal(out[:, 0], ordinals)
+
+
+def test_scaled_integers_are_found_among_floats() -> None:
+    counts = np.random.default_rng(5).integers(-2000, 2000, 800)
+    ordinals = of_multiples(counts, 0.0833333358168602)
+    as_integers = coded(counts[:, None], Grid(GridKind.INTEGER))
+    as_floats = coded(ordinals[:, None], Grid(GridKind.BINARY32))
+    assert len(as_floats) <= len(as_integers) + 12
+
+
+@pytest.mark.parametrize("unit", [0.0, -1.0, float("nan"), float("inf"), 2.0**-201])
+def test_bad_units_are_refused(unit: float) -> None:
+    ordinals = of_multiples(np.arange(1, 50) ** 2, 0.25)
+    stream = coded(ordinals[:, None], Grid(GridKind.BINARY32))
+    broken = stream.replace(struct.pack("<d", 0.25), struct.pack("<d", unit))
+    assert broken != stream
+    with pytest.raises(FormatError, match="unit"):
+        decoded(broken, 49, 1, Grid(GridKind.BINARY32))
