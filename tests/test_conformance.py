@@ -129,7 +129,7 @@ def runner(*arguments: str) -> tuple[int, str]:
 
 def test_runner_passes_our_adapter() -> None:
     ours = f"{sys.executable} -m mcz.cli.conformance"
-    for only in ("valid/notes/m", "uncommon/container/n", "invalid/chunks/t"):
+    for only in ("valid/notes/m", "uncommon/container/n", "invalid/chunks/t", "lossless/copy"):
         code, shown = runner("--decoder", ours, "--only", only)
         assert code == 0, shown
         assert re.search(r"(?m)^conformance: (\d+) of \1 passed", shown), shown
@@ -147,10 +147,19 @@ WRONG = {
         "mcz.codecs.CODECS[0] = replace(raw, decode=lambda *a: raw.decode(*a).byteswap())",
         ["valid/raw/plain", "valid/numbers/integer"],
     ),
+    "forgets copies": (
+        "mcz.codecs.lossless._Segment.group = lambda self, group: self._own(group)[0]",
+        ["valid/lossless/copy-later"],
+    ),
+    "takes bits of any size": (
+        "import mcz.coding.kernels as k; k.coded_size = lambda state: mock.ANY",
+        ["invalid/lossless/byte-0-behind"],
+    ),
 }
 LAX = """
 import sys
 from dataclasses import replace
+from unittest import mock
 import mcz.clip, mcz.signals, mcz.codecs
 from mcz.cli import conformance
 raw = mcz.codecs.CODECS[0]

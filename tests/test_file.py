@@ -241,3 +241,25 @@ def test_nan_payloads_survive_in_ordinals() -> None:
     with mcz.open(written(mcz.Motion(bones, (signal,)))) as file:
         back = file.clips["motion"].motion().signals[0]
     np.testing.assert_array_equal(grid.bits(back.place()[0]), words)
+
+
+def test_reading_a_closed_file() -> None:
+    file = mcz.open(written(smooth(20)))
+    clip = file.clips["smooth"]
+    file.close()
+    with pytest.raises(mcz.OptionError, match="closed"):
+        clip.read()
+
+
+def test_threads_may_share_a_file(tmp_path: Path) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    motion = smooth(400)
+    mcz.write(motion, tmp_path / "a.mcz", segment_frames=20)
+    with mcz.open(tmp_path / "a.mcz") as file, ThreadPoolExecutor(8) as pool:
+        clip = file.clips["smooth"]
+        starts = [n * 7 % 380 for n in range(200)]
+        for start, part in zip(
+            starts, pool.map(lambda s: clip.read((s, s + 20)), starts), strict=True
+        ):
+            np.testing.assert_array_equal(part, motion.values[start : start + 20])

@@ -21,17 +21,23 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
 from tools.vectors import (  # noqa: E402 - needs the path
+    bad_c3d,
     bad_chunks,
     bad_clips,
     bad_data,
     bad_index,
+    bad_lossless,
     bad_notes,
     bad_numbers,
     bad_shared,
     bad_sources,
     sources,
+    sources_c3d,
+    sources_text,
     uncommon,
     valid_container,
+    valid_lossless,
+    valid_lossless_clips,
     valid_notes,
     valid_numbers,
     valid_raw,
@@ -44,7 +50,11 @@ MODULES = (
     valid_numbers,
     valid_notes,
     valid_raw,
+    valid_lossless,
+    valid_lossless_clips,
     sources,
+    sources_c3d,
+    sources_text,
     uncommon,
     bad_chunks,
     bad_index,
@@ -53,7 +63,9 @@ MODULES = (
     bad_data,
     bad_notes,
     bad_numbers,
+    bad_lossless,
     bad_sources,
+    bad_c3d,
 )
 FORMAT_VERSION = "0.1"
 

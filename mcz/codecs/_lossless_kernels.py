@@ -19,7 +19,8 @@ PLAN_SIZE = TAPS + MAX_TAPS
 # Columns of ``track``, what is remembered of a channel.
 LAST, FAST, SLOW, SIDE_1, SIDE_2, DIFFERENCES = range(6)
 TRACK_SIZE = DIFFERENCES + MAX_TAPS
-NEAR, OTHER = range(2)  # of ``flow``: surprise so far in the row, side of the channel before
+NEAR, OTHER, BAD = range(3)  # of ``flow``: surprise so far in the row, side of the channel
+# before, whether there is no such code
 
 # First context of each kind of bit.
 C_SAME, C_UP, C_ZERO, C_FAR, C_MINUS, C_BELOW = 0, 384, 432, 464, 768, 808
@@ -211,13 +212,14 @@ def code_steps(state: Ints, data: Bytes, steps: int, greater: int, rf: int, rs: 
 
 @inner
 def code_plain(state: Ints, data: Bytes, ordinal: int, plan: Ints, track: Ints, flow: Ints) -> int:
-    """Code an ordinal as an integer; return it, or FAULT."""
+    """Code an ordinal as an integer and return it; set BAD where there is no such code."""
     predicted = clamp(predict(plan, track), -MAX_PLAIN, MAX_PLAIN)
     value = ordinal >> plan[DROP]
     scales = track[FAST], track[SLOW]
     residual = code_residual(state, data, value - predicted, 0, scales, track, flow)
     if residual == FAULT or not -MAX_PLAIN <= predicted + residual < MAX_PLAIN:
-        return FAULT
+        flow[BAD] = 1
+        return 0
     value = predicted + residual
     remember(track, flow, value, predicted)
     return int(value << plan[DROP]) | number(state, data, ordinal, plan[DROP])
@@ -227,7 +229,7 @@ def code_plain(state: Ints, data: Bytes, ordinal: int, plan: Ints, track: Ints, 
 def code_scaled(
     state: Ints, data: Bytes, ordinal: int, plan: Ints, track: Ints, flow: Ints, powers: Ints
 ) -> int:
-    """Code an ordinal as class, sign and mantissa; return it, or FAULT."""
+    """Code an ordinal as class, sign and mantissa; return it, or set BAD."""
     width = DECIMAL_WIDTH if plan[BASE] == 10 else BINARY_WIDTH
     low = powers[plan[DIGITS] - 1]
     per_class = low * (plan[BASE] - 1)
@@ -240,7 +242,8 @@ def code_scaled(
     zero = 1 if magnitude == 0 else 0
     found = code_class(state, data, own, zero, abs(predicted), track[FAST], track[SLOW], powers)
     if found == FAULT or (found != ZERO_CLASS and not 0 <= found - shift <= plan[TOP]):
-        return FAULT
+        flow[BAD] = 1
+        return 0
     if found == ZERO_CLASS:
         negative = mixed(
             state, data, negative, M_ZERO_SIGN, C_MINUS + 32, C_MINUS + 33, C_MINUS + 34
@@ -256,7 +259,8 @@ def code_scaled(
     mantissa = (magnitude - first) % per_class + low
     residual = code_residual(state, data, mantissa - guess, negative, scales, track, flow)
     if residual == FAULT or not low <= guess + residual < low * plan[BASE]:
-        return FAULT
+        flow[BAD] = 1
+        return 0
     mantissa = guess + residual
     value = from_mantissa(mantissa, digits_off, powers)
     remember(track, flow, -value if negative else value, predicted)
@@ -319,7 +323,7 @@ def code_rows(state: Ints, data: Bytes, ordinals: Ints, plans: Ints, powers: Int
     n_channels = len(plans)
     tracks = np.zeros((n_channels, TRACK_SIZE), np.int64)
     tracks[:, FAST] = tracks[:, SLOW] = plans[:, SCALE]
-    flow = np.zeros(2, np.int64)
+    flow = np.zeros(3, np.int64)
     for row in range(len(ordinals)):
         flow[NEAR], flow[OTHER] = 0, 3
         for channel in range(n_channels):
@@ -329,7 +333,7 @@ def code_rows(state: Ints, data: Bytes, ordinals: Ints, plans: Ints, powers: Int
             else:
                 base = powers[1 if plan[BASE] == 10 else 0]
                 found = code_scaled(state, data, given, plan, track, flow, base)
-            if found == FAULT:
+            if flow[BAD]:
                 return row
             ordinals[row, channel] = found
             flow[OTHER] = track[SIDE_1]

@@ -13,7 +13,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.errors import OptionError
+from mcz.errors import FormatError, OptionError
 from mcz.motion import Skeleton
 from mcz.numbers import Grid
 
@@ -162,6 +162,14 @@ class Codec:
             name: parameter.parse(given[name]) if name in given else parameter.default
             for name, parameter in known.items()
         }
+
+
+def refuse_extras(name: str, header: bytes, layout: Layout) -> None:
+    """Raise FormatError where a codec without header and resolutions is given some."""
+    if header:
+        raise FormatError(f"{name}: a header of {len(header)} bytes, which it does not have")
+    if layout.n_resolutions != 1:
+        raise FormatError(f"{name}: {layout.n_resolutions} resolutions, it has 1")
 
 
 def gather(

@@ -40,6 +40,7 @@ from mcz.codecs.base import (
     Span,
     gather,
     integer,
+    refuse_extras,
 )
 from mcz.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.errors import FormatError
@@ -246,8 +247,7 @@ def decode(
     header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
 ) -> Ints:
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
-    if header:
-        raise FormatError(f"lossless: a header of {len(header)} bytes, which it does not have")
+    refuse_extras("lossless", header, layout)
     readers = {
         index: _Segment(layout, span.n_frames * layout.samples_per_frame, partial(fetch, index, 0))
         for index, span in enumerate(spans)

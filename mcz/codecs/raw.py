@@ -26,6 +26,7 @@ from mcz.codecs.base import (
     Span,
     gather,
     integer,
+    refuse_extras,
 )
 from mcz.errors import FormatError
 
@@ -84,10 +85,7 @@ def decode(
     header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
 ) -> NDArray[np.int64]:
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
-    if header:
-        raise FormatError(f"raw: a header of {len(header)} bytes, which it does not have")
-    if layout.n_resolutions != 1:
-        raise FormatError(f"raw: {layout.n_resolutions} resolutions, it has 1")
+    refuse_extras("raw", header, layout)
 
     def rows(index: int, group: int) -> NDArray[np.int64]:
         n_rows = spans[index].n_frames * layout.samples_per_frame

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Iterable
+from threading import Lock
 from typing import Any, BinaryIO
 
 from mcz.errors import OptionError, TruncatedError
@@ -22,6 +23,7 @@ class ByteSource:
         self, stream: BinaryIO, *, remote: bool = False, name: str = "", size: int | None = None
     ) -> None:
         self._stream = stream
+        self._lock = Lock()  # seek and read belong together, whoever else reads
         self.gap = 64 * 1024 if remote else 0
         self.tail = 128 * 1024 if remote else 512
         self.remote = remote
@@ -64,13 +66,16 @@ class ByteSource:
             self._held.append((start, self._request(start, stop - start)))
 
     def _request(self, offset: int, size: int) -> bytes:
-        self._stream.seek(offset)
-        data: bytes = self._stream.read(size)
-        while len(data) < size:  # raw streams may return less than was asked for
-            more = self._stream.read(size - len(data))
-            if not more:
-                raise TruncatedError(f"the file ended at {offset + len(data)} while it was read")
-            data += more
+        with self._lock:
+            if getattr(self._stream, "closed", False):
+                raise OptionError(f"{self.name} is closed")
+            self._stream.seek(offset)
+            data: bytes = self._stream.read(size)
+            while len(data) < size:  # raw streams may return less than was asked for
+                more = self._stream.read(size - len(data))
+                if not more:
+                    raise TruncatedError(f"the file ended at {offset + len(data)} while read")
+                data += more
         self.n_requests += 1
         self.n_bytes += size
         return data

@@ -177,12 +177,13 @@ def file_of(
     packets: bool = False,
     grouping: str = "joint",
     segment_frames: int = 0,
+    codec: Codec = raw.CODEC,
     **edits: Any,
 ) -> bytes:
     """A file of these clips, edited; a segment has all frames unless ``segment_frames`` says it."""
     crafter = Crafter(packets=packets, **edits)
     for motion in motions:
-        crafter.clip(motion, grouping=grouping, segment_frames=segment_frames)
+        crafter.clip(motion, grouping=grouping, codec=codec, segment_frames=segment_frames)
     return finished(crafter, index=index)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -50,3 +51,26 @@ def column(values: Any, grid: Grid, **changes: Any) -> Motion:
     skeleton = Skeleton((Joint("dial", channels=(Channel("", "needle", "V"),)),), name="dial")
     signal = Signal(table, (grid,), **changes)
     return Motion(skeleton, (signal,), name=grid.kind.name.lower())
+
+
+def panel(
+    columns: Sequence[Sequence[Any]], grids: Sequence[Grid], split: Sequence[int] = (), **more: Any
+) -> Motion:
+    """Plain scalars, column by column: one joint of all, or joints of ``split`` channels each."""
+    dtype = np.int64 if all(g.kind == GridKind.INTEGER for g in grids) else np.float64
+    table = np.array(columns, dtype).T
+    names = [Channel("", f"needle {c}") for c in range(len(columns))]
+    ends = np.cumsum(split or [len(columns)]).tolist()
+    joints = tuple(
+        Joint(f"panel {j}", channels=tuple(names[a:b]))
+        for j, (a, b) in enumerate(zip([0, *ends], ends, strict=False))
+    )
+    signal = Signal(table, tuple(grids), **more)
+    return Motion(Skeleton(joints), (signal,), name="panel")
+
+
+def wave(n_rows: int, seed: int = 0) -> list[float]:
+    """Hundredths of a smooth curve with some noise: about -60 to 60, no two alike by ``seed``."""
+    places = [(row + 7 * seed) % 96 - 48 for row in range(n_rows)]
+    smooth = [x * (48 - abs(x)) * 10 for x in places]
+    return [(s + (row * row * 37 + seed * 11) % 23) / 100 for row, s in enumerate(smooth)]

@@ -23,11 +23,12 @@ def vectors() -> Iterable[Vector]:
     return shelf.vectors
 
 
-def _grids(shelf: Whole) -> None:
+def grid_cases() -> dict[str, tuple[Grid, list[float]]]:
+    """Grids of every kind, each with values at its ends and between them."""
     flag = GridFlag
     bits = [0.0, -0.0, 1.5, -INFINITE, INFINITE, NOT_A_NUMBER]
     tiny = [5e-324, -1.7976931348623157e308]
-    cases: dict[str, tuple[Grid, list[float]]] = {
+    return {
         "fixed": (Grid(GridKind.FIXED, 4), [9.3722, -0.0, 0.0, -7.5, 225179981368.5247]),
         "fixed-integers": (Grid(GridKind.FIXED, 0), [7.0, -7.0, 2251799813685247.0]),
         "fixed-22-digits": (Grid(GridKind.FIXED, 22), [1e-22, -3e-22, 2.251799813685247e-7]),
@@ -52,7 +53,10 @@ def _grids(shelf: Whole) -> None:
         "binary64": (Grid(GridKind.BINARY64), [*bits, *tiny]),
         "vax-f": (Grid(GridKind.VAX_F), [0.0, 1.0, -0.5, 1.7014117331926443e38, 2.0**-128]),
     }
-    for name, (grid, values) in cases.items():
+
+
+def _grids(shelf: Whole) -> None:
+    for name, (grid, values) in grid_cases().items():
         motion = column(values, grid)
         purpose = f"Ordinals of a {grid.kind.name} grid to values: {name}."
         shelf.hold(name, "Ordinal to value; Number grids", purpose, file_of(motion), motion)
