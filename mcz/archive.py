@@ -24,7 +24,7 @@ from mcz.encoding import Progress
 from mcz.errors import FormatError, MczError, OptionError, SourceError, TruncatedError
 from mcz.file import File, open, profile_of
 from mcz.formats import FORMATS
-from mcz.sources import Entry
+from mcz.sources import Entry, read_bytes
 from mcz.targets import replacing
 
 
@@ -144,7 +144,10 @@ def append(
 
 @contextmanager
 def _appending(path: Path) -> Iterator[tuple[BinaryIO, Container]]:
-    """The file opened behind its last valid FOOT; put back as it was if the block fails."""
+    """What the block writes lands behind the last valid FOOT, in place of what was cut short there.
+
+    If the block fails, the file is not touched.
+    """
     try:
         stream = builtins.open(path, "r+b")  # noqa: SIM115 - closed by the with below
     except OSError as error:
@@ -152,10 +155,12 @@ def _appending(path: Path) -> Iterator[tuple[BinaryIO, Container]]:
     with stream:
         container = _up_to_last_foot(stream, str(path))
         end = container.directory.end
-        stream.truncate(end)
-        stream.seek(end)
+        added = io.BytesIO()
+        yield added, container
         try:
-            yield stream, container
+            stream.seek(end)
+            stream.write(added.getvalue())
+            stream.truncate()
             stream.flush()
             os.fsync(stream.fileno())
         except BaseException:
@@ -220,7 +225,7 @@ def _snapshot(directory: Directory) -> Directory:
 
 def _write_entry(writer: Writer, entry: Entry, seen: dict[bytes, tuple[int, bytes]]) -> str:
     """Write one file, or only its name where the same bytes are there already."""
-    digest = hashlib.sha256(entry.path.read_bytes()).digest() if entry.path.exists() else b""
+    digest = hashlib.sha256(read_bytes(entry.path)).digest()
     is_amc = entry.path.suffix.lower() == ".amc"  # its values hang on the ASF beside it
     if digest in seen and not is_amc:
         writer.alias(entry.name, *seen[digest])
@@ -250,28 +255,33 @@ def unpack(
     root, report = Path(directory), Report()
     with open(target) as file:
         jobs = list(named_files(file))
+        written: set[Path] = set()
         for done, (name, restore) in enumerate(jobs):
             try:
-                data = restore()
                 path = root / safe_path(name)
+                if path in written:
+                    raise FormatError("another file in the archive has the same path")
+                data = restore()
+                written.add(path)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 with replacing(path, force=force) as stream:
                     stream.write(data)
                 report.outcomes.append(Outcome(name, "restored", len(data)))
-            except MczError as error:
+            except (MczError, OSError) as error:
                 report.outcomes.append(Outcome(name, "failed", 0, f"{name}: {error}"))
             if progress is not None:
                 progress(done + 1, len(jobs), name)
         for clip in file.clips.values():
-            if clip.source is None:
-                report.outcomes.append(Outcome(clip.name, "skipped", 0, "it has no source file"))
+            if clip.source is None or not clip.source.path:
+                text = "it has no source file" if clip.source is None else "its file has no name"
+                report.outcomes.append(Outcome(clip.name, "skipped", 0, text))
     return report
 
 
 def named_files(file: File) -> Iterator[tuple[str, Any]]:
     """Path and restoring function of every file that the archive holds under a name."""
     for clip in file.clips.values():
-        if clip.source is not None:
+        if clip.source is not None and clip.source.path:
             yield clip.source.path, clip.source_bytes
     for attachment in file.attachments.values():
         yield attachment.name, attachment.read

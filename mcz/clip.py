@@ -57,9 +57,6 @@ class Clip:
 
     @cached_property
     def _fields(self) -> Any:
-        first = self._row.segments[:1]
-        ahead = [(chunk.offset, chunk.size) for chunk in (self._row.clip,)]
-        self._container.source.read_ahead(ahead + [(r.offset, r.size) for r in first if not ahead])
         return self._container.clip(self._row)
 
     @cached_property

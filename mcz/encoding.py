@@ -21,7 +21,7 @@ from mcz.container.skeletons import build_skeleton, channel_fields
 from mcz.container.writer import Writer
 from mcz.errors import MotionError
 from mcz.formats import FORMATS
-from mcz.frames import frame_number_metadata
+from mcz.frames import KEY, frame_number_metadata
 from mcz.memory import MemorySource
 from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.schema import MAX_COUNT
@@ -58,7 +58,10 @@ def write_clip(
     Raises OptionError for a bad parameter, MotionError for values that the codec cannot hold.
     """
     options = codec.options(params)
-    sources = [MemorySource(motion, index, codec) for index in range(len(motion.signals))]
+    sources = [
+        MemorySource(motion, index, codec, writer.profile.segment_bytes)
+        for index in range(len(motion.signals))
+    ]
     encoded = [codec.encode(source, options) for source in sources]
     fields = _clip_fields(writer, motion, codec, sources, encoded)
     writer.begin_clip(fields, [signal.n_channels for signal in motion.signals])
@@ -86,6 +89,8 @@ def _clip_fields(
     rate = motion.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
         raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
+    if KEY in motion.metadata:
+        raise MotionError(f"metadata {KEY!r} is written from the motion's frame_numbers")
     metadata = dict(motion.metadata) | frame_number_metadata(motion.frame_numbers)
     return {
         "name": motion.name,
@@ -146,6 +151,9 @@ def _write_segment(
     writer: Writer, motion: Motion, index: int, source: MemorySource, segment: Segment
 ) -> None:
     start, stop = segment.first, segment.first + segment.n_frames
+    per_frame = 8 * source.layout.samples_per_frame * max(1, source.layout.n_channels)
+    size = segment.n_frames * per_frame
+    check(f"frames {start}:{stop}: decoded bytes", size, writer.profile.segment_bytes)
     flags = FRESH if segment.fresh else 0
     streams: list[bytes] = []
     notes = b""

@@ -93,6 +93,11 @@ class File:
         """What salvage found wrong, in file order."""
         return self.container.damage
 
+    @property
+    def unverified(self) -> int:
+        """Chunks of which so far only a part was read, and checked by its own table alone."""
+        return self.container.unverified
+
     @cached_property
     def header(self) -> dict[str, Any]:
         """Format version, version needed and profile, from HEAD."""
@@ -181,7 +186,7 @@ def read(
     unit: str | None = None,
     clip: str | None = None,
 ) -> Motion:
-    """The motion in a BVH, AMC or MCZ file.
+    """The motion in a BVH, AMC, C3D or MCZ file.
 
     An AMC finds its ASF beside it, or takes ``skeleton``, a path or a Skeleton. ``rate`` in frames
     a second and ``unit`` (a key of ``UNIT_CM``) say what the file does not. Raises SourceError,
@@ -238,7 +243,7 @@ def encode(
     archive: bool = False,
     progress: Progress | None = None,
 ) -> None:
-    """Turn one ASF, AMC or BVH file into an MCZ file.
+    """Turn one ASF, AMC, BVH or C3D file into an MCZ file.
 
     ``verbatim`` keeps a file that cannot be parsed as an attachment. Raises SourceError,
     OptionError, MotionError or LimitError; nothing is left under the final name then.

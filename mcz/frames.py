@@ -7,8 +7,9 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.errors import FormatError
+from mcz.errors import FormatError, MotionError
 
+KEY = "frame-numbers"  # of the registry
 _INTEGER = r"(?:0|-?[1-9][0-9]{0,15})"
 _TEXT = re.compile(rf"{_INTEGER}(?: [1-9][0-9]{{0,15}}:{_INTEGER})*", re.ASCII)
 
@@ -19,7 +20,10 @@ def frame_number_metadata(frame_numbers: NDArray[np.int64] | None) -> dict[str, 
         return {}
     jumps = np.nonzero(np.diff(frame_numbers) != 1)[0] + 1
     words = [str(frame_numbers[0]), *(f"{row}:{frame_numbers[row]}" for row in jumps)]
-    return {} if words == ["1"] else {"frame-numbers": " ".join(words)}
+    text = " ".join(words)
+    if not _TEXT.fullmatch(text):
+        raise MotionError("a frame number has more than 16 digits")
+    return {} if words == ["1"] else {KEY: text}
 
 
 def parse_frame_numbers(text: str, n_frames: int, name: str) -> NDArray[np.int64]:

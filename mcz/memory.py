@@ -18,7 +18,7 @@ from mcz.container import payloads
 from mcz.errors import MotionError
 from mcz.masks import build_mask
 from mcz.motion import Exceptions, Motion, Signal, Skeleton
-from mcz.numbers import Grid
+from mcz.numbers import Grid, values_of_texts
 from mcz.schema import build
 
 MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
@@ -31,7 +31,7 @@ class MemorySource:
     Values that lie on no point of their text grid join the exceptions, so that nothing is lost.
     """
 
-    def __init__(self, motion: Motion, index: int, codec: Codec) -> None:
+    def __init__(self, motion: Motion, index: int, codec: Codec, segment_bytes: int) -> None:
         signal = motion.signals[index]
         # What a lossy codec returns is no longer the number that an exception spells.
         self.signal = signal if codec.lossless else replace(signal, exceptions=Exceptions())
@@ -42,6 +42,7 @@ class MemorySource:
             skeleton=motion.skeleton,
             frame_rate=motion.frame_rate,
             grids=signal.grids,
+            segment_bytes=segment_bytes,
         )
         frames = {row // signal.samples_per_frame for row, _, _ in signal.grid_changes}
         self.breaks: Sequence[int] = sorted(frames - {0})
@@ -104,6 +105,7 @@ def _place(signal: Signal) -> Block:
         if signal.values.size and not (abs(signal.values) <= MAX_INTEGER).all():
             raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
         return signal.values, signal
+    signal = replace(signal, exceptions=_holding(signal))
     ordinals, exact = signal.place()
     exact[signal.exceptions.rows, signal.exceptions.channels] = True
     if not exact.all():
@@ -112,6 +114,19 @@ def _place(signal: Signal) -> Block:
     for row, channel in zip(exceptions.rows, exceptions.channels, strict=True):
         ordinals[row, channel] = ordinals[row - 1, channel] if row else 0
     return ordinals, signal
+
+
+def _holding(signal: Signal) -> Exceptions:
+    """The exceptions that still spell the value at their place."""
+    old = signal.exceptions
+    if not len(old):
+        return old
+    meant, bad = values_of_texts(old.texts)
+    held = signal.values[old.rows, old.channels]
+    same = (meant.view(np.int64) == held.view(np.int64)) | (np.isnan(meant) & np.isnan(held))
+    keep = np.flatnonzero(same & ~bad)
+    texts = tuple(old.texts[i] for i in keep)
+    return Exceptions(old.rows[keep], old.channels[keep], texts)
 
 
 def _with_strays(signal: Signal, stray: NDArray[np.bool_]) -> Exceptions:

@@ -19,7 +19,7 @@ from mcz.container.segments import StreamTable
 from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
 from mcz.file import File, open
 from mcz.motion import Skeleton
-from mcz.schema import build
+from mcz.schema import build, parse
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,9 +179,11 @@ def clip_sizes(container: Container, clip: Clip) -> Sizes:
         chunk = container.directory.shared.get((b"SRCE", bytes(fields.source[0].template)))
         template = chunk.size if chunk else 0
     cend = row.cend.length or 0 if row.cend else 0
-    hashes = 16 + 32 * (len(clip.signals) + len(fields.source))
+    n_hashes = len(clip.signals) + len(fields.source) if row.cend else 0
+    hashes = 16 + 32 * n_hashes
     clip_length = row.clip.length or 0
-    overhead = n_chunks * FRAMING + tables + clip_length - source - 16 + cend - (hashes - 16)
+    own = clip_length - source - 16 - len(fields.extension) + cend - (hashes - 16)
+    overhead = n_chunks * FRAMING + tables + own
     quality = sum(chunk.size for chunk in row.ancillary if chunk.type == b"QUAL")
     return Sizes(payload - tables, overhead, template + source, hashes, quality)
 
@@ -214,8 +216,6 @@ def exceptions_info(container: Container, clip: Clip) -> dict[str, Any]:
 
 
 def _count(notes: bytes) -> int:
-    from mcz.schema import parse
-
     return len(parse(payloads.GROUP_NOTES, notes, "group notes").exceptions)
 
 

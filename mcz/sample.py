@@ -8,7 +8,7 @@ so the last bits of a machine's sine do not reach the file. Markers sit on the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 
@@ -20,7 +20,6 @@ from mcz.numbers import Grid, GridKind
 
 Floats = NDArray[np.float64]
 Angles = tuple[float | Floats, float | Floats, float | Floats]
-Gait = Callable[[Floats], dict[str, Angles]]
 
 N_FRAMES = 240
 FRAME_RATE = 120

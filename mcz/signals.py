@@ -22,7 +22,7 @@ from mcz.container.segments import FRESH, StreamCounts, StreamTable
 from mcz.errors import FormatError, UnsupportedError
 from mcz.masks import parse_mask
 from mcz.motion import Channel, Exceptions, Skeleton, grid_blocks
-from mcz.numbers import Grid, GridKind, scan
+from mcz.numbers import Grid, GridKind, values_of_texts
 from mcz.schema import parse
 
 BLOCK_ROWS = 2048  # decoded at a time, at least
@@ -51,10 +51,6 @@ class SignalInfo:
     @property
     def is_integer(self) -> bool:
         return bool(self.grids) and all(grid.kind == GridKind.INTEGER for grid in self.grids)
-
-    @property
-    def decoded_bytes(self) -> int:
-        return self.layout.n_frames * self.layout.samples_per_frame * self.layout.n_channels * 8
 
 
 def parse_groups(
@@ -194,8 +190,9 @@ class SignalReader:
         """What can be decoded segment by segment; the rest is invalid."""
         per_frame = self.info.layout.samples_per_frame
         n_columns = sum(len(self.info.layout.groups[g]) for g in self.groups)
-        values = np.full(((stop - start) * per_frame, n_columns), np.nan)
-        mask = np.zeros(values.shape, np.bool_)
+        shape = (stop - start) * per_frame, n_columns
+        values = np.zeros(shape, np.int64) if self.info.is_integer else np.full(shape, np.nan)
+        mask = np.zeros(shape, np.bool_)
         for index in self._covering(start, stop):
             a, b = max(start, spans[index].first), min(stop, spans[index].stop)
             try:
@@ -381,10 +378,8 @@ def _notes(
 
 def _values_of_texts(texts: Sequence[bytes], name: str) -> NDArray[np.float64]:
     """The numbers that exceptions spell; raises FormatError where one is none."""
-    stops = np.cumsum([len(text) + 1 for text in texts]) - 1
-    starts = stops - [len(text) for text in texts]
-    tokens = scan(b" ".join(texts), starts, stops)
-    bad = np.flatnonzero(tokens.bad())
-    if len(bad):
-        raise FormatError(f"clip {name!r}: exception {texts[bad[0]][:40]!r} is not a number")
-    return tokens.values()
+    values, bad = values_of_texts(texts)
+    if bad.any():
+        text = texts[int(np.argmax(bad))]
+        raise FormatError(f"clip {name!r}: exception {text[:40]!r} is not a number")
+    return values

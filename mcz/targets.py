@@ -25,7 +25,10 @@ def replacing(target: Any, *, force: bool) -> Iterator[BinaryIO]:
     if "://" in str(target):
         import fsspec
 
-        fs, path = fsspec.core.url_to_fs(str(target))
+        try:
+            fs, path = fsspec.core.url_to_fs(str(target))
+        except (ValueError, ImportError) as error:  # no such protocol, or not installed
+            raise OptionError(f"{target}: {error}") from None
         if not force and fs.exists(path):
             raise OptionError(f"{target} exists; use force to replace it")
         with fs.transaction, fs.open(path, "wb") as remote:
@@ -52,12 +55,19 @@ def _temporary(path: Path) -> Iterator[BinaryIO]:
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(name, 0o666 & ~umask)  # mkstemp made it private
-        os.replace(name, path)
+        _rename(name, path)
         _sync_directory(path.parent)
     except BaseException:
         with suppress(OSError):
             os.unlink(name)
         raise
+
+
+def _rename(name: str, path: Path) -> None:
+    try:
+        os.replace(name, path)
+    except OSError as error:  # a folder, perhaps
+        raise OptionError(f"{path}: {error.strerror or error}") from None
 
 
 def _sync_directory(path: Path) -> None:

@@ -43,7 +43,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
 
 @click.command(
     cls=_Commands,
-    help="Motion capture files (ASF, AMC, BVH), compressed and given back byte for byte.\n\n"
+    help="Motion capture files (ASF, AMC, BVH, C3D), compressed and given back byte for byte.\n\n"
     "Every command has its own --help. Nothing is overwritten without --force.",
     epilog=EXIT_CODES,
 )

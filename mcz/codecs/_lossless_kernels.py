@@ -14,7 +14,6 @@ from mcz.jit import inner, kernel
 # Columns of ``plan``, one row a coded channel.
 BASE, DIGITS, DROP, TOP, SCALE, FROM_LAST, N_TAPS, TAPS = range(8)
 MAX_TAPS = 8
-PLAN_SIZE = TAPS + MAX_TAPS
 
 # Columns of ``track``, what is remembered of a channel.
 LAST, FAST, SLOW, SIDE_1, SIDE_2, DIFFERENCES = range(6)

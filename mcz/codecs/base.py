@@ -66,6 +66,13 @@ class Layout:
     frame_rate: Fraction | None = None
     grids: tuple[Grid, ...] = ()
     n_resolutions: int = 1
+    segment_bytes: int = 2**53  # decoded, 8 a value: the most that a segment may have
+
+    @property
+    def most_frames(self) -> int:
+        """The frames that a segment may have, at least 1."""
+        per_frame = 8 * self.samples_per_frame * max(1, self.n_channels)
+        return max(1, self.segment_bytes // per_frame)
 
     @property
     def n_channels(self) -> int:
@@ -210,16 +217,5 @@ def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
         if not low <= value <= high:
             raise OptionError(f"{name} is {value}, not from {low} to {high}")
         return value
-
-    return parse
-
-
-def choice(name: str, options: Sequence[str]) -> Callable[[Any], str]:
-    """A parser that admits one of ``options``."""
-
-    def parse(text: Any) -> str:
-        if text not in options:
-            raise OptionError(f"{name} is {text!r}, not one of {', '.join(options)}")
-        return str(text)
 
     return parse

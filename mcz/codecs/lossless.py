@@ -89,7 +89,7 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
 def _segments(source: SignalSource, fixed: int) -> Iterator[Segment]:
     layout = source.layout
     ends = sorted({*source.breaks, layout.n_frames})
-    most = max(1, MAX_ROWS // layout.samples_per_frame)
+    most = min(layout.most_frames, max(1, MAX_ROWS // layout.samples_per_frame))
     per_frame = max(1, layout.n_channels) * layout.samples_per_frame
     guess = fixed or max(1, TARGET_BYTES // (2 * per_frame))
     first = 0

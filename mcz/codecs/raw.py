@@ -53,10 +53,11 @@ def _segments(source: SignalSource, fixed: int) -> Iterator[Segment]:
     guess = fixed or max(
         1, TARGET_BYTES // (4 * layout.samples_per_frame * max(1, layout.n_channels))
     )
+    most = min(layout.most_frames, max(1, MAX_ROWS // layout.samples_per_frame))
     first = 0
     while first < layout.n_frames:
         end = next(e for e in ends if e > first)
-        n_frames = min(guess, end - first, max(1, MAX_ROWS // layout.samples_per_frame))
+        n_frames = min(guess, end - first, most)
         ordinals = source.ordinals(first, first + n_frames)
         streams = tuple(_build(ordinals[:, list(group)]) for group in layout.groups)
         size = sum(map(len, streams))

@@ -170,6 +170,8 @@ def parse_index(payload: bytes, limit: int) -> Directory:
         directory.shared[row.type, row.id] = Chunk(row.type, 0, row.offset, row.length)
     for row in fields.attachments:
         parts = [Chunk(b"ATTA", 0, part.offset, part.length) for part in row.parts]
+        if not parts:
+            raise FormatError(f"INDX: attachment {row.name!r} has no part")
         _add(directory.attachments, row.name, AttachmentRow(row.name, row.size, parts))
     for row in fields.aliases:
         _add(directory.aliases, row.name, (row.of, row.target))

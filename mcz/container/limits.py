@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from mcz.errors import LimitError
 
 MIB = 2**20
-SEGMENT_TARGET = 64 * 1024  # writers keep a DATA chunk of a segmented codec at most this long
 
 
 @dataclass(frozen=True, slots=True)

@@ -221,7 +221,7 @@ INDEXED_PART = Struct(
 INDEXED_ATTACHMENT = Struct(
     "name" / TEXT * "relative path of the attached file",
     "size" / UVARINT * "bytes of the whole file",
-    "parts" / counted(INDEXED_PART) * "its ATTA chunks, in order",
+    "parts" / counted(INDEXED_PART) * "its ATTA chunks, in order, at least 1",
 )
 INDEXED_SIGNAL = Struct(
     "n_channels" / UVARINT * "channels",

@@ -26,7 +26,7 @@ from mcz.container.chunks import (
     resynchronize,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, SignalRow
-from mcz.container.limits import BASE, PROFILES, Profile, output_limit
+from mcz.container.limits import BASE, PROFILES, Profile, check, output_limit
 from mcz.container.packets import SEGMENT, read_packets
 from mcz.container.segments import FRESH, parse_header
 from mcz.container.source import ByteSource
@@ -34,7 +34,6 @@ from mcz.container.writer import build_head, payload_id
 from mcz.errors import FormatError, TruncatedError, UnsupportedError
 from mcz.schema import parse
 
-SHARED = (b"SKEL", b"MODL", b"SRCE")
 PEEK = 64  # enough for the fields of a segment before its table
 
 
@@ -46,7 +45,6 @@ class Found:
     chunks: list[Chunk] = field(default_factory=list)
     feet: list[int] = field(default_factory=list)  # offsets of the FOOTs
     damage: list[str] = field(default_factory=list)
-    truncated: TruncatedError | None = None
 
 
 def parse_head(payload: bytes) -> Profile:
@@ -94,6 +92,8 @@ class _Walker:
         self.strict = whole and not salvage
         self.found = Found()
         self.profile = PROFILES[0]
+        self.templates: dict[bytes, int] = {}  # the source format of each SRCE
+        self.model_bytes = 0
         self.clip: ClipRow | None = None
         self.first: list[int] = []  # the next frame of each signal of the open clip
         self.index: Chunk | None = None  # an INDX that waits for its FOOT
@@ -187,12 +187,14 @@ class _Walker:
     def _check_shared(self, chunk: Chunk, id_: bytes, payload: bytes) -> None:
         if chunk.type == b"SKEL":
             directory = self.found.directory
-            if strict.check_skeleton(payload, chunk.label, directory, self.profile):
+            if strict.check_skeleton(payload, chunk.label, directory, self.templates, self.profile):
                 self.sourced.add((payloads.OF_SKELETON, id_))
         elif chunk.type == b"SRCE":
-            strict.check_template(payload, chunk.label, self.profile)
+            self.templates[id_] = strict.check_template(payload, chunk.label, self.profile)
         else:
             parse(payloads.MODL, payload, chunk.label)
+            self.model_bytes += len(payload)
+            check(f"chunk {chunk.label}: all models", self.model_bytes, self.profile.model_bytes)
 
     def _attachment(self, chunk: Chunk) -> None:
         self._outside(chunk)
@@ -201,7 +203,7 @@ class _Walker:
         if self.strict:
             strict.check_path(fields.name, chunk.label)
         row = rows.get(fields.name) or AttachmentRow(fields.name, fields.size, [])
-        last = self.found.chunks[-1]
+        last = self.found.chunks[-1] if self.found.chunks else None
         follows = row.parts and row.parts[-1] == last
         if (
             fields.part != len(row.parts)
@@ -240,7 +242,9 @@ class _Walker:
             raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
         if not fields.signals:
             raise FormatError(f"chunk {chunk.label}: a clip without a signal")
-        if self.strict and strict.check_clip(fields, chunk.label, self.found.directory):
+        if self.strict and strict.check_clip(
+            fields, chunk.label, self.found.directory, self.templates
+        ):
             self.sourced.add((payloads.OF_CLIP, fields.name.encode()))
         signals = tuple(map(signal_row, fields.signals))
         rate = fields.rate_numerator, fields.rate_denominator
@@ -354,8 +358,6 @@ class _Walker:
         self.found.damage.append(str(error))
         if self.clip is not None:
             self.clip.damage.append(str(error))
-        if isinstance(error, TruncatedError):
-            self.found.truncated = error
 
     def _skip(self, at: int) -> int | None:
         """Where to go on after a fault in what begins at ``at``."""

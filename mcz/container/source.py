@@ -96,10 +96,13 @@ def open_source(target: Any) -> ByteSource:
         if not target.seekable():
             return ByteSource(io.BytesIO(target.read()), name=name)
         return ByteSource(target, remote=_is_remote(target), name=name)
-    if "://" in str(target) or "::" in str(target):
+    if "://" in str(target):
         import fsspec
 
-        stream = fsspec.open(str(target), "rb", cache_type="none").open()
+        try:
+            stream = fsspec.open(str(target), "rb", cache_type="none").open()
+        except (ValueError, ImportError) as error:  # no such protocol, or not installed
+            raise OptionError(f"{target}: {error}") from None
         return ByteSource(stream, remote=_is_remote(stream), name=str(target))
     if not isinstance(target, (str, os.PathLike)):
         raise OptionError(f"cannot open {target!r}: neither a path nor a binary stream")

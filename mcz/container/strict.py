@@ -5,6 +5,7 @@ What only decoding shows is checked where clips are decoded. SPEC.md, "Strict re
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -16,6 +17,7 @@ from mcz.container.skeletons import parse_skeleton
 from mcz.errors import FormatError, LimitError
 from mcz.schema import inflate, parse
 
+Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
 MAX_RATIO = 1032  # raw deflate never inflates to more than this times its size
 
 
@@ -42,28 +44,39 @@ def check_path(name: str, where: str) -> None:
         raise FormatError(f"{where}: path {name!r} is not relative and plain")
 
 
-def check_skeleton(payload: bytes, where: str, directory: Directory, profile: Profile) -> bool:
+def check_skeleton(
+    payload: bytes, where: str, directory: Directory, templates: Templates, profile: Profile
+) -> bool:
     """Check a SKEL; return whether it has a source file of its own."""
     fields = parse(payloads.SKEL, payload, where)
     parse_skeleton(fields, profile, where)
     for base in fields.base:
         _refer(directory, b"SKEL", base, where)
     for source in fields.source:
-        _refer(directory, b"SRCE", source.template, where)
+        _check_source(source, where, directory, templates)
     return bool(fields.source)
 
 
-def check_template(payload: bytes, where: str, profile: Profile) -> None:
+def check_template(payload: bytes, where: str, profile: Profile) -> int:
+    """Check a SRCE; return its source format."""
     fields = parse(payloads.SRCE, payload, where)
     check(f"{where}: bytes", fields.size, profile.text_bytes)
     decoded(fields.data, fields.encoding, fields.size, where)
+    return int(fields.format)
 
 
-def check_clip(fields: Any, where: str, directory: Directory) -> bool:
+def _check_source(source: Any, where: str, directory: Directory, templates: Templates) -> None:
+    id_ = bytes(source.template)
+    _refer(directory, b"SRCE", id_, where)
+    if templates.get(id_, source.format) != source.format:
+        raise FormatError(f"{where}: source format {source.format}, its SRCE has {templates[id_]}")
+
+
+def check_clip(fields: Any, where: str, directory: Directory, templates: Templates) -> bool:
     """Check what CLIP refers to and names; return whether it has a source file."""
     _refer(directory, b"SKEL", fields.skeleton, where)
     for source in fields.source:
-        _refer(directory, b"SRCE", source.template, where)
+        _check_source(source, where, directory, templates)
         if source.path:
             check_path(source.path, where)
     keys = [pair.key for pair in fields.metadata]

@@ -101,6 +101,7 @@ class Writer:
 
     def template(self, format_id: int, template: bytes) -> bytes:
         """Write a SRCE and return its id."""
+        check("template: bytes", len(template), self.profile.text_bytes)
         packed = deflate(template)
         encoding = payloads.DEFLATED if len(packed) < len(template) else payloads.STORED
         fields = {

@@ -13,7 +13,7 @@ ordinal -1 and nothing is an exception only because of its sign.
 from mcz.numbers.choose import choose_grid, fit
 from mcz.numbers.grid import GRID, GRID_FIELDS, Grid
 from mcz.numbers.rules import GridFlag, GridKind
-from mcz.numbers.tokens import Texts, Tokens, scan
+from mcz.numbers.tokens import Texts, Tokens, scan, values_of_texts
 
 __all__ = [
     "GRID",
@@ -26,4 +26,5 @@ __all__ = [
     "choose_grid",
     "fit",
     "scan",
+    "values_of_texts",
 ]

@@ -14,7 +14,6 @@ from mcz.numbers.tokens import EXACT_POWER, NAN, TENS, Floats, Ints, scan_texts
 
 FIRST_NAN32 = 0x7F800001
 FIRST_NAN64 = 0x7FF0000000000001
-_VAX_ONE = 0x40800000  # 1.0 as a VAX F word: exponent 129
 _VAX_TINY = 0x00800000  # below it the exponent is 0: zero, or reserved with a minus sign
 
 

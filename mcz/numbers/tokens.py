@@ -154,6 +154,17 @@ def scan_texts(texts: Sequence[str]) -> Tokens:
     return scan(" ".join((*texts, "")).encode(), start, stop - 1)
 
 
+def values_of_texts(texts: Sequence[bytes]) -> tuple[Floats, Bools]:
+    """The values of texts that stand by themselves, and which are no numbers at all (value 0)."""
+    stop = np.cumsum([len(text) + 1 for text in texts], dtype=np.int64)
+    start = np.concatenate(([0], stop))[:-1]
+    tokens = scan(b" ".join((*texts, b"")), start, stop - 1)
+    bad = tokens.bad()
+    values = np.zeros(len(texts))
+    values[~bad] = tokens[~bad].values()
+    return values, bad
+
+
 def _value(text: bytes, fallback: float | None = None) -> float:
     """The binary64 of one token, by exact conversion; ``fallback`` for what is no number."""
     if _NAN_TEXT.fullmatch(text):

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import time
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from mcz.errors import SourceError
@@ -77,21 +75,3 @@ def test_exceptions_are_rare() -> None:
             n_tokens += motion.signals[0].values.size
     print(f"{n_exceptions} exceptions among {n_tokens} tokens")
     assert n_exceptions < 2e-4 * n_tokens
-
-
-@pytest.mark.parametrize(
-    "name", ["cmu/amc/14_02.amc", "cmu/bvh/01_03.bvh", "cmu/bvh-daz/13_31.bvh"]
-)
-def test_reading_and_writing_are_fast(name: str) -> None:
-    path = DATA / name
-    source_format, size = format_of(path), path.stat().st_size / 1e6
-    best = np.full(2, np.inf)
-    for _ in range(4):
-        begin = time.perf_counter()
-        motion = read(path)
-        middle = time.perf_counter()
-        source_format.write(motion)
-        best = np.minimum(best, [middle - begin, time.perf_counter() - middle])
-    reading, writing = size / best
-    print(f"{name}: read {reading:.0f} MB/s, write {writing:.0f} MB/s")
-    assert reading >= 20 and writing >= 10
