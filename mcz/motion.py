@@ -154,7 +154,7 @@ class Skeleton:
             addresses = self.addresses()
             if joint in addresses:
                 return addresses.index(joint)
-            if joint.lstrip("-").isdigit():
+            if joint.isascii() and joint.isdigit():
                 joint = int(joint)
         if isinstance(joint, int) and 0 <= joint < self.n_joints:
             return joint
@@ -242,12 +242,24 @@ class Signal:
             raise MotionError(
                 f"signal {self.name!r}: {len(self.values)} rows at {self.samples_per_frame} a frame"
             )
+        self._check_places()
         if self.ordinals is not None and self.ordinals.shape != self.values.shape:
             raise MotionError(f"signal {self.name!r}: ordinals do not match the values")
         if self.mask is not None and (
             self.mask.shape != self.values.shape or self.mask.dtype != np.bool_
         ):
             raise MotionError(f"signal {self.name!r}: mask does not match the values")
+
+    def _check_places(self) -> None:
+        """Exceptions and grid changes lie in the signal, exceptions in order."""
+        rows, channels = self.exceptions.rows, self.exceptions.channels
+        places = rows * max(1, self.n_channels) + channels
+        inside = (rows >= 0) & (rows < self.n_rows) & (channels >= 0) & (channels < self.n_channels)
+        if not inside.all() or (np.diff(places) <= 0).any():
+            raise MotionError(f"signal {self.name!r}: exceptions outside of it or out of order")
+        for row, channel, _ in self.grid_changes:
+            if not (row >= 0 and 0 <= channel < self.n_channels):
+                raise MotionError(f"signal {self.name!r}: grid change at {row}, {channel}")
 
     @property
     def n_rows(self) -> int:

@@ -132,11 +132,12 @@ def _export(
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
     start, stop = cut or (0, clip.n_frames)
+    numbers = clip.frame_numbers[start:stop]
     table = Table(
         names,
         np.asarray(values, dtype=np.float64),
         np.ones(values.shape, np.bool_) if mask is None else mask,
-        clip.frame_numbers[start:stop],
+        np.repeat(numbers, len(values) // max(1, len(numbers))),  # a number for every row
         clip.frame_rate,
     )
     return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mcz.errors import FormatError, LimitError, MczError
+from mcz.errors import FormatError, LimitError, MczError, MotionError
 from mcz.formats import bvh
 from mcz.formats.layout import (
     DETAIL,
@@ -144,6 +144,18 @@ def test_sizes_are_known_before_anything_is_allocated() -> None:
         Exceptions(np.array([3]), np.array([0]), (b"1",)),
         Exceptions(np.array([0]), np.array([2]), (b"1",)),
         Exceptions(np.array([0]), np.array([-1]), (b"1",)),
+        Exceptions(np.array([1, 0]), np.array([0, 0]), (b"1", b"1")),
+        Exceptions(np.array([1, 1]), np.array([0, 0]), (b"1", b"1")),
+    ],
+)
+def test_exceptions_out_of_place_are_refused(exceptions: Exceptions) -> None:
+    with pytest.raises(MotionError):
+        Signal(np.zeros((3, 2)), exceptions=exceptions)
+
+
+@pytest.mark.parametrize(
+    "exceptions",
+    [
         Exceptions(np.array([0]), np.array([0]), (b"x",)),
         Exceptions(np.array([0]), np.array([0]), (b"",)),
     ],
