@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -159,6 +160,7 @@ def make_groups(skeleton: Skeleton, signal: Signal, grouping: str) -> tuple[tupl
     if grouping == "all" and signal.n_channels:
         return (tuple(range(signal.n_channels)),)
     if grouping == "joint" and signal.channels is None:
-        columns = (tuple(skeleton.columns(j)) for j in range(skeleton.n_joints))
-        return tuple(group for group in columns if group)
+        ends = accumulate(len(joint.channels) for joint in skeleton.joints)
+        bounds = pairwise([0, *ends])
+        return tuple(tuple(range(start, stop)) for start, stop in bounds if start < stop)
     return tuple((channel,) for channel in range(signal.n_channels))

@@ -125,9 +125,10 @@ EXTENSION = GreedyBytes  # the end of an open structure: ignored by readers, kep
 FINITE = ExprValidator(Float64l, lambda obj, ctx: obj - obj == 0)
 
 
-def counted(item: Construct) -> Construct:
-    """A varint count, then that many items."""
-    return PrefixedArray(UVARINT, item)
+def counted(item: Construct, most: int = MAX_COUNT) -> Construct:
+    """A varint count of at most ``most``, then that many items."""
+    count = UVARINT if most == MAX_COUNT else ExprValidator(UVARINT, lambda n, ctx: n <= most)
+    return PrefixedArray(count, item)
 
 
 def parse(schema: Struct, data: bytes, where: str) -> Container:

@@ -96,7 +96,7 @@ def type_name(subcon: Any) -> str:
 def _counted(subcon: Any) -> str:
     """construct's PrefixedArray: a Rebuild of the count, then an Array."""
     count, items = (renamed.subcon for renamed in subcon.subcons)
-    word = "counted" if count.subcon is schema.UVARINT else "optional"
+    word = "optional" if count.subcon is payloads.AT_MOST_ONE else "counted"
     return f"{word} {type_name(items.subcon)}"
 
 

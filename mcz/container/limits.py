@@ -38,6 +38,11 @@ def check(what: str, value: int, limit: int) -> None:
         raise LimitError(f"{what}: {value} is over the limit of {limit}")
 
 
+def index_limit(file_bytes: int) -> int:
+    """The bytes that an index may inflate to: a row is hardly longer than what it lists."""
+    return max(64 * 1024, 2 * file_bytes)
+
+
 def output_limit(file_bytes: int) -> int:
     """The bytes that a reader decodes from one file unless its caller allows more."""
     return max(64 * MIB, 4096 * file_bytes)

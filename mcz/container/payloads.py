@@ -25,12 +25,12 @@ from mcz.schema import EXTENSION, FINITE, SIZED, TEXT, UVARINT, counted
 FORMAT_MAJOR, FORMAT_MINOR = 0, 1
 
 POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)
-_OPTIONAL = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)
+AT_MOST_ONE = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)
 
 
 def optional(item: Construct) -> Construct:
     """A count of 0 or 1, then that many items."""
-    return PrefixedArray(_OPTIONAL, item)
+    return PrefixedArray(AT_MOST_ONE, item)
 
 
 def flags(*names: str) -> ExprValidator:

@@ -26,7 +26,7 @@ from mcz.container.chunks import (
     read_payload,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, parse_index
-from mcz.container.limits import Profile, check, output_limit
+from mcz.container.limits import Profile, check, index_limit, output_limit
 from mcz.container.scan import parse_head, scan, signal_row
 from mcz.container.segments import SegmentHeader, StreamCounts, StreamTable, parse_table
 from mcz.container.source import ByteSource
@@ -99,7 +99,7 @@ class Container:
             raise FormatError(f"FOOT: an index of {foot.index_length} bytes")
         chunk = Chunk(b"INDX", 0, foot.index_offset, length)
         data = tail[start:stop] if start >= 0 else self._outside(foot, tail, -start)
-        return parse_index(check_chunk(data, chunk), self.max_decoded)
+        return parse_index(check_chunk(data, chunk), index_limit(self.source.size))
 
     def _outside(self, foot: Foot, tail: bytes, missing: int) -> bytes:
         """The INDX chunk, its first ``missing`` bytes read now, the others from ``tail``."""

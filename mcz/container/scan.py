@@ -26,7 +26,7 @@ from mcz.container.chunks import (
     resynchronize,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, SignalRow
-from mcz.container.limits import BASE, PROFILES, Profile, check, output_limit
+from mcz.container.limits import BASE, PROFILES, Profile, check, index_limit
 from mcz.container.packets import SEGMENT, read_packets
 from mcz.container.segments import FRESH, parse_header
 from mcz.container.source import ByteSource
@@ -322,7 +322,7 @@ class _Walker:
         self._outside(chunk)
         payload = self._payload(chunk)
         if self.strict:
-            limit = output_limit(self.source.size)
+            limit = index_limit(self.source.size)
             strict.check_index(payload, chunk, self.found.directory, limit)
         self.index = chunk
 

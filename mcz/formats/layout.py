@@ -20,6 +20,7 @@ from mcz.schema import SIZED, SVARINT, UVARINT, build, counted, parse
 
 FRAME_NUMBER = -1  # the column of the frame number
 MAX_PATTERNS = 1024
+MAX_GAPS = 2**20  # of a template, and of a detail
 MAX_WIDTH = 255
 MAX_ROW_GAPS = 2**20  # bytes of the gaps and the tail of one frame
 
@@ -39,15 +40,19 @@ PATTERN = Struct(
     "tail" / UVARINT * "number of the gap that ends the frame",
 )
 TEMPLATE = Struct(
-    "header" / counted(SIZED) * "text before the frames; the frame count stands between 2 parts",
-    "gaps" / counted(SIZED) * "gaps, numbered from 0",
-    "patterns" / counted(PATTERN) * "none, or the most common pattern, which is number 0",
+    "header" / counted(SIZED, 2) * "text before the frames; the frame count stands between 2 parts",
+    "gaps" / counted(SIZED, MAX_GAPS) * "gaps, numbered from 0",
+    "patterns"
+    / counted(PATTERN, MAX_PATTERNS)
+    * "none, or the most common pattern, which is number 0",
 )
 DETAIL = Struct(
     "count" / SIZED * "frame count as printed; empty: the number of rows in decimal",
     "rows" / UVARINT * "number of rows for which count holds; 0 where count is empty",
-    "gaps" / counted(SIZED) * "further gaps, numbered on from the template's",
-    "patterns" / counted(PATTERN) * "further patterns, numbered on from the template's",
+    "gaps" / counted(SIZED, MAX_GAPS) * "further gaps, numbered on from the template's",
+    "patterns"
+    / counted(PATTERN, MAX_PATTERNS)
+    * "further patterns, numbered on from the template's",
     "ends" / _BIT * "1: ending stands in place of the last row's tail; 0: the tail does",
     "ending" / SIZED * "what follows the last token; empty where ends is 0",
 )

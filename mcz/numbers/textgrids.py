@@ -107,9 +107,9 @@ def float_digits(kind: GridKind, digits: int, magnitudes: Ints) -> tuple[Ints, I
 
 def text32_values(magnitudes: Ints) -> Floats:
     """The binary64 nearest to the shortest text of a binary32, not that binary32 itself."""
-    words = magnitudes.astype(np.uint32).view(np.float32)
-    values = [float(str(value)) for value in words.ravel()]
-    return np.array(values, np.float64).reshape(magnitudes.shape)
+    words, places = np.unique(magnitudes.astype(np.uint32), return_inverse=True)
+    values = np.array([float(str(value)) for value in words.view(np.float32)], np.float64)
+    return values[places].reshape(magnitudes.shape)
 
 
 def _joined(values: NDArray[np.float64], negative: Bools, decimals: int) -> Texts:
