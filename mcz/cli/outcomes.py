@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 import click
@@ -10,7 +12,22 @@ import click
 from mcz.cli.common import Exit, plural, print_json, printable, say
 
 if TYPE_CHECKING:
-    from mcz.archive import Report
+    from mcz.archive import Outcome, Report
+
+
+def _table(report: Report) -> Iterator[str]:
+    """What became of the files of each kind, where there is more than one kind."""
+    kinds: dict[str, list[Outcome]] = {}
+    for outcome in report.outcomes:
+        kinds.setdefault(PurePosixPath(outcome.path).suffix.lower() or "-", []).append(outcome)
+    if len(kinds) < 2:
+        return
+    yield f"  {'kind':<8} {'files':>7} {'bytes':>15}  results"
+    for kind, outcomes in sorted(kinds.items()):
+        counts = Counter(outcome.result for outcome in outcomes)
+        results = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
+        size = sum(outcome.size for outcome in outcomes)
+        yield f"  {kind:<8} {len(outcomes):>7,} {size:>15,}  {results}"
 
 
 def conclude(report: Report, target: str, as_json: bool) -> Exit:
@@ -31,6 +48,8 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
                 + (f" ({shown})" if shown else "")
             )
         )
+        for line in _table(report):
+            click.echo(printable(line))
         for outcome in report.outcomes:
             if outcome.result == "skipped":
                 say(f"{outcome.path}: skipped: {outcome.message}")
