@@ -290,13 +290,19 @@ def named_files(file: File) -> Iterator[tuple[str, Any]]:
 
 
 def _alias_reader(file: File, name: str, of: int, target: bytes) -> Any:
+    """What restores an alias; it raises FormatError where its target is not there."""
     if of == payloads.OF_SKELETON:
         return lambda: file.skeleton_bytes(target)
-    table: Mapping[str, Any] = file.clips if of == payloads.OF_CLIP else file.attachments
-    found = table.get(target.decode("utf-8", "replace"))
-    if found is None:
-        raise FormatError(f"alias {name!r} names {target!r}, which is not there")
-    return found.source_bytes if of == payloads.OF_CLIP else found.read
+
+    def restore() -> bytes:
+        table: Mapping[str, Any] = file.clips if of == payloads.OF_CLIP else file.attachments
+        found = table.get(target.decode("utf-8", "replace"))
+        if found is None:
+            raise FormatError(f"alias {name!r} names {target!r}, which is not there")
+        data: bytes = found.source_bytes() if of == payloads.OF_CLIP else found.read()
+        return data
+
+    return restore
 
 
 def safe_path(name: str) -> PurePosixPath:

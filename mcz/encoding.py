@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,12 @@ from mcz.container import payloads
 from mcz.container.limits import check
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.skeletons import build_skeleton, channel_fields
+from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
 from mcz.errors import MotionError
 from mcz.formats import FORMATS
 from mcz.frames import KEY, frame_number_metadata
-from mcz.memory import MemorySource
+from mcz.memory import MemorySource, place
 from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.schema import MAX_COUNT
 
@@ -34,6 +36,8 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
     """Write SKEL, after the SRCE of its own file if it has one; return its id."""
     check("joints", skeleton.n_joints, writer.profile.joints)
     check("channels", skeleton.n_channels, writer.profile.channels)
+    if skeleton.base and (b"SKEL", skeleton.base) not in writer.directory.shared:
+        skeleton = replace(skeleton, base=None)  # it is in another file
     source = None
     if skeleton.source is not None:
         format_id = FORMATS[skeleton.source.format].id
@@ -58,6 +62,9 @@ def write_clip(
     Raises OptionError for a bad parameter, MotionError for values that the codec cannot hold.
     """
     options = codec.options(params)
+    motion = _with_source_hash(motion)
+    for signal in motion.signals:
+        check(f"signal {signal.name!r}: channels", signal.n_channels, writer.profile.channels)
     sources = [
         MemorySource(motion, index, codec, writer.profile.segment_bytes)
         for index in range(len(motion.signals))
@@ -77,6 +84,17 @@ def write_clip(
         hashes.append(_value_hash(source, codec, part, kept))
     sha256 = motion.source.sha256 if motion.source else b""
     writer.end_clip(motion.n_frames, sha256, hashes)
+
+
+def _with_source_hash(motion: Motion) -> Motion:
+    """The motion with size and hash of its source file, which was changed or cut since."""
+    source = motion.source
+    if source is None or source.sha256:
+        return motion
+    signals = tuple(place(signal)[1] for signal in motion.signals)  # as a reader will have them
+    data = FORMATS[source.format].write(replace(motion, signals=signals))
+    digest = hashlib.sha256(data).digest()
+    return replace(motion, source=replace(source, size=len(data), sha256=digest))
 
 
 def _clip_fields(
@@ -111,6 +129,8 @@ def _clip_fields(
 
 def _source_fields(writer: Writer, source: Source) -> dict[str, Any]:
     format_id = FORMATS[source.format].id
+    if source.path and not is_plain_path(source.path):
+        raise MotionError(f"source path {source.path!r} is not relative and plain")
     return {
         "template": writer.template(format_id, source.template),
         "format": format_id,

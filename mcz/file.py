@@ -165,8 +165,9 @@ def open(target: Any, salvage: bool = False, max_decoded: int | None = None) -> 
     """
     try:
         source = open_source(target)
-    except OSError as error:
-        raise OptionError(f"{target}: {error.strerror or error}") from None
+    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
+        text = getattr(error, "strerror", None) or error
+        raise OptionError(f"{target}: {text}") from None
     try:
         return File(Container(source, salvage=salvage, max_decoded=max_decoded))
     except MczError as error:

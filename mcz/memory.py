@@ -61,7 +61,7 @@ class MemorySource:
     def _block(self, start: int, stop: int) -> Block:
         """Ordinals of a block, exceptions repeating the row before, and its signal with strays."""
         if (start, stop) not in self._placed:
-            self._placed = {(start, stop): _place(self.signal.cut(start, stop))}
+            self._placed = {(start, stop): place(self.signal.cut(start, stop))}
         return self._placed[start, stop]
 
     def group_notes(self, start: int, stop: int) -> list[bytes]:
@@ -101,9 +101,11 @@ class MemorySource:
         return [b"" if block.all() else build_mask(block) for block in blocks]
 
 
-def _place(signal: Signal) -> Block:
+def place(signal: Signal) -> Block:
+    """The ordinals of a signal, and the signal with every value off its grid as an exception."""
     if signal.values.dtype == np.int64:
-        if signal.values.size and not (abs(signal.values) <= MAX_INTEGER).all():
+        inside = (signal.values >= -MAX_INTEGER) & (signal.values <= MAX_INTEGER)
+        if not inside.all():
             raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
         return signal.values, signal
     signal = replace(signal, exceptions=_holding(signal))

@@ -258,7 +258,8 @@ class Signal:
         if not inside.all() or (np.diff(places) <= 0).any():
             raise MotionError(f"signal {self.name!r}: exceptions outside of it or out of order")
         for row, channel, _ in self.grid_changes:
-            if not (row >= 0 and 0 <= channel < self.n_channels):
+            whole = row >= 0 and row % self.samples_per_frame == 0
+            if not (whole and 0 <= channel < self.n_channels):
                 raise MotionError(f"signal {self.name!r}: grid change at {row}, {channel}")
 
     @property
@@ -392,7 +393,8 @@ class Motion:
     def with_values(self, values: NDArray[np.float64]) -> Motion:
         """The same motion with other values of its motion signal, same shape."""
         signal = replace(self.signals[0], values=np.asarray(values, dtype=np.float64))
-        return replace(self, signals=(signal, *self.signals[1:]))
+        source = self.source and replace(self.source, size=0, sha256=b"")  # of no known file
+        return replace(self, signals=(signal, *self.signals[1:]), source=source)
 
 
 def joint_columns(skeleton: Skeleton, joints: Sequence[int | str]) -> list[int]:

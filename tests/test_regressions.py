@@ -166,3 +166,41 @@ def test_writing_onto_a_folder(tmp_path: Path) -> None:
 def test_names_with_colons(tmp_path: Path) -> None:
     mcz.write(smooth(3), tmp_path / "a::b.mcz")
     assert mcz.read(tmp_path / "a::b.mcz").n_frames == 3
+
+
+def test_ramps_are_coded() -> None:
+    values = np.round(np.arange(200)[:, None] * np.linspace(-2, 2, 10), 4)
+    with mcz.open(written(smooth(200).with_values(values))) as file:
+        np.testing.assert_array_equal(file.clips["smooth"].read(), values)
+
+
+def test_changed_and_cut_motions_have_sources_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "a.bvh"
+    path.write_text(BVH)
+    motion = mcz.read(path)
+    for changed in (motion.with_values(motion.values + 1), None):
+        if changed is None:
+            with mcz.open(written(motion)) as file:
+                changed = file.clips["a"].motion((1, 3))
+        data = written(changed)
+        assert mcz.verify(data) == []
+
+
+def test_a_base_in_another_file_is_forgotten() -> None:
+    motion = smooth(3)
+    bones = replace(motion.skeleton, base=b"a" * 16)
+    assert mcz.verify(written(replace(motion, skeleton=bones))) == []
+
+
+def test_least_int64_is_refused() -> None:
+    bones = mcz.Skeleton((mcz.Joint("m", channels=(mcz.Channel("", "n"),)),))
+    signal = Signal(np.array([[-(2**63)]], np.int64))
+    with pytest.raises(mcz.MotionError, match="beyond"):
+        written(mcz.Motion(bones, (signal,)))
+
+
+def test_unsafe_source_paths_are_not_written(tmp_path: Path) -> None:
+    path = tmp_path / "back\\slash.bvh"
+    path.write_text(BVH)
+    with pytest.raises(mcz.MotionError, match="plain"):
+        mcz.encode(path, tmp_path / "a.mcz")

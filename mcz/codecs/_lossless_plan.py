@@ -123,7 +123,7 @@ def _fitted(differences: Floats, lagged: Floats) -> list[tuple[int, tuple[int, .
     for _ in range(_ROUNDS):
         weighted = known * weights[:, None]
         normal = weighted.T @ known + 1e-9 * np.eye(_FITTED)
-        solution = np.linalg.solve(normal, weighted.T @ wanted)
+        solution = np.linalg.lstsq(normal, weighted.T @ wanted, rcond=None)[0]
         errors = np.abs(wanted - known @ solution)
         weights = 1 / (errors + 0.5 * _middle(errors) + 1e-6)
     taps = np.clip(np.rint(solution * TAP_UNIT), -MAX_TAP, MAX_TAP).astype(int)

@@ -212,7 +212,7 @@ def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
     def parse(text: Any) -> int:
         try:
             value = int(text)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise OptionError(f"{name} is {text!r}, not an integer") from None
         if not low <= value <= high:
             raise OptionError(f"{name} is {value}, not from {low} to {high}")
