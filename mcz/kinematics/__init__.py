@@ -1,0 +1,33 @@
+"""Forward kinematics: where the points of a skeleton lie, and what moves them.
+
+SPEC.md, "Kinematics", has the conventions and the point sets. Distances are in the length unit of
+the skeleton. Everything is vectorized over frames and works in blocks of them.
+"""
+
+from __future__ import annotations
+
+from mcz.kinematics.points import (
+    MARKER_DISTANCE_CM,
+    depths,
+    point_names,
+    point_set,
+    points_and_markers_of,
+    positions,
+    positions_of,
+    reach,
+    virtual_markers_of,
+)
+from mcz.kinematics.sensitivity import sensitivities
+
+__all__ = [
+    "MARKER_DISTANCE_CM",
+    "depths",
+    "point_names",
+    "point_set",
+    "points_and_markers_of",
+    "positions",
+    "positions_of",
+    "reach",
+    "sensitivities",
+    "virtual_markers_of",
+]

@@ -1,0 +1,281 @@
+"""The chain of joints: channel values -> origin and local axes of every joint.
+
+SPEC.md, "Kinematics", is normative. For each joint B = W C, whose columns are the joint's local
+axes in the world (W: its rotation in the world, C: the matrix of its ``axis``), is all that is
+kept: from parent to child it takes one constant matrix, C_parent^-1 C, and then one mixing of two
+columns a rotation channel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError
+from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Joint, Skeleton
+
+Floats = NDArray[np.float64]
+
+QUATERNION_KINDS = ("qw", "qx", "qy", "qz")
+SCALE_KINDS = ("sx", "sy", "sz")
+BLOCK_JOINTS = 2**15  # joints x frames at a time: their origins and axes take 3 MB
+LEAST_FRAMES = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A joint as the chain needs it; vectors are along its own local axes unless noted.
+
+    ``change``: C_parent^-1 C, shape (3, 3, 1), None where that is the identity. ``offset``: from
+    the parent's origin, (3,), along the parent's W. ``parent_back``: C_parent^-1, or None.
+    ``moves`` and ``scales``: (component, column); ``turns``: (axis, column) in the order of
+    multiplication from the right; axis 3 is a quaternion, whose column is that of ``quaternion``.
+    ``direction``: of the first tail, None where it has no length.
+    """
+
+    parent: int
+    change: Floats | None
+    offset: Floats
+    parent_back: Floats | None
+    replaces: bool
+    tails: tuple[Floats, ...]
+    direction: Floats | None
+    moves: tuple[tuple[int, int], ...]
+    turns: tuple[tuple[int, int], ...]
+    quaternion: tuple[int, ...]
+    scales: tuple[tuple[int, int], ...]
+    lengths: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Some frames, F of them, resolved to joint transforms.
+
+    Of each joint ``origins`` has its place, (3, F) or (3, 1) where that is constant; ``axes`` its
+    local axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin
+    along the parent's local axes before the parent's scale, (3, F) or (3, 1); ``spins`` what each
+    of its ``turns`` turns about in the world, (3, F) or (3, 1), four for a quaternion.
+    """
+
+    origins: list[Floats]
+    axes: list[Floats]
+    arms: list[Floats]
+    spins: list[list[Floats]]
+
+
+class Chain:
+    """The kinematics of a skeleton, prepared once for all frames.
+
+    Raises MotionError where the skeleton has rotations and its angle unit is unknown, and where
+    it has channels, but none that places a joint.
+    """
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+        channels = skeleton.channels
+        turning = any(c.kind in ROTATION_KINDS for c in channels)
+        if not skeleton.angle_unit and (turning or any(any(j.axis) for j in skeleton.joints)):
+            raise MotionError(
+                f"skeleton {skeleton.name!r}: its angle unit is unknown, so its rotations are, too"
+            )
+        if channels and not any(channel.kind for channel in channels):
+            raise MotionError(
+                f"skeleton {skeleton.name!r}: all of its {len(channels)} channels are plain "
+                "scalars, which place no joint"
+            )
+        self.radians = np.pi / 180 if skeleton.angle_unit == "deg" else 1.0
+        self.turned = [orientation(joint, self.radians) for joint in skeleton.joints]
+        starts = np.cumsum([0, *(len(joint.channels) for joint in skeleton.joints)]).tolist()
+        self.links = [
+            self._link(joint, matrix, start)
+            for joint, matrix, start in zip(skeleton.joints, self.turned, starts, strict=False)
+        ]
+
+    def _link(self, joint: Joint, matrix: Floats | None, start: int) -> Link:
+        above = self.turned[joint.parent] if joint.parent >= 0 else None
+        if above is None:
+            change = matrix
+        else:
+            change = above.T if matrix is None else above.T @ matrix
+        kinds = [channel.kind for channel in joint.channels]
+        first = {kind: start + kinds.index(kind) for kind in kinds}
+        quaternion = tuple(first[kind] for kind in QUATERNION_KINDS if kind in first)
+        quaternion = quaternion if len(quaternion) == 4 else ()
+        turns = [
+            (ROTATION_KINDS.index(kind), start + k)
+            if kind in ROTATION_KINDS
+            else (3, min(quaternion))
+            for k, kind in enumerate(kinds)
+            if kind in ROTATION_KINDS or (quaternion and start + k == min(quaternion))
+        ]
+        back = None if matrix is None else matrix.T
+        tails = tuple(_back(back, np.array(tail)) for tail in joint.tails)
+        length = float(np.sqrt(tails[0] @ tails[0])) if tails else 0.0
+        return Link(
+            parent=joint.parent,
+            change=None if change is None else np.ascontiguousarray(change)[:, :, None],
+            offset=np.array(joint.offset),
+            parent_back=None if above is None else above.T,
+            replaces=not joint.adds_to_offset,
+            tails=tails,
+            direction=tails[0] / length if length else None,
+            moves=_components(kinds, POSITION_KINDS, start),
+            turns=tuple(turns if self.skeleton.intrinsic else reversed(turns)),
+            quaternion=quaternion,
+            scales=tuple((k, first[s]) for k, s in enumerate(SCALE_KINDS) if s in first),
+            lengths=tuple(start + k for k, kind in enumerate(kinds) if kind == "length"),
+        )
+
+    def poses(self, values: Floats) -> Iterator[tuple[slice, Floats, Pose]]:
+        """Blocks of frames: their rows, their values (n_channels, F), and their pose."""
+        if values.ndim != 2 or values.shape[1] != self.skeleton.n_channels:
+            raise MotionError(
+                f"values of shape {values.shape} for {self.skeleton.n_channels} channels"
+            )
+        step = max(LEAST_FRAMES, BLOCK_JOINTS // max(1, len(self.links)))
+        for start in range(0, len(values), step):
+            rows = slice(start, min(start + step, len(values)))
+            columns = np.array(values[rows].T, dtype=np.float64, order="C")
+            with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+                yield rows, columns, self.pose(columns)
+
+    def pose(self, columns: Floats) -> Pose:
+        """The pose of frames whose values are ``columns``, shape (n_channels, F)."""
+        pose = Pose([], [], [], [])
+        for link in self.links:
+            arm = self._arm(link, columns)
+            pose.arms.append(arm)
+            if link.parent < 0:
+                pose.origins.append(arm)
+                axes = IDENTITY if link.change is None else link.change
+            else:
+                above = pose.axes[link.parent]
+                arm = self.scaled(self.links[link.parent], arm, columns)
+                pose.origins.append(pose.origins[link.parent] + along(above, arm))
+                axes = above if link.change is None else times(above, link.change)
+            spins: list[Floats] = []
+            for axis, column in link.turns:
+                if axis == 3:
+                    axes = self._quaternion(axes, columns[list(link.quaternion)], spins)
+                else:
+                    spins.append(axes[:, axis])
+                    axes = turned(axes, axis, columns[column] * self.radians)
+            pose.axes.append(axes)
+            pose.spins.append(spins)
+        return pose
+
+    def _arm(self, link: Link, columns: Floats) -> Floats:
+        """From the parent's origin to the joint's own, lengthened by the parent, not yet scaled."""
+        arm = link.offset[:, None]
+        if link.moves:
+            arm = np.repeat(arm, columns.shape[1], axis=1)
+            if link.replaces:
+                arm[[component for component, _ in link.moves]] = 0.0
+            for component, column in link.moves:
+                arm[component] += columns[column]
+        if link.parent_back is not None:
+            arm = times(link.parent_back[:, :, None], arm[:, None])[:, 0]
+        if link.parent >= 0:
+            arm = self.lengthened(self.links[link.parent], arm, columns)
+        return arm
+
+    def lengthened(self, link: Link, vector: Floats, columns: Floats) -> Floats:
+        """``vector`` from the joint's origin, lengthened by the joint's own length channels."""
+        if not link.lengths or link.direction is None:
+            return vector
+        longer: Floats = link.direction[:, None] * columns[list(link.lengths)].sum(axis=0)
+        return vector + longer
+
+    def scaled(self, link: Link, vector: Floats, columns: Floats) -> Floats:
+        """``vector`` along the joint's local axes, scaled by the joint's own scale channels."""
+        if not link.scales:
+            return vector
+        scales = np.ones((3, columns.shape[1]))
+        for component, column in link.scales:
+            scales[component] = columns[column]
+        scaled: Floats = vector * scales
+        return scaled
+
+    def tail(self, joint: int, k: int, columns: Floats, pose: Pose) -> Floats:
+        """The place of a tail of ``joint`` in the world, (3, F) or (3, 1)."""
+        link = self.links[joint]
+        vector = self.lengthened(link, link.tails[k][:, None], columns)
+        return pose.origins[joint] + along(pose.axes[joint], self.scaled(link, vector, columns))
+
+    @staticmethod
+    def _quaternion(axes: Floats, parts: Floats, spins: list[Floats]) -> Floats:
+        """``axes`` turned by quaternions, (4, F), of any length but 0.
+
+        Adds what a change of each part turns about, in the world, to ``spins``.
+        """
+        square = (parts * parts).sum(axis=0)
+        w, x, y, z = parts
+        # 2 Im(e conj(q)) / |q|^2 is the rotation vector of a change of q along e, before q.
+        two = 2.0 / square
+        changes = ((-x, -y, -z), (w, z, -y), (-z, w, x), (y, -x, w))
+        spins += [along(axes, np.stack(vector) * two) for vector in changes]
+        matrix = np.stack(
+            [
+                np.stack([1 - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y)]),
+                np.stack([two * (x * y + w * z), 1 - two * (x * x + z * z), two * (y * z - w * x)]),
+                np.stack([two * (x * z - w * y), two * (y * z + w * x), 1 - two * (x * x + y * y)]),
+            ]
+        )
+        return times(axes, matrix)
+
+
+IDENTITY: Floats = np.eye(3)[:, :, None]
+
+
+def _components(
+    kinds: list[str], names: tuple[str, ...], start: int
+) -> tuple[tuple[int, int], ...]:
+    return tuple((names.index(kind), start + k) for k, kind in enumerate(kinds) if kind in names)
+
+
+def _back(back: Floats | None, vector: Floats) -> Floats:
+    """``vector`` along the local axes, (3,)."""
+    return vector if back is None else back @ vector
+
+
+def orientation(joint: Joint, radians: float) -> Floats | None:
+    """C, the matrix of the joint's ``axis``, shape (3, 3); None for the identity."""
+    if not any(joint.axis):
+        return None
+    matrix = IDENTITY
+    for letter in reversed(joint.axis_order):  # about fixed axes: the last is outermost
+        k = "XYZ".index(letter)
+        matrix = turned(matrix, k, np.array([joint.axis[k] * radians]))
+    return matrix[:, :, 0]
+
+
+def turned(axes: Floats, axis: int, angle: Floats) -> Floats:
+    """``axes`` R, R the rotation by ``angle`` in radians, (F,), about axis 0, 1 or 2."""
+    j, k = (axis + 1) % 3, (axis + 2) % 3
+    cosine, sine = np.cos(angle), np.sin(angle)
+    result = np.empty((3, 3, max(axes.shape[2], len(angle))))
+    result[:, axis] = axes[:, axis]
+    np.multiply(axes[:, j], cosine, out=result[:, j])
+    result[:, j] += axes[:, k] * sine
+    np.multiply(axes[:, k], cosine, out=result[:, k])
+    result[:, k] -= axes[:, j] * sine
+    return result
+
+
+def times(left: Floats, right: Floats) -> Floats:
+    """The products of matrices, (3, 3, F or 1) by (3, n, F or 1)."""
+    result: Floats = (
+        left[:, 0, None] * right[None, 0]
+        + left[:, 1, None] * right[None, 1]
+        + left[:, 2, None] * right[None, 2]
+    )
+    return result
+
+
+def along(axes: Floats, vector: Floats) -> Floats:
+    """The vector whose components along ``axes``, (3, 3, F), are ``vector``, (3, F or 1)."""
+    result: Floats = axes[:, 0] * vector[0] + axes[:, 1] * vector[1] + axes[:, 2] * vector[2]
+    return result

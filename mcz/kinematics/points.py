@@ -1,0 +1,170 @@
+"""Points: which ones a skeleton has, their names, and their places over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mcz.errors import MotionError, OptionError
+from mcz.kinematics.chain import Chain, Floats, Pose
+from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton
+
+MARKER_DISTANCE_CM = 3.0  # of a virtual marker from its joint's point
+
+
+def positions(motion: Motion) -> Floats:
+    """Where the points of ``motion`` are, float64 (n_frames, n_points, 3), in length units.
+
+    ``point_names`` says which points these are. A point that depends on an invalid value is NaN.
+    Raises MotionError where the skeleton has no kinematics: its angle unit is unknown, or all of
+    its channels are plain scalars.
+    """
+    if motion.signals[0].channels is not None:
+        raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
+    return positions_of(motion.skeleton, np.asarray(motion.values, np.float64))
+
+
+def positions_of(skeleton: Skeleton, values: Floats) -> Floats:
+    """As ``positions``, from values (n_frames, n_channels) in source units."""
+    return _Places(skeleton, values, points=True).points
+
+
+def virtual_markers_of(skeleton: Skeleton, values: Floats) -> Floats:
+    """Three markers a joint, 3 cm off its point along its local axes x, y and z.
+
+    float64 (n_frames, 3 n_joints, 3) in length units. A joint's point is the first of its points.
+    Raises OptionError where the length unit is unknown, otherwise as ``positions``.
+    """
+    return _Places(skeleton, values, markers=True).markers
+
+
+def points_and_markers_of(skeleton: Skeleton, values: Floats) -> tuple[Floats, Floats]:
+    """``positions_of`` and ``virtual_markers_of`` from one pass over the joints."""
+    places = _Places(skeleton, values, points=True, markers=True)
+    return places.points, places.markers
+
+
+class _Places:
+    """Points (n_frames, n_points, 3) and virtual markers (n_frames, 3 n_joints, 3), as wanted."""
+
+    def __init__(
+        self, skeleton: Skeleton, values: Floats, *, points: bool = False, markers: bool = False
+    ) -> None:
+        self._list = list(_points(skeleton))
+        self._distance = _marker_distance(skeleton) if markers else 0.0
+        self._firsts = dict(reversed(self._list)) if markers else {}  # earlier points replace later
+        self.points = np.empty((len(values), len(self._list) if points else 0, 3))
+        self.markers = np.empty((len(values), 3 * len(self._firsts), 3))
+        chain = Chain(skeleton)
+        for rows, columns, pose in chain.poses(values):
+            self._place(chain, rows, columns, pose)
+
+    def _place(self, chain: Chain, rows: slice, columns: Floats, pose: Pose) -> None:
+        points, markers = self.points[rows], self.markers[rows]
+        by_joint = markers.reshape(len(markers), len(self._firsts), 3, 3)
+        for number, (joint, tail) in enumerate(self._list):
+            first = self._firsts.get(joint) == tail
+            if not (first or points.shape[1]):
+                continue
+            point = place(chain, joint, tail, columns, pose)
+            if points.shape[1]:
+                points[:, number] = point.T
+            if first:
+                by_joint[:, joint] = (point[:, None] + self._distance * pose.axes[joint]).T
+        _forget(points)
+        _forget(markers)
+
+
+def _marker_distance(skeleton: Skeleton) -> float:
+    if skeleton.unit_cm is None:
+        raise OptionError(
+            f"skeleton {skeleton.name!r}: its length unit is unknown, and virtual markers lie 3 cm "
+            "off its joints; give the unit"
+        )
+    return MARKER_DISTANCE_CM / skeleton.unit_cm
+
+
+def _forget(points: Floats) -> None:
+    """Make points NaN of which not every coordinate, in the last axis, is finite."""
+    points[~np.isfinite(points).all(axis=-1)] = np.nan
+
+
+def place(chain: Chain, joint: int, tail: int, columns: Floats, pose: Pose) -> Floats:
+    """Where a point is, (3, F) or (3, 1); ``tail`` -1 is the joint's origin."""
+    return pose.origins[joint] if tail < 0 else chain.tail(joint, tail, columns, pose)
+
+
+def point_set(skeleton: Skeleton) -> str:
+    """Which points count, by the id of SPEC.md's registry: "acclaim", "bvh" or "markers"."""
+    if skeleton.joints and all(map(is_marker, skeleton.joints)):
+        return "markers"
+    return "bvh" if skeleton.intrinsic else "acclaim"
+
+
+def is_marker(joint: Joint) -> bool:
+    """Whether a joint is a marker: parentless, without tails, with tx, ty and tz alone."""
+    kinds = sorted(channel.kind for channel in joint.channels)
+    return joint.parent < 0 and not joint.tails and kinds == list(POSITION_KINDS)
+
+
+def point_names(skeleton: Skeleton) -> tuple[str, ...]:
+    """The name of every point: that of its joint, with " end" where it is a tail of a BVH joint.
+
+    From the second tail of a joint on a number follows. A name that repeats has ``#n``.
+    """
+    names = []
+    addresses = skeleton.addresses()
+    for joint, tail in _points(skeleton):
+        name = addresses[joint]
+        if tail >= 0 and (skeleton.intrinsic or tail):
+            name += " end" if tail == 0 else f" end {tail + 1}"
+        names.append(name)
+    return tuple(names)
+
+
+def _points(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
+    """The points in order, each as its joint and the number of its tail, -1 for the origin."""
+    for index, joint in enumerate(skeleton.joints):
+        if skeleton.intrinsic or not joint.tails:
+            yield index, -1
+        for tail in range(len(joint.tails)):
+            yield index, tail
+
+
+def points_of(skeleton: Skeleton) -> list[list[int]]:
+    """The points of every joint, as numbers of its tails, -1 for its origin."""
+    result: list[list[int]] = [[] for _ in skeleton.joints]
+    for joint, tail in _points(skeleton):
+        result[joint].append(tail)
+    return result
+
+
+def depths(skeleton: Skeleton) -> Floats:
+    """How deep each joint is, 0 for roots to 1 for the deepest of all joints, (n_joints,).
+
+    All 0 where no joint has a parent. Joints without channels count as well.
+    """
+    steps = np.zeros(skeleton.n_joints)
+    for index, joint in enumerate(skeleton.joints):
+        if joint.parent >= 0:
+            steps[index] = steps[joint.parent] + 1
+    steps /= max(1.0, steps.max(initial=0.0))
+    return steps
+
+
+def reach(skeleton: Skeleton) -> float:
+    """The size of a skeleton: greatest distance of a point from its root in the rest pose.
+
+    In length units; 0.0 where there is no point but roots.
+    """
+    origins: list[Floats] = []
+    greatest = 0.0
+    for joint in skeleton.joints:
+        origin = np.zeros(3)
+        if joint.parent >= 0:
+            origin = origins[joint.parent] + np.array(joint.offset)
+        origins.append(origin)
+        for end in (origin, *(origin + np.array(tail) for tail in joint.tails)):
+            greatest = max(greatest, float(np.sqrt(end @ end)))
+    return greatest
