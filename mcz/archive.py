@@ -2,35 +2,36 @@
 
 from __future__ import annotations
 
-import builtins
 import hashlib
-import io
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from copy import copy
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Any, BinaryIO
+from typing import Any
 
+from mcz.appending import growing
 from mcz.codecs import DEFAULT
 from mcz.container import payloads
-from mcz.container.directory import Directory
 from mcz.container.reader import Container
-from mcz.container.source import ByteSource
 from mcz.container.strict import check_path
-from mcz.container.writer import Writer
 from mcz.encoding import Progress
-from mcz.errors import FormatError, MczError, OptionError, SourceError, TruncatedError
+from mcz.errors import AccessError, ExistsError, FormatError, MczError, OptionError, SourceError
 from mcz.file import File, open, profile_of
 from mcz.formats import FORMATS
-from mcz.sources import Entry, read_bytes
+from mcz.sources import Digest, Draft, Entry, check_name, read_bytes
 from mcz.targets import replacing
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of one file: "parsed", "skeleton", "alias", "verbatim", "skipped", "failed"."""
+    """What became of one file, and why where that is not plain.
+
+    ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
+    "present" (the target has it already), "restored", "skipped", "exists" (it may not be replaced)
+    or "failed"; of a file that was cut short also "salvaged" or "dropped".
+    """
 
     path: str
     result: str
@@ -46,7 +47,8 @@ class Report:
 
     @property
     def failures(self) -> list[Outcome]:
-        return [outcome for outcome in self.outcomes if outcome.result == "failed"]
+        """The files that failed, those among them that exist and may not be replaced."""
+        return [outcome for outcome in self.outcomes if outcome.result in ("failed", "exists")]
 
     def count(self, result: str) -> int:
         return sum(outcome.result == result for outcome in self.outcomes)
@@ -74,7 +76,7 @@ def pack(
     root = Path(directory)
     if not root.is_dir():
         raise OptionError(f"{root}: not a folder")
-    paths, links = _files_below(root, target)
+    paths, others = _files_below(root, target)
     known = {suffix for source_format in FORMATS.values() for suffix in source_format.suffixes}
     if not keep_all:
         paths = [path for path in paths if path.suffix.lower() in known]
@@ -88,24 +90,45 @@ def pack(
             unit=unit,
             verbatim=verbatim or keep_all,
         )
-        for path in sorted(paths, key=lambda path: path.relative_to(root).as_posix())
+        for path in paths
     ]
     with replacing(target, force=force) as stream:
-        buffer = _Buffer(stream)
-        writer = Writer(buffer, profile=profile_of(archive))
-        report = _write_entries(writer, buffer, entries, progress)
-        writer.finish()
-        buffer.commit()
-    text = "a symbolic link; only files are packed"
-    report.outcomes += [Outcome(p.relative_to(root).as_posix(), "skipped", 0, text) for p in links]
+        draft = Draft(stream, profile_of(archive))
+        report = _write_entries(draft, entries, progress)
+        draft.finish()
+    report.outcomes += others
     return report
 
 
-def _files_below(root: Path, target: Any) -> tuple[list[Path], list[Path]]:
-    """The files below ``root`` but for ``target`` itself, and the symbolic links to files."""
+def _files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
+    """The files below ``root`` but for ``target`` itself, and what else there is, in order."""
     own = Path(target).resolve() if isinstance(target, (str, os.PathLike)) else None
-    files = [path for path in root.rglob("*") if path.is_file() and path.resolve() != own]
-    return [p for p in files if not p.is_symlink()], sorted(p for p in files if p.is_symlink())
+    files: list[Path] = []
+    others: list[Outcome] = []
+
+    def say(path: Path, result: str, text: str) -> None:
+        others.append(Outcome(path.relative_to(root).as_posix(), result, 0, text))
+
+    def unreadable(error: OSError) -> None:
+        if Path(error.filename) == root:
+            raise AccessError(f"{root}: {error.strerror or error}") from None
+        say(Path(error.filename), "failed", f"{error.filename}: {error.strerror or error}")
+
+    for folder, folders, names in os.walk(root, onerror=unreadable):
+        for path in (Path(folder, name) for name in (*folders, *names)):
+            if path.is_symlink():
+                say(path, "skipped", "a symbolic link; only files are packed")
+            elif path.is_file():
+                if path.resolve() != own:
+                    files.append(path)
+            elif not path.is_dir():
+                say(path, "skipped", "neither a file nor a folder")
+
+    def key(name: str) -> bytes:
+        return os.fsencode(name)
+
+    files.sort(key=lambda path: key(path.relative_to(root).as_posix()))
+    return files, sorted(others, key=lambda outcome: key(outcome.path))
 
 
 def append(
@@ -118,120 +141,99 @@ def append(
     rate: float | None = None,
     unit: str | None = None,
     verbatim: bool = False,
+    root: str | os.PathLike[str] | None = None,
+    salvage: bool = False,
+    force: bool = False,
     progress: Progress | None = None,
 ) -> Report:
     """Add files after the last valid FOOT of an MCZ file; what it held stays readable throughout.
 
-    A file whose writing was cut short is taken up from its last valid FOOT. When a source cannot
-    be added, nothing is.
+    Each is stored under its path relative to ``root``, or without one under its name alone. A file
+    that the target restores already under the same path is left out as "present"; another one
+    under a path that is taken is refused. When a source cannot be added, nothing is.
+
+    A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
+    lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
+    them. Where its end is damaged, one of the two has to be given. Raises AccessError while another
+    process is appending.
     """
     entries = [
-        Entry(Path(s), Path(s).name, codec, params, skeleton, rate, unit, verbatim) for s in sources
+        Entry(Path(s), _name_below(s, root), codec, params, skeleton, rate, unit, verbatim)
+        for s in sources
     ]
-    with _appending(Path(target)) as (stream, container):
-        directory = container.directory
-        buffer = _Buffer(stream)
-        writer = Writer(
-            buffer, profile=container.profile, directory=directory, offset=directory.end
+    with growing(Path(target), salvage=salvage, force=force) as growth:
+        container = growth.container
+        draft = Draft(
+            growth.added, container.profile, container.directory, _stored_paths(container)
         )
-        report = _write_entries(writer, buffer, entries, progress)
+        report = _write_entries(draft, entries, progress)
         if report.failures:
             raise SourceError("; ".join(o.message for o in report.failures))
-        writer.finish()
-        buffer.commit()
+        if growth.tail.kept or any(outcome.result != "present" for outcome in report.outcomes):
+            draft.finish()
+    tail = growth.tail
+    text = "it lay whole behind the last FOOT of a file whose writing was cut short"
+    result = "salvaged" if tail.kept else "dropped"
+    report.outcomes += [Outcome(name, result, 0, text) for name in tail.names]
     return report
 
 
-@contextmanager
-def _appending(path: Path) -> Iterator[tuple[BinaryIO, Container]]:
-    """What the block writes lands behind the last valid FOOT, in place of what was cut short there.
-
-    If the block fails, the file is not touched.
-    """
+def _name_below(path: str | os.PathLike[str], root: str | os.PathLike[str] | None) -> str:
+    if root is None:
+        return Path(path).name
     try:
-        stream = builtins.open(path, "r+b")  # noqa: SIM115 - closed by the with below
-    except OSError as error:
-        raise OptionError(f"{path}: {error.strerror or error}") from None
-    with stream:
-        container = _up_to_last_foot(stream, str(path))
-        end = container.directory.end
-        added = io.BytesIO()
-        yield added, container
-        try:
-            stream.seek(end)
-            stream.write(added.getvalue())
-            stream.truncate()
-            stream.flush()
-            os.fsync(stream.fileno())
-        except BaseException:
-            stream.truncate(end)
-            raise
+        return Path(path).resolve().relative_to(Path(root).resolve()).as_posix()
+    except ValueError:
+        raise OptionError(f"{path} does not lie below {root}") from None
 
 
-def _up_to_last_foot(stream: BinaryIO, name: str) -> Container:
-    try:
-        return Container(ByteSource(stream, name=name))
-    except TruncatedError as error:
-        if error.last_foot is None:
-            raise
-        return Container(ByteSource(stream, name=name, size=error.last_foot))
+def _stored_paths(container: Container) -> dict[str, Digest]:
+    """What the file restores under each path: the SHA-256, or what finds it."""
+    file = File(container)
+    paths: dict[str, Digest] = {}
+    for clip in file.clips.values():
+        with suppress(FormatError):  # what is damaged cannot be restored
+            if clip.source is not None and clip.source.path:
+                paths.setdefault(clip.source.path, clip.source.sha256)
+    for name, restore in named_files(file, clips=False):
+        paths.setdefault(name, partial(_digest_of, restore))
+    return paths
 
 
-class _Buffer:
-    """Holds what an entry writes until it is whole, so that a failed one leaves no trace."""
-
-    def __init__(self, sink: BinaryIO) -> None:
-        self._sink, self._pending = sink, io.BytesIO()
-
-    def write(self, data: bytes, /) -> int:
-        return self._pending.write(data)
-
-    def commit(self) -> None:
-        self._sink.write(self._pending.getvalue())
-        self._pending = io.BytesIO()
-
-    def discard(self) -> None:
-        self._pending = io.BytesIO()
+def _digest_of(restore: Callable[[], bytes]) -> bytes:
+    return hashlib.sha256(restore()).digest()
 
 
-def _write_entries(
-    writer: Writer, buffer: _Buffer, entries: Sequence[Entry], progress: Progress | None
-) -> Report:
+def _write_entries(draft: Draft, entries: Sequence[Entry], progress: Progress | None) -> Report:
     report = Report()
     seen: dict[bytes, tuple[int, bytes]] = {}
-    buffer.commit()
     for done, entry in enumerate(entries):
-        before, offset = _snapshot(writer.directory), writer.offset
-        size = entry.path.stat().st_size if entry.path.exists() else 0
+        size = 0
+        with suppress(OSError, ValueError):
+            size = entry.path.stat().st_size
         try:
-            result = _write_entry(writer, entry, seen)
-            report.outcomes.append(Outcome(entry.name, result, size))
-            buffer.commit()
+            result = _write_entry(draft, entry, seen)
+            report.outcomes.append(Outcome(entry.name, result, size, entry.reason))
         except MczError as error:
-            buffer.discard()
-            writer.rewind(before, offset)
             report.outcomes.append(Outcome(entry.name, "failed", size, str(error)))
         if progress is not None:
             progress(done + 1, len(entries), entry.name)
     return report
 
 
-def _snapshot(directory: Directory) -> Directory:
-    kept = copy(directory)
-    for name in ("shared", "attachments", "aliases", "clips"):
-        setattr(kept, name, dict(getattr(directory, name)))
-    return kept
-
-
-def _write_entry(writer: Writer, entry: Entry, seen: dict[bytes, tuple[int, bytes]]) -> str:
+def _write_entry(draft: Draft, entry: Entry, seen: dict[bytes, tuple[int, bytes]]) -> str:
     """Write one file, or only its name where the same bytes are there already."""
     digest = hashlib.sha256(read_bytes(entry.path)).digest()
     is_amc = entry.path.suffix.lower() == ".amc"  # its values hang on the ASF beside it
-    if digest in seen and not is_amc:
-        writer.alias(entry.name, *seen[digest])
+    writer = draft.writer
+    if digest in seen and not is_amc and not draft.holds(entry.name, digest):
+        check_name(entry.name)
+        with draft.step():
+            writer.alias(entry.name, *seen[digest])
+        draft.paths[entry.name] = digest
         return "alias"
     clips, attachments = len(writer.directory.clips), len(writer.directory.attachments)
-    result = entry.write(writer)
+    result = entry.write(draft)
     if len(writer.directory.clips) > clips:
         name = next(reversed(writer.directory.clips))
         seen[digest] = (payloads.OF_CLIP, name.encode())
@@ -245,6 +247,7 @@ def unpack(
     directory: str | os.PathLike[str],
     *,
     force: bool = False,
+    max_decoded: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Write every source file and attachment of an MCZ file below ``directory``.
@@ -253,7 +256,7 @@ def unpack(
     a source are reported as skipped.
     """
     root, report = Path(directory), Report()
-    with open(target) as file:
+    with open(target, max_decoded=max_decoded) as file:
         jobs = list(named_files(file))
         written: set[Path] = set()
         for done, (name, restore) in enumerate(jobs):
@@ -268,7 +271,8 @@ def unpack(
                     stream.write(data)
                 report.outcomes.append(Outcome(name, "restored", len(data)))
             except (MczError, OSError) as error:
-                report.outcomes.append(Outcome(name, "failed", 0, f"{name}: {error}"))
+                result = "exists" if isinstance(error, ExistsError) else "failed"
+                report.outcomes.append(Outcome(name, result, 0, f"{name}: {error}"))
             if progress is not None:
                 progress(done + 1, len(jobs), name)
         for clip in file.clips.values():
@@ -278,9 +282,9 @@ def unpack(
     return report
 
 
-def named_files(file: File) -> Iterator[tuple[str, Any]]:
+def named_files(file: File, *, clips: bool = True) -> Iterator[tuple[str, Any]]:
     """Path and restoring function of every file that the archive holds under a name."""
-    for clip in file.clips.values():
+    for clip in file.clips.values() if clips else ():
         if clip.source is not None and clip.source.path:
             yield clip.source.path, clip.source_bytes
     for attachment in file.attachments.values():

@@ -5,6 +5,8 @@
     MczError
     ├── MotionError          the motion, skeleton or signal itself is not acceptable
     ├── OptionError          a parameter or an argument is out of its range
+    │   ├── AccessError      a file cannot be opened or written, or is in use
+    │   └── ExistsError      the target exists and must not be replaced
     ├── SourceError          a source file (ASF, AMC, BVH, C3D) cannot be parsed
     └── FormatError          the bytes are not a valid MCZ file
         ├── TruncatedError   they end too early
@@ -28,6 +30,14 @@ class MotionError(MczError):
 
 class OptionError(MczError):
     """A parameter or an argument is unknown or out of its range."""
+
+
+class AccessError(OptionError):
+    """A file cannot be opened, read or written, or another process is writing to it."""
+
+
+class ExistsError(OptionError):
+    """The target exists already, and nobody said that it may be replaced."""
 
 
 class SourceError(MczError):

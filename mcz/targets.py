@@ -2,51 +2,86 @@
 
 from __future__ import annotations
 
+import io
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mcz.errors import OptionError
+from mcz.errors import AccessError, ExistsError, OptionError
+
+SHOWN = 48  # characters of a name in that of its temporary file: 192 bytes of 255 at most
 
 
 @contextmanager
 def replacing(target: Any, *, force: bool) -> Iterator[BinaryIO]:
     """A binary stream whose bytes become ``target`` only when the block ends well.
 
-    On disk that is a temporary file beside the target, synced and renamed; a stream that was
-    given is written as it is. Raises OptionError where the target exists and not ``force``.
+    On disk that is a temporary file beside the target, synced and renamed; a device or a pipe, and
+    a stream that was given, are written as they are. Raises ExistsError where the target exists
+    and not ``force``, AccessError where it cannot be written.
     """
     if hasattr(target, "write"):
         yield target
         return
     if "://" in str(target):
-        import fsspec
-
-        try:
-            fs, path = fsspec.core.url_to_fs(str(target))
-        except (ValueError, ImportError) as error:  # no such protocol, or not installed
-            raise OptionError(f"{target}: {error}") from None
-        if not force and fs.exists(path):
-            raise OptionError(f"{target} exists; use force to replace it")
-        with fs.transaction, fs.open(path, "wb") as remote:
-            yield remote
+        with _remote(str(target), force) as stream:
+            yield stream
         return
+    if not isinstance(target, (str, os.PathLike)):
+        raise OptionError(f"cannot write to {target!r}: neither a path nor a binary stream")
     path = Path(target)
-    if not force and path.exists():
-        raise OptionError(f"{path} exists; use force to replace it")
-    with _temporary(path) as stream:
+    if not force and os.path.lexists(path):
+        raise ExistsError(f"{path} exists; use force to replace it")
+    with _in_place(path) if _is_special(path) else _temporary(path, force) as stream:
         yield stream
 
 
 @contextmanager
-def _temporary(path: Path) -> Iterator[BinaryIO]:
+def _remote(target: str, force: bool) -> Iterator[BinaryIO]:
+    import fsspec
+
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+        fs, path = fsspec.core.url_to_fs(target)
+    except (ValueError, ImportError) as error:  # no such protocol, or not installed
+        raise OptionError(f"{target}: {error}") from None
+    if not force and fs.exists(path):
+        raise ExistsError(f"{target} exists; use force to replace it")
+    with fs.transaction, fs.open(path, "wb") as stream:
+        yield stream
+
+
+def _is_special(path: Path) -> bool:
+    """Whether ``path`` is a device, a pipe or the like, which a rename would replace."""
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+@contextmanager
+def _in_place(path: Path) -> Iterator[BinaryIO]:
+    whole = io.BytesIO()
+    yield whole
+    try:
+        with path.open("wb") as stream:
+            stream.write(whole.getvalue())
     except OSError as error:
-        raise OptionError(f"{path}: {error.strerror or error}") from None
+        raise AccessError(f"{path}: {error.strerror or error}") from None
+
+
+@contextmanager
+def _temporary(path: Path, force: bool) -> Iterator[BinaryIO]:
+    try:
+        handle, name = tempfile.mkstemp(
+            prefix=f".{path.name[:SHOWN]}.", suffix=".part", dir=path.parent
+        )
+    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
+        raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     try:
         with os.fdopen(handle, "wb") as stream:
             yield stream
@@ -55,7 +90,7 @@ def _temporary(path: Path) -> Iterator[BinaryIO]:
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(name, 0o666 & ~umask)  # mkstemp made it private
-        _rename(name, path)
+        _give_name(name, path, force)
         _sync_directory(path.parent)
     except BaseException:
         with suppress(OSError):
@@ -63,11 +98,33 @@ def _temporary(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
-def _rename(name: str, path: Path) -> None:
+def _give_name(name: str, path: Path, force: bool) -> None:
+    """Rename ``name`` to ``path``; without ``force`` never over what has come there meanwhile."""
     try:
-        os.replace(name, path)
+        if not force and _linked(name, path):
+            os.unlink(name)
+        else:
+            os.replace(name, path)
+    except FileExistsError:
+        raise ExistsError(f"{path} exists; use force to replace it") from None
     except OSError as error:  # a folder, perhaps
-        raise OptionError(f"{path}: {error.strerror or error}") from None
+        raise AccessError(f"{path}: {error.strerror or error}") from None
+
+
+def _linked(name: str, path: Path) -> bool:
+    """Make ``path`` a second name of the file; False where the file system has no such names.
+
+    Raises FileExistsError, which a rename would not.
+    """
+    try:
+        os.link(name, path)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        if os.path.lexists(path):
+            raise FileExistsError from error
+        return False
+    return True
 
 
 def _sync_directory(path: Path) -> None:

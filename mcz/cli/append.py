@@ -13,27 +13,61 @@ from mcz.cli.progress import Progress
 
 
 @click.command(short_help="More files into an .mcz.")
-@click.argument("sources", metavar="SRC...", nargs=-1, required=True, type=click.Path())
-@click.argument("target", metavar="FILE.mcz", type=click.Path())
-@click.option("--skeleton", metavar="FILE.asf", type=click.Path(), help="The ASF of the AMCs.")
+@click.argument(
+    "sources", metavar="SRC...", nargs=-1, required=True, type=click.Path(readable=False)
+)
+@click.argument("target", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.option(
+    "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of the AMCs."
+)
+@click.option(
+    "--root",
+    metavar="DIR",
+    type=click.Path(readable=False),
+    help="Store paths relative to DIR. Default: names without folders.",
+)
+@click.option(
+    "--salvage", is_flag=True, help="Of a file that was cut short keep what is whole at its end."
+)
+@click.option(
+    "--force", is_flag=True, help="Of a file that was cut short drop what is whole at its end."
+)
 @encoding_options
 @json_option
 def command(
-    sources: tuple[str, ...], target: str, skeleton: str | None, as_json: bool, **options: Any
+    sources: tuple[str, ...],
+    target: str,
+    skeleton: str | None,
+    root: str | None,
+    salvage: bool,
+    force: bool,
+    as_json: bool,
+    **options: Any,
 ) -> Exit:
     """Append SRC... to FILE.mcz; when one of them cannot be added, none is.
 
-    What the file held stays readable at every moment, even if the computer stops in between.
+    What the file held stays readable at every moment, even if the computer stops in between. After
+    that, the next append takes the file up from its last end; whole clips behind it are named, and
+    --salvage or --force must say what becomes of them.
     """
     import mcz
 
     for path in (*sources, target):
         existing(path)
+    if salvage and force:
+        raise Failure("--salvage keeps what --force drops; choose one", Exit.USAGE)
     if "-" in sources:
         raise Failure("append reads files, not standard input", Exit.USAGE)
     with about(target, *sources), Progress() as progress:
         report = mcz.append(
-            sources, target, skeleton=skeleton, progress=progress, **_known(chosen(**options))
+            sources,
+            target,
+            skeleton=skeleton,
+            root=root,
+            salvage=salvage,
+            force=force,
+            progress=progress,
+            **_known(chosen(**options)),
         )
     return conclude(report, target, as_json)
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import signal
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from threading import current_thread, main_thread
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import click
 
-from mcz.errors import MczError, OptionError
+from mcz.errors import AccessError, ExistsError, MczError, OptionError
 
 if TYPE_CHECKING:
     from mcz.file import File
@@ -29,6 +32,7 @@ class Exit(IntEnum):
     NOT_VERIFIED = 3  # verify or info --validate found something wrong
     SALVAGED = 4  # --salvage wrote what could be read, and something was lost
     INTERRUPTED = 130
+    TERMINATED = 143
 
 
 EXIT_CODES = """\b
@@ -38,7 +42,8 @@ Exit codes:
   2  wrong usage, or the target exists and --force is not given
   3  verification failed
   4  salvaged: what could be read was written, and something was lost
-  130  interrupted"""
+  130  interrupted
+  143  terminated"""
 
 
 class Failure(Exception):
@@ -54,12 +59,12 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
 
     Every expected error becomes one line on standard error; any other is a bug and a traceback.
     """
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # a name that the terminal lacks must not end the run
-            stream.reconfigure(errors="backslashreplace")
+    _prepare_streams()
     try:
-        result = command.main(arguments, prog_name=prog, standalone_mode=False)
-        sys.stdout.flush()
+        with _ended_by_signals():
+            result = command.main(arguments, prog_name=prog, standalone_mode=False)
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         error.show()
         return Exit.USAGE
@@ -72,15 +77,61 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
         say("interrupted")
         return Exit.INTERRUPTED
     except BrokenPipeError:  # the reader of our output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _give_up_output()
         return Exit.FINE
     except Failure as failure:
         say(str(failure))
         return failure.code
     except (MczError, OSError) as error:
         say(reason(error))
+        _give_up_output()
         return code_of(error)
+    except _Terminated:
+        say("terminated")
+        return Exit.TERMINATED
     return int(result or Exit.FINE)
+
+
+class _Terminated(BaseException):
+    """SIGTERM came: what is half written is taken away on the way out."""
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Let SIGTERM end the block as an exception, as Ctrl-C does, so that it cleans up."""
+
+    def end(number: int, frame: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise _Terminated
+
+    if current_thread() is not main_thread():  # only there can a handler be set
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before or signal.SIG_DFL)
+
+
+def _prepare_streams() -> None:
+    """A name that the terminal lacks, or a stream that is closed, must not end the run."""
+    while (free := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass  # no file of ours gets the number of a closed standard stream
+    os.close(free)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _give_up_output() -> None:
+    """Where standard output takes no more, nothing shall be written to it when Python ends."""
+    if sys.stdout is None:
+        return
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def say(message: str) -> None:
@@ -106,6 +157,8 @@ def reason(error: Exception) -> str:
 
 
 def code_of(error: Exception) -> Exit:
+    if isinstance(error, AccessError):
+        return Exit.BAD_INPUT
     return Exit.USAGE if isinstance(error, OptionError | FileExistsError) else Exit.BAD_INPUT
 
 
@@ -125,34 +178,54 @@ def about(path: str, *others: str) -> Iterator[None]:
 def existing(path: str) -> None:
     """Raise Failure where a local ``path`` is no file."""
     if path != "-" and "://" not in path and not Path(path).is_file():
-        raise Failure(f"{path}: {'not a file' if Path(path).exists() else 'no such file'}")
+        what = "not a file" if Path(path).exists() else "no such file"
+        raise Failure(f"{path or repr(path)}: {what}")
 
 
 @contextmanager
-def opened(path: str, *, salvage: bool = False) -> Iterator[File]:
+def opened(path: str, *, salvage: bool = False, max_decoded: int | None = None) -> Iterator[File]:
     """The MCZ file at ``path``, or on standard input where that is ``-``; errors name it."""
     import mcz
 
     target: str | bytes = path
     if path == "-":
+        if sys.stdin is None:
+            raise Failure("standard input is closed")
         target = sys.stdin.buffer.read()
     else:
         existing(path)
-    with about(path), mcz.open(target, salvage=salvage) as file:
+    with about(path), mcz.open(target, salvage=salvage, max_decoded=max_decoded) as file:
         yield file
+
+
+def binary_output() -> BinaryIO:
+    """Standard output as bytes; raises Failure where it is closed."""
+    if sys.stdout is None:
+        raise Failure("standard output is closed")
+    return sys.stdout.buffer
 
 
 def write_output(path: Path, data: bytes, force: bool) -> None:
     """Write ``data`` under its name in one step, never over an existing file without ``force``."""
-    with about(str(path)):
-        if path.exists() and not force:
-            raise Failure(f"{path}: exists; --force overwrites it", Exit.USAGE)
-        part = path.with_name(f".{path.name}.{os.getpid()}.part")
-        try:
-            part.write_bytes(data)
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
+    from mcz.targets import replacing
+
+    try:
+        with about(str(path)), replacing(path, force=force) as stream:
+            stream.write(data)
+    except Failure as failure:
+        if isinstance(failure.__cause__, ExistsError):
+            raise Failure(f"{path}: exists; --force overwrites it", Exit.USAGE) from None
+        raise
+
+
+def plain_name(name: str) -> str:
+    r"""A name from a file as one that can be written below any folder.
+
+    >>> plain_name("walk.bvh"), plain_name(".."), plain_name("a\0b")
+    ('walk.bvh', '_', 'a_b')
+    """
+    name = re.sub(r"[\0/\\]", "_", name)
+    return "_" if name in ("", ".", "..") else name
 
 
 def print_json(document: Any) -> None:
@@ -194,7 +267,7 @@ def to_frames(
     if value is None:
         return None
     start, colon, stop = value.partition(":")
-    digits = all(part.isascii() and part.isdigit() for part in (start, stop) if part)
+    digits = all(re.fullmatch("[0-9]{1,16}", part) for part in (start, stop) if part)
     if not colon or not digits or (start and stop and int(start) > int(stop)):
         raise click.BadParameter(f"{value!r} is not a range A:B of frames with A <= B")
     return int(start or 0), int(stop) if stop else None
@@ -204,13 +277,23 @@ def to_rate(ctx: click.Context, param: click.Parameter, value: str | None) -> Fr
     """Callback of a rate: frames a second as ``120``, ``29.97`` or ``30000/1001``."""
     if value is None:
         return None
-    try:
+    rate = Fraction(0)
+    if re.fullmatch(r"[0-9]{1,15}(\.[0-9]{1,15}|/0*[1-9][0-9]{0,14})?", value):
         rate = Fraction(value)
-    except (ValueError, ZeroDivisionError):
-        rate = Fraction(0)
     if rate <= 0:
         raise click.BadParameter(f"{value!r} is not a rate such as 120, 29.97 or 30000/1001")
     return rate
+
+
+def to_bytes(ctx: click.Context, param: click.Parameter, value: str | None) -> int | None:
+    """Callback of a number of bytes: ``200000000``, ``200M`` or ``2G``; K, M, G, T are binary."""
+    if value is None:
+        return None
+    match = re.fullmatch(r"([0-9]{1,15})([KMGT]?)(?:i?B)?", value, re.IGNORECASE)
+    if not match:
+        raise click.BadParameter(f"{value!r} is not a number of bytes such as 200M or 2G")
+    factor: int = 1024 ** " KMGT".index(match[2].upper() or " ")
+    return int(match[1]) * factor
 
 
 def to_params(

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import io
-import sys
 from pathlib import Path
 from typing import Any
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, existing, opened, plural, print_json, printable
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    binary_output,
+    existing,
+    opened,
+    plural,
+    print_json,
+    printable,
+    say,
+)
 from mcz.cli.options import chosen, encoding_options, force_option, json_option
 from mcz.cli.progress import Progress
 
 
 @click.command(short_help="A .bvh, .amc or .asf file to .mcz.")
-@click.argument("source", metavar="SRC", type=click.Path())
+@click.argument("source", metavar="SRC", type=click.Path(readable=False))
 @click.option(
     "-o",
     "--output",
@@ -25,7 +35,7 @@ from mcz.cli.progress import Progress
 @click.option(
     "--skeleton",
     metavar="FILE.asf",
-    type=click.Path(),
+    type=click.Path(readable=False),
     help="The ASF of an AMC. Default: the same stem, the subject's prefix beside it, a sibling "
     "folder asf/, or the only ASF beside it.",
 )
@@ -42,12 +52,13 @@ def command(
 ) -> Exit:
     """Encode SRC (.bvh, .amc or .asf) into OUT.mcz; an ASF alone makes a file of a skeleton."""
     import mcz
-    from mcz.report import info
+    from mcz.report import decoded_bytes, info
 
-    target = output or str(Path(source).with_suffix(".mcz"))
     existing(source)
-    if output == "-" and as_json:
-        raise Failure("-o - leaves no room for --json", Exit.USAGE)
+    target = output or str(Path(source).with_suffix(".mcz"))
+    unread = output == "-" or _is_special(target)
+    if unread and as_json:
+        raise Failure(f"-o {target} leaves no room for --json", Exit.USAGE)
     piped = io.BytesIO()
     with about(source, target), Progress() as progress:
         mcz.encode(
@@ -59,15 +70,25 @@ def command(
             **chosen(**options),
         )
     if output == "-":
-        sys.stdout.buffer.write(piped.getvalue())
+        binary_output().write(piped.getvalue())
+    if unread:
         return Exit.FINE
     with opened(target) as file:
         document = info(file)
+        needed, allowed = decoded_bytes(file), file.container.max_decoded
+    if needed > allowed:
+        say(f"{target}: reading it takes --max-decoded {needed}, the default is {allowed}")
     if as_json:
         print_json({"output": target, **document})
     else:
         click.echo(summary(target, document, Path(source).stat().st_size))
     return Exit.FINE
+
+
+def _is_special(target: str) -> bool:
+    """Whether the target is a device or a pipe, which cannot be read again."""
+    path = Path(target)
+    return "://" not in target and path.exists() and not (path.is_file() or path.is_dir())
 
 
 def summary(target: str, document: dict[str, Any], source_size: int) -> str:

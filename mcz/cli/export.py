@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.motion import Skeleton
+from mcz.motion import Channel, Skeleton
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +29,13 @@ class Table:
     frame_rate: Fraction | None
 
 
-def channel_names(skeleton: Skeleton) -> list[str]:
-    """``joint.channel`` of every column; ``joint#n`` where a joint's name repeats."""
+def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> list[str]:
+    """``joint.channel`` of every column; ``joint#n`` where a joint's name repeats.
+
+    Of a signal with ``own`` channels their names, or ``channel-n`` where one has none.
+    """
+    if own is not None:
+        return [channel.label or f"channel-{n}" for n, channel in enumerate(own)]
     return [
         f"{address}.{channel.label}"
         for address, joint in zip(skeleton.addresses(), skeleton.joints, strict=True)

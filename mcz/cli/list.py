@@ -9,7 +9,7 @@ from mcz.cli.options import json_option
 
 
 @click.command(short_help="Names of clips, from the index alone.")
-@click.argument("file", metavar="FILE.mcz", type=click.Path())
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @json_option
 def command(file: str, as_json: bool) -> Exit:
     """List the clips and attachments of FILE.mcz; only its index is read."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from mcz.cli.common import to_params, to_rate
+from mcz.cli.common import to_bytes, to_params, to_rate
 
 UNITS = ("mm", "cm", "dm", "m", "in", "ft")
 Function = Callable[..., Any]
@@ -21,6 +21,16 @@ def json_option(function: Function) -> Function:
 
 def force_option(function: Function) -> Function:
     return click.option("--force", is_flag=True, help="Overwrite what exists.")(function)
+
+
+def decoded_option(function: Function) -> Function:
+    """``--max-decoded``, as the argument ``max_decoded`` of ``mcz.open``."""
+    return click.option(
+        "--max-decoded",
+        metavar="BYTES",
+        callback=to_bytes,
+        help="Decode up to BYTES (200M, 2G) of one file. Default: 64 MiB, or 4096 times its size.",
+    )(function)
 
 
 def encoding_options(function: Function) -> Function:

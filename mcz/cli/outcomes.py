@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from mcz.archive import Outcome, Report
 
 
+TOLD = ("skipped", "verbatim", "salvaged", "dropped")  # results whose reason is said
+
+
 def _table(report: Report) -> Iterator[str]:
     """What became of the files of each kind, where there is more than one kind."""
     kinds: dict[str, list[Outcome]] = {}
@@ -51,9 +54,13 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
         for line in _table(report):
             click.echo(printable(line))
         for outcome in report.outcomes:
-            if outcome.result == "skipped":
-                say(f"{outcome.path}: skipped: {outcome.message}")
+            if outcome.result in TOLD and outcome.message:
+                say(f"{outcome.path}: {outcome.result}: {outcome.message}")
     for failure in report.failures:
         named = failure.path in failure.message
         say(failure.message if named else f"{failure.path}: {failure.message}")
-    return Exit.BAD_INPUT if report.failures else Exit.FINE
+    if any(failure.result == "failed" for failure in report.failures):
+        return Exit.BAD_INPUT
+    if report.failures:
+        return Exit.USAGE
+    return Exit.SALVAGED if report.count("salvaged") else Exit.FINE

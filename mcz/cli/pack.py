@@ -13,8 +13,8 @@ from mcz.cli.progress import Progress
 
 
 @click.command(short_help="A folder of motion files to one .mcz.")
-@click.argument("folder", metavar="DIR", type=click.Path())
-@click.argument("target", metavar="OUT.mcz", type=click.Path())
+@click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@click.argument("target", metavar="OUT.mcz", type=click.Path(readable=False))
 @encoding_options
 @click.option("--keep-all", is_flag=True, help="Keep files of other kinds too, as attachments.")
 @force_option

@@ -18,7 +18,7 @@ class Progress:
 
     def __init__(self) -> None:
         self._started = time.monotonic()
-        self._wanted = sys.stderr.isatty()
+        self._wanted = sys.stderr is not None and sys.stderr.isatty()
         self.bar: Any = None  # rich's, once it shows
         self.task: Any = None
 

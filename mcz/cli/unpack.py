@@ -5,21 +5,22 @@ from __future__ import annotations
 import click
 
 from mcz.cli.common import Exit, about, existing
-from mcz.cli.options import force_option, json_option
+from mcz.cli.options import decoded_option, force_option, json_option
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
 
 @click.command(short_help="Every source file out of an .mcz.")
-@click.argument("file", metavar="FILE.mcz", type=click.Path())
-@click.argument("folder", metavar="DIR", type=click.Path())
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@decoded_option
 @force_option
 @json_option
-def command(file: str, folder: str, force: bool, as_json: bool) -> Exit:
+def command(file: str, folder: str, max_decoded: int | None, force: bool, as_json: bool) -> Exit:
     """Write every source file and attachment of FILE.mcz below DIR, under the path it had."""
     import mcz
 
     existing(file)
     with about(file), Progress() as progress:
-        report = mcz.unpack(file, folder, force=force, progress=progress)
+        report = mcz.unpack(file, folder, force=force, max_decoded=max_decoded, progress=progress)
     return conclude(report, folder, as_json)

@@ -9,33 +9,37 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mcz.cli.common import Exit, Failure, about, existing, opened, print_json, printable, say
-from mcz.cli.options import json_option
+from mcz.cli.options import decoded_option, json_option
 from mcz.cli.progress import Progress
-from mcz.errors import ChecksumError, TruncatedError
+from mcz.errors import FormatError, LimitError, UnsupportedError
 
 if TYPE_CHECKING:
     from mcz.file import File
 
 
 @click.command(short_help="Prove that sources come back identical.")
-@click.argument("file", metavar="FILE.mcz", type=click.Path())
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.option(
-    "--source", metavar="SRC", type=click.Path(), help="Compare with this source file, too."
+    "--source",
+    metavar="SRC",
+    type=click.Path(readable=False),
+    help="Compare with this source file, too.",
 )
+@decoded_option
 @json_option
-def command(file: str, source: str | None, as_json: bool) -> Exit:
+def command(file: str, source: str | None, max_decoded: int | None, as_json: bool) -> Exit:
     """Check every checksum, decode everything, restore every source and compare its SHA-256."""
     if source is not None:
         existing(source)
     try:
-        with opened(file) as held, Progress() as progress:
+        with opened(file, max_decoded=max_decoded) as held, Progress() as progress:
             rows = list(_parts(held, progress))
             if source is not None:
                 rows.append(_compare(held, source))
     except Failure as failure:
-        if isinstance(failure.__cause__, TruncatedError | ChecksumError):
-            raise Failure(str(failure), Exit.NOT_VERIFIED) from failure
-        raise
+        if not is_unsound(failure):
+            raise
+        rows = [_row("structure", "", [str(failure).removeprefix(f"{file}: ")])]
     failed = [row for row in rows if row["problems"]]
     if as_json:
         print_json({"verified": not failed, "parts": rows})
@@ -45,6 +49,12 @@ def command(file: str, source: str | None, as_json: bool) -> Exit:
         for problem in row["problems"]:
             say(f"{file}: {row['kind']} {row['name']}: {problem}".replace(" :", ":"))
     return Exit.NOT_VERIFIED if failed else Exit.FINE
+
+
+def is_unsound(failure: Failure) -> bool:
+    """Whether the file is no sound MCZ file, rather than one that cannot be read, or not here."""
+    cause = failure.__cause__
+    return isinstance(cause, FormatError) and not isinstance(cause, UnsupportedError | LimitError)
 
 
 def _parts(held: File, progress: Progress) -> Iterator[dict[str, Any]]:

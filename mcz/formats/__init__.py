@@ -26,6 +26,7 @@ class Format:
     ``read(data, name)`` gives a Motion, a Skeleton where ``is_skeleton``, and takes the Skeleton or
     None as a third argument where ``wants_skeleton``; it raises SourceError. ``write`` is its
     inverse; it raises MotionError or FormatError. ``join_notes`` is the inverse of the notes' cut.
+    ``states_rate``: the template holds the frame rate, so that it does not suit another.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Format:
     join_notes: Callable[[Sequence[tuple[int, int, bytes]]], FrameNotes] | None = None
     is_skeleton: bool = False
     wants_skeleton: bool = False
+    states_rate: bool = False
 
 
 FORMATS: dict[str, Format] = {
@@ -43,8 +45,8 @@ FORMATS: dict[str, Format] = {
     for f in (
         Format("asf", 1, (".asf",), asf.read, asf.write, is_skeleton=True),
         Format("amc", 2, (".amc",), amc.read, amc.write, join_notes, wants_skeleton=True),
-        Format("bvh", 3, (".bvh",), bvh.read, bvh.write, join_notes),
-        Format("c3d", 4, (".c3d",), c3d.read, c3d.write),
+        Format("bvh", 3, (".bvh",), bvh.read, bvh.write, join_notes, states_rate=True),
+        Format("c3d", 4, (".c3d",), c3d.read, c3d.write, states_rate=True),
     )
 }
 

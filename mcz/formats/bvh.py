@@ -7,6 +7,7 @@ the order of the hierarchy; how many there are counts, not what ``Frames:`` says
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,7 +40,7 @@ def read(data: bytes, name: str = "motion") -> Motion:
     count, time, body = _motion_section(data, at, n_columns)
     rows = read_rows(data, body, n_columns, _Frames(data, n_columns))
     signal = read_signal(data, rows)
-    skeleton = Skeleton(_with_positions(joints, signal.values), unit_cm=None)
+    skeleton = Skeleton(with_positions(joints, signal.values), unit_cm=None)
     rate, exact = frame_rate(data[slice(*time)].decode("latin-1"))
     header = (data[: count[0]], data[count[1] : body])
     return Motion(
@@ -112,7 +113,7 @@ class _Frames:
         return ([], line_end) if line_end and not self.n_columns else None
 
 
-def _with_positions(joints: list[Joint], values: NDArray[np.float64]) -> tuple[Joint, ...]:
+def with_positions(joints: Sequence[Joint], values: NDArray[np.float64]) -> tuple[Joint, ...]:
     """The joints, with what their position channels do to the offset.
 
     BVH does not say it, and programs differ, so the values decide: positions replace the offset

@@ -7,6 +7,7 @@ frames than the file had.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -94,11 +95,15 @@ def _section(motion: Motion, layout: Layout) -> bytes:
     n_analog = layout.n_channels * layout.subframes
     end = 4 * n_points
     words = np.empty((n_frames, end + n_analog), f"{layout.order.prefix}u{layout.word}")
-    positions = _words(_checked(motion.signals[0], 3 * n_points, 1), layout)
+    points = _checked(motion.signals[0], 3 * n_points, 1)
+    if n_points:
+        residuals = _residuals(motion, layout)
+        words[:, 3:end:4] = _words(residuals, layout)
+        if layout.order.grid.kind == GridKind.BINARY32 and layout.word == 4:
+            points = _with_gaps(points, residuals)
+    positions = _words(points, layout)
     for axis in range(3):
         words[:, axis:end:4] = positions[:, axis::3]
-    if n_points:
-        words[:, 3:end:4] = _words(_residuals(motion, layout), layout)
     if n_analog:
         analog = _signal(motion, "analog", layout.n_channels, layout.subframes)
         samples = _words(analog, layout, layout.unsigned)
@@ -135,6 +140,23 @@ def _residuals(motion: Motion, layout: Layout) -> Signal:
     if layout.word == 2:
         return Signal(residuals, (Grid(GridKind.INTEGER),) * layout.n_points)
     return Signal(residuals.astype(np.float64), (layout.order.grid,) * layout.n_points)
+
+
+def _with_gaps(points: Signal, residuals: Signal) -> Signal:
+    """The points, NaN where they are invalid and neither they nor their residuals say so.
+
+    A lossy codec fills such gaps, which the file would then no longer have.
+    """
+    valid = valid_points(points)
+    if valid is None:
+        return points
+    values = points.values.reshape(len(valid), -1, 3)
+    lost = ~valid & (residuals.values >= 0) & ~np.isnan(values).any(axis=2)
+    if not lost.any():
+        return points
+    return replace(
+        points, values=np.where(lost[:, :, None], np.nan, values).reshape(len(valid), -1)
+    )
 
 
 def valid_points(signal: Signal) -> NDArray[np.bool_] | None:

@@ -15,8 +15,10 @@ Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 Columns = Ints | slice
 
+BLOCK = 2**17  # cells that are printed at a time
 INTEGERS = Grid(GridKind.FIXED)
 SHORTEST = Grid(GridKind.TEXT64)
+SLOW = (GridKind.TEXT32, GridKind.TEXT64)  # printed by Python, not by a compiled loop
 
 
 class Cells:
@@ -58,11 +60,20 @@ class Cells:
         self._total += len(buffer)
 
     def _add(self, grid: Grid, ordinals: Ints, rows: slice, columns: Columns) -> None:
-        texts = grid.texts(ordinals.ravel())
-        shape = self.start[rows, columns].shape
-        self.start[rows, columns] = (texts.offsets[:-1] + self._total).reshape(shape)
-        self.size[rows, columns] = np.diff(texts.offsets).reshape(shape)
-        self._append(texts.buffer)
+        starts, sizes = self.start[rows], self.size[rows]
+        step = max(1, BLOCK // max(1, ordinals.shape[1] if ordinals.ndim > 1 else 1))
+        for first in range(0, len(ordinals), step):
+            block = slice(first, first + step)
+            part = ordinals[block]
+            places: Ints | slice = slice(None)
+            unique: Ints = part.ravel()
+            if grid.kind in SLOW:  # what is the same is printed once
+                unique, places = np.unique(part, return_inverse=True)
+            texts = grid.texts(unique)
+            shape = starts[block, columns].shape
+            starts[block, columns] = (texts.offsets[:-1] + self._total)[places].reshape(shape)
+            sizes[block, columns] = np.diff(texts.offsets)[places].reshape(shape)
+            self._append(texts.buffer)
 
     def _print(
         self, grid: Grid, values: NDArray[np.float64], rows: slice, columns: Columns

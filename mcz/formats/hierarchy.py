@@ -21,6 +21,7 @@ _NAMES = {f"{k}{a}": f"{a.upper()}{name}" for name, k in _KINDS.items() for a in
 _WORD = re.compile(rb"(?:[\x00-\x20]++|#[^\n]*+)*+([{}]|[^\x00-\x20{}]+)")
 _REST = re.compile(rb"[^\n{]*")
 BLANKS = bytes(range(0x21))
+MAX_INDENT = 64  # tabs; the depth of a joint has no limit
 
 
 @dataclass(slots=True)
@@ -175,7 +176,7 @@ def write_hierarchy(skeleton: Skeleton) -> tuple[str, list[int]]:
     while stack:
         index, depth = stack.pop()
         if index < 0:
-            lines.append("\t" * depth + "}")
+            lines.append("\t" * min(depth, MAX_INDENT) + "}")
             continue
         order.append(index)
         lines += _opening(skeleton.joints[index], depth)
@@ -186,7 +187,7 @@ def write_hierarchy(skeleton: Skeleton) -> tuple[str, list[int]]:
 
 def _opening(joint: Joint, depth: int) -> list[str]:
     """The lines of a joint up to its first child; its end sites come before."""
-    indent = "\t" * depth
+    indent = "\t" * min(depth, MAX_INDENT)
     names = [_NAMES.get(c.kind, c.name) for c in joint.channels]
     lines = [
         f"{indent}{'JOINT' if depth else 'ROOT'} {joint.name}",

@@ -21,6 +21,7 @@ from mcz.schema import SIZED, SVARINT, UVARINT, build, counted, parse
 FRAME_NUMBER = -1  # the column of the frame number
 MAX_PATTERNS = 1024
 MAX_GAPS = 2**20  # of a template, and of a detail
+MAX_RUNS = 2**18  # of a template, and of a detail
 MAX_WIDTH = 255
 MAX_ROW_GAPS = 2**20  # bytes of the gaps and the tail of one frame
 
@@ -36,7 +37,7 @@ RUN = Struct(
     "width" / _WIDTH * "padding: 0 none, 1 blank for no sign, w > 1 right, w < -1 left justified",
 )
 PATTERN = Struct(
-    "runs" / counted(RUN) * "the tokens of a frame, in order",
+    "runs" / counted(RUN, kind="runs") * "the tokens of a frame, in order",
     "tail" / UVARINT * "number of the gap that ends the frame",
 )
 TEMPLATE = Struct(
@@ -119,7 +120,9 @@ class Layout:
     ending: bytes | None = None
 
     def build(self) -> tuple[bytes, bytes]:
-        """The bytes of the template and of the detail."""
+        """The bytes of the template and of the detail; LimitError for too many runs."""
+        if sum(len(pattern.runs) for pattern in self.patterns) > MAX_RUNS:
+            raise LimitError(f"the frames are laid out in more than {MAX_RUNS} runs of columns")
         gaps: dict[bytes, int] = {}
         fields = []
         n_shared = 0
@@ -159,8 +162,8 @@ def _pattern_fields(pattern: Pattern, gaps: dict[bytes, int]) -> dict[str, Any]:
 
 def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
     """The layout of a clip of ``n_channels`` channels; raises FormatError on bad bytes."""
-    shared = parse(TEMPLATE, template, "source template")
-    own = parse(DETAIL, detail, "source detail")
+    shared = parse(TEMPLATE, template, "source template", {"runs": MAX_RUNS})
+    own = parse(DETAIL, detail, "source detail", {"runs": MAX_RUNS})
     if len(shared.header) not in (1, 2) or len(shared.patterns) > 1:
         raise FormatError(
             f"source template: {len(shared.header)} parts of a header (1 or 2), "

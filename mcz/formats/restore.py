@@ -19,7 +19,8 @@ from mcz.motion import FrameNotes, Motion, Source
 Ints = NDArray[np.int64]
 
 TEXT_LIMIT = 2**26  # a text may always be that large,
-TEXT_PER_CELL = 512  # or that large for each row and channel, plus one
+TEXT_PER_CELL = 512  # or that large for each row and channel, plus one,
+TEXT_PER_SIZE = 4  # but then only so many times the stated size of the source file
 
 
 def restore(motion: Motion, source: Source) -> bytes:
@@ -29,7 +30,7 @@ def restore(motion: Motion, source: Source) -> bytes:
     the nearest number of the grid.
 
     Raises FormatError where the source does not belong to such a motion, and LimitError for a text
-    that is larger than both limits above.
+    that is larger than the limits above.
     """
     signal = motion.signals[0]
     layout = parse_layout(source.template, source.detail, signal.n_channels)
@@ -38,13 +39,16 @@ def restore(motion: Motion, source: Source) -> bytes:
     numbers = motion.frame_numbers
     if numbers is None:
         numbers = np.arange(1, signal.n_rows + 1)
+    limit = max(TEXT_LIMIT, TEXT_PER_CELL * signal.n_rows * (signal.n_channels + 1))
+    if source.size:
+        limit = min(limit, max(TEXT_LIMIT, TEXT_PER_SIZE * source.size))
     cells = Cells(signal, numbers if numbered else None)
     if numbered and isinstance(source.notes, RowNotes):
         odd = (entry for entry in source.notes.texts if entry[0] < signal.n_rows)
         texts = [(row, text) for row, text in odd if int(text) == numbers[row]]
         rows = np.array([row for row, _ in texts], dtype=np.int64)
         cells.set(rows, np.full_like(rows, -1), [text for _, text in texts])
-    body = _body(cells, runs, max(TEXT_LIMIT, TEXT_PER_CELL * cells.start.size))
+    body = _body(cells, runs, limit)
     count = layout.count if layout.count and layout.rows == signal.n_rows else b"%d" % signal.n_rows
     header = count.join(layout.header) if len(layout.header) > 1 else layout.header[0]
     if layout.ending is None:
