@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mcz.archive import Outcome, Report, append, pack, unpack
     from mcz.clip import Clip
+    from mcz.conversion import convert
     from mcz.errors import (
+        AccessError,
         ChecksumError,
+        ExistsError,
         FormatError,
         LimitError,
         MczError,
@@ -23,18 +26,24 @@ if TYPE_CHECKING:
         TruncatedError,
         UnsupportedError,
     )
+    from mcz.extraction import ExtractedClip, Extraction, extract
     from mcz.file import Attachment, File, encode, open, read, write
+    from mcz.kinematics import positions
+    from mcz.metrics import Comparison, compare
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
     from mcz.report import Problem, verify
     from mcz.sources import read_skeleton
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "mcz.archive": ("Outcome", "Report", "append", "pack", "unpack"),
     "mcz.clip": ("Clip",),
+    "mcz.conversion": ("convert",),
     "mcz.errors": (
+        "AccessError",
         "ChecksumError",
+        "ExistsError",
         "FormatError",
         "LimitError",
         "MczError",
@@ -44,19 +53,27 @@ _HOMES = {
         "TruncatedError",
         "UnsupportedError",
     ),
+    "mcz.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.file": ("Attachment", "File", "encode", "open", "read", "write"),
+    "mcz.kinematics": ("positions",),
     "mcz.report": ("Problem", "verify"),
+    "mcz.metrics": ("Comparison", "compare"),
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
     "mcz.sources": ("read_skeleton",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "AccessError",
     "Attachment",
     "Channel",
     "ChecksumError",
     "Clip",
+    "Comparison",
     "Exceptions",
+    "ExistsError",
+    "ExtractedClip",
+    "Extraction",
     "File",
     "FormatError",
     "Joint",
@@ -75,9 +92,13 @@ __all__ = [
     "TruncatedError",
     "UnsupportedError",
     "append",
+    "compare",
+    "convert",
     "encode",
+    "extract",
     "open",
     "pack",
+    "positions",
     "read",
     "read_skeleton",
     "unpack",

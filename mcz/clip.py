@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -15,32 +15,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clip_source import SourceInfo, of_no_file, read_source, skeleton_source
 from mcz.codecs import by_id
 from mcz.codecs.base import Layout
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
-from mcz.container.limits import check
+from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
-from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts
-from mcz.container.skeletons import parse_channels, parse_skeleton
+from mcz.container.skeletons import parse_skeleton
+from mcz.decimation import decimated, decimated_rows
 from mcz.encoding import value_hash
 from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
-from mcz.formats import Format, format_by_id
+from mcz.formats import FORMATS, format_by_id
 from mcz.frames import parse_frame_numbers
 from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.schema import parse
-from mcz.signals import SignalInfo, SignalReader, parse_grids, parse_groups
+from mcz.signal_info import SignalInfo, read_signal
+from mcz.signals import SignalReader
 from mcz.views import ClipValues
-
-
-@dataclass(frozen=True, slots=True)
-class SourceInfo:
-    """What is known of a source file without restoring it."""
-
-    format: str
-    path: str
-    size: int
-    sha256: bytes
 
 
 class Clip:
@@ -96,8 +88,8 @@ class Clip:
     @property
     def frame_numbers(self) -> NDArray[np.int64]:
         """The number of every frame; 1, 2, 3, ... unless the metadata say otherwise."""
-        where = f"clip {self.name!r}: bytes of frame numbers"
-        check(where, 8 * self.n_frames, self._container.max_decoded)
+        where = f"clip {self.name!r}: frame numbers"
+        check_decoded(where, 8 * self.n_frames, self._container.max_decoded)
         return parse_frame_numbers(
             self.metadata.get("frame-numbers", "1"), self.n_frames, self.name
         )
@@ -110,61 +102,14 @@ class Clip:
     @cached_property
     def signals(self) -> tuple[SignalInfo, ...]:
         """The signals, the motion first."""
-        if not self._fields.signals:
+        fields = self._fields
+        if not fields.signals:
             raise FormatError(f"clip {self.name!r} has no signal")
-        return tuple(self._signal(i, fields) for i, fields in enumerate(self._fields.signals))
-
-    def _signal(self, index: int, fields: Any) -> SignalInfo:
-        where = f"clip {self.name!r}, signal {index}"
-        channels = None
-        if fields.flags & payloads.OWN_CHANNELS:
-            channels = parse_channels(fields.channels, where)
-        n_channels = self.skeleton.n_channels if channels is None else len(channels)
-        check(f"{where}: channels", n_channels, self._container.profile.channels)
-        layout = Layout(
-            self.n_frames,
-            parse_groups(
-                fields.groups, self.skeleton if channels is None else None, n_channels, where
-            ),
-            fields.samples_per_frame,
-            self.skeleton,
-            self.frame_rate,
-            parse_grids(fields.grids, n_channels, where),
-            fields.n_resolutions,
+        skeleton, rate = self.skeleton, self.frame_rate
+        return tuple(
+            read_signal(self._container, self._row, fields, index, skeleton, rate)
+            for index in range(len(fields.signals))
         )
-        counts = StreamCounts(len(layout.groups), fields.n_resolutions)
-        rows = tuple(row for row in self._row.segments if row.header.signal == index)
-        info = SignalInfo(
-            index,
-            fields.name,
-            channels,
-            layout.grids,
-            fields.codec,
-            fields.codec_version,
-            bytes(fields.header),
-            layout,
-            counts,
-            rows,
-        )
-        self._check_rows(info, where)
-        return info
-
-    def _check_rows(self, info: SignalInfo, where: str) -> None:
-        limit = self._container.profile.segment_bytes
-        per_frame = max(1, info.layout.n_channels) * info.layout.samples_per_frame * 8
-        due = 0
-        noted = info.index == 0 and bool(self._fields.source)
-        for row in info.rows:
-            if row.header.flags & FRAME_NOTES and not noted:
-                raise FormatError(f"{where}: frame notes, but no source that they belong to")
-            if not (row.header.first or row.header.flags & FRESH):
-                raise FormatError(f"{where}: the first segment needs one before it")
-            check(f"{where}: bytes of a segment", row.header.n_frames * per_frame, limit)
-            if row.header.first != due and not self._container.salvage:
-                raise FormatError(f"{where}: a segment begins at {row.header.first}, {due} is due")
-            due = row.header.stop
-        if due != self.n_frames and not self._container.salvage:
-            raise FormatError(f"{where}: segments end at frame {due} of {self.n_frames}")
 
     @property
     def n_channels(self) -> int:
@@ -220,14 +165,18 @@ class Clip:
         """The values of frames a <= f < b of some joints, NaN where invalid.
 
         Shape (rows, channels of the joints in the order given), binary64 in source units.
-        ``resolution`` leaves out that many of the finest details; with ``decimate`` only every
-        2^resolution-th frame is returned. Raises OptionError for a range outside the clip and
-        FormatError for bad bytes; a full read also checks the value hash.
+        ``resolution`` leaves out that many of the finest details; with ``decimate`` only the rows
+        of every 2^resolution-th frame are returned; ``motion`` also gives their numbers. Raises
+        OptionError for a range outside the clip and FormatError for bad bytes; a full read also
+        checks the value hash.
         """
         values, mask = self.read_masked(frames, joints, resolution, signal=signal)
         if mask is not None:
             values = np.where(mask, values, np.nan)
-        return values[:: 2**resolution] if decimate else values
+        if not decimate:
+            return values
+        per_frame = self.signals[signal].layout.samples_per_frame
+        return decimated_rows(values, per_frame, 2**resolution)
 
     def read_masked(
         self,
@@ -240,15 +189,11 @@ class Clip:
         """The values with the stored coordinates beneath the mask, and the mask."""
         info = self._info(signal)
         start, stop = self._range(frames)
-        if not 0 <= resolution < info.counts.n_resolutions:
-            raise OptionError(
-                f"clip {self.name!r} has resolutions 0 to {info.counts.n_resolutions - 1}, "
-                f"not {resolution}"
-            )
+        self._check_resolution(info, resolution)
         columns = self._columns(info, joints)
         groups, places = _groups_of(info.layout, columns)
         reader = SignalReader(self._container, info, groups, resolution, self.name)
-        values, mask = reader.read(start, stop)
+        values, mask = reader.read(start + info.skip, stop + info.skip)
         if joints is not None:
             values = values[:, places]
             mask = mask[:, places] if mask is not None else None
@@ -261,6 +206,13 @@ class Clip:
         if not 0 <= signal < len(self.signals):
             raise OptionError(f"clip {self.name!r} has {len(self.signals)} signals, not {signal}")
         return self.signals[signal]
+
+    def _check_resolution(self, info: SignalInfo, resolution: int) -> None:
+        if not 0 <= resolution < info.counts.n_resolutions:
+            raise OptionError(
+                f"clip {self.name!r} has resolutions 0 to {info.counts.n_resolutions - 1}, "
+                f"not {resolution}"
+            )
 
     def _range(self, frames: tuple[int, int] | None) -> tuple[int, int]:
         start, stop = frames if frames is not None else (0, self.n_frames)
@@ -292,26 +244,57 @@ class Clip:
                 f"stored is {hashes[info.index].hex()}"
             )
 
-    def motion(self, frames: tuple[int, int] | None = None) -> Motion:
-        """The whole clip, or frames a <= f < b of it, as a Motion with its source."""
+    def motion(
+        self,
+        frames: tuple[int, int] | None = None,
+        resolution: int = 0,
+        *,
+        decimate: bool = False,
+    ) -> Motion:
+        """The whole clip, or frames a <= f < b of it, as a Motion with its source.
+
+        ``resolution`` leaves out that many of the finest details of the motion, and of every
+        other signal as many as it has. With ``decimate`` only frames a, a + 2^resolution, ... are
+        there, at a frame rate divided by 2^resolution, their numbers in ``frame_numbers``; the
+        source then is left out where its text states the rate.
+        """
+        motion = self._motion(frames, resolution, decimate)
+        return replace(motion, skeleton=self._sourced_skeleton)
+
+    @cached_property
+    def _sourced_skeleton(self) -> Skeleton:
+        """The skeleton with its own source file, unless salvage finds that damaged."""
+        try:
+            return replace(self.skeleton, source=skeleton_source(self._container, self.skeleton_id))
+        except FormatError:
+            if not self._container.salvage:
+                raise
+            return self.skeleton
+
+    def _motion(self, frames: tuple[int, int] | None, resolution: int, decimate: bool) -> Motion:
         start, stop = self._range(frames)
-        signals = tuple(self._read_signal(info, start, stop) for info in self.signals)
-        numbers_ = self.frame_numbers[start:stop]
-        return Motion(
+        self._check_resolution(self.signals[0], resolution)
+        numbers = self.frame_numbers[start:stop]
+        motion = Motion(
             skeleton=self.skeleton,
-            signals=signals,
+            signals=tuple(self._read_signal(s, start, stop, resolution) for s in self.signals),
             frame_rate=self.frame_rate,
             frame_rate_exact=self.frame_rate_exact,
             name=self.name,
             metadata={k: v for k, v in self.metadata.items() if k != "frame-numbers"},
-            source=self._source(start, stop),
-            frame_numbers=None if "frame-numbers" not in self.metadata and not start else numbers_,
+            frame_numbers=None if "frame-numbers" not in self.metadata and not start else numbers,
         )
+        step = 2**resolution if decimate else 1
+        if step > 1:
+            motion = decimated(motion, step)
+        return replace(motion, source=self._source(start, stop, resolution, step))
 
-    def _read_signal(self, info: SignalInfo, start: int, stop: int) -> Signal:
-        values, mask = self.read_masked((start, stop), signal=info.index)
+    def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:
+        resolution = info.coarser(resolution)
+        values, mask = self.read_masked((start, stop), resolution=resolution, signal=info.index)
         groups = range(len(info.layout.groups))
-        reader = SignalReader(self._container, info, tuple(groups), 0, self.name)
+        reader = SignalReader(self._container, info, tuple(groups), resolution, self.name)
+        start, stop = start + info.skip, stop + info.skip
         exceptions, changes = reader.exceptions(start, stop)
         binary = not info.is_integer and any(not grid.is_text for grid in info.grids)
         keep = binary and info.codec.domain == "ordinals" and not self._container.salvage
@@ -327,48 +310,37 @@ class Clip:
             ordinals=reader.ordinals(start, stop) if keep else None,
         )
 
-    def _source(self, start: int, stop: int) -> Source | None:
+    def _source(self, start: int, stop: int, resolution: int, step: int) -> Source | None:
         info = self.source
-        if info is None:
+        if info is None or (step > 1 and FORMATS[info.format].states_rate):
             return None
+        skip = self.signals[0].skip
+        frames = range(start + skip, stop + skip, step)
         fields = self._fields.source[0]
-        source_format = format_by_id(fields.format)
-        signal = self.signals[0]
-        parts = []
-        for row in signal.rows:
-            if row.header.first < stop and start < row.header.stop:
-                table, streams = self._container.streams(row, signal.counts, None)
-                index = table.frame_notes()
-                part = b"" if index is None else streams[index]
-                parts.append((row.header.first, row.header.stop, part))
-        notes = source_format.join_notes(parts) if source_format.join_notes else None
-        source = Source(
-            format=info.format,
-            template=self._container.template(fields.template, fields.format),
-            detail=bytes(fields.detail),
-            notes=notes,
-            path=info.path,
-            size=info.size,
-            sha256=info.sha256,
-        )
-        if (start, stop) == (0, self.n_frames):
+        source = read_source(self._container, fields, info, self.signals[0], frames)
+        if (start, stop, resolution) == (0, self.n_frames, 0):
             return source
-        return _cut_source(source, source_format, start, stop)
+        return of_no_file(source)
 
-    def source_bytes(self, frames: tuple[int, int] | None = None) -> bytes:
-        """The source file, byte for byte (of a lossy clip: like it), or a range of its frames.
+    def source_bytes(
+        self,
+        frames: tuple[int, int] | None = None,
+        resolution: int = 0,
+        *,
+        decimate: bool = False,
+    ) -> bytes:
+        """The source file, byte for byte (of a lossy clip: like it), or a part of it.
 
-        Raises ChecksumError where a lossless clip does not give back the bytes it was made of.
+        The arguments are those of ``motion``. Raises ChecksumError where a lossless clip does not
+        give back the bytes it was made of.
         """
         info = self.source
         if info is None:
             raise OptionError(f"clip {self.name!r} has no source file; choose a format with --to")
-        check(f"clip {self.name!r}: source bytes", info.size, self._container.max_decoded)
-        motion = self.motion(frames)
-        source_format = format_by_id(self._fields.source[0].format)
-        data = source_format.write(motion)
+        check_decoded(f"clip {self.name!r}: source", info.size, self._container.max_decoded)
+        data: bytes = FORMATS[info.format].write(self._motion(frames, resolution, decimate))
         lossless = all(signal.codec.lossless for signal in self.signals)
-        if frames is None and lossless and not self._container.salvage:
+        if frames is None and not resolution and lossless and not self._container.salvage:
             self._check_source(data, info)
         return data
 
@@ -387,11 +359,3 @@ def _groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...],
     groups = tuple(dict.fromkeys(sorted(group_of[c] for c in columns)))
     place = {c: i for i, c in enumerate(c for g in groups for c in layout.groups[g])}
     return groups, [place[c] for c in columns]
-
-
-def _cut_source(source: Source, source_format: Format, start: int, stop: int) -> Source:
-    """The source of frames start <= f < stop alone; its hash is that of no file."""
-    notes = source.notes
-    if notes is not None and source_format.join_notes is not None:
-        notes = source_format.join_notes([(0, stop - start, notes.cut(start, stop))])
-    return replace(source, notes=notes, size=0, sha256=b"")

@@ -8,24 +8,27 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.base import Codec, Encoded, Request, Segment, Span
+from mcz.codecs import DEFAULT, by_name
+from mcz.codecs.base import TARGETS, Codec, Encoded, Request, Segment, Span
 from mcz.container import payloads
 from mcz.container.limits import check
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.skeletons import build_skeleton, channel_fields
 from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
-from mcz.errors import MotionError
+from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.frames import KEY, frame_number_metadata
 from mcz.memory import MemorySource, place
 from mcz.motion import Motion, Signal, Skeleton, Source
+from mcz.quality import CHUNK, quality_payload
 from mcz.schema import MAX_COUNT
 
 Progress = Callable[[int, int, str], None]
@@ -50,40 +53,91 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
     return writer.shared(b"SKEL", build_skeleton(skeleton, source))
 
 
+@dataclass(frozen=True, slots=True)
+class _Coded:
+    """A signal on its way into a file."""
+
+    source: MemorySource
+    codec: Codec
+    encoded: Encoded
+
+
 def write_clip(
     writer: Writer,
     motion: Motion,
     codec: Codec,
     params: Mapping[str, Any],
     progress: Progress | None = None,
+    *,
+    quality: bool = True,
+    remarks: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """Write one clip: its skeleton and template if new, CLIP, segments, CEND.
+    """Write one clip: its skeleton and template if new, CLIP, segments, CEND, quality if lossy.
 
-    Raises OptionError for a bad parameter, MotionError for values that the codec cannot hold.
+    A lossy codec takes the motion alone; further signals stay lossless. ``remarks`` join the
+    quality record. Raises OptionError for a bad parameter or a target that nobody has met yet (see
+    ``tuning.py``), MotionError for values that the codec cannot hold.
     """
     options = codec.options(params)
+    if codec.dial and asked(options) and options[codec.dial.parameter] is None:
+        raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
     motion = _with_source_hash(motion)
     for signal in motion.signals:
         check(f"signal {signal.name!r}: channels", signal.n_channels, writer.profile.channels)
-    sources = [
-        MemorySource(motion, index, codec, writer.profile.segment_bytes)
+    coded = [
+        _coded(motion, index, codec, options, writer.profile.segment_bytes)
         for index in range(len(motion.signals))
     ]
-    encoded = [codec.encode(source, options) for source in sources]
-    fields = _clip_fields(writer, motion, codec, sources, encoded)
+    fields = _clip_fields(writer, motion, coded)
     writer.begin_clip(fields, [signal.n_channels for signal in motion.signals])
-    hashes = []
-    for index, (source, part) in enumerate(zip(sources, encoded, strict=True)):
-        kept = []
-        for segment in part.segments:
-            _write_segment(writer, motion, index, source, segment)
-            if not codec.lossless:
-                kept.append(segment)
-            if progress is not None:
-                progress(segment.first + segment.n_frames, motion.n_frames, motion.name)
-        hashes.append(_value_hash(source, codec, part, kept))
+    decoded = [
+        _write_signal(writer, motion, index, part, progress) for index, part in enumerate(coded)
+    ]
+    hashes = [
+        value_hash(values, signal.mask)
+        for values, signal in zip(decoded, motion.signals, strict=True)
+    ]
     sha256 = motion.source.sha256 if motion.source else b""
     writer.end_clip(motion.n_frames, sha256, hashes)
+    if quality and not codec.lossless:
+        payload = quality_payload(motion, decoded, codec.name, options, remarks)
+        writer.ancillary(CHUNK, payload)
+
+
+def asked(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The targets among the options of a codec."""
+    return {t.name: options[t.name] for t in TARGETS if options.get(t.name) is not None}
+
+
+def _coded(
+    motion: Motion, index: int, codec: Codec, options: Mapping[str, Any], segment_bytes: int
+) -> _Coded:
+    if index and not codec.lossless:
+        codec = by_name(DEFAULT)
+        options = codec.options({})
+    signal = motion.signals[index]
+    if not codec.lossless and signal.channels is not None:
+        raise MotionError(f"codec {codec.name}: signal {signal.name!r} has channels of its own")
+    if codec.domain == "values" and signal.values.dtype == np.int64:
+        raise MotionError(f"codec {codec.name}: signal {signal.name!r} is one of integers")
+    source = MemorySource(motion, index, codec, segment_bytes)
+    if codec.domain == "values" and source.signal.values.dtype == np.int64:
+        raise MotionError(f"signal {source.signal.name!r}: codec {codec.name} holds no integers")
+    return _Coded(source, codec, codec.encode(source, options))
+
+
+def _write_signal(
+    writer: Writer, motion: Motion, index: int, coded: _Coded, progress: Progress | None
+) -> NDArray[Any]:
+    """Write the segments of a signal; return its values as a reader will have them."""
+    kept = []
+    for segment in coded.encoded.segments:
+        _write_segment(writer, motion, index, coded.source, segment)
+        if not coded.codec.lossless:
+            kept.append(segment)
+        if progress is not None:
+            progress(segment.first + segment.n_frames, motion.n_frames, motion.name)
+    return coded.source.signal.values if coded.codec.lossless else _decoded(coded, kept)
 
 
 def _with_source_hash(motion: Motion) -> Motion:
@@ -97,13 +151,7 @@ def _with_source_hash(motion: Motion) -> Motion:
     return replace(motion, source=replace(source, size=len(data), sha256=digest))
 
 
-def _clip_fields(
-    writer: Writer,
-    motion: Motion,
-    codec: Codec,
-    sources: Sequence[MemorySource],
-    encoded: Sequence[Encoded],
-) -> dict[str, Any]:
+def _clip_fields(writer: Writer, motion: Motion, coded: Sequence[_Coded]) -> dict[str, Any]:
     rate = motion.frame_rate
     if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
         raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
@@ -119,10 +167,7 @@ def _clip_fields(
         "rate_denominator": rate.denominator if rate else 1,
         "metadata": [{"key": k, "value": metadata[k]} for k in sorted(metadata)],
         "source": [_source_fields(writer, motion.source)] if motion.source else [],
-        "signals": [
-            _signal_fields(source.signal, codec, part)
-            for source, part in zip(sources, encoded, strict=True)
-        ],
+        "signals": [_signal_fields(part.source.signal, part.codec, part.encoded) for part in coded],
         "extension": b"",
     }
 
@@ -157,6 +202,8 @@ def _signal_fields(signal: Signal, codec: Codec, part: Encoded) -> dict[str, Any
         "flags": payloads.OWN_CHANNELS if own else 0,
         "channels": channel_fields(signal.channels) if signal.channels is not None else None,
         "samples_per_frame": signal.samples_per_frame,
+        "skip": 0,
+        "spare": 0,
         "grids": runs,
         "codec": codec.id,
         "codec_version": codec.version,
@@ -202,16 +249,6 @@ def canonical(values: NDArray[Any]) -> bytes:
     return np.where(np.isnan(values), math.nan, values).astype("<f8").tobytes()
 
 
-def _value_hash(
-    source: MemorySource, codec: Codec, part: Encoded, segments: Sequence[Segment]
-) -> bytes:
-    """SHA-256 of the canonical array, as a reader will decode it, and of the mask if any."""
-    values = source.signal.values
-    if not codec.lossless:
-        values = _decoded(source, codec, part, segments)
-    return value_hash(values, source.signal.mask)
-
-
 def value_hash(values: NDArray[Any], mask: NDArray[np.bool_] | None) -> bytes:
     """SHA-256 of the canonical array and, where any value is invalid, of the mask."""
     digest = hashlib.sha256()
@@ -222,15 +259,13 @@ def value_hash(values: NDArray[Any], mask: NDArray[np.bool_] | None) -> bytes:
     return digest.digest()
 
 
-def _decoded(
-    source: MemorySource, codec: Codec, part: Encoded, segments: Sequence[Segment]
-) -> NDArray[np.float64]:
-    layout = source.layout
+def _decoded(coded: _Coded, segments: Sequence[Segment]) -> NDArray[np.float64]:
+    layout = replace(coded.source.layout, n_resolutions=coded.encoded.n_resolutions)
     spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
     n_groups = len(layout.groups)
     request = Request(0, layout.n_frames, tuple(range(n_groups)))
-    return codec.decode(
-        part.header,
+    return coded.codec.decode(
+        coded.encoded.header,
         layout,
         spans,
         request,

@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import Any
 
 from mcz.clip import Clip
+from mcz.clip_source import skeleton_source
 from mcz.codecs import DEFAULT, by_name
 from mcz.container import payloads
 from mcz.container.directory import AttachmentRow
@@ -26,13 +27,14 @@ from mcz.container.reader import Container
 from mcz.container.skeletons import parse_skeleton
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
-from mcz.encoding import Progress, write_clip
-from mcz.errors import ChecksumError, MczError, OptionError
-from mcz.formats import FORMATS, format_by_id, format_of
-from mcz.motion import Motion, Skeleton, Source
+from mcz.encoding import Progress
+from mcz.errors import AccessError, ChecksumError, MczError, OptionError
+from mcz.formats import FORMATS, format_of
+from mcz.motion import Motion, Skeleton
 from mcz.schema import parse
-from mcz.sources import Entry, read_source, skeleton_of, with_facts
+from mcz.sources import Draft, Entry, name_skeleton, read_source, skeleton_of, with_facts
 from mcz.targets import replacing
+from mcz.tuning import write_tuned
 
 
 class Attachment:
@@ -118,18 +120,9 @@ class File:
         """The skeleton with this id; ``with_source`` also reads the template of its own file."""
         fields = self.container.shared(b"SKEL", id_, payloads.SKEL)
         skeleton = parse_skeleton(fields, self.container.profile, f"SKEL {id_.hex()}")
-        if not with_source or not fields.source:
+        if not with_source:
             return skeleton
-        source = fields.source[0]
-        return replace(
-            skeleton,
-            source=Source(
-                format=format_by_id(source.format, of_skeleton=True).name,
-                template=self.container.template(bytes(source.template), source.format),
-                size=source.size,
-                sha256=bytes(source.sha256),
-            ),
-        )
+        return replace(skeleton, source=skeleton_source(self.container, id_))
 
     def skeleton_bytes(self, id_: bytes) -> bytes:
         """The skeleton's own source file (ASF), byte for byte."""
@@ -161,13 +154,14 @@ def open(target: Any, salvage: bool = False, max_decoded: int | None = None) -> 
 
     ``salvage`` reads what a damaged file still holds and lists the rest in ``File.damage``.
     ``max_decoded`` replaces the limit of decoded bytes, max(64 MiB, 4096 x file size).
-    Raises FormatError, in particular TruncatedError where there is no FOOT at the end.
+    Raises FormatError, in particular TruncatedError where there is no FOOT at the end, and
+    AccessError where the file cannot be read.
     """
     try:
         source = open_source(target)
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
         text = getattr(error, "strerror", None) or error
-        raise OptionError(f"{target}: {text}") from None
+        raise AccessError(f"{target}: {text}") from None
     try:
         return File(Container(source, salvage=salvage, max_decoded=max_decoded))
     except MczError as error:
@@ -186,16 +180,17 @@ def read(
     rate: Fraction | float | None = None,
     unit: str | None = None,
     clip: str | None = None,
+    max_decoded: int | None = None,
 ) -> Motion:
     """The motion in a BVH, AMC, C3D or MCZ file.
 
     An AMC finds its ASF beside it, or takes ``skeleton``, a path or a Skeleton. ``rate`` in frames
-    a second and ``unit`` (a key of ``UNIT_CM``) say what the file does not. Raises SourceError,
-    FormatError or OptionError.
+    a second and ``unit`` (a key of ``UNIT_CM``) say what the file does not. Of an MCZ file ``clip``
+    is read, with ``max_decoded`` as in ``open``. Raises SourceError, FormatError or OptionError.
     """
     path = Path(path)
     if path.suffix.lower() == ".mcz":
-        with open(path) as file:
+        with open(path, max_decoded=max_decoded) as file:
             motion = file.only_clip(clip).motion()
     else:
         source_format = format_of(path)
@@ -222,7 +217,8 @@ def write(
     """
     with replacing(target, force=force) as stream:
         writer = Writer(stream, profile=profile_of(archive))
-        write_clip(writer, motion, by_name(codec), params, progress)
+        name_skeleton(writer, motion.skeleton)
+        write_tuned(writer, motion, by_name(codec), params, progress)
         writer.finish()
 
 
@@ -250,8 +246,8 @@ def encode(
     OptionError, MotionError or LimitError; nothing is left under the final name then.
     """
     path = Path(source)
+    entry = Entry(path, path.name, codec, params or {}, skeleton, rate, unit, verbatim, True)
     with replacing(target, force=force) as stream:
-        writer = Writer(stream, profile=profile_of(archive))
-        entry = Entry(path, path.name, codec, params or {}, skeleton, rate, unit, verbatim, True)
-        entry.write(writer, progress)
-        writer.finish()
+        draft = Draft(stream, profile_of(archive), hold=verbatim)
+        entry.write(draft, progress)
+        draft.finish()

@@ -55,6 +55,9 @@ class MemorySource:
     def values(self, start: int, stop: int) -> NDArray[Any]:
         return self.signal.cut(start, stop).values
 
+    def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
+        return self.signal.cut(start, stop).mask
+
     def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
         return self._block(start, stop)[0]
 

@@ -5,7 +5,9 @@ Nothing here reads or writes files. SPEC.md, "SKEL" and "CLIP", have the stored 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import pairwise
@@ -75,10 +77,16 @@ class Joint:
 
     def __post_init__(self) -> None:
         vectors = (self.offset, self.axis, *self.tails)
-        if not np.isfinite(np.array(vectors, dtype=np.float64)).all():
-            raise MotionError(f"joint {self.name!r}: offset, tail or axis is not finite: {vectors}")
+        if not all(map(_is_vector, vectors)):
+            raise MotionError(f"joint {self.name!r}: not three finite numbers among {vectors}")
         if sorted(self.axis_order) != ["X", "Y", "Z"]:
             raise MotionError(f"joint {self.name!r}: axis order {self.axis_order!r}")
+
+
+def _is_vector(vector: Any) -> bool:
+    with suppress(TypeError):
+        return len(vector) == 3 and all(map(math.isfinite, vector))
+    return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,10 +162,10 @@ class Skeleton:
             addresses = self.addresses()
             if joint in addresses:
                 return addresses.index(joint)
-            if joint.isascii() and joint.isdigit():
+            if joint.isascii() and joint.isdigit() and len(joint) < 10:
                 joint = int(joint)
-        if isinstance(joint, int) and 0 <= joint < self.n_joints:
-            return joint
+        if isinstance(joint, (int, np.integer)) and 0 <= joint < self.n_joints:
+            return int(joint)
         raise MotionError(f"no joint {joint!r} among {', '.join(self.addresses()) or 'no joints'}")
 
 
@@ -345,6 +353,16 @@ def grid_blocks(
             yield slice(start, stop), [c for c, g in enumerate(current) if g == grid], grid
 
 
+def _positive(rate: Any, name: str) -> Fraction:
+    """A frame rate as a Fraction, the nearest one to a number of another kind."""
+    with suppress(TypeError, ValueError, OverflowError):  # no number, NaN, infinite
+        exact = isinstance(rate, Fraction)
+        value: Fraction = rate if exact else Fraction(float(rate)).limit_denominator(2**52)
+        if value > 0:
+            return value
+    raise MotionError(f"motion {name!r}: frame rate {rate!r}")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
     """A skeleton in motion: the motion signal first, then any others (analog, ...).
@@ -376,8 +394,8 @@ class Motion:
         counts = {signal.n_frames for signal in self.signals}
         if len(counts) > 1:
             raise MotionError(f"motion {self.name!r}: signals of {sorted(counts)} frames")
-        if self.frame_rate is not None and self.frame_rate <= 0:
-            raise MotionError(f"motion {self.name!r}: frame rate {self.frame_rate}")
+        if self.frame_rate is not None:
+            object.__setattr__(self, "frame_rate", _positive(self.frame_rate, self.name))
         if self.frame_numbers is not None and len(self.frame_numbers) != self.n_frames:
             raise MotionError(f"motion {self.name!r}: {len(self.frame_numbers)} frame numbers")
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from mcz.clip import Clip
 from mcz.container import payloads
-from mcz.container.chunks import CRC, FOOT, FRAMING, HEADER, SIGNATURE, Chunk
+from mcz.container.chunks import CRC, FOOT, HEADER, SIGNATURE, Chunk
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.container.scan import scan
@@ -19,7 +19,8 @@ from mcz.container.segments import StreamTable
 from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
 from mcz.file import File, open
 from mcz.motion import Skeleton
-from mcz.schema import build, parse
+from mcz.schema import parse
+from mcz.sizes import Sizes, clip_sizes
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,17 +30,6 @@ class Problem:
     offset: int
     heading: str
     message: str
-
-
-@dataclass(frozen=True, slots=True)
-class Sizes:
-    """The bytes of one clip by part; see SPEC.md, "Sizes and ratios"."""
-
-    payload: int = 0
-    overhead: int = 0
-    source: int = 0
-    hashes: int = 0
-    quality: int = 0
 
 
 def info(file: File) -> dict[str, Any]:
@@ -60,6 +50,17 @@ def info(file: File) -> dict[str, Any]:
         "cr_file": sum(sources) / file.size if sources else None,
         "damage": list(file.damage),
     }
+
+
+def decoded_bytes(file: File) -> int:
+    """What ``max_decoded`` must be at least, so that every part of the file can be read."""
+    sizes = [attachment.size for attachment in file.attachments.values()]
+    for clip in file.clips.values():
+        sizes.append(clip.source.size if clip.source else 0)
+        for signal in clip.signals:
+            n_rows = clip.n_frames * signal.layout.samples_per_frame
+            sizes.append(8 * n_rows * max(1, signal.layout.n_channels))
+    return max(sizes, default=0)
 
 
 def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> dict[str, Any]:
@@ -100,6 +101,7 @@ def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
                 "segments": len(s.rows),
                 "groups": s.counts.n_groups,
                 "resolutions": s.counts.n_resolutions,
+                "stored_frames": s.layout.n_frames,
             }
             for s in clip.signals
         ],
@@ -142,6 +144,11 @@ def _source_info(clip: Clip) -> dict[str, Any]:
     }
 
 
+def clip_ratios(file: File, clip: Clip) -> dict[str, float | None]:
+    """``cr_source cr_float32 cr_40B cr_file`` of one clip."""
+    return _ratios(file, clip, clip_sizes(file.container, clip))
+
+
 def _ratios(file: File, clip: Clip, sizes: Sizes) -> dict[str, float | None]:
     """The compression ratios of SPEC.md's registry; None where the numerator is unknown."""
     coded = sizes.payload + sizes.overhead
@@ -152,7 +159,7 @@ def _ratios(file: File, clip: Clip, sizes: Sizes) -> dict[str, float | None]:
     restored = coded + sizes.source + sizes.hashes if lossless else coded
     source = clip.source.size if clip.source else 0
     rows = sum(
-        s.layout.n_frames * s.layout.samples_per_frame * s.layout.n_channels for s in clip.signals
+        clip.n_frames * s.layout.samples_per_frame * s.layout.n_channels for s in clip.signals
     )
     return {
         "cr_source": source / restored if source else None,
@@ -160,38 +167,6 @@ def _ratios(file: File, clip: Clip, sizes: Sizes) -> dict[str, float | None]:
         "cr_40B": 40 * clip.n_frames * clip.skeleton.n_joints / coded if rows else None,
         "cr_file": source / file.size if source and len(file.clips) == 1 else None,
     }
-
-
-def clip_sizes(container: Container, clip: Clip) -> Sizes:
-    """The bytes of a clip's own chunks, and of the template that it needs, by part."""
-    row = container.directory.clips[clip.name]
-    fields = clip._fields
-    payload = sum(signal_row.size for signal in clip.signals for signal_row in signal.rows)
-    tables = sum(
-        container.table(segment, signal.counts).size
-        for signal in clip.signals
-        for segment in signal.rows
-    )
-    n_chunks = 2 + sum(not segment.packet for segment in row.segments)
-    source = _source_fields_size(fields)
-    template = 0
-    if fields.source:
-        chunk = container.directory.shared.get((b"SRCE", bytes(fields.source[0].template)))
-        template = chunk.size if chunk else 0
-    cend = row.cend.length or 0 if row.cend else 0
-    n_hashes = len(clip.signals) + len(fields.source) if row.cend else 0
-    hashes = 16 + 32 * n_hashes
-    clip_length = row.clip.length or 0
-    own = clip_length - source - 16 - len(fields.extension) + cend - (hashes - 16)
-    overhead = n_chunks * FRAMING + tables + own
-    quality = sum(chunk.size for chunk in row.ancillary if chunk.type == b"QUAL")
-    return Sizes(payload - tables, overhead, template + source, hashes, quality)
-
-
-def _source_fields_size(fields: Any) -> int:
-    if not fields.source:
-        return 0
-    return len(build(payloads.CLIP_SOURCE, fields.source[0], "source"))
 
 
 def exceptions_info(container: Container, clip: Clip) -> dict[str, Any]:
@@ -314,12 +289,13 @@ def _heading(file: File, offset: int) -> str:
     return kind if kind in HEADINGS else "Chunks"
 
 
-def verify(target: Any) -> list[Problem]:
+def verify(target: Any, max_decoded: int | None = None) -> list[Problem]:
     """Check every checksum of a file, decode everything, restore every source.
 
     Returns the faults, none for a sound file; raises FormatError where it cannot even be opened.
+    ``max_decoded`` is that of ``mcz.open``.
     """
-    with open(target) as file:
+    with open(target, max_decoded=max_decoded) as file:
         return validate(file)
 
 

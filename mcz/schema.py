@@ -7,7 +7,7 @@ and keep the path of the field at fault. SPEC.md, "Conventions", is normative.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from construct import (
@@ -28,6 +28,7 @@ from construct import (
 
 from mcz.errors import FormatError, LimitError, MczError, TruncatedError
 
+MAX_RATIO = 1032  # raw deflate never inflates to more than this times its size
 MAX_COUNT = 2**53 - 1  # every count, size and offset; JavaScript's largest exact integer
 
 
@@ -35,17 +36,7 @@ class Varint(Construct):
     """Unsigned, up to ``MAX_COUNT``: 7 bits a byte, least significant first, shortest form."""
 
     def _parse(self, stream: Any, context: Any, path: str) -> int:
-        value = shift = 0
-        while True:
-            byte: int = stream_read(stream, 1, path)[0]
-            value |= (byte & 0x7F) << shift
-            if value > MAX_COUNT:
-                raise FormatError(f"{path}: varint beyond 2^53 - 1")
-            if byte < 0x80:
-                if byte == 0 and shift:
-                    raise FormatError(f"{path}: varint {value} in a form that is not the shortest")
-                return value
-            shift += 7
+        return take_varint(iter(lambda: stream_read(stream, 1, path)[0], None), path)
 
     def _build(self, obj: Any, stream: Any, context: Any, path: str) -> Any:
         _write(stream, varint(obj), path)
@@ -68,22 +59,25 @@ def varint(value: int) -> bytes:
     return bytes(out)
 
 
-def read_varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
-    """The varint at offset ``at`` of ``data`` and the offset after it."""
+def take_varint(source: Iterable[int], where: str) -> int:
+    """The varint that the bytes of ``source`` begin with; no more of them are taken."""
     value = shift = 0
-    while True:
-        if at >= len(data):
-            raise TruncatedError(f"a varint runs past the end at {at}")
-        byte = data[at]
+    for byte in source:
         value |= (byte & 0x7F) << shift
-        at += 1
-        if value > MAX_COUNT:
-            raise FormatError(f"varint beyond 2^53 - 1 before offset {at}")
+        if value > MAX_COUNT or shift > 49:  # 8 bytes hold 56 bits
+            raise FormatError(f"{where}: varint beyond 2^53 - 1")
         if byte < 0x80:
             if byte == 0 and shift:
-                raise FormatError(f"varint {value} before offset {at} is not in its shortest form")
-            return value, at
+                raise FormatError(f"{where}: varint {value} is not in its shortest form")
+            return value
         shift += 7
+    raise TruncatedError(f"{where}: a varint runs past the end")
+
+
+def read_varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
+    """The varint at offset ``at`` of ``data`` and the offset after it."""
+    value = take_varint(data[at : at + 9], f"offset {at}")
+    return value, at + max(1, -(-value.bit_length() // 7))  # its form is the shortest
 
 
 class _Zigzag(Adapter):
@@ -125,19 +119,37 @@ EXTENSION = GreedyBytes  # the end of an open structure: ignored by readers, kep
 FINITE = ExprValidator(Float64l, lambda obj, ctx: obj - obj == 0)
 
 
-def counted(item: Construct, most: int = MAX_COUNT) -> Construct:
-    """A varint count of at most ``most``, then that many items."""
+def counted(item: Construct, most: int = MAX_COUNT, kind: str = "") -> Construct:
+    """A varint count of at most ``most``, then that many items.
+
+    ``kind`` names the items where ``parse`` may be told how many there are to be in all.
+    """
     count = UVARINT if most == MAX_COUNT else ExprValidator(UVARINT, lambda n, ctx: n <= most)
+    if kind:
+        count = ExprValidator(count, lambda n, ctx: _take(ctx, kind, n))
     return PrefixedArray(count, item)
 
 
-def parse(schema: Struct, data: bytes, where: str) -> Container:
+def _take(context: Any, kind: str, count: int) -> bool:
+    """Take ``count`` off what is left of the items of a kind, before any of them is parsed."""
+    left = context._params.get("left") or {}
+    if count > left.get(kind, count):
+        raise LimitError(f"{kind}: {count} are over the limit, which leaves {left[kind]}")
+    if kind in left:
+        left[kind] -= count
+    return True
+
+
+def parse(
+    schema: Struct, data: bytes, where: str, limits: Mapping[str, int] | None = None
+) -> Container:
     """The fields of ``data``, all of which ``schema`` must consume.
 
-    Raises TruncatedError or FormatError; ``where`` opens the message.
+    ``limits`` says how many items of some kinds, see ``counted``, there may be in all. Raises
+    TruncatedError, LimitError or FormatError; ``where`` opens the message.
     """
     try:
-        whole = Struct("fields" / schema, Terminated).parse(data)
+        whole = Struct("fields" / schema, Terminated).parse(data, left=dict(limits or {}))
     except MczError as error:
         error.args = (f"{where}: {error}",)
         raise
@@ -166,6 +178,8 @@ def _plain(error: Exception) -> str:
 
 def inflate(data: bytes, size: int, where: str) -> bytes:
     """The ``size`` bytes whose raw deflate is ``data``; never more memory than ``size`` + 1."""
+    if size > MAX_RATIO * (len(data) + 1):
+        raise LimitError(f"{where}: {size} bytes cannot come of {len(data)}")
     inflater = zlib.decompressobj(-15)
     try:
         out = inflater.decompress(data, size + 1)

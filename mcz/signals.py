@@ -6,90 +6,28 @@ Part of the joint between motion, codec and container (see ``file.py``).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import by_id
-from mcz.codecs.base import Codec, Layout, Request, Span
+from mcz.codecs.base import Request, Span
 from mcz.container import payloads
-from mcz.container.directory import SegmentRow
-from mcz.container.limits import check
+from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
-from mcz.container.segments import FRESH, StreamCounts, StreamTable
+from mcz.container.segments import FRESH, StreamTable
 from mcz.errors import FormatError, UnsupportedError
 from mcz.masks import parse_mask
-from mcz.motion import Channel, Exceptions, Skeleton, grid_blocks
+from mcz.motion import Exceptions, grid_blocks
 from mcz.numbers import Grid, GridKind, values_of_texts
 from mcz.schema import parse
+from mcz.signal_info import SignalInfo
 
 BLOCK_ROWS = 2048  # decoded at a time, at least
 
 
-@dataclass(frozen=True, slots=True)
-class SignalInfo:
-    """What CLIP says of one signal, and where its segments lie."""
-
-    index: int
-    name: str
-    channels: tuple[Channel, ...] | None
-    grids: tuple[Grid, ...]
-    codec_id: int
-    codec_version: int
-    header: bytes
-    layout: Layout
-    counts: StreamCounts
-    rows: tuple[SegmentRow, ...]
-
-    @property
-    def codec(self) -> Codec:
-        """Raises UnsupportedError where this reader lacks the codec."""
-        return by_id(self.codec_id, self.codec_version)
-
-    @property
-    def is_integer(self) -> bool:
-        return bool(self.grids) and all(grid.kind == GridKind.INTEGER for grid in self.grids)
-
-
-def parse_groups(
-    fields: Any, skeleton: Skeleton | None, n_channels: int, where: str
-) -> tuple[tuple[int, ...], ...]:
-    """The channels of each group, as the ``kind`` of GROUPS defines them."""
-    if fields.kind == payloads.GROUP_ALL:
-        return (tuple(range(n_channels)),) if n_channels else ()
-    if fields.kind == payloads.GROUP_JOINT:
-        if skeleton is None:
-            raise FormatError(f"{where}: groups per joint, but the channels have no joints")
-        sizes = [len(joint.channels) for joint in skeleton.joints]
-    elif fields.kind == payloads.GROUP_CHANNEL:
-        sizes = [1] * n_channels
-    else:
-        sizes = list(fields.sizes)
-        if 0 in sizes or sum(sizes) != n_channels:
-            raise FormatError(f"{where}: groups of {sizes} channels do not make {n_channels}")
-    groups, at = [], 0
-    for size in sizes:
-        if size:
-            groups.append(tuple(range(at, at + size)))
-        at += size
-    return tuple(groups)
-
-
-def parse_grids(runs: Any, n_channels: int, where: str) -> tuple[Grid, ...]:
-    grids: list[Grid] = []
-    for run in runs:
-        if not 1 <= run.n_channels <= n_channels - len(grids):
-            raise FormatError(f"{where}: grids for more than its {n_channels} channels")
-        grids += [run.grid] * run.n_channels
-    if len(grids) != n_channels:
-        raise FormatError(f"{where}: grids for {len(grids)} of {n_channels} channels")
-    return tuple(grids)
-
-
 class SignalReader:
-    """Decodes a range of frames of some groups, each stream fetched once."""
+    """Decodes a range of stored frames of some groups, each stream fetched once."""
 
     def __init__(
         self,
@@ -108,26 +46,34 @@ class SignalReader:
 
     def read(self, start: int, stop: int) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
         """Values and mask of frames start <= f < stop, groups side by side."""
-        spans = self._prepare(start, stop)
         if self.container.salvage:
-            return self._salvage(spans, start, stop)
+            return self._salvage(self._prepare(start, stop), start, stop)
+        self._check_size(start, stop)
         per_frame = self.info.layout.samples_per_frame
         n_columns = sum(len(self.info.layout.groups[g]) for g in self.groups)
         dtype = np.int64 if self.info.is_integer else np.float64
         values = np.empty(((stop - start) * per_frame, n_columns), dtype)
         mask: NDArray[np.bool_] | None = None
-        for a, b in self._blocks(start, stop):
+        for a, b, part, valid in self.blocks(start, stop):
             rows = slice((a - start) * per_frame, (b - start) * per_frame)
-            values[rows], valid = self._finish(self._decode(spans, a, b), a, b)
+            values[rows] = part
             if valid is not None:
                 mask = np.ones(values.shape, np.bool_) if mask is None else mask
                 mask[rows] = valid
         return values, mask
 
-    def _blocks(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
+    def blocks(
+        self, start: int, stop: int
+    ) -> Iterator[tuple[int, int, NDArray[Any], NDArray[np.bool_] | None]]:
+        """The same block by block: its frames a <= f < b, values and mask (None: all valid)."""
+        spans = self._prepare(start, stop)
+        for a, b in self._ranges(start, stop):
+            yield a, b, *self._finish(self._decode(spans, a, b), a, b)
+
+    def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
         """The range in blocks of a few segments, which bound the memory beside the result."""
         if self.info.codec.segmented:
-            for index in self._covering(start, stop):
+            for index in self.info.covering(start, stop):
                 end = min(self.info.rows[index].header.stop, stop)
                 if (end - start) * self.info.layout.samples_per_frame >= BLOCK_ROWS:
                     yield start, end
@@ -150,14 +96,8 @@ class SignalReader:
 
     def _prepare(self, start: int, stop: int) -> list[Span]:
         """The spans of all segments, after the limit was checked and near ones were read."""
-        info, layout = self.info, self.info.layout
-        n_columns = sum(len(layout.groups[g]) for g in self.groups)
-        n_rows = (stop - start) * layout.samples_per_frame
-        check(
-            f"clip {self.name!r}: decoded bytes",
-            n_rows * max(1, n_columns) * 8,
-            self.container.max_decoded,
-        )
+        self._check_size(start, stop)
+        info = self.info
         spans = [
             Span(
                 r.header.first,
@@ -168,7 +108,7 @@ class SignalReader:
             )
             for r in info.rows
         ]
-        covering = self._covering(start, stop)
+        covering = info.covering(start, stop)
         self.container.source.read_ahead(
             (info.rows[i].chunk().offset, info.rows[i].chunk().size)
             for i in covering
@@ -176,13 +116,13 @@ class SignalReader:
         )
         return spans
 
-    def _covering(self, start: int, stop: int) -> list[int]:
-        """Segments whose frames meet the range."""
-        return [
-            i
-            for i, row in enumerate(self.info.rows)
-            if row.header.first < stop and start < row.header.stop
-        ]
+    def _check_size(self, start: int, stop: int) -> None:
+        """Raise LimitError for more than may be decoded; a codec of whole clips decodes all."""
+        layout = self.info.layout
+        n_columns = sum(len(layout.groups[g]) for g in self.groups)
+        n_frames = stop - start if self.info.codec.segmented else layout.n_frames
+        size = n_frames * layout.samples_per_frame * max(1, n_columns) * 8
+        check_decoded(f"clip {self.name!r}: values", size, self.container.max_decoded)
 
     def _salvage(
         self, spans: Sequence[Span], start: int, stop: int
@@ -193,17 +133,21 @@ class SignalReader:
         shape = (stop - start) * per_frame, n_columns
         values = np.zeros(shape, np.int64) if self.info.is_integer else np.full(shape, np.nan)
         mask = np.zeros(shape, np.bool_)
-        for index in self._covering(start, stop):
+        lead = max((span.lead for span in spans), default=0)
+        for index in self.info.covering(start, stop):
             a, b = max(start, spans[index].first), min(stop, spans[index].stop)
-            try:
-                part, valid = self._finish(self._decode(spans, a, b), a, b)
-            except UnsupportedError:
-                raise
-            except FormatError as error:
-                self.container.damage.append(f"clip {self.name!r}, frames {a}:{b}: {error}")
-                continue
-            rows = slice((a - start) * per_frame, (b - start) * per_frame)
-            values[rows], mask[rows] = part, True if valid is None else valid
+            # Frames that the segment after bears upon may be lost with it; the others are not.
+            for end in dict.fromkeys((b, min(b, max(a, spans[index].stop - lead)))):
+                try:
+                    part, valid = self._finish(self._decode(spans, a, end), a, end)
+                except UnsupportedError:
+                    raise
+                except FormatError as error:
+                    self.container.damage.append(f"clip {self.name!r}, frames {a}:{end}: {error}")
+                    continue
+                rows = slice((a - start) * per_frame, (end - start) * per_frame)
+                values[rows], mask[rows] = part, True if valid is None else valid
+                break
         return values, mask
 
     def _fetch(self, segment: int, resolution: int, group: int) -> bytes:
@@ -243,6 +187,11 @@ class SignalReader:
         exceptions, changes = self.exceptions(start, stop, columns)
         values = coded
         if self.info.is_integer:
+            if self.info.codec.domain == "values":
+                raise FormatError(
+                    f"clip {self.name!r}: signal {self.info.name!r} is of integers, codec "
+                    f"{self.info.codec.name} decodes none"
+                )
             Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
         if self.info.codec.domain == "ordinals" and not self.info.is_integer:
             values = _values_of(coded, [layout.grids[c] for c in columns], changes)
@@ -265,7 +214,7 @@ class SignalReader:
         }
         found: list[tuple[int, int, bytes]] = []
         changes: dict[int, dict[int, Grid]] = {}
-        for index in self._covering(start, stop):
+        for index in self.info.covering(start, stop):
             header = self.info.rows[index].header
             table, streams = self._streams(index)
             shift = (header.first - start) * per_frame
@@ -302,7 +251,7 @@ class SignalReader:
     def _mask(self, start: int, stop: int, columns: Sequence[int]) -> NDArray[np.bool_] | None:
         layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
         mask: NDArray[np.bool_] | None = None
-        for index in self._covering(start, stop):
+        for index in self.info.covering(start, stop):
             header = self.info.rows[index].header
             table, streams = self._streams(index)
             if table.mask(0) is None:

@@ -5,22 +5,31 @@ Part of the joint between motion, codec and container (see ``file.py``).
 
 from __future__ import annotations
 
+import hashlib
+import io
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from copy import copy
 from dataclasses import replace
 from fractions import Fraction
+from itertools import chain, count
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from mcz.codecs import DEFAULT, by_name
 from mcz.container import payloads
 from mcz.container.directory import Directory
+from mcz.container.limits import Profile
+from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
-from mcz.encoding import Progress, write_clip, write_skeleton
-from mcz.errors import MczError, OptionError, SourceError
+from mcz.encoding import Progress, write_skeleton
+from mcz.errors import LimitError, MczError, MotionError, OptionError, SourceError
 from mcz.formats import FORMATS, Format, find_asf, format_of
 from mcz.motion import Motion, Skeleton
+from mcz.tuning import write_tuned
 
+Digest = bytes | Callable[[], bytes]
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}
 
 
@@ -31,7 +40,9 @@ def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     if not source_format.is_skeleton:
         raise OptionError(f"{path}: not a skeleton file")
     skeleton: Skeleton = _named(path, source_format.read, read_bytes(path), path.stem)
-    return skeleton
+    if skeleton.source is None:
+        return skeleton
+    return replace(skeleton, source=replace(skeleton.source, path=path.name))
 
 
 def skeleton_of(
@@ -45,9 +56,13 @@ def skeleton_of(
     return read_skeleton(found) if found is not None else None
 
 
-def read_source(path: Path, source_format: Format, skeleton: Skeleton | None) -> Motion:
+def read_source(
+    path: Path, source_format: Format, skeleton: Skeleton | None, data: bytes | None = None
+) -> Motion:
+    """The motion in the file ``path``, whose bytes are ``data`` if they were read already."""
     arguments = (skeleton,) if source_format.wants_skeleton else ()
-    motion: Motion = _named(path, source_format.read, read_bytes(path), path.stem, *arguments)
+    data = read_bytes(path) if data is None else data
+    motion: Motion = _named(path, source_format.read, data, path.stem, *arguments)
     if motion.source is None:
         return motion
     return replace(motion, source=replace(motion.source, path=path.name))
@@ -72,8 +87,9 @@ def read_bytes(path: Path) -> bytes:
 def with_facts(motion: Motion, rate: Fraction | float | None, unit: str | None) -> Motion:
     if rate is not None:
         try:
-            value = Fraction(rate).limit_denominator(2**52)
-        except (ValueError, ZeroDivisionError, OverflowError):
+            exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))
+            value = exact.limit_denominator(2**52)
+        except (TypeError, ValueError, OverflowError):
             raise OptionError(f"frame rate {rate!r} is not a number") from None
         if value <= 0:
             raise OptionError(f"frame rate {rate} is not positive")
@@ -92,6 +108,69 @@ def plain_source(motion: Motion, name: str) -> bytes:
     """
     data: bytes = FORMATS[name].write(replace(motion, source=None))
     return data
+
+
+class Draft:
+    """A file that is being written in steps: a step that fails leaves no trace.
+
+    ``paths`` tells what the file restores under each path: the SHA-256 of those bytes, or a
+    function that finds it. With ``hold`` False what is written goes straight to ``sink``, so that
+    nothing can be taken back; that needs no memory and suits a file of one step.
+    """
+
+    def __init__(
+        self,
+        sink: BinaryIO,
+        profile: Profile,
+        directory: Directory | None = None,
+        paths: Mapping[str, Digest] | None = None,
+        *,
+        hold: bool = True,
+    ) -> None:
+        self._sink, self._pending, self._hold = sink, io.BytesIO(), hold
+        self.paths = dict(paths or {})
+        offset = directory.end if directory is not None else 0
+        self.writer = Writer(self, profile=profile, directory=directory, offset=offset)
+        self._commit()
+
+    def write(self, data: bytes, /) -> int:
+        return (self._pending if self._hold else self._sink).write(data)
+
+    def _commit(self) -> None:
+        self._sink.write(self._pending.getbuffer())
+        self._pending = io.BytesIO()
+
+    @contextmanager
+    def step(self) -> Iterator[None]:
+        """What the block writes is kept when the block ends well."""
+        before, offset = _snapshot(self.writer.directory), self.writer.offset
+        try:
+            yield
+        except MczError:
+            self._pending = io.BytesIO()
+            self.writer.rewind(before, offset)
+            raise
+        self._commit()
+
+    def holds(self, path: str, digest: bytes) -> bool:
+        """Whether the file restores these bytes as ``path``; raises where it restores others."""
+        if path not in self.paths:
+            return False
+        there = self.paths[path]
+        if (there if isinstance(there, bytes) else there()) == digest:
+            return True
+        raise SourceError(f"the file already restores another {path!r}; rename this one")
+
+    def finish(self) -> None:
+        self.writer.finish()
+        self._commit()
+
+
+def _snapshot(directory: Directory) -> Directory:
+    kept = copy(directory)
+    for name in ("shared", "attachments", "aliases", "clips"):
+        setattr(kept, name, dict(getattr(directory, name)))
+    return kept
 
 
 class Entry:
@@ -116,34 +195,55 @@ class Entry:
         self.skeleton, self.rate, self.unit = skeleton, rate, unit
         self.verbatim = verbatim
         self.keep_skeleton = keep_skeleton  # under its own name, to be restored as well
+        self.reason = ""  # why it was kept verbatim
 
-    def write(self, writer: Writer, progress: Progress | None = None) -> str:
-        """Write the file; return how: "skeleton", "parsed", "alias" or "verbatim"."""
+    def write(self, draft: Draft, progress: Progress | None = None) -> str:
+        """Write the file; return how: "skeleton", "parsed", "present" or "verbatim"."""
+        check_name(self.name)
+        data = read_bytes(self.path)
+        digest = hashlib.sha256(data).digest()
+        if draft.holds(self.name, digest):
+            return "present"
+        given = self._given_skeleton()
         try:
-            return self._parsed(writer, progress)
-        except SourceError:
+            with draft.step():
+                result = self._parsed(draft.writer, data, given, progress)
+        except (SourceError, MotionError, LimitError) as error:
             if not self.verbatim:
                 raise
-        writer.attachment(self.name, read_bytes(self.path))
-        return "verbatim"
+            self.reason = str(error)
+            with draft.step():
+                draft.writer.attachment(self.name, data)
+            result = "verbatim"
+        draft.paths[self.name] = digest
+        return result
 
-    def _parsed(self, writer: Writer, progress: Progress | None) -> str:
+    def _given_skeleton(self) -> Skeleton | None:
+        """The skeleton that was asked for; that it cannot be read is not the source's fault."""
+        if self.skeleton is None or self.path.suffix.lower() != ".amc":
+            return None
+        return self._unit(read_skeleton(self.skeleton))
+
+    def _parsed(
+        self, writer: Writer, data: bytes, given: Skeleton | None, progress: Progress | None
+    ) -> str:
         source_format = format_of(self.path)
         if source_format.is_skeleton:
             id_ = write_skeleton(writer, self._unit(read_skeleton(self.path)))
             _alias_once(writer, self.name, id_)
             return "skeleton"
-        skeleton = skeleton_of(self.path, source_format, self.skeleton)
+        skeleton = skeleton_of(self.path, source_format, given)
         if skeleton is not None:
             skeleton = self._unit(skeleton)
-        motion = read_source(self.path, source_format, skeleton)
+        motion = read_source(self.path, source_format, skeleton, data)
         motion = with_facts(motion, self.rate, self.unit)
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
         if skeleton is not None:
             motion = self._based(writer, motion, skeleton)
         name = clip_name(self.name, writer.directory)
-        write_clip(writer, replace(motion, name=name), self.codec, self.params, progress)
+        motion = replace(motion, name=name)
+        write_tuned(writer, motion, self.codec, self.params, progress)
         return "parsed"
 
     def _unit(self, skeleton: Skeleton) -> Skeleton:
@@ -153,19 +253,39 @@ class Entry:
         """``motion`` after its ASF was written; a derived skeleton names it as its base."""
         id_ = write_skeleton(writer, skeleton)
         if self.keep_skeleton:
-            found = self.skeleton or find_asf(self.path)
-            _alias_once(writer, Path(found).name if found else f"{skeleton.name}.asf", id_)
+            path = skeleton.source.path if skeleton.source is not None else ""
+            _alias_once(writer, path or f"{skeleton.name}.asf", id_)
         if motion.skeleton.base is None:
             return motion
         return replace(motion, skeleton=replace(motion.skeleton, base=id_))
 
 
+def name_skeleton(writer: Writer, skeleton: Skeleton) -> None:
+    """Write the skeleton, and the name under which its own file is restored, if it has one."""
+    path = skeleton.source.path if skeleton.source is not None else ""
+    if path:
+        _alias_once(writer, path, write_skeleton(writer, skeleton))
+
+
 def _alias_once(writer: Writer, name: str, id_: bytes) -> None:
+    check_name(name)
     if name not in writer.directory.aliases:
         writer.alias(name, payloads.OF_SKELETON, id_)
 
 
+def check_name(path: str) -> None:
+    """Raise MotionError where a file cannot be stored and restored under ``path``."""
+    try:
+        path.encode("utf-8")
+    except UnicodeEncodeError:
+        raise MotionError(
+            f"the name {os.fsencode(path)!r} is not UTF-8, as MCZ keeps names; rename the file"
+        ) from None
+    if not is_plain_path(path):
+        raise MotionError(f"source path {path!r} is not relative and plain; rename the file")
+
+
 def clip_name(path: str, directory: Directory) -> str:
-    """The relative path without its suffix, or with it where that name is taken."""
-    stem = Path(path).with_suffix("").as_posix()
-    return path if stem in directory.clips else stem
+    """The relative path without its suffix; with it, or a number, where that name is taken."""
+    names = chain((Path(path).with_suffix("").as_posix(), path), (f"{path}#{n}" for n in count(2)))
+    return next(name for name in names if name not in directory.clips)

@@ -54,7 +54,8 @@ def decode(header, layout, spans, request, fetch):
         column = 0
         for group in request.groups:
             width = len(layout.groups[group])
-            rows = _rows(index, span, spans, group, width, request.resolution, fetch)
+            coarse = layout.n_resolutions - request.resolution == 1  # details not wanted, or cut
+            rows = _rows(index, span, spans, group, width, coarse, fetch)
             for frame in range(max(span.first, request.start), min(span.stop, request.stop)):
                 place = slice(column, column + width)
                 out[frame - request.start, place] = rows[frame - span.first]
@@ -62,14 +63,14 @@ def decode(header, layout, spans, request, fetch):
     return out
 
 
-def _rows(index, span, spans, group, width, resolution, fetch):
+def _rows(index, span, spans, group, width, coarse, fetch):
     even = _floats(fetch(index, 0, group), (span.n_frames + 1) // 2, width)
     after = even[-1]
     if span.n_frames % 2 == 0 and index + 1 < len(spans) and spans[index + 1].lead:
         after = _floats(fetch(index + 1, 0, group), (spans[index + 1].n_frames + 1) // 2, width)[0]
     right = np.concatenate([even[1:], after[None]])
     odd = (even + right)[: span.n_frames // 2] / 2
-    if not resolution:
+    if not coarse:
         odd = odd + _floats(fetch(index, 1, group), span.n_frames // 2, width)
     rows = np.empty((span.n_frames, width))
     rows[0::2], rows[1::2] = even, odd

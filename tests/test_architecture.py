@@ -27,10 +27,11 @@ ALLOWED = {
     "numbers": {"errors", "schema"},
     "motion": GROUND,
     "kinematics": MODEL,
-    "metrics": MODEL | {"kinematics"},
+    "angles": MODEL,
+    "metrics": MODEL | {"angles", "kinematics"},
     "coding": GROUND,
     "transforms": GROUND,
-    "codecs": MODEL | {"kinematics", "metrics", "coding", "transforms"},
+    "codecs": MODEL | {"angles", "kinematics", "metrics", "coding", "transforms"},
     "container": MODEL,
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},
@@ -40,7 +41,8 @@ ALLOWED = {
 }
 FILE_HELPERS = {  # beside file.py, of one part with it
     *("archive", "clip", "encoding", "frames", "masks", "report", "signals", "sources", "targets"),
-    *("memory", "views"),
+    *("appending", "clip_source", "cutting", "decimation", "extraction", "memory", "quality"),
+    *("conversion", "signal_info", "sizes", "tuning", "views"),
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 

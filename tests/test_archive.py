@@ -138,7 +138,7 @@ def test_append_cut_at_every_byte(tmp_path: Path) -> None:
         with mcz.open(new[:size], salvage=True) as file:
             assert file.clips["one"].source_bytes() == one.read_bytes()
     path.write_bytes(new[: len(new) - 40])
-    mcz.append([two], path)
+    mcz.append([two], path, force=True)
     assert path.read_bytes() == new
 
 

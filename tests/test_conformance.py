@@ -153,7 +153,32 @@ WRONG = {
     ),
     "takes bits of any size": (
         "import mcz.coding.kernels as k; k.coded_size = lambda state: mock.ANY",
-        ["invalid/lossless/byte-0-behind"],
+        ["invalid/lossless/byte-0-behind", "invalid/mrdwt/detail-byte-0-behind"],
+    ),
+    "sets no detail back": (
+        "mcz.codecs._wavelet_codec.INWARD = 0",
+        ["valid/mrdwt/scaled", "valid/mrdwt/unit-least"],
+    ),
+    "starts all bands with one table": (
+        (
+            "import mcz.codecs._wavelet_streams as w; f = w._start_states\n"
+            "w._start_states = lambda: f()[:1] * 5"
+        ),
+        ["valid/mrdwt/start-tables", "valid/mrdwt/wavelet-db3"],
+    ),
+    "decodes too little of a coarser band": (
+        (
+            "import mcz.codecs._wavelet_streams as w\n"
+            "w._prefixes = lambda counts, wanted, coding: list(wanted)"
+        ),
+        ["valid/mrdwt/segments"],
+    ),
+    "shows frames from the first that is stored": (
+        (
+            "S = mcz.signals.SignalReader; f = S.read\n"
+            "S.read = lambda s, a, b: f(s, a - s.info.skip, b - s.info.skip)"
+        ),
+        ["valid/mrdwt/cut-frames-21-30", "valid/cut/frames-1-5"],
     ),
 }
 LAX = """

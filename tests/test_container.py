@@ -122,7 +122,7 @@ def test_unknown_ancillary_chunk_is_skipped() -> None:
         (build_chunk(b"NEWS", b""), UnsupportedError),
         (build_chunk(b"NEWS", b"", 4), FormatError),
         (build_chunk(b"SK3L", b""), FormatError),
-        (build_chunk(b"HEAD", b"\0\x01\0\x01\0"), FormatError),
+        (build_chunk(b"HEAD", b"\0\x02\0\x02\0"), FormatError),
         (build_chunk(b"CEND", b"\0\0\0"), FormatError),
         (build_chunk(b"DATA", b"\0" * 20), FormatError),
         (build_chunk(b"ALIA", b"\x01a\x00\x01b", ANCILLARY), FormatError),
@@ -133,10 +133,11 @@ def test_chunks_out_of_place(chunk: bytes, error: type[Exception]) -> None:
         use(with_chunk(written("a"), chunk))
 
 
-def test_newer_version_is_unsupported() -> None:
+@pytest.mark.parametrize("needed", [(0, 1), (0, 3), (1, 0), (1, 2)])
+def test_another_version_is_unsupported(needed: tuple[int, int]) -> None:
     parts = parts_of(written())
-    parts[0] = (parts[0][0], bytes((0, 2, 0, 2, 0)))
-    with pytest.raises(UnsupportedError, match=r"needs format 0\.2"):
+    parts[0] = (parts[0][0], bytes((*needed, *needed, 0)))
+    with pytest.raises(UnsupportedError, match=rf"needs format {needed[0]}\.{needed[1]}"):
         use(joined(parts))
 
 

@@ -4,15 +4,30 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import mcz
+import mcz.formats.restore as restore_module
+from mcz.cli.info import _tree
+from mcz.codecs import by_name
+from mcz.container import payloads
+from mcz.container.chunks import build_header
+from mcz.container.limits import BASE
 from mcz.container.writer import Writer
+from mcz.encoding import write_clip
+from mcz.formats.cells import Cells
+from mcz.formats.hierarchy import write_hierarchy
+from mcz.formats.layout import MAX_RUNS, Layout, Pattern, Run, parse_layout
 from mcz.motion import Exceptions, Signal
+from mcz.numbers import Grid, GridKind
 from mcz.report import validate
+from mcz.sample import write_samples
+from mcz.schema import parse, varint
+from mcz.targets import replacing
 from tests.motions import smooth
 from tests.repair import with_index_content
 
@@ -119,7 +134,7 @@ def test_failed_append_keeps_even_what_was_cut_off(folder: Path) -> None:
     path.write_bytes(path.read_bytes()[:-40])
     before = path.read_bytes()
     with pytest.raises(mcz.SourceError):
-        mcz.append([folder / "none.bvh"], path)
+        mcz.append([folder / "none.bvh"], path, force=True)
     assert path.read_bytes() == before
     with mcz.open(path, salvage=True) as file:
         assert list(file.clips) == ["one", "two"]
@@ -132,10 +147,14 @@ def test_append_of_a_folder(folder: Path) -> None:
 
 
 def test_unpack_never_overwrites_one_member_by_another(folder: Path) -> None:
-    (folder / "d").mkdir()
-    (folder / "d/one.bvh").write_text(BVH)
-    mcz.encode(folder / "one.bvh", folder / "a.mcz")
-    mcz.append([folder / "d/one.bvh"], folder / "a.mcz")
+    with (folder / "a.mcz").open("wb") as stream:
+        writer = Writer(stream)
+        for name in ("one", "two"):
+            motion = mcz.read(folder / f"{name}.bvh")
+            assert motion.source is not None
+            same = replace(motion, source=replace(motion.source, path="one.bvh"))
+            write_clip(writer, same, by_name("raw"), {})
+        writer.finish()
     report = mcz.unpack(folder / "a.mcz", folder / "out", force=True)
     assert [outcome.result for outcome in report.outcomes] == ["restored", "failed"]
     assert (folder / "out/one.bvh").read_bytes() == (folder / "one.bvh").read_bytes()
@@ -204,3 +223,161 @@ def test_unsafe_source_paths_are_not_written(tmp_path: Path) -> None:
     path.write_text(BVH)
     with pytest.raises(mcz.MotionError, match="plain"):
         mcz.encode(path, tmp_path / "a.mcz")
+
+
+@pytest.mark.parametrize("through", ["walk.mcz", "walk.amc", "clip"])
+def test_a_skeletons_own_file_survives(tmp_path: Path, through: str) -> None:
+    write_samples(tmp_path)
+    mcz.encode(tmp_path / "walk.amc", tmp_path / "walk.mcz")
+    if through == "clip":
+        with mcz.open(tmp_path / "walk.mcz") as file:
+            motion = file.clips["walk"].motion()
+    else:
+        motion = mcz.read(tmp_path / through)
+    mcz.write(motion, tmp_path / "again.mcz")
+    assert mcz.verify(tmp_path / "again.mcz") == []
+    assert not mcz.unpack(tmp_path / "again.mcz", tmp_path / "out").failures
+    for name in ("walk.amc", "walk.asf"):
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / name).read_bytes()
+
+
+def test_a_channel_without_kind_and_name() -> None:
+    bones = mcz.Skeleton((mcz.Joint("m", channels=(mcz.Channel("", ""),)),))
+    motion = mcz.Motion(bones, (Signal(np.zeros((2, 1))),))
+    with mcz.open(written(motion)) as file:
+        assert file.clips["motion"].skeleton == bones
+
+
+def test_joints_by_numpy_numbers() -> None:
+    motion = smooth(3)
+    with mcz.open(written(motion)) as file:
+        clip = file.clips["smooth"]
+        wanted = clip.read(joints=[1, 0])
+        np.testing.assert_array_equal(clip.read(joints=np.array([1, 0])), wanted)
+        with pytest.raises(mcz.MotionError, match="no joint"):
+            clip.read(joints=[5000 * "9"])
+
+
+@pytest.mark.parametrize(
+    ("rate", "expected"),
+    [
+        (120, Fraction(120)),
+        (29.97, Fraction(29.97).limit_denominator(2**52)),
+        (np.float32(0.5), Fraction(1, 2)),
+        (np.int64(60), Fraction(60)),
+    ],
+)
+def test_rates_of_other_kinds(rate: object, expected: Fraction) -> None:
+    motion = replace(smooth(3), frame_rate=rate)
+    assert motion.frame_rate == expected
+    with mcz.open(written(motion)) as file:
+        assert file.clips["smooth"].frame_rate == expected
+
+
+@pytest.mark.parametrize("rate", [0, -1.5, float("nan"), float("inf"), "fast", [], 1e-300])
+def test_rates_that_are_none(rate: object) -> None:
+    with pytest.raises(mcz.MotionError, match="frame rate"):
+        replace(smooth(3), frame_rate=rate)
+
+
+@pytest.mark.parametrize("offset", [(1.0, 2.0), (1.0, 2.0, float("nan")), "abc", 5, (1, 2, None)])
+def test_vectors_that_are_none(offset: object) -> None:
+    with pytest.raises(mcz.MotionError, match="three finite numbers"):
+        mcz.Joint("m", offset=offset)  # type: ignore[arg-type]
+    with pytest.raises(mcz.MotionError, match="three finite numbers"):
+        mcz.Joint("m", tails=((0.0, 0.0, 0.0), offset))  # type: ignore[arg-type]
+
+
+def test_counts_are_checked_before_what_they_count() -> None:
+    """Not one joint, channel or run is there: the count alone is refused."""
+    head = b"\0\0\0\1\0\0\0"  # a skeleton up to its joints
+    for joints in (varint(4097), b"\1\0\0\0\0" + varint(16385)):
+        with pytest.raises(mcz.LimitError):
+            parse(payloads.SKEL, head + joints, "SKEL", BASE.counts)
+    template = b"\1\0\1\0\1" + varint(MAX_RUNS + 1)
+    with pytest.raises(mcz.LimitError, match="runs"):
+        parse_layout(template, b"", 1)
+
+
+def test_runs_are_limited_when_written() -> None:
+    runs = tuple(Run(b" ", column) for column in range(MAX_RUNS + 1))
+    with pytest.raises(mcz.LimitError, match="runs"):
+        Layout((b"",), (Pattern(runs, b"\n"),)).build()
+
+
+def test_salvage_gives_up_where_everything_looks_like_a_chunk() -> None:
+    data = bytearray(written(smooth(3)))
+    false = b"".join(build_header(b"DATA", 0, 16 * left - 20) for left in range(20_000, 1, -1))
+    false += bytes(16)
+    with mcz.open(bytes(data) + b"\0" + false, salvage=True) as file:
+        assert list(file.clips) == ["smooth"]
+        assert "looks like a chunk" in file.damage[-1]
+
+
+def test_equal_numbers_are_printed_once() -> None:
+    signal = Signal(np.full((50_000, 3), 1 / 3), (Grid(GridKind.TEXT64),) * 3)
+    cells = Cells(signal, None)
+    assert len(cells.texts()) < 100
+    assert (
+        cells.texts()[cells.start[-1, 2] :][: cells.size[-1, 2]].tobytes() == repr(1 / 3).encode()
+    )
+
+
+def test_a_text_keeps_to_the_stated_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.bvh").write_text(BVH)
+    motion = mcz.read(tmp_path / "a.bvh")
+    assert motion.source is not None
+    grids = (Grid(GridKind.FIXED, 15),)
+    signal = Signal(np.linspace(1, 2, 400)[:, None], grids)
+    monkeypatch.setattr(restore_module, "TEXT_LIMIT", 200)
+    source = replace(motion.source, size=100)
+    with pytest.raises(mcz.LimitError, match="text of"):
+        restore_module.restore(replace(motion, signals=(signal,)), source)
+
+
+def test_deep_skeletons_are_not_indented_without_end() -> None:
+    joints = [mcz.Joint("j0")]
+    joints += [mcz.Joint(f"j{n}", n - 1) for n in range(1, 3000)]
+    text, order = write_hierarchy(mcz.Skeleton(tuple(joints)))
+    assert len(text) < 3000 * 5 * 80
+    assert order == list(range(3000))
+    parents = [{"name": j.name, "parent": j.parent, "channels": []} for j in joints]
+    shown = list(_tree(parents))
+    assert len(shown) == 3000
+    assert max(map(len, shown)) < 120
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_what_comes_meanwhile_is_not_overwritten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, links: bool
+) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError
+
+    if not links:
+        monkeypatch.setattr("os.link", refuse)
+    path = tmp_path / "a"
+    with pytest.raises(mcz.ExistsError), replacing(path, force=False) as stream:
+        stream.write(b"mine")
+        path.write_bytes(b"theirs")
+    assert path.read_bytes() == b"theirs"
+    with replacing(tmp_path / "b", force=False) as stream:
+        stream.write(b"mine")
+    with replacing(path, force=True) as stream:
+        stream.write(b"mine")
+    assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == {"a": b"mine", "b": b"mine"}
+
+
+@pytest.mark.parametrize("target", [None, 5, b"bytes"])
+def test_odd_targets_to_write(target: object) -> None:
+    with pytest.raises(mcz.OptionError, match="cannot write"):
+        mcz.write(smooth(3), target)
+    with pytest.raises(mcz.OptionError):
+        mcz.write(smooth(3), "a\0b")
+
+
+@pytest.mark.parametrize("rate", ["fast", [], float("nan"), 0, -1, "1e99999"])
+def test_odd_rates(tmp_path: Path, rate: object) -> None:
+    (tmp_path / "a.bvh").write_text(BVH)
+    with pytest.raises(mcz.OptionError, match="frame rate"):
+        mcz.read(tmp_path / "a.bvh", rate=rate)  # type: ignore[arg-type]

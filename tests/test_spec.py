@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import subprocess
 import sys
@@ -130,9 +131,24 @@ def test_spec_never_defers(word: str) -> None:
     assert word not in SPEC
 
 
-def test_annex_is_what_the_package_ships_and_the_text_names() -> None:
+@pytest.mark.parametrize("name", ["lossless_start.json", "wavelet_start.json"])
+def test_annex_is_what_the_package_ships_and_the_text_names(name: str) -> None:
     import hashlib
 
-    data = (ROOT / "conformance/annex/lossless_start.json").read_bytes()
-    assert data == (ROOT / "mcz/codecs/lossless_start.json").read_bytes()
+    data = (ROOT / "conformance/annex" / name).read_bytes()
+    assert data == (ROOT / "mcz/codecs" / name).read_bytes()
     assert hashlib.sha256(data).hexdigest() in SPEC
+
+
+def test_wavelets_of_the_text_and_the_annex_are_those_of_the_package() -> None:
+    from mcz.transforms.wavelets import IDS, WAVELETS
+
+    annex = json.loads((ROOT / "conformance/annex/wavelets.json").read_text())
+    found = {n: {"id": IDS[n], "lo": list(w.lo), "hi": list(w.hi)} for n, w in WAVELETS.items()}
+    assert annex == found
+    rows = [(int(row[0]), row[1], int(row[2])) for row in rows_under("Wavelets")]
+    assert rows == [(IDS[name], name, w.n_taps) for name, w in WAVELETS.items()]
+    text = SPEC.split("### Wavelets")[1].split("```")[1]
+    printed = [float(word) for word in text.split() if word[0] in "-.0123456789"]
+    derived = [w.lo if name != "bior4.4" else (*w.lo, *w.hi) for name, w in WAVELETS.items()]
+    assert printed == [tap for taps in derived for tap in taps]

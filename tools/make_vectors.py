@@ -24,9 +24,11 @@ from tools.vectors import (  # noqa: E402 - needs the path
     bad_c3d,
     bad_chunks,
     bad_clips,
+    bad_cut,
     bad_data,
     bad_index,
     bad_lossless,
+    bad_mrdwt,
     bad_notes,
     bad_numbers,
     bad_shared,
@@ -36,8 +38,11 @@ from tools.vectors import (  # noqa: E402 - needs the path
     sources_text,
     uncommon,
     valid_container,
+    valid_cut,
     valid_lossless,
     valid_lossless_clips,
+    valid_mrdwt,
+    valid_mrdwt_clips,
     valid_notes,
     valid_numbers,
     valid_raw,
@@ -52,6 +57,9 @@ MODULES = (
     valid_raw,
     valid_lossless,
     valid_lossless_clips,
+    valid_mrdwt,
+    valid_mrdwt_clips,
+    valid_cut,
     sources,
     sources_c3d,
     sources_text,
@@ -61,13 +69,15 @@ MODULES = (
     bad_shared,
     bad_clips,
     bad_data,
+    bad_cut,
     bad_notes,
     bad_numbers,
     bad_lossless,
+    bad_mrdwt,
     bad_sources,
     bad_c3d,
 )
-FORMAT_VERSION = "0.1"
+FORMAT_VERSION = "0.2"
 
 
 def vectors() -> list[Vector]:

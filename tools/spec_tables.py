@@ -27,6 +27,8 @@ MODULES = (
     "mcz.container.directory",
     "mcz.codecs.raw",
     "mcz.codecs.lossless",
+    "mcz.codecs._wavelet_codec",
+    "mcz.codecs._wavelet_streams",
     "mcz.formats.layout",
     "mcz.formats.notes",
     "mcz.formats.c3d_layout",
@@ -87,7 +89,7 @@ def type_name(subcon: Any) -> str:
         case construct.IfThenElse():
             return type_name(subcon.thensubcon) + ", or absent"
         case construct.FormatField():
-            return {"B": "u8"}[subcon.fmtstr[-1]]
+            return {"B": "u8", "d": "binary64"}[subcon.fmtstr[-1]]
     if subcon is construct.GreedyBytes:
         return "bytes to the end"
     return type_name(subcon.subcon)

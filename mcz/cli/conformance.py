@@ -102,9 +102,8 @@ def _clip_arrays(clip: Clip, given: argparse.Namespace) -> Iterator[Part]:
     for signal in clip.signals:
         if given.joints is not None and signal.channels is not None:
             continue
-        values, mask = clip.read_masked(
-            given.frames, given.joints, given.resolution, signal=signal.index
-        )
+        resolution = signal.coarser(given.resolution) if signal.index else given.resolution
+        values, mask = clip.read_masked(given.frames, given.joints, resolution, signal=signal.index)
         yield _part(clip.name, signal.name, "values", values)
         if mask is not None and not mask.all():
             yield _part(clip.name, signal.name, "mask", mask)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import sys
+from fractions import Fraction
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 import numpy as np
@@ -12,24 +12,36 @@ import numpy as np
 from mcz.cli.common import (
     Exit,
     Failure,
+    binary_output,
     opened,
+    plain_name,
     print_json,
     printable,
     say,
     to_frames,
+    to_rate,
     write_output,
 )
-from mcz.cli.options import force_option, json_option
+from mcz.cli.options import decoded_option, force_option, json_option
 
 if TYPE_CHECKING:
     from mcz.clip import Clip
     from mcz.file import File
 
 Output = tuple[str, str, bytes]  # kind, file name, content
+CONVERSIONS = ("bvh", "amc", "c3d")
+
+
+class _Part(NamedTuple):
+    """What of a clip is wanted: the arguments of ``Clip.motion``."""
+
+    frames: tuple[int, int] | None
+    resolution: int
+    decimate: bool
 
 
 @click.command(short_help="The original file again, or its numbers.")
-@click.argument("file", metavar="FILE.mcz", type=click.Path())
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.option(
     "-o",
     "--output",
@@ -46,16 +58,26 @@ Output = tuple[str, str, bytes]  # kind, file name, content
     metavar="K",
     type=click.IntRange(min=0),
     default=0,
-    help="Leave out the K finest details (with --to).",
+    help="Leave out the K finest details.",
+)
+@click.option(
+    "--decimate", is_flag=True, help="Write every 2^K-th frame alone, at the rate divided by 2^K."
 )
 @click.option(
     "--to",
     "target",
-    type=click.Choice(["csv", "npz", "c3d"]),
-    help="Numbers, or the markers as a plain C3D, instead of the source file.",
+    type=click.Choice(["csv", "npz", *CONVERSIONS]),
+    help="Numbers, or the motion as another format, instead of the source file.",
+)
+@click.option(
+    "--rate",
+    metavar="R",
+    callback=to_rate,
+    help="Frames a second (with --to bvh or c3d), where the clip does not know them.",
 )
 @click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
 @click.option("--salvage", is_flag=True, help="Write what a damaged file still holds.")
+@decoded_option
 @force_option
 @json_option
 def command(
@@ -65,32 +87,41 @@ def command(
     frames: tuple[int, int | None] | None,
     joints: str | None,
     resolution: int,
+    decimate: bool,
     target: str | None,
+    rate: Fraction | None,
     with_skeleton: bool,
     salvage: bool,
+    max_decoded: int | None,
     force: bool,
     as_json: bool,
 ) -> Exit:
-    """Write the original file of a clip, byte for byte, or its numbers as CSV, NPZ or C3D.
+    """Write the original file of a clip, byte for byte, or its numbers, or another format.
 
     A file without clips gives its skeleton's ASF or its attachment.
     """
-    if target in (None, "c3d") and (joints is not None or resolution):
-        raise Failure("--joints and --resolution need --to csv or --to npz", Exit.USAGE)
+    if target in (None, *CONVERSIONS) and joints is not None:
+        raise Failure("--joints needs --to csv or --to npz", Exit.USAGE)
+    if decimate and not resolution:
+        raise Failure("--decimate needs --resolution", Exit.USAGE)
+    if rate is not None and target not in CONVERSIONS:
+        raise Failure(f"--rate needs --to {' or '.join(CONVERSIONS)}", Exit.USAGE)
     if output == "-" and (as_json or with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
-    with opened(file, salvage=salvage) as held:
+    with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
         if held.clips:
             clip = held.only_clip(name)
-            cut = _cut(clip, frames)
+            part = _Part(_cut(clip, frames), resolution, decimate)
             if target is None:
-                outputs = [_source(clip, cut)]
-            elif target == "c3d":
-                outputs = [_markers(clip, cut)]
+                outputs = [_source(clip, part)]
+            elif target in CONVERSIONS:
+                outputs = _converted(clip, part, target, rate, with_skeleton)
             else:
-                outputs = [_export(clip, target, cut, joints, resolution)]
-            if with_skeleton:
+                outputs = [_export(clip, target, part, joints)]
+            if with_skeleton and target != "amc":
                 outputs.append(_skeleton(held, clip.skeleton_id))
+        elif target is not None or frames is not None:
+            raise Failure(f"{file}: it has no clips, so --to and --frames do not apply", Exit.USAGE)
         else:
             outputs = [_other(held, name)]
         damage = list(held.damage)
@@ -107,38 +138,47 @@ def _cut(clip: Clip, frames: tuple[int, int | None] | None) -> tuple[int, int] |
     return start, clip.n_frames if stop is None else stop
 
 
-def _source(clip: Clip, cut: tuple[int, int] | None) -> Output:
-    data = clip.source_bytes(cut)
+def _source(clip: Clip, part: _Part) -> Output:
+    data = clip.source_bytes(part.frames, part.resolution, decimate=part.decimate)
     path = clip.source.path if clip.source else ""
     return "source", PurePosixPath(path).name or f"{_stem(clip)}.out", data
 
 
-def _markers(clip: Clip, cut: tuple[int, int] | None) -> Output:
-    """The clip as a plain C3D; refused where its joints are no markers."""
-    from mcz.sources import plain_source
+def _converted(
+    clip: Clip, part: _Part, target: str, rate: Fraction | None, with_skeleton: bool
+) -> list[Output]:
+    """The clip as a plain file of another format, with its ASF where an AMC is to have one."""
+    from mcz.conversion import converted_files
 
-    return "c3d", f"{_stem(clip)}.c3d", plain_source(clip.motion(cut), "c3d")
+    motion = clip.motion(part.frames, part.resolution, decimate=part.decimate)
+    files = converted_files(motion, target, rate, with_skeleton)
+    kinds = {"asf": "skeleton"}
+    return [(kinds.get(s, s), f"{_stem(clip)}.{s}", data) for s, data in files.items()]
 
 
-def _export(
-    clip: Clip, target: str, cut: tuple[int, int] | None, joints: str | None, resolution: int
-) -> Output:
+def _export(clip: Clip, target: str, part: _Part, joints: str | None) -> Output:
     from mcz.cli.export import EXPORTS, Table, channel_names
+    from mcz.decimation import decimated_rows
 
     chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]
-    values, mask = clip.read_masked(cut, chosen, resolution)
-    names = channel_names(clip.skeleton)
+    values, mask = clip.read_masked(part.frames, chosen, part.resolution)
+    mask = np.ones(values.shape, np.bool_) if mask is None else mask
+    names = channel_names(clip.skeleton, clip.signals[0].channels)
     if chosen is not None:
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
-    start, stop = cut or (0, clip.n_frames)
-    numbers = clip.frame_numbers[start:stop]
+    start, stop = part.frames or (0, clip.n_frames)
+    numbers, rate = clip.frame_numbers[start:stop], clip.frame_rate
+    if part.decimate:
+        step, per_frame = 2**part.resolution, clip.signals[0].layout.samples_per_frame
+        values, mask = (decimated_rows(rows, per_frame, step) for rows in (values, mask))
+        numbers, rate = numbers[::step], rate and rate / step
     table = Table(
         names,
         np.asarray(values, dtype=np.float64),
-        np.ones(values.shape, np.bool_) if mask is None else mask,
+        mask,
         np.repeat(numbers, len(values) // max(1, len(numbers))),  # a number for every row
-        clip.frame_rate,
+        rate,
     )
     return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
 
@@ -178,7 +218,7 @@ def _deliver(
 ) -> None:
     """Write the outputs where they belong and say so."""
     if output == "-":
-        sys.stdout.buffer.write(outputs[0][2])
+        binary_output().write(outputs[0][2])
         return
     folder = Path() if file == "-" else Path(file).parent
     if output is not None:
@@ -186,7 +226,7 @@ def _deliver(
     rows = []
     for place, (kind, name, data) in enumerate(outputs):
         named = output is not None and not Path(output).is_dir() and place == 0
-        path = Path(str(output)) if named else folder / name
+        path = Path(str(output)) if named else folder / plain_name(name)
         write_output(path, data, force)
         rows.append({"path": str(path), "kind": kind, "bytes": len(data)})
     if as_json:

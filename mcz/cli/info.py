@@ -11,6 +11,7 @@ import click
 from mcz.cli.common import (
     EXIT_CODES,
     Exit,
+    Failure,
     opened,
     plural,
     print_json,
@@ -19,8 +20,11 @@ from mcz.cli.common import (
     say,
     table,
 )
-from mcz.cli.options import json_option
+from mcz.cli.figures import figure_lines
+from mcz.cli.options import decoded_option, json_option
+from mcz.cli.verify import is_unsound
 
+DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
 FEW = 4  # clips that are shown in full; more are shown as a table
 PARTS = ("payload", "overhead", "source_chunk", "hash", "quality")
 RATIOS = (
@@ -32,7 +36,7 @@ RATIOS = (
 
 
 @click.command(short_help="What a file holds and what it costs.", epilog=EXIT_CODES)
-@click.argument("file", metavar="FILE.mcz", type=click.Path())
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @json_option
 @click.option("--layout", "show_layout", is_flag=True, help="What every range of bytes means.")
 @click.option(
@@ -41,14 +45,16 @@ RATIOS = (
     is_flag=True,
     help="Check everything; name the offset and SPEC.md's heading of each fault.",
 )
-def command(file: str, as_json: bool, show_layout: bool, check: bool) -> Exit:
+@decoded_option
+def command(
+    file: str, as_json: bool, show_layout: bool, check: bool, max_decoded: int | None
+) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz."""
     from mcz import report
 
-    with opened(file) as held:
-        if check:
-            problems = report.validate(held)
-            return _say_problems(file, held.size, problems, as_json)
+    if check:
+        return _validate(file, max_decoded, as_json)
+    with opened(file, max_decoded=max_decoded) as held:
         if show_layout:
             places = report.layout(held)
         else:
@@ -60,6 +66,22 @@ def command(file: str, as_json: bool, show_layout: bool, check: bool) -> Exit:
     else:
         click.echo("\n".join(printable(line) for line in lines(file, document)))
     return Exit.FINE
+
+
+def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
+    from mcz import report
+
+    size = 0
+    try:
+        with opened(file, max_decoded=max_decoded) as held:
+            size, problems = held.size, report.validate(held)
+    except Failure as failure:
+        if not is_unsound(failure):
+            raise
+        text = str(failure).removeprefix(f"{file}: ")
+        offset = getattr(failure.__cause__, "offset", None) or 0
+        problems = [report.Problem(offset, "Strict reading", text)]
+    return _say_problems(file, size, problems, as_json)
 
 
 def _say_problems(file: str, size: int, problems: list[Any], as_json: bool) -> Exit:
@@ -129,6 +151,8 @@ def _tree(joints: list[dict[str, Any]]) -> Iterator[str]:
     stack = [(root, "  ", "  ") for root in reversed(children.get(-1, []))]
     while stack:
         index, own, below = stack.pop()
+        if len(below) > DEEPEST:
+            own, below = f"{below} ... ", below[:DEEPEST]
         yield f"{own}{joints[index]['name']}  {' '.join(joints[index]['channels'])}".rstrip()
         for place, child in enumerate(reversed(children.get(index, []))):
             last = place == 0
@@ -148,8 +172,9 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
     yield from _source(clip)
     for key, value in clip["metadata"].items():
         yield f"  {key}  {value[:80]}"
-    for metric, value in (clip["quality"] or {}).items():
-        yield f"  quality    {metric} {value}"
+    if clip["quality"]:
+        yield "  quality"
+        yield from (f"    {line}" for line in figure_lines(clip["quality"]))
     total = sum(clip[f"{part}_bytes"] for part in PARTS)
     rows = [
         [

@@ -19,6 +19,8 @@ COMMANDS = (
     "append",
     "unpack",
     "list",
+    "extract",
+    "diff",
 )
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from mcz.codecs import lossless, raw
+from mcz.codecs import lossless, mrdwt, raw
 from mcz.codecs.base import Codec
 from mcz.errors import OptionError, UnsupportedError
 
-CODECS: dict[int, Codec] = {codec.id: codec for codec in (raw.CODEC, lossless.CODEC)}
+CODECS: dict[int, Codec] = {codec.id: codec for codec in (raw.CODEC, lossless.CODEC, mrdwt.CODEC)}
 DEFAULT = lossless.CODEC.name  # the best lossless one there is
 
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mcz.coding import residuals
 from mcz.coding.kernels import Bytes, Ints, mixed, number
+from mcz.coding.residuals import FAULT, bits, clamp, code_residual
 from mcz.jit import inner, kernel
 
 # Columns of ``plan``, one row a coded channel.
@@ -21,12 +23,11 @@ TRACK_SIZE = DIFFERENCES + MAX_TAPS
 NEAR, OTHER, BAD = range(3)  # of ``flow``: surprise so far in the row, side of the channel
 # before, whether there is no such code
 
-# First context of each kind of bit.
-C_SAME, C_UP, C_ZERO, C_FAR, C_MINUS, C_BELOW = 0, 384, 432, 464, 768, 808
-C_LESS, C_MORE, C_SECOND, C_THIRD, C_SIDE, N_CONTEXTS = 880, 960, 2880, 3040, 3360, 3376
-# Mixer of each kind of bit; "more" has twelve, by how far the length is.
-M_SAME, M_UP, M_ZERO, M_FAR, M_ZERO_SIGN, M_MINUS, M_BELOW, M_LESS, M_MORE = range(9)
-M_SECOND, M_THIRD, M_SIDE, N_MIXERS = 20, 21, 22, 23
+# First context of each kind of bit, and its mixer; residuals come last.
+C_SAME, C_UP, C_ZERO, C_FAR, C_MINUS, C_RESIDUAL = 0, 384, 432, 464, 768, 808
+M_SAME, M_UP, M_ZERO, M_FAR, M_ZERO_SIGN, M_MINUS, M_RESIDUAL = range(7)
+RESIDUALS = C_RESIDUAL, M_RESIDUAL
+N_CONTEXTS, N_MIXERS = C_RESIDUAL + residuals.N_CONTEXTS, M_RESIDUAL + residuals.N_MIXERS
 
 DECIMAL_WIDTH, BINARY_WIDTH = 13, 44  # digits of the greatest class in fixed point
 MAX_PLAIN = 1 << 44
@@ -34,30 +35,7 @@ MAX_DIFFERENCE = 1 << 40
 MAX_SCALE = 1 << 52
 LAST_POWER = 63
 MAX_STEPS_LENGTH = 12
-FAULT = -(1 << 62)
 ZERO_CLASS = 1 << 62
-
-
-@inner
-def bits(value: int) -> int:
-    """Bits of ``value`` >= 0 without leading zeros."""
-    n = 0
-    while value > 0:
-        value >>= 1
-        n += 1
-    return n
-
-
-@inner
-def quarters(value: int) -> int:
-    """About 4 log2(value), value >= 1, at most 111."""
-    n = bits(value)
-    return min(4 * (n - 1) + ((value << 2) >> (n - 1) & 3), 111)
-
-
-@inner
-def clamp(value: int, low: int, high: int) -> int:
-    return min(max(value, low), high)
 
 
 @inner
@@ -92,72 +70,19 @@ def remember(track: Ints, flow: Ints, value: int, predicted: int) -> None:
 
 
 @inner
-def code_residual(
+def code_error(
     state: Ints,
     data: Bytes,
-    residual: int,
+    error: int,
     negative: int,
     scales: tuple[int, int],
     track: Ints,
     flow: Ints,
 ) -> int:
-    """Code an integer of about the size of ``scales``, in sixteenths; FAULT if it is too long."""
-    kf, ks = quarters(scales[0] + 1), quarters(scales[1] + 1)
-    cf, cs = kf if kf < 28 else 28 + (kf & 3), ks if ks < 28 else 28 + (ks & 3)
-    bf, bs = 0 if kf < 28 else (kf - 24) >> 2, 0 if ks < 28 else (ks - 24) >> 2
+    """Code what the prediction of a channel missed, or return FAULT."""
     near = clamp(flow[NEAR] + 3, 0, 7)
-    size = abs(residual)
-    length = code_length(state, data, bits(size), cf, cs, bf, bs, near)
-    if length < 0 or length > 53:
-        return FAULT
-    found = min(length, 1)
-    f, s, e = clamp(length - bf + 4, 0, 15), clamp(length - bs + 4, 0, 15), min(length, 31)
-    if length > 1:
-        a = C_SECOND + 4 * f + (kf & 3)
-        b = C_SECOND + 64 + 4 * s + (ks & 3)
-        found = 2 + mixed(state, data, size >> (length - 2) & 1, M_SECOND, a, b, C_SECOND + 128 + e)
-    if length > 2:
-        bit = found & 1
-        a = C_THIRD + 8 * f + 2 * (kf & 3) + bit
-        b = C_THIRD + 128 + 8 * s + 2 * (ks & 3) + bit
-        c = C_THIRD + 256 + 2 * e + bit
-        found = 2 * found + mixed(state, data, size >> (length - 3) & 1, M_THIRD, a, b, c)
-    if length > 3:
-        found = found << (length - 3) | number(state, data, size, length - 3)
-    if length == 0:
-        return 0
-    side = 1 if (residual < 0) != (negative == 1) else 0
-    a, b = C_SIDE + track[SIDE_1], C_SIDE + 3 + 3 * track[SIDE_1] + track[SIDE_2]
-    side = mixed(state, data, side, M_SIDE, a, b, C_SIDE + 12 + flow[OTHER])
-    return -found if (side == 1) != (negative == 1) else found
-
-
-@inner
-def code_length(
-    state: Ints, data: Bytes, length: int, cf: int, cs: int, bf: int, bs: int, near: int
-) -> int:
-    """Code the bit length of a residual, first against a length that it will hardly miss."""
-    base = max(0, min(bf, bs) - 2)
-    if base > 0:
-        below = 1 if length < base else 0
-        if mixed(state, data, below, M_BELOW, C_BELOW + cf, C_BELOW + 32 + cs, C_BELOW + 64 + near):
-            at = base - 1
-            while at > 0:
-                a = C_LESS + min(base - at, 15)
-                less = 1 if length < at else 0
-                if not mixed(state, data, less, M_LESS, a, C_LESS + 16 + cf, C_LESS + 48 + cs):
-                    break
-                at -= 1
-            return at
-    at = base
-    while at <= 60:
-        f, s = clamp(at - bf + 4, 0, 23), clamp(at - bs + 4, 0, 23)
-        c = C_MORE + 1536 + 2 * (24 * near + f) + (1 if bf > bs else 0)
-        a, b = C_MORE + 24 * cf + f, C_MORE + 768 + 24 * cs + s
-        if not mixed(state, data, 1 if length > at else 0, M_MORE + min(f, 11), a, b, c):
-            return at
-        at += 1
-    return -1
+    sides = track[SIDE_1], track[SIDE_2], flow[OTHER]
+    return code_residual(state, data, error, negative, scales, near, sides, RESIDUALS)
 
 
 @inner
@@ -215,7 +140,7 @@ def code_plain(state: Ints, data: Bytes, ordinal: int, plan: Ints, track: Ints, 
     predicted = clamp(predict(plan, track), -MAX_PLAIN, MAX_PLAIN)
     value = ordinal >> plan[DROP]
     scales = track[FAST], track[SLOW]
-    residual = code_residual(state, data, value - predicted, 0, scales, track, flow)
+    residual = code_error(state, data, value - predicted, 0, scales, track, flow)
     if residual == FAULT or not -MAX_PLAIN <= predicted + residual < MAX_PLAIN:
         flow[BAD] = 1
         return 0
@@ -256,7 +181,7 @@ def code_scaled(
         guess = to_mantissa(abs(predicted), digits_off, low, low * plan[BASE] - 1, powers)
     scales = to_scale(track, digits_off, powers)
     mantissa = (magnitude - first) % per_class + low
-    residual = code_residual(state, data, mantissa - guess, negative, scales, track, flow)
+    residual = code_error(state, data, mantissa - guess, negative, scales, track, flow)
     if residual == FAULT or not low <= guess + residual < low * plan[BASE]:
         flow[BAD] = 1
         return 0

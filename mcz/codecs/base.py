@@ -56,7 +56,8 @@ class Span:
 class Layout:
     """What encoder and decoder both know of a signal.
 
-    ``groups`` lists the channels of each group; ``samples_per_frame`` rows make a frame.
+    ``n_frames`` are the stored ones. ``groups`` lists the channels of each group;
+    ``samples_per_frame`` rows make a frame.
     """
 
     n_frames: int
@@ -97,6 +98,10 @@ class SignalSource(Protocol):
         """Values of these frames in source units, (rows, n_channels)."""
         ...
 
+    def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
+        """Which of these values are valid, None where all are."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Request:
@@ -122,6 +127,18 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
+class Dial:
+    """The one parameter that trades quality for size: the greater, the smaller the file.
+
+    A caller who names a size or an error instead has it searched for between ``low`` and ``high``.
+    """
+
+    parameter: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
 class Encoded:
     """An encoded signal: what goes into CLIP, then the segments as they are made."""
 
@@ -133,6 +150,14 @@ class Encoded:
 Encode = Callable[[SignalSource, Mapping[str, Any]], Encoded]
 Decode = Callable[[bytes, Layout, Sequence[Span], Request, Fetch], NDArray[Any]]
 
+# (header, layout, first, stop, groups) -> header of a signal that is left with frames
+# first <= f < stop, both of them ends of segments, and with these groups, ascending.
+Cut = Callable[[bytes, Layout, int, int, tuple[int, ...]], bytes]
+
+# (stream, layout, group, numbers) -> the stream of a group where the groups that are left have the
+# new ``numbers``. Looking up a group that is left out raises; the message is the caller's.
+Regroup = Callable[[bytes, Layout, int, Mapping[int, int]], bytes]
+
 
 @dataclass(frozen=True, slots=True)
 class Codec:
@@ -142,6 +167,14 @@ class Codec:
     (rows, channels of the requested groups in the order requested).
     ``segmented``: memory is bounded by a segment. ``delay``: frames a live encoder holds back,
     None where it cannot work live.
+
+    A clip may be cut without the codec's help, SPEC.md, "Cutting without re-encoding": whole
+    segments at its ends, groups, and the streams of the finest resolutions are left out, and what
+    is left is renumbered from 0. ``decode`` then is given the numbers of frames, groups and
+    resolutions that are left, MUST give the same values as before, and takes details that are
+    not stored as zero. ``cut`` makes the header fit where it says something of frames or
+    channels (None: it holds as it is); ``regroup`` a stream that names other groups (None: none
+    does). Both are given the layout before the cut, and raise FormatError for bad bytes.
     """
 
     id: int
@@ -155,10 +188,13 @@ class Codec:
     segmented: bool = True
     delay: int | None = None
     parameters: tuple[Parameter, ...] = field(default=())
+    dial: Dial | None = None
+    cut: Cut | None = None
+    regroup: Regroup | None = None
 
     def options(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """All parameters, those given checked; raises OptionError for an unknown or bad one."""
-        known = {p.name: p for p in self.parameters}
+        known = {p.name: p for p in (*self.parameters, *(TARGETS if self.dial else ()))}
         unknown = sorted(set(given) - set(known))
         if unknown:
             raise OptionError(
@@ -212,6 +248,8 @@ def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
     def parse(text: Any) -> int:
         try:
             value = int(text)
+            if isinstance(text, float) and value != text:
+                raise ValueError
         except (TypeError, ValueError, OverflowError):
             raise OptionError(f"{name} is {text!r}, not an integer") from None
         if not low <= value <= high:
@@ -219,3 +257,58 @@ def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
         return value
 
     return parse
+
+
+def number(name: str, low: float, high: float) -> Callable[[Any], float]:
+    """A parser of numbers from ``low`` to ``high``."""
+
+    def parse(text: Any) -> float:
+        try:
+            value = float(text)
+        except (TypeError, ValueError, OverflowError):
+            raise OptionError(f"{name} is {text!r}, not a number") from None
+        if not low <= value <= high:
+            raise OptionError(f"{name} is {value}, not from {low:g} to {high:g}")
+        return value
+
+    return parse
+
+
+def choice(name: str, among: tuple[str, ...]) -> Callable[[Any], str]:
+    """A parser of one word of several."""
+
+    def parse(text: Any) -> str:
+        if text not in among:
+            raise OptionError(f"{name} is {text!r}, not one of {', '.join(among)}")
+        return str(text)
+
+    return parse
+
+
+# What a caller may ask for instead of setting the dial of a codec; None: not asked for.
+TARGETS = (
+    Parameter(
+        "target_bytes",
+        None,
+        "at most so many bytes of payload and overhead",
+        integer("target_bytes", 1, 2**53 - 1),
+    ),
+    Parameter(
+        "kbps",
+        None,
+        "at most so many kilobits of payload a second",
+        number("kbps", 1e-9, 1e9),
+    ),
+    Parameter(
+        "mean_error_cm",
+        None,
+        "at most this mean position error",
+        number("mean_error_cm", 1e-9, 1e9),
+    ),
+    Parameter(
+        "max_error_cm",
+        None,
+        "at most this maximum position error",
+        number("max_error_cm", 1e-9, 1e9),
+    ),
+)

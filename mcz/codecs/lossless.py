@@ -18,15 +18,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs._lossless_plan import (
-    MAX_TAP,
-    Lattice,
-    base_and_digits,
-    choose_predictor,
-    fixed_point,
-    lattice,
-    max_top,
+from mcz.codecs._lossless_heads import (
+    CODED,
+    CONSTANT,
+    COPY,
+    MAX_SCALE,
+    MULTIPLES,
+    OWN_FORM,
+    form_of,
+    form_of_grid,
+    make_plan,
+    read_heads,
+    scale_of,
 )
+from mcz.codecs._lossless_plan import choose_predictor, fixed_point, lattice, max_top
 from mcz.codecs._lossless_units import find_unit, of_multiples
 from mcz.codecs.base import (
     Codec,
@@ -42,10 +47,10 @@ from mcz.codecs.base import (
     integer,
     refuse_extras,
 )
-from mcz.coding.logistic import rate_table, squash_table, stretch_table
+from mcz.coding.start import start_state
 from mcz.errors import FormatError
 from mcz.numbers import Grid, GridKind
-from mcz.schema import read_varint, varint
+from mcz.schema import varint
 
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
@@ -53,8 +58,6 @@ Bytes = NDArray[np.uint8]
 TARGET_BYTES = 62_000  # of a segment: under the 64 KiB that DATA should have, table included
 MAX_ROWS = 2**16
 START_TABLE = Path(__file__).with_name("lossless_start.json")
-
-CODED, CONSTANT, COPY = range(3)  # bits 0 and 1 of a channel's first byte
 
 # The head of each channel of a stream, as SPEC.md's table has it: (name, type, meaning).
 LOSSLESS_FIELDS = (
@@ -73,12 +76,7 @@ LOSSLESS_FIELDS = (
     ("scale", "u8", "coded: first scale, in quarters of an octave"),
     ("taps", "zigzag varint each", "coded: as many as bits 3-6 of kind say; bit 2: from_last"),
 )
-MAX_DROP = 19
-MAX_SCALE = 172  # 2^43
-MAX_TAPS = 8
 PLAIN = Grid(GridKind.INTEGER)
-OWN_FORM = 128  # in kind: form and drop are in the stream
-MULTIPLES = 32  # form: integers that are multiplied by a unit
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
@@ -165,30 +163,7 @@ def _coded_head(column: Ints, grid: Grid, clip_grid: Grid) -> tuple[bytes, Ints,
     head += [struct.pack("<d", unit)] if form == MULTIPLES else []
     head += [varint(shape.top)] if shape.base else []
     head += [bytes((scale,)), *(varint(2 * t if t >= 0 else -2 * t - 1) for t in taps)]
-    return b"".join(head), _plan(shape, scale, from_last, taps), column
-
-
-def form_of(shape: Lattice) -> int:
-    """The byte ``form``: 0 plain, digits of base 10, or 64 + digits of base 2, drop included."""
-    return {0: 0, 10: shape.digits, 2: 64 + shape.digits + shape.drop}[shape.base]
-
-
-def form_of_grid(grid: Grid) -> int:
-    base, digits = base_and_digits(grid)
-    return form_of(Lattice(base, digits))
-
-
-def scale_of(quarters: int) -> int:
-    """The scale that a byte stands for: about 2^(q / 4)."""
-    return 4 + (quarters & 3) << (quarters >> 2) >> 2
-
-
-def _plan(shape: Lattice, scale: int, from_last: int, taps: Sequence[int]) -> Ints:
-    plan = np.zeros(7 + MAX_TAPS, np.int64)
-    fields = (shape.base, shape.digits, shape.drop, shape.top, scale_of(scale) << 4)
-    plan[:7] = *fields, from_last, len(taps)
-    plan[7 : 7 + len(taps)] = taps
-    return plan
+    return b"".join(head), make_plan(shape, scale, from_last, taps), column
 
 
 @cache
@@ -204,18 +179,7 @@ def _start_state() -> Ints:
     """The state of a coder before its first bit; SPEC.md's annex has the numbers."""
     import json
 
-    loops, coding = _kernels()
-    table = json.loads(START_TABLE.read_text())
-    state = np.zeros(coding.MODELS + 2 * loops.N_CONTEXTS, np.int64)
-    state[coding.SQUASH : coding.SQUASH + 4096] = squash_table()
-    state[coding.STRETCH : coding.STRETCH + 4096] = stretch_table()
-    rates = rate_table()
-    state[coding.RATES : coding.RATES + len(rates)] = rates
-    state[coding.WEIGHTS : coding.WEIGHTS + len(table["weights"])] = table["weights"]
-    probabilities = np.frombuffer(bytes.fromhex("".join(table["probabilities"])), "u1")
-    state[coding.MODELS :: 2] = probabilities.astype(np.int64) * 256 + 128
-    state[coding.MODELS + 1 :: 2] = np.frombuffer(bytes.fromhex("".join(table["counts"])), "u1")
-    return state
+    return start_state(json.loads(START_TABLE.read_text()))
 
 
 @cache
@@ -267,8 +231,7 @@ class _Segment:
         """The ordinals of one group, (n_rows, channels), its copies filled in."""
         columns, copies = self._own(group)
         for channel, (other, place) in copies.items():
-            if not other < len(self.layout.groups) or not place < len(self.layout.groups[other]):
-                raise FormatError(f"lossless: a copy of channel {place} of group {other}")
+            _check_copy(self.layout, other, place)
             source, others = self._own(other)
             if place in others:
                 raise FormatError(f"lossless: a copy of a copy, channel {place} of group {other}")
@@ -283,96 +246,39 @@ class _Segment:
         return self._done[group]
 
 
+def _check_copy(layout: Layout, group: int, place: int) -> None:
+    if not group < len(layout.groups) or not place < len(layout.groups[group]):
+        raise FormatError(f"lossless: a copy of channel {place} of group {group}")
+
+
+def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int]) -> bytes:
+    """``stream`` of ``group`` with its copies referring to the groups' new ``numbers``."""
+    heads, end = read_heads(stream, [layout.grids[c] for c in layout.groups[group]])
+    parts = []
+    for kind, found, head in heads:
+        if kind == COPY:
+            _check_copy(layout, *found)
+            head = bytes((COPY,)) + varint(numbers[found[0]]) + varint(found[1])
+        parts.append(head)
+    return b"".join(parts) + stream[end:]
+
+
 def _parse(
     stream: bytes, grids: Sequence[Grid], n_rows: int
 ) -> tuple[Ints, dict[int, tuple[int, int]]]:
     columns = np.zeros((n_rows, len(grids)), np.int64)
-    copies: dict[int, tuple[int, int]] = {}
-    plans, coded, units, at = [], [], {}, 0
-    for channel, grid in enumerate(grids):
-        kind, at = _byte(stream, at)
-        if kind & 3 == CODED:
-            plan, unit, at = _parse_coded(stream, at, kind, grid)
-            if unit is not None:
-                units[channel] = unit
-            plans.append(plan)
-            coded.append(channel)
-        elif kind & 3 == CONSTANT:
-            columns[:, channel], at = _parse_constant(stream, at, kind)
-        elif kind == COPY:
-            group, at = read_varint(stream, at)
-            place, at = read_varint(stream, at)
-            copies[channel] = group, place
-        else:
-            raise FormatError(f"lossless: channel {channel} is of kind {kind:#04x}")
-    columns[:, coded] = _uncode(stream[at:], plans, n_rows)
-    for channel, unit in units.items():
-        columns[:, channel] = of_multiples(columns[:, channel], unit)
+    heads, end = read_heads(stream, grids)
+    coded = [channel for channel, (kind, _, _) in enumerate(heads) if kind == CODED]
+    columns[:, coded] = _uncode(stream[end:], [heads[c][1][0] for c in coded], n_rows)
+    copies = {}
+    for channel, (kind, found, _) in enumerate(heads):
+        if kind == COPY:
+            copies[channel] = found
+        elif kind == CONSTANT:
+            columns[:, channel] = found
+        elif found[1] is not None:
+            columns[:, channel] = of_multiples(columns[:, channel], found[1])
     return columns, copies
-
-
-def _byte(stream: bytes, at: int) -> tuple[int, int]:
-    if at >= len(stream):
-        raise FormatError(f"lossless: the stream ends at {at}, in the head of a channel")
-    return stream[at], at + 1
-
-
-def _parse_constant(stream: bytes, at: int, kind: int) -> tuple[int, int]:
-    size = kind >> 2
-    if size > 8 or at + size > len(stream):
-        raise FormatError(f"lossless: a constant of {size} bytes at {at}")
-    folded = int.from_bytes(stream[at : at + size], "little")
-    if size and stream[at + size - 1] == 0:
-        raise FormatError(f"lossless: a constant of {size} bytes, the last of which is 0")
-    return (folded >> 1) ^ -(folded & 1), at + size
-
-
-def _parse_coded(stream: bytes, at: int, kind: int, grid: Grid) -> tuple[Ints, float | None, int]:
-    """The plan of a coded channel, its unit if it has one, and the offset after its head."""
-    form, drop, unit = form_of_grid(grid), 0, None
-    if kind & OWN_FORM:
-        form, at = _byte(stream, at)
-        drop, at = _byte(stream, at)
-    if form == MULTIPLES:
-        unit, at = _parse_unit(stream, at)
-    shape = _shape(form, drop)
-    top = 0
-    if shape.base:
-        top, at = read_varint(stream, at)
-    scale, at = _byte(stream, at)
-    taps = []
-    for _ in range(kind >> 3 & 15):
-        folded, at = read_varint(stream, at)
-        taps.append((folded >> 1) ^ -(folded & 1))
-    if (
-        (shape.base and top > max_top(shape))
-        or len(taps) > MAX_TAPS
-        or any(abs(t) > MAX_TAP for t in taps)
-    ):
-        raise FormatError(f"lossless: greatest class {top}, taps {taps}")
-    if scale > MAX_SCALE:
-        raise FormatError(f"lossless: scale {scale}")
-    shape = Lattice(shape.base, shape.digits, drop, top)
-    return _plan(shape, scale, kind >> 2 & 1, taps), unit, at
-
-
-def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
-    if at + 8 > len(stream):
-        raise FormatError(f"lossless: the stream ends at {len(stream)}, in a unit")
-    (unit,) = struct.unpack_from("<d", stream, at)
-    if not 2.0**-200 <= unit <= 2.0**80:
-        raise FormatError(f"lossless: a unit of {unit!r}")
-    return unit, at + 8
-
-
-def _shape(form: int, drop: int) -> Lattice:
-    if (form == 0 and drop <= MAX_DROP) or (form == MULTIPLES and drop == 0):
-        return Lattice(0, 0, drop)
-    if 1 <= form <= 15 and drop == 0:
-        return Lattice(10, form)
-    if form in (64 + 24, 64 + 53) and drop <= form - 64 - 2:
-        return Lattice(2, form - 64 - drop, drop)
-    raise FormatError(f"lossless: form {form}, drop {drop}")
 
 
 def _uncode(data: bytes, plans: Sequence[Ints], n_rows: int) -> Ints:
@@ -404,6 +310,7 @@ CODEC = Codec(
     lossless=True,
     encode=encode,
     decode=decode,
+    regroup=regroup,
     delay=0,
     parameters=(
         Parameter(

@@ -20,11 +20,11 @@ Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
 # Places in ``state``: the ends of the interval, the 32 bits within it, the place in the data,
-# whether it encodes; then the tables, the weights of 32 mixers, the models.
+# whether it encodes; then the tables, the weights of 64 mixers, the models.
 LOW, HIGH, CODE, POSITION, ENCODING = range(5)
 SQUASH, STRETCH, RATES = 8, 8 + 4096, 8 + 8192
 WEIGHTS = RATES + 256
-MODELS = WEIGHTS + 3 * 32
+MODELS = WEIGHTS + 3 * 64
 TOP = 0xFFFFFFFF
 MAX_WEIGHT = 1 << 24
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from mcz.container.source import ByteSource
@@ -184,17 +184,20 @@ def is_foot_at(source: ByteSource, offset: int) -> bool:
     return True
 
 
-def resynchronize(source: ByteSource, start: int, limit: int) -> int | None:
+def resynchronize(
+    source: ByteSource, start: int, limit: int, spend: Callable[[int], None]
+) -> int | None:
     """The offset of the next valid chunk or FOOT at or after ``start``, None where there is none.
 
-    A chunk counts when both its header_check and its crc are right.
+    A chunk counts when both its header_check and its crc are right. ``spend`` is told how many
+    bytes will be read to find that out, and may raise.
     """
     window = 4 * 1024 * 1024
     overlap = FOOT.size - 1
     while start < source.size:
         data = source.read(start, min(window, source.size - start))
         for at in _candidates(data):
-            if _is_valid(source, start + at, limit):
+            if _is_valid(source, start + at, limit, spend):
                 return start + at
         if start + len(data) == source.size:
             return None
@@ -209,13 +212,18 @@ def _candidates(data: bytes) -> Iterator[int]:
     return iter(sorted(chunks + feet))
 
 
-def _is_valid(source: ByteSource, offset: int, limit: int) -> bool:
+def _is_valid(source: ByteSource, offset: int, limit: int, spend: Callable[[int], None]) -> bool:
     try:
         if is_foot_at(source, offset):
             return True
         chunk = read_chunk(source, offset)
-        if chunk.length is not None:
-            read_payload(source, chunk, limit)
-        return True
     except FormatError:
         return False
+    if chunk.length is None:
+        return True
+    spend(chunk.length)
+    try:
+        read_payload(source, chunk, limit)
+    except FormatError:
+        return False
+    return True

@@ -13,7 +13,7 @@ from mcz.container import payloads
 from mcz.container.chunks import HEADER, Chunk, build_chunk
 from mcz.container.limits import check
 from mcz.container.segments import SegmentHeader
-from mcz.errors import FormatError, LimitError
+from mcz.errors import FormatError
 from mcz.schema import build, deflate, inflate, parse, read_varint, varint
 
 PACKET = 128  # set in the indexed flags of a segment that is a packet of an open DATA
@@ -56,6 +56,12 @@ class SignalRow:
     samples_per_frame: int
     codec: int
     codec_version: int
+    skip: int = 0  # stored frames before the first that the clip shows
+    spare: int = 0  # stored frames after the last
+
+    def stored(self, n_frames: int) -> int:
+        """The frames that the segments of the signal cover, where the clip has ``n_frames``."""
+        return self.skip + n_frames + self.spare
 
 
 @dataclass(slots=True)
@@ -145,6 +151,8 @@ def _clip_fields(clip: ClipRow) -> dict[str, Any]:
             {
                 "n_channels": s.n_channels,
                 "samples_per_frame": s.samples_per_frame,
+                "skip": s.skip,
+                "spare": s.spare,
                 "codec": s.codec,
                 "codec_version": s.codec_version,
             }
@@ -162,8 +170,6 @@ def parse_index(payload: bytes, limit: int) -> Directory:
     """The Directory in the payload of an INDX; ``limit`` bounds its inflated size."""
     outer = parse(payloads.INDX, payload, "INDX")
     check("INDX: inflated size", outer.size, limit)
-    if outer.size > 1032 * (len(outer.data) + 1):  # deflate's greatest ratio
-        raise LimitError(f"INDX: {outer.size} bytes cannot come of {len(outer.data)}")
     fields = parse(payloads.INDEX, inflate(outer.data, outer.size, "INDX"), "INDX")
     directory = Directory(head=fields.head)
     for row in fields.shared:
@@ -189,7 +195,8 @@ def _add(table: dict[str, Any], name: str, row: Any) -> None:
 def _parse_clip(row: Any) -> ClipRow:
     clip = Chunk(b"CLIP", 0, row.offset, row.length)
     signals = tuple(
-        SignalRow(s.n_channels, s.samples_per_frame, s.codec, s.codec_version) for s in row.signals
+        SignalRow(s.n_channels, s.samples_per_frame, s.codec, s.codec_version, s.skip, s.spare)
+        for s in row.signals
     )
     if not signals:
         raise FormatError(f"INDX: clip {row.name!r} has no signal")

@@ -26,6 +26,11 @@ class Profile:
     packet_bytes: int
     text_bytes: int
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many joints and channels a skeleton may have, checked while it is parsed."""
+        return {"joints": self.joints, "channels": self.channels}
+
 
 BASE = Profile(0, "base", 16_384, 4_096, 64 * MIB, 64 * MIB, 2**31, 64 * 1024, 64 * MIB)
 ARCHIVE = Profile(1, "archive", 2**20, 2**18, 2**34, 2**31, 2**40, MIB, 2**31)
@@ -36,6 +41,15 @@ def check(what: str, value: int, limit: int) -> None:
     """Raise LimitError where ``value`` exceeds ``limit``."""
     if value > limit:
         raise LimitError(f"{what}: {value} is over the limit of {limit}")
+
+
+def check_decoded(what: str, value: int, limit: int) -> None:
+    """Raise LimitError where ``value`` bytes exceed what the caller lets one file decode to."""
+    if value > limit:
+        raise LimitError(
+            f"{what}: {value} bytes are over the limit of {limit} decoded bytes; "
+            "max_decoded (--max-decoded) raises it"
+        )
 
 
 def index_limit(file_bytes: int) -> int:

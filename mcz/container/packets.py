@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from mcz.container.limits import check
 from mcz.errors import ChecksumError, FormatError
-from mcz.schema import varint
+from mcz.schema import take_varint, varint
 
 END, SEGMENT, CODEC = 0, 1, 2  # kinds, bits 0 to 3 of the first byte
 FRESH = 0x80  # the packet needs none before it
@@ -66,7 +66,12 @@ def read_packets(read: Callable[[int], bytes], limit: int) -> Iterator[Packet]:
 
 def _read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
     head = bytearray(read(1))
-    values = [_stream_varint(read, head) for _ in range(2)]
+
+    def seen() -> int:
+        head.extend(read(1))
+        return head[-1]
+
+    values = [take_varint(iter(seen, None), "packet") for _ in range(2)]
     if read(2) != _check16(bytes(head)):
         raise ChecksumError(f"head_check of packet {values[0]} is wrong")
     kind = head[0] & 0x0F
@@ -77,19 +82,3 @@ def _read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
     if read(2) != _check16(body):
         raise ChecksumError(f"body_check of packet {values[0]} is wrong")
     return Packet(kind, values[0], body, bool(head[0] & FRESH))
-
-
-def _stream_varint(read: Callable[[int], bytes], seen: bytearray) -> int:
-    """The next varint, its bytes also appended to ``seen``."""
-    value = shift = 0
-    while True:
-        byte = read(1)[0]
-        seen.append(byte)
-        value |= (byte & 0x7F) << shift
-        shift += 7
-        if value >= 2**53 or shift > 56:
-            raise FormatError("packet: varint beyond 2^53 - 1")
-        if byte < 0x80:
-            if byte == 0 and shift > 7:
-                raise FormatError("packet: varint not in its shortest form")
-            return value

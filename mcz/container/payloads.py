@@ -22,7 +22,8 @@ from construct import (
 from mcz.numbers import GRID
 from mcz.schema import EXTENSION, FINITE, SIZED, TEXT, UVARINT, counted
 
-FORMAT_MAJOR, FORMAT_MINOR = 0, 1
+FORMAT_MAJOR, FORMAT_MINOR = 0, 2
+LEAST_NEEDED = 0, 2  # 0.1 had another CLIP and INDX
 
 POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)
 AT_MOST_ONE = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)
@@ -73,7 +74,7 @@ JOINT = Struct(
     / IfThenElse(this.flags & HAS_AXIS, OneOf(Int8ul, range(6)), Pass)
     * "0 XYZ, 1 XZY, 2 YXZ, 3 YZX, 4 ZXY, 5 ZYX; XYZ where absent",
     "tails" / counted(VECTOR) * "3 binary64 each, own origin to the end of a bone",
-    "channels" / counted(CHANNEL) * "the joint's channels, in column order",
+    "channels" / counted(CHANNEL, kind="channels") * "the joint's channels, in column order",
 )
 
 SKELETON_SOURCE = Struct(
@@ -91,7 +92,7 @@ SKEL = Struct(
     "up_axis" / OneOf(Int8ul, range(4)) * "0 unknown, 1 x, 2 y, 3 z",
     "base" / optional(ID) * "0 or 1: id of the SKEL that this one was derived from",
     "source" / optional(SKELETON_SOURCE) * "0 or 1: how to restore the skeleton's own file",
-    "joints" / counted(JOINT) * "the joints, parents before children",
+    "joints" / counted(JOINT, kind="joints") * "the joints, parents before children",
     "extension" / EXTENSION * "ignored, kept",
 )
 
@@ -157,6 +158,8 @@ SIGNAL = Struct(
     / IfThenElse(this.flags & OWN_CHANNELS, counted(CHANNEL), Pass)
     * "the signal's own channels",
     "samples_per_frame" / POSITIVE * "rows a frame, at least 1",
+    "skip" / UVARINT * "stored frames before the first that is shown",
+    "spare" / UVARINT * "stored frames after the last that is shown",
     "grids" / counted(GRID_RUN) * "number grids, in column order",
     "codec" / UVARINT * "codec id",
     "codec_version" / UVARINT * "codec version",
@@ -226,6 +229,8 @@ INDEXED_ATTACHMENT = Struct(
 INDEXED_SIGNAL = Struct(
     "n_channels" / UVARINT * "channels",
     "samples_per_frame" / UVARINT * "rows a frame",
+    "skip" / UVARINT * "as in CLIP",
+    "spare" / UVARINT * "as in CLIP",
     "codec" / UVARINT * "codec id",
     "codec_version" / UVARINT * "codec version",
 )

@@ -26,8 +26,8 @@ from mcz.container.chunks import (
     read_payload,
 )
 from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, parse_index
-from mcz.container.limits import Profile, check, index_limit, output_limit
-from mcz.container.scan import parse_head, scan, signal_row
+from mcz.container.limits import Profile, check, check_decoded, index_limit, output_limit
+from mcz.container.scan import parse_head, scan, signal_rows
 from mcz.container.segments import SegmentHeader, StreamCounts, StreamTable, parse_table
 from mcz.container.source import ByteSource
 from mcz.container.strict import decoded
@@ -120,22 +120,21 @@ class Container:
         payload = self.payload(chunk)
         if payload_id(payload) != id_:
             raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
-        return parse(schema, payload, chunk.label)
+        return parse(schema, payload, chunk.label, self.profile.counts)
 
     def template(self, id_: bytes, format_id: int) -> bytes:
         """The template in the SRCE with this id."""
         fields = self.shared(b"SRCE", id_, payloads.SRCE)
         if fields.format != format_id:
             raise FormatError(f"SRCE {id_.hex()} is of format {fields.format}, not {format_id}")
-        check(
-            f"SRCE {id_.hex()}: bytes", fields.size, min(self.profile.text_bytes, self.max_decoded)
-        )
+        check(f"SRCE {id_.hex()}: bytes", fields.size, self.profile.text_bytes)
+        check_decoded(f"SRCE {id_.hex()}", fields.size, self.max_decoded)
         return decoded(fields.data, fields.encoding, fields.size, f"SRCE {id_.hex()}")
 
     def clip(self, row: ClipRow) -> Any:
         """The fields of CLIP, compared with what the index says of them."""
         fields = parse(payloads.CLIP, self.payload(row.clip), row.clip.label)
-        signals = [signal_row(signal) for signal in fields.signals]
+        signals = signal_rows(fields, row.clip.label)
         rate = fields.rate_numerator, fields.rate_denominator
         n_frames = fields.n_frames
         if fields.flags & payloads.OPEN_CLIP:
@@ -144,7 +143,7 @@ class Container:
             n_frames = row.n_frames
         found = (fields.name, fields.skeleton, n_frames, *rate, signals)
         listed = (row.name, row.skeleton, row.n_frames, row.rate_numerator, row.rate_denominator)
-        if found != (*listed, list(row.signals)) and not (self.salvage and row.damage):
+        if found != (*listed, row.signals) and not (self.salvage and row.damage):
             raise FormatError(f"clip {row.name!r} is {found}, but the index says {listed}")
         return fields
 
@@ -159,7 +158,7 @@ class Container:
 
     def attachment(self, row: AttachmentRow) -> bytes:
         """The bytes of an attached file, its hash checked."""
-        check(f"attachment {row.name!r}: bytes", row.size, self.max_decoded)
+        check_decoded(f"attachment {row.name!r}", row.size, self.max_decoded)
         parts = []
         left, digest = row.size, b""
         for number, chunk in enumerate(row.parts):

@@ -31,9 +31,10 @@ from mcz.container.packets import SEGMENT, read_packets
 from mcz.container.segments import FRESH, parse_header
 from mcz.container.source import ByteSource
 from mcz.container.writer import build_head, payload_id
-from mcz.errors import FormatError, TruncatedError, UnsupportedError
-from mcz.schema import parse
+from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
+from mcz.schema import MAX_COUNT, parse
 
+LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that salvage may read in vain, in all
 PEEK = 64  # enough for the fields of a segment before its table
 
 
@@ -51,9 +52,10 @@ def parse_head(payload: bytes) -> Profile:
     """The profile of the file; raises UnsupportedError where it needs a newer reader."""
     head = parse(payloads.HEAD, payload, "HEAD")
     ours = payloads.FORMAT_MAJOR, payloads.FORMAT_MINOR
-    if (head.needs_major, head.needs_minor) > ours or head.needs_major != ours[0]:
+    needed = head.needs_major, head.needs_minor
+    if not payloads.LEAST_NEEDED <= needed <= ours:
         raise UnsupportedError(
-            f"HEAD: the file needs format {head.needs_major}.{head.needs_minor}, "
+            f"HEAD: the file needs format {needed[0]}.{needed[1]}, "
             f"this reader knows {ours[0]}.{ours[1]}"
         )
     if head.profile not in PROFILES:
@@ -78,10 +80,20 @@ def scan(source: ByteSource, *, salvage: bool = False, whole: bool = False) -> F
     return walker.found
 
 
-def signal_row(fields: Any) -> SignalRow:
-    """What the index says of a signal, from its fields in CLIP."""
+def signal_rows(clip: Any, where: str) -> tuple[SignalRow, ...]:
+    """What the index says of the signals, from the fields of CLIP; raises FormatError."""
+    return tuple(_signal_row(fields, clip, where) for fields in clip.signals)
+
+
+def _signal_row(fields: Any, clip: Any, where: str) -> SignalRow:
+    cut = fields.skip, fields.spare
+    if clip.flags & payloads.OPEN_CLIP and any(cut):
+        raise FormatError(f"{where}: n_frames is open, but a signal has skip and spare {cut}")
+    if sum(cut) + clip.n_frames > MAX_COUNT:
+        raise FormatError(f"{where}: skip and spare {cut} of {clip.n_frames} frames")
     n_channels = sum(run.n_channels for run in fields.grids)
-    return SignalRow(n_channels, fields.samples_per_frame, fields.codec, fields.codec_version)
+    codec = fields.codec, fields.codec_version
+    return SignalRow(n_channels, fields.samples_per_frame, *codec, *cut)
 
 
 class _Walker:
@@ -94,6 +106,7 @@ class _Walker:
         self.profile = PROFILES[0]
         self.templates: dict[bytes, int] = {}  # the source format of each SRCE
         self.model_bytes = 0
+        self.tried = 0  # bytes that were read to find out whether a chunk begins somewhere
         self.clip: ClipRow | None = None
         self.first: list[int] = []  # the next frame of each signal of the open clip
         self.index: Chunk | None = None  # an INDX that waits for its FOOT
@@ -246,7 +259,7 @@ class _Walker:
             fields, chunk.label, self.found.directory, self.templates
         ):
             self.sourced.add((payloads.OF_CLIP, fields.name.encode()))
-        signals = tuple(map(signal_row, fields.signals))
+        signals = signal_rows(fields, chunk.label)
         rate = fields.rate_numerator, fields.rate_denominator
         self.clip = ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, signals, chunk)
         self.first = [0] * len(signals)
@@ -307,16 +320,25 @@ class _Walker:
         clip, self.clip = self.clip, None
         if clip.cend is None:
             clip.damage.append(f"clip {clip.name!r} has no CEND")
-            clip.n_frames = max(self.first, default=0)
-        for signal, frames in enumerate(self.first):
-            if frames != clip.n_frames:
+            clip.n_frames = self._frames_found(clip)
+        for signal, (frames, row) in enumerate(zip(self.first, clip.signals, strict=True)):
+            stored = row.stored(clip.n_frames)
+            if frames != stored:
                 error = FormatError(
-                    f"clip {clip.name!r}: signal {signal} has {frames} of {clip.n_frames} frames"
+                    f"clip {clip.name!r}: signal {signal} has {frames} of {stored} frames"
                 )
                 if not self.salvage:
                     raise error
                 clip.damage.append(str(error))
         self.found.directory.clips[clip.name] = clip
+
+    def _frames_found(self, clip: ClipRow) -> int:
+        """The frames that a clip without CEND shows: up to its last segment."""
+        found = 0
+        for stop, row in zip(self.first, clip.signals, strict=True):
+            most = clip.n_frames if row.skip or row.spare else stop  # those after are spare
+            found = max(found, min(stop - row.skip, most))
+        return found
 
     def _index(self, chunk: Chunk) -> None:
         self._outside(chunk)
@@ -368,7 +390,17 @@ class _Walker:
                 return chunk.offset + chunk.size  # its header is sound, so its end is known
         except FormatError:
             pass
-        return resynchronize(self.source, at + 1, self.profile.chunk_bytes)
+        try:
+            return resynchronize(self.source, at + 1, self.profile.chunk_bytes, self._spend)
+        except LimitError as error:
+            self._note(error)
+            return None
+
+    def _spend(self, size: int) -> None:
+        """Count what is read in search of the next chunk; what looks like one seldom is none."""
+        self.tried += size
+        if self.tried > max(LEAST_TRIED, TRIED_PER_BYTE * self.source.size):
+            raise LimitError(f"too much looks like a chunk and is none; {self.tried} bytes read")
 
     def _finish(self) -> None:
         self._close_clip()

@@ -70,7 +70,8 @@ def parse_channels(rows: Any, where: str) -> tuple[Channel, ...]:
     for row in rows:
         known = 0 < row.kind <= len(CHANNEL_KINDS)
         kind = CHANNEL_KINDS[row.kind - 1] if known else ""
-        channels.append(Channel(kind, row.name or ("" if known else f"kind-{row.kind}"), row.unit))
+        unknown = f"kind-{row.kind}" if row.kind and not known else ""
+        channels.append(Channel(kind, row.name or unknown, row.unit))
     return tuple(channels)
 
 

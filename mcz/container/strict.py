@@ -14,11 +14,10 @@ from mcz.container.chunks import Chunk
 from mcz.container.directory import ClipRow, Directory, parse_index
 from mcz.container.limits import Profile, check
 from mcz.container.skeletons import parse_skeleton
-from mcz.errors import FormatError, LimitError
+from mcz.errors import FormatError
 from mcz.schema import inflate, parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
-MAX_RATIO = 1032  # raw deflate never inflates to more than this times its size
 
 
 def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
@@ -27,8 +26,6 @@ def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
         if len(data) != size:
             raise FormatError(f"{where}: {len(data)} bytes stored, {size} stated")
         return bytes(data)
-    if size > MAX_RATIO * (len(data) + 1):
-        raise LimitError(f"{where}: {size} bytes cannot come of {len(data)}")
     return inflate(data, size, where)
 
 
@@ -48,7 +45,7 @@ def check_skeleton(
     payload: bytes, where: str, directory: Directory, templates: Templates, profile: Profile
 ) -> bool:
     """Check a SKEL; return whether it has a source file of its own."""
-    fields = parse(payloads.SKEL, payload, where)
+    fields = parse(payloads.SKEL, payload, where, profile.counts)
     parse_skeleton(fields, profile, where)
     for base in fields.base:
         _refer(directory, b"SKEL", base, where)

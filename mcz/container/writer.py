@@ -65,6 +65,7 @@ class Writer:
         profile: Profile = BASE,
         directory: Directory | None = None,
         offset: int = 0,
+        head_extension: bytes = b"",
     ) -> None:
         self._sink = sink
         self.profile = profile
@@ -73,11 +74,11 @@ class Writer:
         self._clip: ClipRow | None = None
         self._next_packet: int | None = None  # while a DATA is open
         if offset == 0:
-            self._write_head()
+            self._write_head(head_extension)
 
-    def _write_head(self) -> None:
+    def _write_head(self, extension: bytes) -> None:
         self._write(SIGNATURE)
-        self.directory.head = build_head(self.profile)
+        self.directory.head = build_head(self.profile) + extension
         self.chunk(b"HEAD", self.directory.head)
 
     def _write(self, data: bytes) -> None:
@@ -137,6 +138,13 @@ class Writer:
             row.parts.append(self.chunk(b"ATTA", build(payloads.ATTA, fields, "ATTA")))
         self.directory.attachments[name] = row
 
+    def attachment_parts(self, name: str, size: int, parts: Sequence[bytes]) -> None:
+        """Write an attachment from the payloads of its ATTA chunks."""
+        self._between_clips("ATTA")
+        self._new_name(name, self.directory.attachments)
+        row = AttachmentRow(name, size, [self.chunk(b"ATTA", part) for part in parts])
+        self.directory.attachments[name] = row
+
     def alias(self, name: str, of: int, target: bytes) -> None:
         """Write that the file ``name`` is identical to something that this file holds."""
         self._between_clips("ALIA")
@@ -161,7 +169,9 @@ class Writer:
         self._new_name(name, self.directory.clips)
         chunk = self.chunk(b"CLIP", build(payloads.CLIP, fields, f"clip {name!r}"))
         signals = tuple(
-            SignalRow(n, s["samples_per_frame"], s["codec"], s["codec_version"])
+            SignalRow(
+                n, s["samples_per_frame"], s["codec"], s["codec_version"], s["skip"], s["spare"]
+            )
             for n, s in zip(n_channels, fields["signals"], strict=True)
         )
         rate = fields["rate_numerator"], fields["rate_denominator"]
@@ -197,7 +207,13 @@ class Writer:
         self._write(build_packet(Packet(END, self._next_packet, b"")))
         self._next_packet = None
 
-    def end_clip(self, n_frames: int, source_sha256: bytes, value_sha256: Sequence[bytes]) -> None:
+    def end_clip(
+        self,
+        n_frames: int,
+        source_sha256: bytes,
+        value_sha256: Sequence[bytes],
+        extension: bytes = b"",
+    ) -> None:
         """Write CEND; an empty ``source_sha256`` means that there is no source."""
         clip = self._in_clip("CEND")
         if self._next_packet is not None:
@@ -206,7 +222,7 @@ class Writer:
             "n_frames": n_frames,
             "source_sha256": [source_sha256] if source_sha256 else [],
             "value_sha256": list(value_sha256),
-            "extension": b"",
+            "extension": extension,
         }
         clip.n_frames = n_frames
         clip.cend = self.chunk(b"CEND", build(payloads.CEND, fields, "CEND"))

@@ -21,6 +21,9 @@ import mcz
 from mcz.cli.common import run
 from mcz.cli.info import command as info_command
 from mcz.cli.main import COMMANDS, cli
+from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR
+
+VERSION = f"{FORMAT_MAJOR}.{FORMAT_MINOR}"
 
 CLIP_KEYS = {
     "name",
@@ -263,11 +266,19 @@ def test_damage_and_salvage(folder: Path, call: Call) -> None:
 
 def test_info(walk: Path, call: Call) -> None:
     text = call("info", walk).out
-    for words in ("MCZ 0.1", "31 joints", "96 channels", "codec", "payload", "sha256", "Hips"):
+    for words in (
+        f"MCZ {VERSION}",
+        "31 joints",
+        "96 channels",
+        "codec",
+        "payload",
+        "sha256",
+        "Hips",
+    ):
         assert words in text
     document = call("info", walk, "--json").document
     assert document["file_bytes"] == walk.stat().st_size
-    assert document["format_version"] == "0.1"
+    assert document["format_version"] == VERSION
     assert set(document["clips"][0]) >= CLIP_KEYS
     clip = document["clips"][0]
     readme = Path(mcz.__file__).parents[1].joinpath("README.md").read_text("utf-8")
@@ -305,7 +316,7 @@ def test_mcz_info_is_the_same(walk: Path, call: Call, capsys: pytest.CaptureFixt
 
 def test_not_an_mcz_file(folder: Path, call: Call) -> None:
     for name in ("info", "decode", "list", "verify"):
-        fails(call(name, folder / "walk.bvh"), 1, "walk.bvh")
+        fails(call(name, folder / "walk.bvh"), 3 if name == "verify" else 1, "walk.bvh")
         fails(call(name, folder / "absent.mcz"), 1, "absent.mcz")
 
 
@@ -391,7 +402,7 @@ def test_pack_and_unpack(
     assert found == {p.relative_to(folder) for p in folder.rglob("*") if p.is_file()}
     assert all(digest(out / name) == digest(folder / name) for name in found)
     refused = call("unpack", target, out)
-    assert refused.code == 1
+    assert refused.code == 2
     assert refused.err.count("\n") == len(found)
     assert call("unpack", target, out, "--force").code == 0
 
@@ -418,5 +429,32 @@ def test_markers_as_plain_c3d(folder: Path, call: Call) -> None:
     plain = folder / "plain.c3d"
     assert call("decode", folder / "walk.mcz", "--to", "c3d", "-o", plain).code == 0
     assert call("encode", plain, "-o", folder / "plain.mcz").code == 0
-    assert call("encode", folder / "walk.bvh", "-o", folder / "bvh.mcz").code == 0
-    fails(call("decode", folder / "bvh.mcz", "--to", "c3d", "-o", folder / "x.c3d"), 1, "marker")
+    fails(call("decode", folder / "walk.mcz", "--to", "bvh", "-o", folder / "x.bvh"), 1, "skeleton")
+
+
+def test_conversions(folder: Path, call: Call) -> None:
+    """An AMC as BVH, that as AMC with its ASF, that again as C3D."""
+    assert call("encode", folder / "walk.amc", "-o", folder / "clip.mcz").code == 0
+    out = folder / "out"
+    out.mkdir()
+    walk = folder / "clip.mcz"
+    fails(call("decode", walk, "--to", "bvh", "-o", out), 2, "frame rate is unknown")
+    fails(call("decode", walk, "--rate", 120, "-o", out), 2, "--rate needs --to")
+    fails(call("decode", walk, "--to", "bvh", "--joints", "root", "-o", out), 2, "--joints")
+    shown = call("decode", walk, "--to", "bvh", "--rate", 120, "-o", out, "--json").document
+    assert [(row["kind"], Path(row["path"]).name) for row in shown["outputs"]] == [
+        ("bvh", "walk.bvh")
+    ]
+    assert call("encode", out / "walk.bvh", "-o", out / "bvh.mcz").code == 0
+    assert call("decode", out / "bvh.mcz", "--to", "amc", "--with-skeleton", "-o", out).code == 0
+    assert {"walk.amc", "walk.asf"} <= {path.name for path in out.iterdir()}
+    arguments = ("--skeleton", out / "walk.asf", "-o", out / "amc.mcz")
+    assert call("encode", out / "walk.amc", *arguments).code == 0
+    three_d = ("--to", "c3d", "--rate", 120, "--frames", "0:9", "-o", out / "clip.c3d")
+    assert call("decode", out / "amc.mcz", *three_d).code == 0
+    again = folder / "again"
+    again.mkdir()
+    assert call("decode", walk, "--to", "amc", "--with-skeleton", "-o", again).code == 0
+    assert (again / "walk.amc").read_bytes() == (folder / "walk.amc").read_bytes()
+    skeletons = [mcz.read_skeleton(place / "walk.asf") for place in (folder, again)]
+    assert skeletons[0] == skeletons[1]

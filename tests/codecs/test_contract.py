@@ -119,7 +119,7 @@ def test_unknown_codec_makes_only_that_clip_unsupported(monkeypatch: pytest.Monk
 
 def test_tiny_payloads_keep_the_overhead_bound() -> None:
     """DESIGN 3: 160 bytes, 1 byte a stream, 1 % of the payload."""
-    from mcz.report import clip_sizes
+    from mcz.sizes import clip_sizes
 
     motion = smooth(40)
     values = np.zeros_like(motion.values)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import lossless
+from mcz.codecs import _lossless_heads, lossless
 from mcz.codecs._lossless_plan import Lattice
 from mcz.codecs.base import Codec, Encoded, Segment
 from mcz.numbers import Grid
@@ -110,7 +110,9 @@ def build_stream(
             shape = _shape(head, grids[place], column.tolist())
             data += _coded_head(head, shape)
             plans.append(
-                lossless._plan(shape, head.scale, head.from_last, head.taps[: lossless.MAX_TAPS])
+                _lossless_heads.make_plan(
+                    shape, head.scale, head.from_last, head.taps[: _lossless_heads.MAX_TAPS]
+                )
             )
             coded.append(head.multiples or column.tolist())
     return data + code(np.array(coded, np.int64).T, plans) if plans else data

@@ -70,8 +70,8 @@ class Crafter(Writer):
         self._sink_bytes = io.BytesIO()
         super().__init__(self._sink_bytes, profile=profile)
 
-    def _write_head(self) -> None:
-        super()._write_head()
+    def _write_head(self, extension: bytes) -> None:
+        super()._write_head(extension)
         self.directory.head = self.edited("HEAD", self.directory.head)
 
     @property
@@ -102,8 +102,8 @@ class Crafter(Writer):
     def clip(
         self, motion: Motion, *, grouping: str = "joint", codec: Codec = raw.CODEC, **params: Any
     ) -> None:
-        """Write ``motion`` with the raw codec, or another."""
-        write_clip(self, motion, replace(codec, grouping=grouping), params)
+        """Write ``motion`` with the raw codec, or another, without a quality record."""
+        write_clip(self, motion, replace(codec, grouping=grouping), params, quality=False)
 
     def parts(self, name: str, *pieces: bytes) -> None:
         """Write an attachment in these parts, each stored or deflated, whichever is shorter."""

@@ -176,6 +176,7 @@ def _needs_more(shelf: Whole) -> None:
         ("newer-codec", "Codecs", "A later version of a known codec.", finished(crafters[1])),
         ("unknown-critical", "Chunks", "A critical chunk of unknown type.", finished(crafters[2])),
         ("newer-minor", "HEAD", "A later minor version.", file_of(dance(), HEAD=at(3, b"\xff"))),
+        ("older-minor", "HEAD", "Minor version 1 of 0.", file_of(dance(), HEAD=at(3, b"\1"))),
         ("newer-major", "HEAD", "Another major version.", file_of(dance(), HEAD=at(2, b"\1\0"))),
         ("unknown-profile", "HEAD", "A later profile.", file_of(dance(), HEAD=at(4, b"\7"))),
         ("codec-packet", "Open DATA and packets", "A packet of kind 2, a codec's own.", packets),

@@ -1,0 +1,103 @@
+"""``mcz extract``: frames, joints or coarser resolutions out of an .mcz, without re-encoding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+import click
+
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    existing,
+    plural,
+    print_json,
+    printable,
+    say,
+    to_frames,
+)
+from mcz.cli.options import force_option, json_option
+from mcz.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from mcz.extraction import ExtractedClip, Extraction
+
+
+@click.command(short_help="A part of an .mcz, cut out of its stored bytes.")
+@click.argument("file", metavar="IN.mcz", type=click.Path(readable=False))
+@click.argument("output", metavar="OUT.mcz", type=click.Path(readable=False))
+@click.option(
+    "--resolution",
+    metavar="K",
+    type=click.IntRange(min=0),
+    default=0,
+    help="Leave out the K finest resolutions.",
+)
+@click.option(
+    "--joints", metavar="a,b", help="Keep the channels of these joints, by name or index."
+)
+@click.option(
+    "--frames", metavar="A:B", callback=to_frames, help="Keep frames A <= f < B, counted from 0."
+)
+@click.option("--clip", "name", metavar="NAME", help="Take out this clip alone. Default: all.")
+@force_option
+@json_option
+def command(
+    file: str,
+    output: str,
+    resolution: int,
+    joints: str | None,
+    frames: tuple[int, int | None] | None,
+    name: str | None,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    """Cut frames, joints or the finest resolutions out of IN.mcz, without re-encoding.
+
+    Streams are copied byte for byte, so the values of OUT.mcz are those that IN.mcz gives for the
+    same frames, joints and resolution. Its quality record says what was cut.
+    """
+    import mcz
+
+    if "-" in (file, output):
+        raise Failure("extract reads and writes files, not standard streams", Exit.USAGE)
+    existing(file)
+    with about(file, output), Progress() as progress:
+        found = mcz.extract(
+            file,
+            output,
+            resolution=resolution,
+            joints=None if joints is None else [joint.strip() for joint in joints.split(",")],
+            frames=frames,
+            clip=name,
+            force=force,
+            progress=progress,
+        )
+    if as_json:
+        print_json({"output": output, **asdict(found)})
+        return Exit.FINE
+    for line in _lines(output, found):
+        click.echo(printable(line))
+    for text in found.left_out:
+        say(f"left out: {text}")
+    return Exit.FINE
+
+
+def _lines(output: str, found: Extraction) -> Iterator[str]:
+    yield f"{output}: {plural(len(found.clips), 'clip')}, {found.size:,} bytes"
+    for clip in found.clips:
+        yield f"  {clip.name}: {', '.join(_parts(clip))}"
+
+
+def _parts(clip: ExtractedClip) -> Iterator[str]:
+    start, stop = clip.frames
+    stored = "" if clip.stored_frames == stop - start else f" ({clip.stored_frames:,} stored)"
+    yield f"frames {start}:{stop}{stored}"
+    if clip.joints is not None:
+        yield f"joints {' '.join(clip.joints)}"
+    if clip.resolution:
+        yield f"resolution {clip.resolution}"
+    yield f"data {clip.data_bytes:,} of {clip.data_bytes_before:,} bytes"

@@ -1,0 +1,163 @@
+"""What CLIP says of a signal, checked: channels, grids, groups, and where its segments lie.
+
+Part of the joint between motion, codec and container (see ``file.py``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from mcz.codecs import by_id
+from mcz.codecs.base import Codec, Layout
+from mcz.container import payloads
+from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.limits import check
+from mcz.container.reader import Container
+from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts
+from mcz.container.skeletons import parse_channels
+from mcz.errors import FormatError
+from mcz.motion import Channel, Skeleton
+from mcz.numbers import Grid, GridKind
+
+
+@dataclass(frozen=True, slots=True)
+class SignalInfo:
+    """What CLIP says of one signal, and where its segments lie.
+
+    ``layout`` and ``rows`` count stored frames, of which the clip shows those from ``skip`` on.
+    """
+
+    index: int
+    name: str
+    channels: tuple[Channel, ...] | None
+    grids: tuple[Grid, ...]
+    codec_id: int
+    codec_version: int
+    header: bytes
+    layout: Layout
+    counts: StreamCounts
+    rows: tuple[SegmentRow, ...]
+    skip: int = 0
+    spare: int = 0
+
+    @property
+    def codec(self) -> Codec:
+        """Raises UnsupportedError where this reader lacks the codec."""
+        return by_id(self.codec_id, self.codec_version)
+
+    @property
+    def is_integer(self) -> bool:
+        return bool(self.grids) and all(grid.kind == GridKind.INTEGER for grid in self.grids)
+
+    def covering(self, start: int, stop: int) -> list[int]:
+        """The segments whose own frames meet the stored frames start <= f < stop."""
+        return [
+            index
+            for index, row in enumerate(self.rows)
+            if row.header.first < stop and start < row.header.stop
+        ]
+
+    def coarser(self, resolution: int) -> int:
+        """The details to leave out of a signal beside the motion: no more than it has."""
+        return min(resolution, self.counts.n_resolutions - 1)
+
+
+def read_signal(
+    container: Container,
+    row: ClipRow,
+    fields: Any,
+    index: int,
+    skeleton: Skeleton,
+    frame_rate: Fraction | None,
+) -> SignalInfo:
+    """The checked SignalInfo of signal ``index`` of a clip; ``fields`` are those of CLIP.
+
+    Raises FormatError or LimitError.
+    """
+    where = f"clip {row.name!r}, signal {index}"
+    own = fields.signals[index]
+    channels = None
+    if own.flags & payloads.OWN_CHANNELS:
+        channels = parse_channels(own.channels, where)
+    n_channels = skeleton.n_channels if channels is None else len(channels)
+    check(f"{where}: channels", n_channels, container.profile.channels)
+    layout = Layout(
+        own.skip + row.n_frames + own.spare,
+        parse_groups(own.groups, skeleton if channels is None else None, n_channels, where),
+        own.samples_per_frame,
+        skeleton,
+        frame_rate,
+        parse_grids(own.grids, n_channels, where),
+        own.n_resolutions,
+    )
+    info = SignalInfo(
+        index,
+        own.name,
+        channels,
+        layout.grids,
+        own.codec,
+        own.codec_version,
+        bytes(own.header),
+        layout,
+        StreamCounts(len(layout.groups), own.n_resolutions),
+        tuple(segment for segment in row.segments if segment.header.signal == index),
+        own.skip,
+        own.spare,
+    )
+    _check_segments(container, info, index == 0 and bool(fields.source), where)
+    return info
+
+
+def _check_segments(container: Container, info: SignalInfo, noted: bool, where: str) -> None:
+    """``noted``: frame notes are legal."""
+    limit = container.profile.segment_bytes
+    per_frame = max(1, info.layout.n_channels) * info.layout.samples_per_frame * 8
+    due = 0
+    for row in info.rows:
+        if row.header.flags & FRAME_NOTES and not noted:
+            raise FormatError(f"{where}: frame notes, but no source that they belong to")
+        if not (row.header.first or row.header.flags & FRESH):
+            raise FormatError(f"{where}: the first segment needs one before it")
+        check(f"{where}: bytes of a segment", row.header.n_frames * per_frame, limit)
+        if row.header.first != due and not container.salvage:
+            raise FormatError(f"{where}: a segment begins at {row.header.first}, {due} is due")
+        due = row.header.stop
+    if due != info.layout.n_frames and not container.salvage:
+        raise FormatError(f"{where}: segments end at frame {due} of {info.layout.n_frames}")
+
+
+def parse_groups(
+    fields: Any, skeleton: Skeleton | None, n_channels: int, where: str
+) -> tuple[tuple[int, ...], ...]:
+    """The channels of each group, as the ``kind`` of GROUPS defines them."""
+    if fields.kind == payloads.GROUP_ALL:
+        return (tuple(range(n_channels)),) if n_channels else ()
+    if fields.kind == payloads.GROUP_JOINT:
+        if skeleton is None:
+            raise FormatError(f"{where}: groups per joint, but the channels have no joints")
+        sizes = [len(joint.channels) for joint in skeleton.joints]
+    elif fields.kind == payloads.GROUP_CHANNEL:
+        sizes = [1] * n_channels
+    else:
+        sizes = list(fields.sizes)
+        if 0 in sizes or sum(sizes) != n_channels:
+            raise FormatError(f"{where}: groups of {sizes} channels do not make {n_channels}")
+    groups, at = [], 0
+    for size in sizes:
+        if size:
+            groups.append(tuple(range(at, at + size)))
+        at += size
+    return tuple(groups)
+
+
+def parse_grids(runs: Any, n_channels: int, where: str) -> tuple[Grid, ...]:
+    grids: list[Grid] = []
+    for run in runs:
+        if not 1 <= run.n_channels <= n_channels - len(grids):
+            raise FormatError(f"{where}: grids for more than its {n_channels} channels")
+        grids += [run.grid] * run.n_channels
+    if len(grids) != n_channels:
+        raise FormatError(f"{where}: grids for {len(grids)} of {n_channels} channels")
+    return tuple(grids)

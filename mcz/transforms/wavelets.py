@@ -1,0 +1,227 @@
+"""Wavelets: the filters of the registry and the lengths of their bands.
+
+SPEC.md, "Wavelets", is normative and has the same numbers. A wavelet is its two synthesis filters;
+those of analysis follow from them (``Wavelet.analysis``). Filters are those of PyWavelets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+from mcz.errors import FormatError, OptionError
+
+MAX_TAPS = 64
+MAX_TAP = 16.0  # the greatest size of one
+MAX_LEVELS = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Wavelet:
+    """Synthesis filters of equal, even length: ``lo`` for approximations, ``hi`` for details."""
+
+    lo: tuple[float, ...]
+    hi: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        n_taps = len(self.lo)
+        if n_taps != len(self.hi) or n_taps % 2 or not 2 <= n_taps <= MAX_TAPS:
+            raise FormatError(f"wavelet: filters of {n_taps} and {len(self.hi)} taps")
+        if not all(abs(tap) <= MAX_TAP for tap in (*self.lo, *self.hi)):
+            raise FormatError(f"wavelet: a tap beyond {MAX_TAP}")
+
+    @property
+    def n_taps(self) -> int:
+        return len(self.lo)
+
+    @property
+    def analysis(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The analysis filters, low and high, of a biorthogonal pair."""
+        signs = [1.0, -1.0] * (self.n_taps // 2)
+        low = tuple(s * tap for s, tap in zip(signs, self.hi, strict=True))
+        high = tuple(-s * tap for s, tap in zip(signs, self.lo, strict=True))
+        return low, high
+
+    def lengths(self, n: int, levels: int) -> list[int]:
+        """Samples of the signal and of the approximations of levels 1, 2, ..., (levels + 1,)."""
+        out = [n]
+        for _ in range(levels):
+            out.append((out[-1] + self.n_taps - 1) // 2)
+        return out
+
+    def lead(self, levels: int) -> int:
+        """The frames before its own that the first coefficient of a segment bears upon."""
+        return (self.n_taps - 2) * ((1 << levels) - 1)
+
+    def mirrored(self, levels: int) -> int:
+        """The first frames, whose mirror image the first coefficients of all levels need."""
+        return (self.n_taps - 2) << max(0, levels - 1)
+
+
+def _orthogonal(lo: tuple[float, ...]) -> Wavelet:
+    signs = [1.0, -1.0] * (len(lo) // 2)
+    return Wavelet(lo, tuple(s * tap for s, tap in zip(signs, reversed(lo), strict=True)))
+
+
+# Synthesis filters ``lo``; ``hi`` is the same backwards, every second tap with the other sign.
+_ORTHOGONAL: dict[str, tuple[float, ...]] = {
+    "haar": (
+        0.7071067811865476,
+        0.7071067811865476,
+    ),
+    "db2": (
+        0.48296291314453416,
+        0.8365163037378079,
+        0.2241438680420134,
+        -0.12940952255126037,
+    ),
+    "db3": (
+        0.33267055295008263,
+        0.8068915093110925,
+        0.45987750211849154,
+        -0.13501102001025458,
+        -0.08544127388202666,
+        0.03522629188570953,
+    ),
+    "db4": (
+        0.2303778133088965,
+        0.7148465705529157,
+        0.6308807679298589,
+        -0.027983769416859854,
+        -0.18703481171909309,
+        0.030841381835560764,
+        0.0328830116668852,
+        -0.010597401785069032,
+    ),
+    "db5": (
+        0.16010239797419293,
+        0.6038292697971896,
+        0.7243085284377729,
+        0.13842814590132074,
+        -0.24229488706638203,
+        -0.032244869584638375,
+        0.07757149384004572,
+        -0.006241490212798274,
+        -0.012580751999081999,
+        0.0033357252854737712,
+    ),
+    "db6": (
+        0.11154074335010947,
+        0.49462389039845306,
+        0.7511339080210954,
+        0.31525035170919763,
+        -0.22626469396543983,
+        -0.12976686756726194,
+        0.09750160558732304,
+        0.027522865530305727,
+        -0.03158203931748603,
+        0.0005538422011614961,
+        0.004777257510945511,
+        -0.0010773010853084796,
+    ),
+    "db7": (
+        0.07785205408500918,
+        0.3965393194819173,
+        0.7291320908462351,
+        0.4697822874051931,
+        -0.14390600392856498,
+        -0.22403618499387498,
+        0.07130921926683026,
+        0.08061260915108308,
+        -0.03802993693501441,
+        -0.01657454163066688,
+        0.01255099855609984,
+        0.0004295779729213665,
+        -0.0018016407040474908,
+        0.00035371379997452024,
+    ),
+    "db8": (
+        0.05441584224310401,
+        0.31287159091429995,
+        0.6756307362972898,
+        0.5853546836542067,
+        -0.015829105256349306,
+        -0.2840155429615469,
+        0.0004724845739132828,
+        0.12874742662047847,
+        -0.017369301001807547,
+        -0.044088253930794755,
+        0.013981027917398282,
+        0.008746094047405777,
+        -0.004870352993451574,
+        -0.00039174037337694705,
+        0.0006754494064505693,
+        -0.00011747678412476953,
+    ),
+    "sym4": (
+        0.0322231006040427,
+        -0.012603967262037833,
+        -0.09921954357684722,
+        0.29785779560527736,
+        0.8037387518059161,
+        0.49761866763201545,
+        -0.02963552764599851,
+        -0.07576571478927333,
+    ),
+}
+
+# CDF 9/7.
+_BIOR_4_4 = Wavelet(
+    lo=(
+        0.0,
+        -0.06453888262869706,
+        -0.04068941760916406,
+        0.41809227322161724,
+        0.7884856164055829,
+        0.41809227322161724,
+        -0.04068941760916406,
+        -0.06453888262869706,
+        0.0,
+        0.0,
+    ),
+    hi=(
+        0.0,
+        -0.03782845550726404,
+        -0.023849465019556843,
+        0.11062440441843718,
+        0.37740285561283066,
+        -0.8526986790088938,
+        0.37740285561283066,
+        0.11062440441843718,
+        -0.023849465019556843,
+        -0.03782845550726404,
+    ),
+)
+
+INLINE = 0  # the id of filters that are in the header
+WAVELETS: dict[str, Wavelet] = {
+    **{name: _orthogonal(lo) for name, lo in _ORTHOGONAL.items()},
+    "bior4.4": _BIOR_4_4,
+}
+IDS = {name: id_ for id_, name in enumerate(WAVELETS, 1)}
+
+
+@cache
+def by_name(name: str) -> tuple[int, Wavelet]:
+    """The id and filters of a wavelet; another one that PyWavelets knows has the id INLINE.
+
+    Raises OptionError for a name that neither knows.
+    """
+    if name in WAVELETS:
+        return IDS[name], WAVELETS[name]
+    import pywt
+
+    if name not in pywt.wavelist(kind="discrete"):
+        raise OptionError(f"wavelet {name!r} is unknown; registered are {', '.join(WAVELETS)}")
+    found = pywt.Wavelet(name)
+    try:
+        return INLINE, Wavelet(tuple(found.rec_lo), tuple(found.rec_hi))
+    except FormatError as error:
+        raise OptionError(f"wavelet {name!r}: {error}") from None
+
+
+def by_id(id_: int) -> Wavelet:
+    """The registered wavelet with this id; raises FormatError."""
+    if not 1 <= id_ <= len(WAVELETS):
+        raise FormatError(f"wavelet {id_} is not one of 1 to {len(WAVELETS)}")
+    return list(WAVELETS.values())[id_ - 1]

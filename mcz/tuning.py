@@ -1,0 +1,231 @@
+"""Sizes and errors as targets: the dial of a codec is turned until they are met, and it is proved.
+
+Part of the joint between motion, codec and container (see ``file.py``). Every trial is a file in
+memory that the public reader opens; nothing is trusted that it did not measure.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from operator import itemgetter
+from typing import Any
+
+from mcz.clip import Clip
+from mcz.codecs.base import Codec, Dial
+from mcz.container.reader import Container
+from mcz.container.source import open_source
+from mcz.container.writer import Writer
+from mcz.encoding import Progress, asked, write_clip
+from mcz.errors import MotionError, OptionError
+from mcz.metrics import compare
+from mcz.motion import Motion
+from mcz.sizes import clip_sizes
+
+GOAL = 0.985  # of a target: near enough to stop
+PROMISED = 0.97  # of a target: what is less is remarked upon
+MOST_TRIALS = 60
+CLOSE = 1.00002  # between a setting that meets the target and one that does not
+NEAR, NEIGHBORS = 1.01, 24  # where figures jump: settings tried beside the one that was found
+
+Point = tuple[float, float]  # a setting and its figure
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What was asked for; the figure of that name must not exceed ``limit``.
+
+    ``falls``: the figure falls as the dial goes up (a size), instead of rising (an error).
+    """
+
+    name: str
+    limit: float
+    falls: bool
+
+
+def write_tuned(
+    writer: Writer,
+    motion: Motion,
+    codec: Codec,
+    params: Mapping[str, Any],
+    progress: Progress | None = None,
+) -> None:
+    """``write_clip``, a size or an error among ``params`` met first.
+
+    The quality record says what was reached. Raises OptionError where a target cannot be met or has
+    no meaning for this clip.
+    """
+    options = codec.options(params)
+    targets = asked(options)
+    if not targets or codec.dial is None:
+        write_clip(writer, motion, codec, params, progress)
+        return
+    target = _target(motion, codec, codec.dial, options, targets)
+    trial = _Trials(motion, codec, params, writer)
+    setting, reached, ended = search(codec.dial, target, trial)
+    remark = None
+    if reached < PROMISED * target.limit:
+        dial = codec.dial.parameter
+        why = f"the range of {dial} ends there" if ended else f"no {dial} that was tried is nearer"
+        remark = f"{target.name} {target.limit:g}: {reached:g} was reached; {why}"
+    remarks = {"target_reached": repr(reached)} | ({"target_remark": remark} if remark else {})
+    found = dict(params) | {codec.dial.parameter: setting}
+    write_clip(writer, motion, codec, found, progress, remarks=remarks)
+
+
+def _target(
+    motion: Motion, codec: Codec, dial: Dial, options: Mapping[str, Any], targets: Mapping[str, Any]
+) -> Target:
+    if len(targets) > 1:
+        raise OptionError(f"{' and '.join(targets)} are asked for, only one can be")
+    ((name, limit),) = targets.items()
+    if options[dial.parameter] is not None:
+        raise OptionError(f"{name} is asked for and {dial.parameter} is given, only one can be")
+    if name == "kbps" and not (motion.frame_rate and motion.n_frames):
+        raise OptionError("kbps has no meaning: the frame rate is unknown or there are no frames")
+    if name.endswith("_cm") and motion.skeleton.unit_cm is None:
+        raise OptionError(f"{name} has no meaning: the length unit is unknown")
+    return Target(name, float(limit), falls=not name.endswith("_cm"))
+
+
+class _Trials:
+    """The figures of a clip at one setting of the dial, measured on a file in memory."""
+
+    def __init__(
+        self, motion: Motion, codec: Codec, params: Mapping[str, Any], writer: Writer
+    ) -> None:
+        self.motion, self.codec, self.params, self.writer = motion, codec, params, writer
+        self.alone = replace(motion, signals=motion.signals[:1])
+        self.others = 0.0  # bytes of the further signals, which no dial changes
+        self.other_payload = 0.0
+
+    def __call__(self, target: Target, setting: float) -> float:
+        figures = self._measure(self.alone, target, setting)
+        if len(self.motion.signals) > 1 and target.falls:
+            if not self.others:
+                whole = self._measure(self.motion, target, setting)
+                self.others = whole - figures
+            figures += self.others
+        return figures
+
+    def _measure(self, motion: Motion, target: Target, setting: float) -> float:
+        assert self.codec.dial is not None
+        out = io.BytesIO()
+        scratch = Writer(out, profile=self.writer.profile)
+        params = dict(self.params) | {self.codec.dial.parameter: setting}
+        write_clip(scratch, motion, self.codec, params, quality=False)
+        scratch.finish()
+        container = Container(open_source(out.getvalue()), max_decoded=2**53)
+        clip = Clip(container, container.directory.clips[motion.name])
+        if not target.falls:
+            return _error(target, compare(motion, clip.motion(), virtual_markers=False))
+        sizes = clip_sizes(container, clip)
+        if target.name == "target_bytes":
+            return float(sizes.payload + sizes.overhead)
+        assert motion.frame_rate is not None
+        return float(sizes.payload * 8 * motion.frame_rate / motion.n_frames / 1000)
+
+
+def _error(target: Target, comparison: Any) -> float:
+    name = target.name.replace("_error_cm", "_position_error_cm")
+    value = getattr(comparison, name)
+    if value is None:
+        raise OptionError(f"{target.name} has no meaning: {'; '.join(comparison.notes)}")
+    return float(value)
+
+
+def search(
+    dial: Dial, target: Target, measure: Callable[[Target, float], float]
+) -> tuple[float, float, bool]:
+    """The setting that comes nearest to the target, of those tried, without exceeding it.
+
+    Returns the setting, its figure, and whether the range of the dial ended before the target.
+    Raises OptionError where no setting meets it. A figure may jump, up and down: a greatest error
+    does.
+    """
+    meets, misses, ended = _bracket(dial, target, measure)
+    if ended:
+        return *meets, True
+    best = meets
+    for _ in range(MOST_TRIALS):
+        if meets[1] >= GOAL * target.limit or _ratio(meets[0], misses[0]) < CLOSE:
+            break
+        setting = _between(meets, misses, target.limit)
+        found = setting, _figure(measure, target, setting)
+        if found[1] <= target.limit:
+            meets = found
+            best = max(found, best, key=itemgetter(1))
+        else:
+            misses = found
+    if best[1] < PROMISED * target.limit:
+        best = _beside(best, dial, target, measure)
+    return *best, False
+
+
+def _beside(
+    best: Point, dial: Dial, target: Target, measure: Callable[[Target, float], float]
+) -> Point:
+    """A setting beside ``best`` that keeps the promise, or else the best of all."""
+    middle = best[0]
+    for power in range(1, NEIGHBORS + 1):
+        for setting in (middle * NEAR**power, middle / NEAR**power):
+            if dial.low <= setting <= dial.high:
+                found = setting, _figure(measure, target, setting)
+                if found[1] <= target.limit:
+                    best = max(best, found, key=itemgetter(1))
+        if best[1] >= PROMISED * target.limit:
+            break
+    return best
+
+
+def _bracket(
+    dial: Dial, target: Target, measure: Callable[[Target, float], float]
+) -> tuple[Point, Point, bool]:
+    """A setting that meets the target and one that does not, or the end of the range."""
+    setting = min(max(1.0, dial.low), dial.high)
+    found = setting, _figure(measure, target, setting)
+    first_meets = found[1] <= target.limit
+    upwards = first_meets != target.falls  # where the other side of the target lies
+    factor = 2.0
+    while True:
+        end = dial.high if upwards else dial.low
+        if setting == end:
+            if first_meets:
+                return found, found, True
+            raise OptionError(
+                f"{target.name} {target.limit:g} cannot be met: {dial.parameter} {setting:g} "
+                f"gives {found[1]:g}"
+            )
+        moved = setting * factor if upwards else setting / factor
+        setting = min(max(moved, dial.low), dial.high)
+        factor = min(factor * 2, 2.0**8)
+        other = setting, _figure(measure, target, setting)
+        if (other[1] <= target.limit) != first_meets:
+            return (found, other, False) if first_meets else (other, found, False)
+        found = other
+
+
+def _figure(measure: Callable[[Target, float], float], target: Target, setting: float) -> float:
+    """The figure of a setting; one that the codec refuses as too fine has no bound on its size."""
+    try:
+        return measure(target, setting)
+    except MotionError:
+        if target.falls and setting < 1:
+            return math.inf
+        raise
+
+
+def _ratio(a: float, b: float) -> float:
+    return max(a, b) / min(a, b)
+
+
+def _between(meets: Point, misses: Point, limit: float) -> float:
+    """A setting between two, where a straight line in logarithms meets the target, or halfway."""
+    low, high = math.log(meets[0]), math.log(misses[0])
+    share = 0.5
+    if 0 < meets[1] < misses[1] < math.inf:
+        wanted = math.log(0.5 * (1 + GOAL) * limit)
+        share = (wanted - math.log(meets[1])) / (math.log(misses[1]) - math.log(meets[1]))
+    return math.exp(low + min(max(share, 0.05), 0.95) * (high - low))

@@ -1,0 +1,235 @@
+"""``mcz diff``, run as a user would: figures, units, clips, frames; records in ``info``."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz import codecs
+from mcz.cli.common import run
+from mcz.cli.figures import figure_lines
+from mcz.cli.main import cli
+from tests import overlap_codec
+
+Call = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Call:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = run(cli, "mcz", [str(a) for a in arguments])
+        captured = capsys.readouterr()
+        return int(code), captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture
+def folder(samples: Path, tmp_path: Path) -> Path:
+    for path in samples.iterdir():
+        shutil.copy(path, tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def moved(folder: Path) -> Path:
+    """The walk of walk.bvh, in cm, its root 1 to the side and, in frame 7, 5: an .mcz."""
+    motion = mcz.read(folder / "walk.bvh", unit="cm")
+    values = motion.values.copy()
+    values[:, 0] += 1
+    values[7, 0] += 4
+    mcz.write(replace(motion.with_values(values), source=None), folder / "moved.mcz")
+    return folder / "moved.mcz"
+
+
+def document(result: tuple[int, str, str]) -> Any:
+    assert result[0] == 0, result
+    return json.loads(result[1])
+
+
+def fails(result: tuple[int, str, str], code: int, *words: str) -> None:
+    assert (result[0], result[1]) == (code, ""), result
+    assert result[2].startswith("mcz: ")
+    assert result[2].count("\n") == 1
+    for word in words:
+        assert word in result[2]
+
+
+@pytest.mark.parametrize("name", ["walk.amc", "walk.bvh", "walk.c3d"])
+def test_a_file_and_its_mcz_are_equal(folder: Path, call: Call, name: str) -> None:
+    assert call("encode", folder / name, "-o", folder / "x.mcz")[0] == 0
+    shown = document(call("diff", folder / name, folder / "x.mcz", "--json"))
+    (clip,) = shown["clips"]
+    assert (clip["mse"], clip["mse_raw"], clip["max_position_error"]) == (0, 0, 0)
+    assert (clip["mismatched_values"], clip["mismatched_points"]) == (0, 0)
+    assert clip["ratios_a"] is None
+    assert set(clip["ratios_b"]) == {"cr_source", "cr_float32", "cr_40B"}
+    info = document(call("info", folder / "x.mcz", "--json"))["clips"][0]
+    assert clip["ratios_b"] == {key: info[key] for key in clip["ratios_b"]}
+    if name == "walk.c3d":
+        assert [key for key in clip if key.startswith("signal.")]
+
+
+def test_figures_are_printed_with_their_units(folder: Path, moved: Path, call: Call) -> None:
+    code, out, err = call("diff", folder / "walk.bvh", moved, "--unit", "cm")
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line.split() for line in out.splitlines() if line.startswith("  ")}
+    assert rows["max_position_error"][1:7] == ["5", "units", "5", "frame", "7,", "point"]
+    assert rows["virtual_marker_max"][1:] == ["5"]
+    assert rows["mse"][2:] == ["channels,", "squared"]
+    assert "1 unit = 1 cm" in out
+    assert "note" not in out
+    assert f"{moved}: cr_float32" in out
+
+
+def test_unit_is_for_files_that_say_none(folder: Path, moved: Path, call: Call) -> None:
+    clip = document(call("diff", folder / "walk.bvh", moved, "--json"))["clips"][0]
+    assert clip["max_position_error"] == pytest.approx(5)
+    assert clip["max_position_error_cm"] is clip["virtual_marker_max_cm"] is None
+    assert any("unit" in note for note in clip["notes"])
+    shown = document(call("diff", moved, folder / "walk.bvh", "--unit", "m", "--json"))
+    clip = shown["clips"][0]
+    assert clip["unit_cm"] == 1  # moved.mcz says cm
+    assert clip["max_position_error_cm"] > 100
+    assert clip["mse"] is None
+
+
+def test_frames(folder: Path, moved: Path, call: Call) -> None:
+    bvh = folder / "walk.bvh"
+    clip = document(call("diff", bvh, moved, "--frames", "5:10", "--json"))["clips"][0]
+    assert (clip["frames"], clip["max_position_error_frame"]) == (5, 7)
+    clip = document(call("diff", bvh, moved, "--frames", ":7", "--json"))["clips"][0]
+    assert (clip["frames"], clip["max_position_error"]) == (7, pytest.approx(1))
+    fails(call("diff", bvh, moved, "--frames", "5:99999"), 2, "99999")
+    fails(call("diff", bvh, moved, "--frames", "5"), 2, "A:B")
+
+
+def test_other_numbers_of_frames_are_refused(folder: Path, call: Call) -> None:
+    motion = mcz.read(folder / "walk.bvh")
+    signal = motion.signals[0].cut(0, 100)
+    short = replace(motion, signals=(signal,), source=None, frame_numbers=None)
+    mcz.write(short, folder / "short.mcz")
+    files = folder / "walk.bvh", folder / "short.mcz"
+    fails(call("diff", *files), 1, "100", f"{motion.n_frames} frames", "--frames")
+    fails(call("diff", *files, "--frames", "50:"), 1, "short.mcz 50;", "--frames")
+    clip = document(call("diff", *files, "--frames", "0:100", "--json"))["clips"][0]
+    assert (clip["frames"], clip["mse"]) == (100, 0)
+
+
+def test_what_cannot_be_compared_is_said(folder: Path, call: Call) -> None:
+    code, out, _ = call("diff", folder / "walk.bvh", folder / "walk.c3d")
+    assert code == 0
+    assert "note: other channels" in out
+    assert "mse" not in out
+
+
+def test_clips_of_archives(folder: Path, call: Call) -> None:
+    walk = (folder / "walk.bvh").read_bytes()
+    one, two = folder / "one", folder / "two"
+    for path, names in ((one, "ab"), (two, "bcd"), (folder / "three", "b"), (folder / "four", "x")):
+        path.mkdir()
+        for place, name in enumerate(names):
+            changed = walk.replace(b"OFFSET 9.59556", f"OFFSET {10 + place}.5".encode())
+            (path / f"{name}.bvh").write_bytes(changed)
+        assert call("pack", path, f"{path}.mcz")[0] == 0
+    files = folder / "one.mcz", folder / "two.mcz"
+    shown = document(call("diff", *files, "--json"))
+    assert [clip["name_a"] for clip in shown["clips"]] == ["b"]
+    assert (shown["only_in_a"], shown["only_in_b"]) == (["a"], ["c", "d"])
+    code, out, _ = call("diff", *files)
+    assert code == 0
+    assert f"only in {files[0]}: a" in out
+    shown = document(call("diff", files[1], files[1], "--clip", "d", "--clip", "c", "--json"))
+    assert [clip["name_b"] for clip in shown["clips"]] == ["d", "c"]
+    assert "only_in_a" not in shown
+    shown = document(call("diff", folder / "walk.bvh", files[1], "--clip", "c", "--json"))
+    assert shown["clips"][0]["mse"] == 0
+    fails(call("diff", *files, "--clip", "a"), 2, "two.mcz", "no clip 'a'")
+    fails(call("diff", folder / "walk.bvh", files[1]), 2, "two.mcz", "choose one")
+    shown = document(call("diff", folder / "three.mcz", files[1], "--json"))
+    assert (shown["only_in_a"], shown["only_in_b"]) == ([], ["c", "d"])
+    assert shown["clips"][0]["max_position_error"] == 0
+    fails(call("diff", files[0], folder / "four.mcz"), 2, "no clip in common")
+    shown = document(call("diff", folder / "three.mcz", folder / "four.mcz", "--json"))
+    assert (shown["clips"][0]["name_b"], "only_in_b" in shown) == ("x", False)
+
+
+def test_the_skeleton_of_an_amc(folder: Path, call: Call) -> None:
+    away = folder / "away"
+    away.mkdir()
+    shutil.copy(folder / "walk.amc", away / "walk.amc")
+    files = folder / "walk.amc", away / "walk.amc"
+    shown = document(call("diff", *files, "--skeleton", folder / "walk.asf", "--json"))
+    assert shown["clips"][0]["max_position_error_cm"] == 0
+
+
+def test_standard_input(
+    folder: Path, moved: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stream = io.TextIOWrapper(io.BytesIO(moved.read_bytes()))
+    monkeypatch.setattr("sys.stdin", stream)
+    clip = document(call("diff", folder / "walk.bvh", "-", "--json"))["clips"][0]
+    assert clip["max_position_error"] == pytest.approx(5)
+    fails(call("diff", "-", "-"), 2, "standard input")
+
+
+def test_bad_files_are_refused(folder: Path, moved: Path, call: Call) -> None:
+    fails(call("diff", folder / "none.bvh", moved), 1, "none.bvh", "no such file")
+    fails(call("diff", moved, folder / "none.mcz"), 1, "none.mcz", "no such file")
+    fails(call("diff", folder / "walk.asf", moved), 2, "walk.asf")
+    (folder / "walk.txt").write_text("walk")
+    assert call("diff", folder / "walk.txt", moved)[0] in (1, 2)
+    moved.write_bytes(moved.read_bytes()[:-40])
+    fails(call("diff", folder / "walk.bvh", moved), 1, "moved.mcz")
+
+
+def test_info_shows_the_record(folder: Path, call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(codecs.CODECS, overlap_codec.ID, overlap_codec.CODEC)
+    arguments = "-o", folder / "x.mcz", "--codec", "overlap", "--param", "length=20"
+    assert call("encode", folder / "walk.amc", *arguments)[0] == 0
+    clip = document(call("info", folder / "x.mcz", "--json"))["clips"][0]
+    assert clip["quality"]["param.length"] == "20"
+    assert float(clip["quality"]["mse"]) < 1e-20
+    assert clip["quality_bytes"] > 100
+    code, out, _ = call("info", folder / "x.mcz")
+    assert code == 0
+    assert "codec overlap, length 20" in out
+    assert "1 unit = 5.64444 cm" in out
+    assert "mean_position_error" in out
+
+
+def test_records_of_others_are_shown_as_they_are() -> None:
+    """A record may say anything."""
+    odd = {"frames": "many", "unit_cm": "?", "point_set": "x", "mse": "low", "mood": "good"}
+    lines = list(figure_lines(odd))
+    assert lines[0] == "point set x, 1 unit = ? cm"
+    assert lines[2].split() == ["mse", "low", "channels,", "squared"]
+    assert lines[3].split() == ["mood", "good"]
+    assert list(figure_lines({})) == []
+    long = list(figure_lines({"mood\n\x1b[2J": "9" * 5000, "frames": "9" * 5000}))
+    assert len(long) == 3
+    assert all(line.isprintable() and len(line) < 200 for line in long)
+    assert list(figure_lines({"codec": "z", "param.q": "3"})) == ["codec z, q 3"]
+
+
+@pytest.mark.real
+def test_real_rounding(data: Path, tmp_path: Path, call: Call) -> None:
+    """A clip rounded to one decimal, and the figures that the public reader gives of it."""
+    motion = mcz.read(data / "cmu/amc/10_03.amc")
+    rounded = motion.with_values(np.round(motion.values, 1))
+    mcz.write(replace(rounded, source=None), tmp_path / "x.mcz")
+    shown = document(call("diff", data / "cmu/amc/10_03.amc", tmp_path / "x.mcz", "--json"))
+    (clip,) = shown["clips"]
+    found = mcz.compare(motion, rounded)
+    assert clip["mse"] == found.mse
+    assert clip["virtual_marker_mean_cm"] == found.virtual_marker_mean_cm
+    assert clip["point_set"] == "acclaim"

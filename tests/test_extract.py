@@ -1,0 +1,850 @@
+"""Frames, joints and resolutions cut from stored bytes, without re-encoding."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz import codecs
+from mcz.codecs.base import Encoded
+from mcz.container import payloads
+from mcz.container.scan import scan
+from mcz.container.segments import FRESH
+from mcz.container.source import open_source
+from mcz.container.writer import Writer
+from mcz.encoding import canonical, write_clip
+from mcz.errors import FormatError
+from mcz.motion import Exceptions, Signal
+from mcz.numbers import Grid, GridKind
+from mcz.report import validate
+from mcz.schema import build, parse, varint
+from tests import overlap_codec
+from tests.motions import smooth
+from tests.repair import flipped, flips, joined, parts_of, replaced, use
+
+JOINTS = ("hips", "spine", "fixed", "knee")
+
+
+def _counted_encode(source: Any, params: Any) -> Encoded:
+    """The overlap codec with a header that counts frames and channels."""
+    encoded = overlap_codec.encode(source, params)
+    size = struct.pack("<II", source.layout.n_frames, source.layout.n_channels)
+    return Encoded(size, encoded.segments, encoded.n_resolutions)
+
+
+def _counted_decode(header: bytes, layout: Any, *rest: Any) -> Any:
+    if struct.unpack("<II", header) != (layout.n_frames, layout.n_channels):
+        raise FormatError("counted: a header of another signal")
+    return overlap_codec.decode(b"overlap", layout, *rest)
+
+
+def _counted_cut(header: bytes, layout: Any, first: int, stop: int, groups: Any) -> bytes:
+    assert header == struct.pack("<II", layout.n_frames, layout.n_channels)
+    return struct.pack("<II", stop - first, sum(len(layout.groups[g]) for g in groups))
+
+
+def _running_encode(source: Any, params: Any) -> Encoded:
+    """Raw, but only every third segment is said to start fresh."""
+    encoded = codecs.raw.encode(source, params)
+    runs = (replace(s, fresh=i % 3 == 0) for i, s in enumerate(encoded.segments))
+    return Encoded(encoded.header, runs)
+
+
+EXTRA = (
+    overlap_codec.CODEC,
+    replace(
+        overlap_codec.CODEC,
+        id=252,
+        name="counted",
+        encode=_counted_encode,
+        decode=_counted_decode,
+        cut=_counted_cut,
+    ),
+    replace(codecs.raw.CODEC, id=253, name="running", encode=_running_encode),
+    replace(codecs.raw.CODEC, id=254, name="one", grouping="all"),
+)
+LENGTH = {"overlap": "length", "counted": "length"}  # else segment_frames
+
+
+@pytest.fixture(autouse=True, scope="module")
+def extra_codecs() -> Any:
+    codecs.CODECS.update({codec.id: codec for codec in EXTRA})
+    yield
+    for codec in EXTRA:
+        del codecs.CODECS[codec.id]
+
+
+def written(motion: mcz.Motion, codec: str = "raw", length: int = 7) -> bytes:
+    out = io.BytesIO()
+    mcz.write(motion, out, codec, **{LENGTH.get(codec, "segment_frames"): length})
+    return out.getvalue()
+
+
+def extracted(data: bytes, **how: Any) -> bytes:
+    out = io.BytesIO()
+    mcz.extract(data, out, **how)
+    return out.getvalue()
+
+
+def rich(n_frames: int = 40) -> mcz.Motion:
+    """Masks, exceptions, a change of grid, frame numbers, copied and constant channels."""
+    motion = smooth(n_frames)
+    values = motion.values.copy()
+    values[:, 9] = values[:, 6]  # the knee repeats the spine
+    values[:, 1] = 3.5
+    values[n_frames // 2 :, 4] = np.round(values[n_frames // 2 :, 4], 1)
+    values[2, 0], values[-1, 9] = 1000, np.nan
+    mask = np.ones(values.shape, bool)
+    mask[4:6, 3], mask[-3:, 8] = False, False
+    signal = Signal(
+        values,
+        motion.signals[0].grids,
+        mask=mask,
+        exceptions=Exceptions(np.array([2, n_frames - 1]), np.array([0, 9]), (b"1e3", b"nan")),
+        grid_changes=((n_frames // 2, 4, Grid(GridKind.FIXED, 1)),),
+    )
+    analog = Signal(
+        np.arange(2 * n_frames, dtype=np.int64).reshape(-1, 1) ** 2,
+        name="analog",
+        samples_per_frame=2,
+        channels=(mcz.Channel("", "emg", "V"),),
+    )
+    numbers = np.arange(n_frames) + 5
+    numbers[n_frames // 3 :] += 4
+    return replace(
+        motion, signals=(signal, analog), frame_numbers=numbers, metadata={"subject": "7"}
+    )
+
+
+def check(whole: bytes, part: bytes, start: int, stop: int, joints: Any, resolution: int) -> None:
+    """``part`` shows what ``whole`` gives for the same request, and is sound in itself."""
+    with mcz.open(whole) as old, mcz.open(part) as new:
+        assert validate(new) == []
+        assert new.container.directory == scan(open_source(part), whole=True).directory
+        before, after = old.clips["smooth"], new.clips["smooth"]
+        assert after.n_frames == stop - start
+        np.testing.assert_array_equal(after.frame_numbers, before.frame_numbers[start:stop])
+        for one, other in zip(before.signals, after.signals, strict=True):
+            chosen = None
+            if joints is not None and one.channels is None:
+                chosen = sorted({before.skeleton.find(joint) for joint in joints})
+            coarser = one.coarser(resolution)
+            values, mask = before.read_masked((start, stop), chosen, coarser, signal=one.index)
+            found, valid = after.read_masked(signal=one.index)
+            assert canonical(found) == canonical(values)
+            all_valid = np.ones(values.shape, bool)
+            np.testing.assert_array_equal(
+                all_valid if mask is None else mask, all_valid if valid is None else valid
+            )
+            assert other.counts.n_resolutions == one.counts.n_resolutions - coarser
+            for a in range(0, stop - start, 5):  # a part of the part
+                piece = after.read_masked((a, stop - start), signal=one.index)[0]
+                assert canonical(piece) == canonical(found[a * one.layout.samples_per_frame :])
+
+
+CODECS = ("raw", "lossless", "overlap", "counted", "running")
+
+
+def motion_for(codec: str) -> mcz.Motion:
+    motion = rich()
+    if codec in LENGTH:  # of values, one row a frame
+        return replace(motion, signals=(Signal(motion.signals[0].values),))
+    return motion
+
+
+@st.composite
+def requests(draw: st.DrawFn) -> tuple[str, int, list[dict[str, Any]]]:
+    """A codec, a segment length, and one or two cuts that can be made one after the other."""
+    codec = draw(st.sampled_from(CODECS))
+    length = draw(st.integers(2, 17))
+    cuts, n_frames, resolutions = [], 40, 2 if codec in LENGTH else 1
+    joints: tuple[str, ...] | None = None
+    for _ in range(draw(st.integers(1, 2))):
+        how: dict[str, Any] = {}
+        if draw(st.booleans()):
+            start = draw(st.integers(0, n_frames))
+            stop = draw(st.integers(start, n_frames))
+            how["frames"] = start, None if stop == n_frames else stop
+            n_frames = stop - start
+        if draw(st.booleans()) or not how:
+            kept = draw(st.lists(st.sampled_from(joints or JOINTS), unique=True))
+            if "knee" in kept and "spine" not in kept:
+                kept.append("spine")  # of which it is a copy
+            how["joints"] = joints = tuple(kept)
+        if resolutions > 1 and draw(st.booleans()):
+            how["resolution"] = 1
+            resolutions -= 1
+        cuts.append(how)
+        if joints == ():
+            break
+    return codec, length, cuts
+
+
+@given(requests())
+def test_any_cut_shows_what_was_asked_for(request: tuple[str, int, list[dict[str, Any]]]) -> None:
+    codec, length, cuts = request
+    whole = part = written(motion_for(codec), codec, length)
+    start, stop, joints, resolution = 0, 40, None, 0
+    for how in cuts:
+        part = extracted(part, **how)
+        a, b = how.get("frames", (0, None))
+        start, stop = start + a, stop if b is None else start + b
+        joints, resolution = how.get("joints", joints), resolution + how.get("resolution", 0)
+        check(whole, part, start, stop, joints, resolution)
+
+
+def streams_of(data: bytes) -> list[bytes]:
+    with mcz.open(data) as file:
+        found = []
+        for clip in file.clips.values():
+            for signal in clip.signals:
+                for row in signal.rows:
+                    found += file.container.streams(row, signal.counts, None)[1].values()
+        return [stream for stream in found if stream]
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_streams_are_copied_byte_for_byte(codec: str) -> None:
+    whole = written(motion_for(codec), codec)
+    for how in ({"frames": (10, 20)}, {"joints": ["hips", "spine"]}, {"frames": (3, 4)}):
+        streams = streams_of(extracted(whole, **how))
+        assert streams
+        assert set(streams) <= set(streams_of(whole))
+        assert len(streams) < len(streams_of(whole))
+
+
+@pytest.mark.parametrize(("start", "stop"), [(0, 200), (3, 4), (31, 33), (90, 170), (64, 64)])
+@pytest.mark.parametrize("resolution", [0, 1, 2])
+def test_wavelets_are_cut(start: int, stop: int, resolution: int) -> None:
+    """A codec whose header counts frames, whose segments overlap and have many resolutions."""
+    out = io.BytesIO()
+    mcz.write(smooth(200), out, "mrdwt", segment_frames=32)
+    whole = out.getvalue()
+    part = extracted(whole, frames=(start, stop), resolution=resolution, joints=["hips", "knee"])
+    check(whole, part, start, stop, ["hips", "knee"], resolution)
+    if stop - start > 20:
+        part = extracted(part, frames=(9, 20), resolution=1, joints=["knee"])
+        check(whole, part, start + 9, start + 20, ["knee"], resolution + 1)
+
+
+def segments_of(data: bytes, signal: int = 0) -> list[tuple[int, int, int, bool]]:
+    with mcz.open(data) as file:
+        rows = next(iter(file.clips.values())).signals[signal].rows
+        return [
+            (r.header.first, r.header.stop, r.header.lead, bool(r.header.flags & FRESH))
+            for r in rows
+        ]
+
+
+def test_segments_that_bear_upon_the_frames_are_kept() -> None:
+    data = written(motion_for("overlap"), "overlap", 10)
+    assert segments_of(data)[1] == (10, 20, 1, True)
+    # Frame 19 hangs on the segment after it, frame 18 does not; the first lead is cut to 0.
+    assert segments_of(extracted(data, frames=(12, 20))) == [(0, 10, 0, True), (10, 20, 1, True)]
+    assert segments_of(extracted(data, frames=(12, 19))) == [(0, 10, 0, True)]
+    with mcz.open(extracted(data, frames=(12, 19))) as file:
+        info = file.clips["smooth"].signals[0]
+        assert (info.skip, info.spare, info.layout.n_frames) == (2, 1, 10)
+
+
+def test_segments_that_are_needed_are_kept() -> None:
+    data = written(motion_for("running"), "running", 5)
+    part = extracted(data, frames=(31, 33))  # in segment 6, which is fresh
+    assert segments_of(part) == [(0, 5, 0, True)]
+    part = extracted(data, frames=(11, 12))  # in segment 2, which needs 1 and 0
+    assert [s[3] for s in segments_of(part)] == [True, False, False]
+
+
+def test_every_signal_is_cut_at_its_own_segments() -> None:
+    motion = motion_for("raw")
+    out = io.BytesIO()
+    writer = Writer(out)
+    write_clip(writer, motion, codecs.by_name("raw"), {})
+    writer.finish()
+    with mcz.open(out.getvalue()) as file:
+        assert [len(s.rows) for s in file.clips["smooth"].signals] == [2, 1]
+    part = extracted(out.getvalue(), frames=(25, 30))
+    check(out.getvalue(), part, 25, 30, None, 0)
+    with mcz.open(part) as file:
+        assert [(s.skip, s.spare) for s in file.clips["smooth"].signals] == [(5, 10), (25, 10)]
+
+
+def test_copies_need_the_joint_that_they_repeat() -> None:
+    whole = written(motion_for("lossless"), "lossless")
+    with pytest.raises(mcz.OptionError, match=r"copies of those of joint spine, which must be"):
+        extracted(whole, joints=["knee"])
+    part = extracted(whole, joints=["knee", "spine"])
+    check(whole, part, 0, 40, ["knee", "spine"], 0)
+    assert set(streams_of(part)) - set(streams_of(whole))  # the groups have new numbers
+
+
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        ({}, "nothing to extract"),
+        ({"resolution": 2}, "2 finest resolutions cannot be cut, it has 2"),
+        ({"resolution": -1}, "cannot be cut"),
+        ({"frames": (0, 41)}, "has frames 0 to 40, not 0:41"),
+        ({"frames": (7, 3)}, "not 7:3"),
+        ({"frames": (-1, 3)}, "not -1:3"),
+        ({"clip": "other"}, "no clip 'other'"),
+    ],
+)
+def test_what_cannot_be_cut(tmp_path: Path, how: dict[str, Any], message: str) -> None:
+    whole = written(motion_for("overlap"), "overlap")
+    with pytest.raises(mcz.OptionError, match=message):
+        mcz.extract(whole, tmp_path / "a.mcz", **how)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_joints_that_cannot_be_cut() -> None:
+    whole = written(motion_for("raw"), "one")
+    with pytest.raises(mcz.OptionError, match="joint spine cannot be cut out, its channels are"):
+        extracted(whole, joints=["spine"])
+    check(whole, extracted(whole, joints=["hips", "spine", "knee"]), 0, 40, None, 0)
+    with pytest.raises(mcz.MotionError, match="no joint 'elbow'"):
+        extracted(whole, joints=["elbow"])
+    signal = replace(
+        smooth(4).signals[0], channels=tuple(mcz.Channel("", f"c{i}") for i in range(10))
+    )
+    with pytest.raises(mcz.OptionError, match="channels of its own, no joints"):
+        extracted(written(replace(smooth(4), signals=(signal,))), joints=["spine"])
+
+
+def test_only_codecs_with_resolutions_are_cut_so() -> None:
+    with pytest.raises(mcz.OptionError, match="1 finest resolutions cannot be cut, it has 1"):
+        extracted(written(rich()), resolution=1)
+
+
+def test_a_failed_extraction_leaves_nothing(tmp_path: Path) -> None:
+    whole = written(motion_for("lossless"), "lossless")
+    with pytest.raises(mcz.OptionError, match="copies"):
+        mcz.extract(whole, tmp_path / "a.mcz", joints=["knee"])
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "a.mcz").write_bytes(b"mine")
+    with pytest.raises(mcz.OptionError, match="exists"):
+        mcz.extract(whole, tmp_path / "a.mcz", frames=(0, 3))
+    mcz.extract(whole, tmp_path / "a.mcz", frames=(0, 3), force=True)
+    assert mcz.read(tmp_path / "a.mcz").n_frames == 3
+
+
+def test_damage_is_found_and_not_copied() -> None:
+    whole = bytearray(written(rich()))
+    with mcz.open(bytes(whole)) as file:
+        row = file.clips["smooth"].signals[0].rows[3]
+    whole[row.offset + row.size - 1] ^= 1
+    with pytest.raises(mcz.ChecksumError, match="crc of chunk DATA"):
+        extracted(bytes(whole), frames=(20, 30), joints=["hips"])
+
+
+def test_an_uncut_clip_is_copied_as_it_is() -> None:
+    out = io.BytesIO()
+    writer = Writer(out)
+    writer.attachment("notes.txt", b"kept")
+    for name in ("a", "b"):
+        write_clip(writer, replace(rich(), name=name), codecs.by_name("raw"), {})
+        writer.ancillary(b"abCD", name.encode())
+        writer.ancillary(b"abCE", b"", safe_to_copy=False)
+    writer.finish()
+    found = mcz.extract(out.getvalue(), part := io.BytesIO(), clip="b")
+    assert [clip.name for clip in found.clips] == ["b"]
+    assert found.size == len(part.getvalue())
+    assert len(found.left_out) == 1
+    assert "abCE" in found.left_out[0]
+    before, after = parts_of(out.getvalue()), parts_of(part.getvalue())
+    start = max(i for i, (chunk, _) in enumerate(before) if chunk.type == b"CLIP")
+    kept = [payload for chunk, payload in before[start:] if chunk.type != b"abCE"]
+    assert [payload for _, payload in after[2:]] == kept
+    with mcz.open(part.getvalue()) as file:
+        assert validate(file) == []
+        assert list(file.attachments) == []
+        assert file.clips["b"].quality is None
+
+
+def test_all_clips_are_cut_alike_and_the_rest_is_kept() -> None:
+    out = io.BytesIO()
+    writer = Writer(out, head_extension=b"later")
+    writer.ancillary(b"abCD", b"before all clips")
+    writer.shared(b"MODL", build(payloads.MODL, {"kind": 77, "data": b"learned"}, "MODL"))
+    writer.attachment("notes.txt", b"kept")
+    writer.alias("more.txt", payloads.OF_ATTACHMENT, b"notes.txt")
+    for name in ("a", "b"):
+        write_clip(writer, replace(rich(), name=name), codecs.by_name("raw"), {})
+    writer.finish()
+    part = extracted(out.getvalue(), frames=(3, 9))
+    with mcz.open(part) as file:
+        assert validate(file) == []
+        assert file.container.directory.head.endswith(b"later")
+        assert [clip.n_frames for clip in file.clips.values()] == [6, 6]
+        assert file.attachments["notes.txt"].read() == b"kept"
+        assert list(file.aliases) == ["more.txt"]
+        assert (b"abCD", b"before all clips") in [(c.type, p) for c, p in parts_of(part)]
+        assert [c.type for c, _ in parts_of(part)].count(b"MODL") == 1
+
+
+def test_listed_groups_and_extensions() -> None:
+    """Groups of kind 3 are those that are left; what is not known is kept."""
+    whole = written(rich())
+    listed = {"kind": payloads.GROUP_LISTED, "sizes": [6, 3, 1]}
+    data = clip_with(whole, groups=listed, extension=b"of a signal")
+    part = extracted(data, joints=["hips", "knee"], frames=(5, 30))
+    check(whole, part, 5, 30, ["hips", "knee"], 0)
+    fields = clip_fields_of(part)
+    assert list(fields.signals[0].groups.sizes) == [6, 1]
+    assert fields.signals[0].extension == b"of a signal"
+
+
+def test_an_open_clip_is_closed() -> None:
+    whole = written(rich())
+    part = extracted(clip_with(whole, flags=1, n_frames=0), frames=(5, 30))
+    check(whole, part, 5, 30, None, 0)
+    assert clip_fields_of(part).flags == 0
+
+
+def test_open_data_is_cut_and_closed() -> None:
+    out = io.BytesIO()
+    writer = _Live(out)
+    write_clip(writer, rich(), codecs.by_name("raw"), {"segment_frames": 5})
+    writer.finish()
+    part = extracted(out.getvalue(), frames=(11, 30))
+    check(out.getvalue(), part, 11, 30, None, 0)
+    with mcz.open(part) as file:
+        assert not any(row.packet for row in file.container.directory.clips["smooth"].segments)
+
+
+class _Live(Writer):
+    """Every clip in one open DATA, behind an ancillary chunk."""
+
+    def begin_clip(self, fields: Any, n_channels: Any) -> None:
+        super().begin_clip(fields, n_channels)
+        self.ancillary(b"abCD", b"inside")
+        self.open_data()
+
+
+def test_ancillary_chunks_inside_a_clip_are_kept() -> None:
+    out = io.BytesIO()
+    writer = _Live(out)
+    write_clip(writer, rich(), codecs.by_name("raw"), {})
+    writer.finish()
+    for how in ({"frames": (3, 9)}, {"clip": "smooth"}):
+        kinds = [chunk.type for chunk, _ in parts_of(extracted(out.getvalue(), **how))]
+        assert kinds.index(b"CLIP") < kinds.index(b"abCD") < kinds.index(b"CEND")
+
+
+def test_skeleton_of_joints_keeps_the_tree() -> None:
+    whole = written(rich())
+    with mcz.open(whole) as old, mcz.open(extracted(whole, joints=["knee", "fixed"])) as new:
+        before, after = old.clips["smooth"].skeleton, new.clips["smooth"].skeleton
+        assert [j.name for j in after.joints] == list(JOINTS)
+        assert [len(j.channels) for j in after.joints] == [0, 0, 0, 1]
+        assert [replace(j, channels=()) for j in before.joints] == [
+            replace(j, channels=()) for j in after.joints
+        ]
+        assert after.base == old.clips["smooth"].skeleton_id
+        assert new.skeleton(after.base) == before
+
+
+def quality(data: bytes) -> dict[str, str]:
+    with mcz.open(data) as file:
+        return next(iter(file.clips.values())).quality or {}
+
+
+def test_quality_says_what_was_cut() -> None:
+    motion = replace(smooth(40), signals=(Signal(smooth(40).signals[0].values),))
+    whole = written(motion, "overlap")
+    assert quality(whole)["param.length"] == "7"
+    part = extracted(whole, frames=(10, 30), joints=["hips", "knee"], resolution=1)
+    found = quality(part)
+    assert found["cut-frames"] == "10:30"
+    assert found["cut-joints"] == "hips,knee"
+    assert found["cut-resolution"] == "1"
+    assert found["param.length"] == "7"
+    assert found["uncut_mse"] == quality(whole)["mse"]
+    assert "mse" not in found
+    again = quality(extracted(part, frames=(3, 5), joints=["knee"]))
+    assert again == found | {"cut-frames": "13:15", "cut-joints": "knee"}
+    assert quality(extracted(part, clip="smooth")) == found
+    assert quality(extracted(written(rich()), frames=(1, 2))) == {"cut-frames": "1:2"}
+
+
+def test_a_quality_record_that_makes_no_sense() -> None:
+    parts = parts_of(extracted(written(rich()), frames=(1, 9)))
+    which = next(i for i, (chunk, _) in enumerate(parts) if chunk.type == b"QUAL")
+    entries = [{"key": "cut-frames", "value": "one"}]
+    payload = build(payloads.QUAL, {"entries": entries, "extension": b"more"}, "QUAL")
+    data = joined(replaced(parts, which, payload))
+    assert quality(extracted(data, frames=(1, 2))) == {"cut-frames": "1:2"}
+    cut = parts_of(extracted(data, joints=["hips"]))
+    assert next(p for c, p in cut if c.type == b"QUAL").endswith(b"more")
+
+
+def test_notes_of_joint_cuts() -> None:
+    whole = written(replace(rich(), metadata={"skeleton-note": "flat"}))
+    part = extracted(whole, joints=["hips", "spine"])
+    with mcz.open(extracted(part, joints=["hips"])) as file:
+        metadata = file.clips["smooth"].metadata
+        assert metadata["skeleton-note"] == "flat; the channels of other joints were cut"
+
+
+@pytest.mark.parametrize("suffix", ["amc", "bvh", "c3d"])
+@pytest.mark.parametrize("codec", ["lossless", "raw"])
+def test_sources_of_cut_frames(samples: Path, tmp_path: Path, suffix: str, codec: str) -> None:
+    path = tmp_path / "whole.mcz"
+    mcz.encode(samples / f"walk.{suffix}", path, codec=codec, params={"segment_frames": 32})
+    part = tmp_path / "part.mcz"
+    found = mcz.extract(path, part, frames=(37, 101))
+    assert found.clips[0].stored_frames == 96
+    with mcz.open(path) as old, mcz.open(part) as new:
+        assert mcz.verify(part) == []
+        wanted = old.clips["walk"].source_bytes((37, 101))
+        assert new.clips["walk"].source_bytes() == wanted
+        assert new.clips["walk"].source is not None
+        assert new.clips["walk"].source.size == len(wanted)
+        piece = old.clips["walk"].source_bytes((40, 45))
+        assert new.clips["walk"].source_bytes((3, 8)) == piece
+    (tmp_path / f"part.{suffix}").write_bytes(wanted)
+    skeleton = {"skeleton": samples / "walk.asf"} if suffix == "amc" else {}
+    read = mcz.read(tmp_path / f"part.{suffix}", **skeleton)
+    np.testing.assert_array_equal(read.values, mcz.read(part).values)
+
+
+def test_sources_of_cut_joints(samples: Path, tmp_path: Path) -> None:
+    mcz.encode(samples / "walk.amc", tmp_path / "whole.mcz")
+    found = mcz.extract(tmp_path / "whole.mcz", tmp_path / "part.mcz", joints=["lfemur", "root"])
+    assert found.left_out == ["clip walk: its source file, as joints were cut"]
+    with mcz.open(tmp_path / "part.mcz") as file:
+        clip = file.clips["walk"]
+        assert clip.source is None
+        assert "left out when joints were cut" in clip.metadata["source-note"]
+        assert clip.skeleton.base is not None
+        assert file.skeleton_bytes(clip.skeleton.base) == (samples / "walk.asf").read_bytes()
+        assert list(file.aliases) == ["walk.asf"]
+        assert validate(file) == []
+
+
+def test_a_source_that_cannot_be_cut_is_left_out(
+    samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from mcz.formats import FORMATS
+
+    def refuse(motion: mcz.Motion) -> bytes:
+        raise mcz.MotionError("only whole clips can be written")
+
+    mcz.encode(samples / "walk.c3d", tmp_path / "whole.mcz")
+    monkeypatch.setitem(FORMATS, "c3d", replace(FORMATS["c3d"], write=refuse))
+    found = mcz.extract(tmp_path / "whole.mcz", tmp_path / "part.mcz", frames=(3, 9))
+    assert found.left_out == ["clip walk: its source file, as only whole clips can be written"]
+    with mcz.open(tmp_path / "part.mcz") as file:
+        assert file.clips["walk"].source is None
+        assert validate(file) == []
+
+
+def test_aliases_of_cut_clips_are_left_out(samples: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "take"
+    folder.mkdir()
+    for name in ("walk.bvh", "same.bvh"):
+        (folder / name).write_bytes((samples / "walk.bvh").read_bytes())
+    mcz.pack(folder, tmp_path / "all.mcz")
+    found = mcz.extract(tmp_path / "all.mcz", tmp_path / "part.mcz", frames=(0, 50))
+    assert len(found.left_out) == 1
+    assert found.left_out[0].startswith("walk.bvh, a file identical to that of clip same")
+    with mcz.open(tmp_path / "part.mcz") as file:
+        assert dict(file.aliases) == {}
+    found = mcz.extract(tmp_path / "all.mcz", tmp_path / "one.mcz", clip="same")
+    assert found.left_out == []
+    with mcz.open(tmp_path / "one.mcz") as file:
+        assert list(file.aliases) == ["walk.bvh"]
+        assert validate(file) == []
+
+
+def test_resolution_beside_a_signal_without_any() -> None:
+    """A second signal loses as many resolutions as it has, here none."""
+    motion = rich()
+    out = io.BytesIO()
+    writer = Writer(out)
+    write_clip(writer, replace(motion, signals=motion.signals[:1]), overlap_codec.CODEC, {})
+    write_clip(writer, replace(motion, name="raw"), codecs.by_name("raw"), {})
+    writer.finish()
+    with pytest.raises(mcz.OptionError, match="clip 'raw': the 1 finest"):
+        extracted(out.getvalue(), resolution=1)
+    found = mcz.extract(out.getvalue(), io.BytesIO(), resolution=1, clip="smooth")
+    assert found.clips[0].data_bytes < 0.6 * found.clips[0].data_bytes_before
+
+
+# Decimation
+
+
+def test_decimate_takes_whole_frames() -> None:
+    from mcz.decimation import decimated_rows
+
+    values = np.arange(21)[:, None]
+    assert decimated_rows(values, 3, 2)[:, 0].tolist() == [0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, 20]
+    assert decimated_rows(values, 1, 8)[:, 0].tolist() == [0, 8, 16]
+    assert decimated_rows(values[:0], 3, 4).shape == (0, 1)
+
+
+@pytest.mark.parametrize("step", [2, 3, 8, 64])
+def test_decimated_motions(step: int) -> None:
+    from mcz.decimation import decimated
+
+    motion = rich()
+    thin = decimated(motion, step)
+    assert thin.frame_rate == motion.frame_rate / step
+    assert motion.frame_numbers is not None
+    assert list(thin.frame_numbers) == list(motion.frame_numbers[::step])
+    np.testing.assert_array_equal(thin.values, motion.values[::step])
+    with mcz.open(written(thin)) as file:  # exceptions and grids still fit
+        back = file.clips["smooth"].motion()
+    np.testing.assert_array_equal(back.values, thin.values)
+    frames = np.arange(motion.n_frames)
+    for frame in frames[::step]:
+        before = motion.signals[0].cut(int(frame), int(frame) + 1)
+        after = thin.signals[0].cut(int(frame) // step, int(frame) // step + 1)
+        assert before.grids == after.grids
+        assert before.exceptions.texts == after.exceptions.texts
+
+
+def test_motion_at_a_resolution() -> None:
+    motion = replace(smooth(45), frame_numbers=np.arange(45) + 3)
+    with mcz.open(written(motion, "overlap")) as file:
+        clip = file.clips["smooth"]
+        coarse = clip.motion((4, 40), 1)
+        np.testing.assert_array_equal(coarse.values, clip.read((4, 40), resolution=1))
+        assert coarse.frame_rate == 120
+        thin = clip.motion((4, 40), 1, decimate=True)
+        np.testing.assert_array_equal(thin.values, clip.read((4, 40), None, 1, decimate=True))
+        assert thin.frame_numbers is not None
+        assert list(thin.frame_numbers) == list(range(7, 43, 2))
+        assert thin.frame_rate == 60
+        with pytest.raises(mcz.OptionError, match="resolutions 0 to 1, not 2"):
+            clip.motion(resolution=2)
+
+
+@pytest.mark.parametrize("suffix", ["amc", "bvh"])
+def test_files_at_a_resolution(samples: Path, tmp_path: Path, suffix: str) -> None:
+    """The original format at half the rate; numbers of frames stay what they were."""
+    motion = replace(mcz.read(samples / f"walk.{suffix}"), frame_rate=120)
+    mcz.write(motion, tmp_path / "a.mcz", "overlap", length=20)
+    with mcz.open(tmp_path / "a.mcz") as file:
+        clip = file.clips["walk"]
+        values = clip.read(resolution=1)
+        full = clip.source_bytes(resolution=1)
+        thin = clip.source_bytes(resolution=1, decimate=True)
+        assert clip.motion(decimate=True).source is not None
+        assert (clip.motion(None, 1, decimate=True).source is None) is (suffix == "bvh")
+    skeleton = {"skeleton": samples / "walk.asf"} if suffix == "amc" else {}
+    for text, step in ((full, 1), (thin, 2)):
+        (tmp_path / f"b.{suffix}").write_bytes(text)
+        back = mcz.read(tmp_path / f"b.{suffix}", **skeleton)
+        assert back.n_frames == len(values[::step])
+        np.testing.assert_allclose(back.values, values[::step], rtol=1e-5, atol=1e-4)
+        if suffix == "bvh":
+            assert float(back.frame_rate or 0) == pytest.approx(120 / step)
+        elif step == 2:
+            assert back.frame_numbers is not None
+            assert list(back.frame_numbers[:3]) == [1, 3, 5]
+
+
+def test_sources_of_a_coarser_clip(samples: Path, tmp_path: Path) -> None:
+    motion = mcz.read(samples / "walk.bvh")
+    mcz.write(motion, tmp_path / "a.mcz", "overlap", length=20)
+    mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", resolution=1)
+    with mcz.open(tmp_path / "a.mcz") as old, mcz.open(tmp_path / "b.mcz") as new:
+        wanted = old.clips["walk"].source_bytes(resolution=1)
+        assert new.clips["walk"].source_bytes() == wanted
+        assert new.clips["walk"].source is not None
+        assert new.clips["walk"].source.size == len(wanted)
+
+
+# Hostile
+
+
+def clip_fields_of(data: bytes) -> Any:
+    (payload,) = (p for chunk, p in parts_of(data) if chunk.type == b"CLIP")
+    return parse(payloads.CLIP, payload, "CLIP")
+
+
+def clip_with(data: bytes, *, flags: int = 0, n_frames: int | None = None, **signal: Any) -> bytes:
+    """The file with other fields in its clip and the first signal, checksums made right."""
+    parts = parts_of(data)
+    which = next(i for i, (chunk, _) in enumerate(parts) if chunk.type == b"CLIP")
+    fields = clip_fields_of(data)
+    fields.flags, fields.n_frames = flags, fields.n_frames if n_frames is None else n_frames
+    fields.signals[0].update(signal)
+    return joined(replaced(parts, which, build(payloads.CLIP, fields, "CLIP")))
+
+
+@pytest.mark.parametrize("name", ["skip", "spare"])
+@pytest.mark.parametrize("more", [1, 2**20, 2**52, 2**53 - 41, 2**53 - 40, 2**53 - 10])
+def test_stored_frames_that_are_not_there(name: str, more: int) -> None:
+    for whole in (written(rich()), extracted(written(rich()), frames=(3, 30))):
+        with mcz.open(whole) as file:
+            before = getattr(file.clips["smooth"].signals[0], name)
+        data = clip_with(whole, **{name: before + more})
+        with pytest.raises(FormatError):
+            use(data)
+        try:
+            use(data, salvage=True)
+        except mcz.MczError as error:
+            assert str(error)
+
+
+def test_shown_frames_move_and_the_hash_tells() -> None:
+    part = extracted(written(rich()), frames=(9, 30))
+    with mcz.open(part) as file:
+        info = file.clips["smooth"].signals[0]
+        assert (info.skip, info.spare) == (2, 4)  # grid changes begin a segment at 20
+    with pytest.raises(mcz.ChecksumError, match="value hash"):
+        use(clip_with(part, skip=3, spare=3))
+
+
+def test_an_open_clip_skips_nothing() -> None:
+    part = extracted(written(rich()), frames=(9, 30))
+    with pytest.raises(FormatError, match="n_frames is open, but a signal has skip"):
+        use(clip_with(part, flags=1, n_frames=0))
+
+
+def test_a_clip_without_an_end_shows_what_is_there() -> None:
+    part = extracted(written(rich()), frames=(9, 30))
+    parts = [p for p in parts_of(part) if p[0].type != b"CEND"]
+    with mcz.open(joined(parts), salvage=True) as file:
+        clip = file.clips["smooth"]
+        assert clip.n_frames == 21
+        with mcz.open(part) as whole:
+            np.testing.assert_array_equal(clip.read(), whole.clips["smooth"].read())
+    data = [i for i, p in enumerate(parts) if p[0].type == b"DATA"]
+    with mcz.open(joined([p for i, p in enumerate(parts) if i not in data[1:]]), salvage=True) as f:
+        assert f.clips["smooth"].n_frames == 5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_flipped_bits_of_a_cut_file(seed: int) -> None:
+    data = extracted(written(motion_for("lossless"), "lossless"), frames=(9, 30), joints=JOINTS[:2])
+    parts = parts_of(data)
+    for which, (_, payload) in enumerate(parts):
+        for byte, bit in flips(len(payload), 60, seed=seed * 100 + which):
+            changed = joined(replaced(parts, which, flipped(payload, byte, bit)))
+            for act in (use, lambda file: extracted(file, frames=(1, 4), joints=["hips"])):
+                try:
+                    act(changed)
+                except mcz.MczError as error:
+                    assert str(error)
+
+
+def test_index_says_what_is_skipped() -> None:
+    from tests.repair import with_index_content
+
+    part = extracted(written(rich()), frames=(9, 30))
+    with mcz.open(part) as file:
+        row = file.container.directory.clips["smooth"]
+        assert [(s.skip, s.spare) for s in row.signals] == [(2, 4), (2, 5)]
+    old = varint(10) + varint(1) + varint(2) + varint(4)
+    new = varint(10) + varint(1) + varint(1) + varint(5)
+
+    def swap(content: bytes) -> bytes:
+        assert content.count(old) == 1
+        return content.replace(old, new)
+
+    with pytest.raises(FormatError, match="but the index says"):
+        use(with_index_content(part, swap))
+
+
+# The command
+
+
+def run(*arguments: str) -> int:
+    from mcz.cli.common import run as run_command
+    from mcz.cli.main import cli
+
+    return run_command(cli, "mcz", list(arguments))
+
+
+def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    motion = replace(smooth(40), signals=(Signal(smooth(40).signals[0].values),))
+    mcz.write(motion, tmp_path / "a.mcz", "overlap")
+    a, b = str(tmp_path / "a.mcz"), str(tmp_path / "b.mcz")
+    how = ("--frames", "10:", "--joints", "hips, 3", "--resolution", "1")
+    assert run("extract", a, b, *how, "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["output"] == b
+    assert document["size"] == Path(b).stat().st_size
+    (clip,) = document["clips"]
+    assert clip["frames"] == [10, 40]
+    assert clip["joints"] == ["hips", "knee"]
+    assert clip["resolution"] == 1
+    assert run("extract", a, b, *how) == 2  # exists
+    assert "exists" in capsys.readouterr().err
+    assert run("extract", a, b, *how, "--force") == 0
+    shown = capsys.readouterr().out
+    assert "1 clip" in shown
+    assert "frames 10:40, joints hips knee, resolution 1" in shown
+    assert run("verify", b) == 0
+    assert run("extract", a, b, "--force") == 2
+    assert run("extract", a, "-") == 2
+    assert run("extract", a, b, "--joints", "elbow", "--force") == 1
+
+
+@pytest.mark.parametrize("target", ["bvh", "csv", "npz"])
+def test_decode_at_a_resolution(samples: Path, tmp_path: Path, target: str) -> None:
+    mcz.write(mcz.read(samples / "walk.bvh"), tmp_path / "a.mcz", "overlap", length=20)
+    a, b = str(tmp_path / "a.mcz"), str(tmp_path / f"b.{target}")
+    with mcz.open(a) as file:
+        wanted = file.clips["walk"].read((3, 50), resolution=1)[::2]
+    how = ("-o", b, "--frames", "3:50", "--resolution", "1", "--decimate")
+    assert run("decode", a, *how, "--to", target) == 0
+    if target == "bvh":
+        found = mcz.read(b)
+        assert float(found.frame_rate or 0) == pytest.approx(60)
+        np.testing.assert_allclose(found.values, wanted, rtol=0, atol=6e-5)
+        assert run("decode", a, *how, "--force") == 0
+        np.testing.assert_allclose(mcz.read(b).values, wanted, rtol=0, atol=6e-5)
+    elif target == "npz":
+        arrays = np.load(b, allow_pickle=False)
+        np.testing.assert_array_equal(arrays["values"], wanted)
+        assert arrays["frame_numbers"].tolist() == list(range(4, 51, 2))
+    else:
+        assert len(Path(b).read_text().splitlines()) == 1 + len(wanted)
+    assert run("decode", a, "-o", b, "--decimate", "--force") == 2
+
+
+# Real files
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", ["amc/01_01.amc", "bvh/01_01.bvh", "c3d/01_01.c3d"])
+def test_real_clips(data: Path, tmp_path: Path, name: str) -> None:
+    path = data / "cmu" / name
+    mcz.encode(path, tmp_path / "a.mcz")
+    found = mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(500, 700))
+    assert found.clips[0].data_bytes < found.clips[0].data_bytes_before
+    assert mcz.verify(tmp_path / "b.mcz") == []
+    with mcz.open(tmp_path / "a.mcz") as old, mcz.open(tmp_path / "b.mcz") as new:
+        before, after = old.clips["01_01"], new.clips["01_01"]
+        assert after.source_bytes() == before.source_bytes((500, 700))
+        np.testing.assert_array_equal(after.read(), before.read((500, 700)))
+
+
+@pytest.mark.real
+def test_real_copies(data: Path, tmp_path: Path) -> None:
+    """In CMU's files the left clavicle is a copy of the right one."""
+    mcz.encode(data / "cmu/amc/01_01.amc", tmp_path / "a.mcz")
+    with pytest.raises(mcz.OptionError, match=r"joint \w+clavicle, which must be extracted, too"):
+        for joint in ("lclavicle", "rclavicle"):
+            mcz.extract(tmp_path / "a.mcz", tmp_path / f"{joint}.mcz", joints=[joint])
+    both = ["lclavicle", "rclavicle"]
+    found = mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", joints=both)
+    assert found.clips[0].data_bytes < 0.2 * found.clips[0].data_bytes_before
+    with mcz.open(tmp_path / "a.mcz") as old, mcz.open(tmp_path / "b.mcz") as new:
+        assert validate(new) == []
+        wanted = old.clips["01_01"].read(joints=sorted(both, key=old.clips["01_01"].skeleton.find))
+        np.testing.assert_array_equal(new.clips["01_01"].read(), wanted)

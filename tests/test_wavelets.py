@@ -1,0 +1,188 @@
+"""The wavelet transform: against PyWavelets, and a part of it against the whole."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pywt
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mcz.errors import FormatError, OptionError
+from mcz.transforms import dwt
+from mcz.transforms.wavelets import IDS, INLINE, MAX_TAPS, WAVELETS, Wavelet, by_id, by_name
+
+ANNEX = Path(__file__).parents[1] / "conformance" / "annex" / "wavelets.json"
+REGISTERED = tuple(WAVELETS)
+OTHERS = ("db10", "sym7", "coif3", "bior1.3", "bior2.2", "bior6.8", "rbio3.5", "dmey")
+NAMES = st.sampled_from(REGISTERED + OTHERS)
+SIZES = st.one_of(st.integers(1, 40), st.sampled_from([63, 64, 65, 127, 201]))
+LEVELS = st.integers(0, 6)
+
+
+def signal_of(n: int, seed: int = 0, channels: int = 3) -> np.ndarray:
+    return np.random.default_rng(seed).normal(0, 10, (n, channels))
+
+
+def reference(signal: np.ndarray, name: str, levels: int) -> list[np.ndarray]:
+    """The bands by PyWavelets, which warns where a signal is short for so many levels."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return list(pywt.wavedec(signal, name, mode="symmetric", level=levels, axis=0))
+
+
+def whole(signal: np.ndarray, wavelet: Wavelet, levels: int) -> list[np.ndarray]:
+    n = len(signal)
+    return dwt.analyze(signal, 0, 0, n, wavelet.lengths(n, levels), wavelet)
+
+
+def synthesized(bands: list[np.ndarray], wavelet: Wavelet, start: int, stop: int) -> np.ndarray:
+    """Frames of a range from no more than the coefficients that it needs."""
+    levels = len(bands) - 1
+    ranges = dwt.needed(start, stop, levels, wavelet.n_taps)
+    places = [ranges[levels], *reversed(ranges[1:])] if levels else [ranges[0]]
+    cut = [band[a:b] if len(band) else band for band, (a, b) in zip(bands, places, strict=True)]
+    return dwt.synthesize(cut, [a for a, _ in ranges[1:]], start, stop, wavelet)
+
+
+@given(NAMES, SIZES, LEVELS)
+def test_analysis_is_that_of_pywavelets(name: str, n: int, levels: int) -> None:
+    signal, (_, wavelet) = signal_of(n), by_name(name)
+    found, meant = whole(signal, wavelet, levels), reference(signal, name, levels)
+    assert [band.shape for band in found] == [band.shape for band in meant]
+    for a, b in zip(found, meant, strict=True):
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9)
+
+
+@given(NAMES, SIZES, LEVELS)
+def test_synthesis_is_that_of_pywavelets(name: str, n: int, levels: int) -> None:
+    """Any coefficients, not only those of a signal; PyWavelets adds a sample to odd lengths."""
+    wavelet = by_name(name)[1]
+    lengths = wavelet.lengths(n, levels)
+    sizes = [lengths[levels], *reversed(lengths[1:])] if levels else [n]
+    bands = [signal_of(size, seed) for seed, size in enumerate(sizes)]
+    meant = pywt.waverec(bands, name, mode="symmetric", axis=0)[:n]
+    np.testing.assert_allclose(synthesized(bands, wavelet, 0, n), meant, rtol=0, atol=1e-9)
+
+
+@given(NAMES.filter(lambda name: name != "dmey"), SIZES, LEVELS)
+def test_synthesis_undoes_analysis(name: str, n: int, levels: int) -> None:
+    """The filters of dmey are rounded: PyWavelets does not get the signal back either."""
+    signal, (_, wavelet) = signal_of(n), by_name(name)
+    again = synthesized(whole(signal, wavelet, levels), wavelet, 0, n)
+    np.testing.assert_allclose(again, signal, rtol=0, atol=1e-8)
+
+
+@given(NAMES, SIZES, LEVELS, st.data())
+def test_any_range_is_the_same_as_in_the_whole(name: str, n: int, levels: int, data) -> None:
+    wavelet = by_name(name)[1]
+    bands = whole(signal_of(n), wavelet, levels)
+    for band in data.draw(st.sets(st.integers(1, levels))) if levels else ():
+        bands[band] = np.zeros((0, 3))  # details that are left out
+    start = data.draw(st.integers(0, n - 1))
+    stop = data.draw(st.integers(start + 1, n))
+    full = synthesized(bands, wavelet, 0, n)
+    part = synthesized(bands, wavelet, start, stop)
+    assert part.tobytes() == full[start:stop].tobytes()
+
+
+@given(NAMES, SIZES, LEVELS)
+def test_details_left_out_are_zeros(name: str, n: int, levels: int) -> None:
+    wavelet = by_name(name)[1]
+    bands = whole(signal_of(n), wavelet, levels)
+    left_out = [bands[0], *(np.zeros((0, 3)) for _ in bands[1:])]
+    zeroed = [bands[0], *(np.zeros_like(band) for band in bands[1:])]
+    np.testing.assert_array_equal(
+        synthesized(left_out, wavelet, 0, n), synthesized(zeroed, wavelet, 0, n)
+    )
+
+
+@given(NAMES, SIZES, st.integers(0, 4), st.data())
+def test_analysis_of_windows_is_that_of_the_whole(name: str, n: int, levels: int, data) -> None:
+    """Segment by segment, with no more frames than ``Wavelet.lead`` and ``mirrored`` say."""
+    signal, (_, wavelet) = signal_of(n), by_name(name)
+    lengths, unit = wavelet.lengths(n, levels), 1 << levels
+    inner = range(unit, n, unit)
+    cuts = data.draw(st.sets(st.sampled_from(inner))) if inner else set()
+    bounds = [0, *sorted(cuts), n]
+    parts = []
+    for first, stop in zip(bounds, bounds[1:], strict=False):
+        at = max(0, first - -(-wavelet.lead(levels) // unit) * unit)
+        end = min(n, max(stop, -(-wavelet.mirrored(levels) // unit) * unit))
+        parts.append(dwt.analyze(signal[at:end], at, first, stop, lengths, wavelet))
+    for number, meant in enumerate(whole(signal, wavelet, levels)):
+        joined = np.concatenate([part[number] for part in parts])
+        assert joined.tobytes() == meant.tobytes()
+
+
+@given(NAMES, SIZES, LEVELS)
+def test_needed_ranges_lie_in_the_bands(name: str, n: int, levels: int) -> None:
+    wavelet = by_name(name)[1]
+    lengths = wavelet.lengths(n, levels)
+    for (start, stop), length in zip(
+        dwt.needed(0, n, levels, wavelet.n_taps), lengths, strict=True
+    ):
+        assert 0 == start < stop <= length
+
+
+@pytest.mark.parametrize("name", REGISTERED)
+def test_the_registry_has_the_filters_of_pywavelets(name: str) -> None:
+    id_, wavelet = by_name(name)
+    assert id_ == IDS[name] and by_id(id_) is wavelet
+    theirs = pywt.Wavelet(name)
+    assert wavelet.lo == tuple(theirs.rec_lo) and wavelet.hi == tuple(theirs.rec_hi)
+    low, high = wavelet.analysis
+    np.testing.assert_allclose(low, theirs.dec_lo, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(high, theirs.dec_hi, rtol=0, atol=1e-15)
+
+
+def test_the_annex_has_the_same_filters() -> None:
+    text = json.dumps(json.loads(ANNEX.read_text()))
+    for wavelet in WAVELETS.values():
+        assert all(repr(tap) in text for tap in wavelet.lo)
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_wavelets_are_inline(name: str) -> None:
+    id_, wavelet = by_name(name)
+    assert id_ == INLINE and wavelet.lo == tuple(pywt.Wavelet(name).rec_lo)
+
+
+@pytest.mark.parametrize("name", ["", "nosuch", "db0", "DB3 ", "morl", "gaus1", "cmor1.5-1.0"])
+def test_unknown_names_are_refused(name: str) -> None:
+    with pytest.raises(OptionError, match="wavelet .*is unknown; registered are haar, db2"):
+        by_name(name)
+
+
+def test_a_wavelet_with_too_many_taps_is_refused() -> None:
+    assert pywt.Wavelet("db38").rec_len > MAX_TAPS
+    with pytest.raises(OptionError, match="wavelet 'db38': .*76"):
+        by_name("db38")
+
+
+@pytest.mark.parametrize(
+    ("lo", "hi", "words"),
+    [
+        ((), (), "0 and 0 taps"),
+        ((1.0,), (1.0,), "1 and 1"),
+        ((1.0, 1.0), (1.0, 1.0, 1.0, 1.0), "2 and 4"),
+        ((1.0,) * 3, (1.0,) * 3, "3 and 3"),
+        ((0.1,) * 66, (0.1,) * 66, "66 and 66"),
+        ((1.0, 16.5), (1.0, 1.0), "a tap beyond 16"),
+        ((1.0, 1.0), (float("nan"), 1.0), "a tap beyond 16"),
+        ((1.0, float("-inf")), (1.0, 1.0), "a tap beyond 16"),
+    ],
+)
+def test_bad_filters_are_refused(lo: tuple[float, ...], hi: tuple[float, ...], words: str) -> None:
+    with pytest.raises(FormatError, match=words):
+        Wavelet(lo, hi)
+
+
+@pytest.mark.parametrize("id_", [-1, 0, len(WAVELETS) + 1, 255])
+def test_unknown_ids_are_refused(id_: int) -> None:
+    with pytest.raises(FormatError, match=f"wavelet {id_} is not one of 1 to 10"):
+        by_id(id_)

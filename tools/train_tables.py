@@ -1,0 +1,91 @@
+"""Train the start tables of lossy codecs: the states in which their coders begin.
+
+    python tools/train_tables.py wavelet OUT.json FILE...
+
+The files are coded twice, with every setting below, by coders that are never reset; see
+``tools/start_tables.py``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+import mcz
+from mcz.codecs import _wavelet_streams, mrdwt
+from mcz.codecs.base import Codec
+from mcz.coding import residuals
+from mcz.memory import MemorySource
+from mcz.motion import Motion
+from tools.start_tables import Kept, table, untrained
+
+SEGMENT_BYTES = 2**26
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A module with ``_start_states``, the codec that uses them, mixers and counts of each set."""
+
+    module: ModuleType
+    codec: Codec
+    n_mixers: tuple[int, ...]
+    max_count: int
+    settings: tuple[Mapping[str, Any], ...]
+
+
+PLANS = {
+    "wavelet": Plan(
+        _wavelet_streams,
+        mrdwt.CODEC,
+        (residuals.N_MIXERS,) * _wavelet_streams.N_SETS,
+        24,
+        (
+            {"T_g": 0.05},
+            {"preset": "khan2016", "T_g": 12},
+            {"T_g": 0.2},
+            {"T_g": 0.5, "N": 5},
+            {"preset": "khan2016", "T_g": 3},
+            {"T_g": 1},
+            {"T_g": 3, "N": 5},
+            {"preset": "khan2016", "T_g": 30},
+        ),
+    ),
+}
+
+
+def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
+    """The mean state of every set after the files of the second round."""
+    states = [untrained(state) for state in plan.module._start_states()]
+    kept = tuple(state.view(Kept) for state in states)
+    plan.module._start_states = lambda: kept  # type: ignore[attr-defined]
+    totals = [np.zeros_like(state) for state in states]
+    rounds = 0
+    for number, motion in enumerate([*motions, *motions]):
+        sizes = []
+        for setting in plan.settings:
+            source = MemorySource(motion, 0, plan.codec, SEGMENT_BYTES)
+            encoded = plan.codec.encode(source, plan.codec.options(setting))
+            sizes.append(sum(len(s) for part in encoded.segments for s in part.streams))
+            if number >= len(motions):
+                rounds += 1
+                for total, state in zip(totals, states, strict=True):
+                    total += state
+        print(f"{motion.name}: {sizes}", file=sys.stderr)
+    return [total // rounds for total in totals]
+
+
+if __name__ == "__main__":
+    chosen = PLANS[sys.argv[1]]
+    trained = train(chosen, [mcz.read(name) for name in sys.argv[3:]])
+    sets = [
+        table(state, n_mixers, chosen.max_count)
+        for state, n_mixers in zip(trained, chosen.n_mixers, strict=True)
+    ]
+    Path(sys.argv[2]).write_text(json.dumps({"sets": sets}, indent=1) + "\n")
