@@ -1,0 +1,75 @@
+"""Results kept by what they depend on, so that a rerun does not measure again."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mcz
+
+# Of this part; of cli/ no measured figure depends on any file.
+MEASURING = ("cases.py", "ladder.py", "measure.py", "peers.py", "tasks.py")
+
+
+def default_folder() -> Path:
+    """Below the user's cache folder."""
+    home = Path.home()
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or str(home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = str(home / "Library" / "Caches")
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or str(home / ".cache")
+    return Path(base) / "mcz" / "bench"
+
+
+@cache
+def code_digest() -> str:
+    """Of every file of the package that a figure may depend on: more than its version says."""
+    folder = Path(mcz.__file__).parent
+    digest = hashlib.sha256(mcz.__version__.encode())
+    for path in sorted([*folder.rglob("*.py"), *folder.rglob("*.json")]):
+        part = path.relative_to(folder).parts[0]
+        if part not in ("bench", "cli") or (part == "bench" and path.name in MEASURING):
+            digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+class Cache:
+    """Results as JSON files named by the hash of their key; without a folder nothing is kept."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+
+    def _path(self, key: str) -> Path:
+        assert self.folder is not None
+        name = hashlib.sha256(f"{code_digest()} {key}".encode()).hexdigest()
+        return self.folder / name[:2] / f"{name}.json"
+
+    def get(self, key: str) -> Any:
+        """What was kept under ``key``, None where nothing was or it cannot be read."""
+        if self.folder is None:
+            return None
+        try:
+            held = json.loads(self._path(key).read_text("utf-8"))
+        except (OSError, ValueError):
+            return None
+        return held.get("result") if isinstance(held, dict) else None
+
+    def put(self, key: str, result: Any) -> None:
+        """Keep ``result``; a folder that takes nothing is no error."""
+        if self.folder is None:
+            return
+        path = self._path(key)
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as stream:
+                json.dump({"key": key, "result": result}, stream)
+            os.replace(stream.name, path)

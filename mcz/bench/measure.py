@@ -1,0 +1,193 @@
+"""The figures of one clip, one codec, one setting: bytes, errors, seconds, memory."""
+
+from __future__ import annotations
+
+import io
+import time
+import tracemalloc
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mcz
+from mcz.bench.cases import Case, Loaded, Variant, load
+from mcz.codecs import by_name
+from mcz.codecs.base import Request, Span
+from mcz.container.limits import BASE
+from mcz.container.writer import Writer
+from mcz.encoding import write_clip
+from mcz.formats import format_of
+from mcz.memory import MemorySource
+from mcz.motion import Motion
+from mcz.report import clip_ratios
+from mcz.sizes import clip_sizes
+from mcz.sources import read_source
+
+Record = dict[str, Any]
+
+LEAST_SECONDS = 0.25  # of CPU time that a speed is taken from, the fastest of its runs
+MOST_RUNS = 50
+DROPPED = ("frames", "channels", "point_set", "points", "max_position_error_point")
+
+
+def what_is_coded(motion: Motion, codec: str) -> Motion:
+    """All of the clip for a lossless codec, the motion alone for a lossy one."""
+    return motion if by_name(codec).lossless else replace(motion, signals=motion.signals[:1])
+
+
+def write_file(motion: Motion, codec: str, params: Mapping[str, Any]) -> bytes:
+    """An MCZ file of one clip, without its quality record, which is no part of the codec."""
+    out = io.BytesIO()
+    writer = Writer(out)
+    write_clip(writer, motion, by_name(codec), params, quality=False)
+    writer.finish()
+    return out.getvalue()
+
+
+def coded_bytes(case: Case, variant: Variant, params: Mapping[str, Any]) -> int:
+    """Payload and overhead, SPEC.md's "Sizes and ratios"."""
+    motion = what_is_coded(load(case).motion, variant.codec)
+    data = write_file(motion, variant.codec, variant.options(params))
+    with mcz.open(data, max_decoded=2**53) as file:
+        sizes = clip_sizes(file.container, file.only_clip())
+    return sizes.payload + sizes.overhead
+
+
+def point(
+    case: Case, variant: Variant, params: Mapping[str, Any], *, markers: bool = True
+) -> Record:
+    """Sizes and errors of a clip at one setting, as the public reader has them."""
+    whole = load(case).motion
+    motion = what_is_coded(whole, variant.codec)
+    data = write_file(motion, variant.codec, variant.options(params))
+    with mcz.open(data, max_decoded=2**53) as file:
+        clip = file.only_clip()
+        sizes, ratios = clip_sizes(file.container, clip), clip_ratios(file, clip)
+        found = mcz.compare(motion, clip.motion(), virtual_markers=markers)
+    del ratios["cr_file"]
+    if len(motion.signals) < len(whole.signals):
+        ratios["cr_source"] = None  # its bytes are of signals, too, that are not coded here
+    entries = {k: v for k, v in found.entries().items() if k not in DROPPED}
+    return {
+        "params": dict(params),
+        "coded_bytes": sizes.payload + sizes.overhead,
+        "payload_bytes": sizes.payload,
+        **ratios,
+        **{k: v for k, v in entries.items() if not k.startswith("signal.")},
+    }
+
+
+def cpu_seconds(work: Callable[[], Any]) -> float:
+    """CPU time of the fastest of several runs, the first of which (compilation) does not count."""
+    work()
+    spent, best = 0.0, float("inf")
+    for _ in range(MOST_RUNS):
+        start = time.process_time()
+        work()
+        took = time.process_time() - start
+        best, spent = min(best, took), spent + took
+        if spent >= LEAST_SECONDS:
+            break
+    return max(best, 1e-9)
+
+
+def peak_bytes(work: Callable[[], Any]) -> int:
+    """The most memory that Python and numpy held while it ran, beside what they had before."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def speeds(case: Case, variant: Variant, params: Mapping[str, Any]) -> Record:
+    """Frames a second, warm, of the codec alone, of writing and reading files, of parsing text.
+
+    Peak memory is that of the codec alone, beside the values themselves.
+    """
+    loaded = load(case)
+    motion = what_is_coded(loaded.motion, variant.codec)
+    codec = by_name(variant.codec)
+    options = codec.options(variant.options(params))
+    encoded, segments = _encode(motion, variant.codec, options)
+
+    def decode() -> Any:
+        layout = MemorySource(motion, 0, codec, BASE.segment_bytes).layout
+        layout = replace(layout, n_resolutions=encoded.n_resolutions)
+        spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
+        n = len(layout.groups)
+        request = Request(0, layout.n_frames, tuple(range(n)))
+        return codec.decode(
+            encoded.header, layout, spans, request, lambda s, r, g: segments[s].streams[r * n + g]
+        )
+
+    def encode() -> Any:
+        return _encode(motion, variant.codec, options)
+
+    def read() -> Any:
+        with mcz.open(data, max_decoded=2**53) as file:
+            return file.only_clip().read()
+
+    given = variant.options(params)
+    data = write_file(motion, variant.codec, given)
+    seconds = {
+        "parse": cpu_seconds(lambda: _parse(case, loaded)),
+        "encode": cpu_seconds(encode),
+        "decode": cpu_seconds(decode),
+        "write": cpu_seconds(lambda: write_file(motion, variant.codec, given)),
+        "read": cpu_seconds(read),
+    }
+    fps = {f"{name}_fps": motion.n_frames / took for name, took in seconds.items()}
+    ratios = {
+        f"{name}_to_parse": seconds["parse"] / took
+        for name, took in seconds.items()
+        if name != "parse"
+    }
+    memory = {"encode_peak_bytes": peak_bytes(encode), "decode_peak_bytes": peak_bytes(decode)}
+    return {"params": dict(params), **fps, **ratios, **memory}
+
+
+def _encode(motion: Motion, name: str, options: Mapping[str, Any]) -> tuple[Any, list[Any]]:
+    codec = by_name(name)
+    encoded = codec.encode(MemorySource(motion, 0, codec, BASE.segment_bytes), options)
+    return encoded, list(encoded.segments)
+
+
+def _parse(case: Case, loaded: Loaded) -> Motion:
+    path = Path(case.path)
+    source_format = format_of(path)
+    skeleton = loaded.motion.skeleton if source_format.wants_skeleton else None
+    return read_source(path, source_format, skeleton, loaded.data)
+
+
+def resolutions(case: Case, variant: Variant, params: Mapping[str, Any], joint: str) -> Record:
+    """MSE of a joint's first channel, and bytes read, with the finest details left out."""
+    import numpy as np
+
+    from mcz.angles import unwrap
+
+    motion = load(case).motion
+    skeleton = motion.skeleton
+    column = skeleton.columns(skeleton.find(joint))[0]
+    wanted = unwrap(motion.values, skeleton)[:, column]
+    data = write_file(motion, variant.codec, variant.options(params))
+    rows = []
+    with mcz.open(data) as file:
+        n_resolutions = file.only_clip().signals[0].counts.n_resolutions
+    for resolution in range(n_resolutions):
+        values, of_joint = _read_counted(data, resolution, [joint])
+        _, of_all = _read_counted(data, resolution, None)
+        error = float(np.mean((values[:, 0] - wanted) ** 2))
+        row = {"resolution": resolution, "mse": error}
+        rows.append(row | {"bytes_read_joint": of_joint, "bytes_read_all": of_all})
+    return {"file_bytes": len(data), "rows": rows}
+
+
+def _read_counted(data: bytes, resolution: int, joints: list[str] | None) -> tuple[Any, int]:
+    """Values, and the bytes that were read for them."""
+    with mcz.open(data) as file:
+        before = file.container.source.n_bytes
+        values = file.only_clip().read(joints=joints, resolution=resolution)
+        return values, file.container.source.n_bytes - before

@@ -1,0 +1,153 @@
+"""Rate-distortion plots as PNG; matplotlib is imported when the first is drawn."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from mcz.bench.sweep import ClipResult, Curve
+
+MISSING = "no plots: matplotlib is not installed (pip install 'mcz[plot]')"
+MARKS = "osD^vP*X<>"
+PUBLISHED = (0, (4, 2))  # dashes of presets that follow a paper
+PEER = (0, (1, 1.5))
+LONG = 3.2  # decades of an axis
+MOST_WIDE = 2  # times the greatest size of our codecs: how far to the right a peer is drawn
+
+
+def can_draw() -> bool:
+    return find_spec("matplotlib") is not None
+
+
+def draw(clips: Sequence[ClipResult], folder: Path) -> Iterator[Path]:
+    """One plot a clip with all its codecs, and one a codec with all its variants."""
+    for clip in clips:
+        if not clip.lossy:
+            continue
+        path = folder / f"{_plain(clip.name)}.png"
+        _draw(clip, clip.drawn, path, clip.name)
+        yield path
+        names = list(dict.fromkeys(c.variant.codec for c in clip.lossy if c.variant))
+        for name in names:
+            own = [c for c in clip.lossy if c.variant and c.variant.codec == name]
+            path = folder / f"{_plain(clip.name)}_{name}.png"
+            _draw(clip, own, path, f"{clip.name}, {name}", labels=True)
+            yield path
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^\w.-]", "_", name)
+
+
+def _panels(clip: ClipResult) -> list[tuple[str, str, bool]]:
+    """Key, axis label, whether the axis is logarithmic."""
+    panels = [(clip.error_key, f"mean position error, joints ({clip.unit})", True)]
+    if clip.unit_cm:
+        panels.append(("virtual_marker_mean_cm", "mean position error, virtual markers (cm)", True))
+    mse = "MSE of channels (degrees and length units, squared)"
+    return [*panels, ("mse", mse, True), ("sqnr_db", "SQNR of positions (dB)", False)]
+
+
+def _draw(
+    clip: ClipResult, curves: Sequence[Curve], path: Path, title: str, *, labels: bool = False
+) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    panels = [p for p in _panels(clip) if any(curve.pairs(p[0]) for curve in curves)]
+    n_rows = -(-len(panels) // 2)
+    figure: Any = Figure(figsize=(13, 1.2 + 4.6 * n_rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(n_rows, 2, squeeze=False).ravel()
+    for axes in grid[len(panels) :]:
+        axes.remove()
+    for axes, panel in zip(grid, panels, strict=False):
+        _panel(axes, clip, curves, panel, labels)
+    handles, names = grid[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=4, frameon=False)
+    figure.suptitle(f"{title}: {clip.n_frames:,} frames, {clip.source_bytes:,} bytes of source")
+    figure.savefig(path, dpi=110)
+
+
+def _panel(
+    axes: Any,
+    clip: ClipResult,
+    curves: Sequence[Curve],
+    panel: tuple[str, str, bool],
+    labels: bool,
+) -> None:
+    key, text, logarithmic = panel
+    codecs = list(dict.fromkeys(c.variant.codec if c.variant else c.label for c in curves))
+    widest = max((p["coded_bytes"] for c in curves if c.variant for p in c.points), default=0)
+    for curve in curves:
+        pairs = [pair for pair in curve.pairs(key) if pair[0] <= MOST_WIDE * widest]
+        if not pairs:
+            continue
+        number = codecs.index(curve.variant.codec if curve.variant else curve.label)
+        published = bool(curve.variant and curve.variant.published)
+        style: Any = PUBLISHED if published else "-" if curve.variant else PEER
+        axes.plot(
+            *zip(*pairs, strict=True),
+            linestyle=style,
+            marker=MARKS[number % len(MARKS)],
+            markersize=4.5,
+            markerfacecolor="white" if published else None,
+            linewidth=1.4,
+            color=f"C{number}" if curve.variant else "0.5",
+            label=curve.label,
+        )
+        if labels:
+            _label_points(axes, curve, key, published)
+    axes.set_xscale("log")
+    _plain_ticks(axes.xaxis)
+    if logarithmic:
+        axes.set_yscale("log")
+        _plain_ticks(axes.yaxis)
+    axes.set_xlabel("coded bytes, payload and overhead")
+    axes.set_ylabel(text)
+    axes.grid(True, which="both", color="0.9", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=8)
+    above = axes.secondary_xaxis(
+        "top",
+        functions=(lambda x: clip.source_bytes / _safe(x), lambda x: clip.source_bytes / _safe(x)),
+    )
+    above.set_xlabel("CR: source bytes / coded bytes (cr_source)", fontsize=8)
+    above.tick_params(which="both", labelsize=8)
+    _plain_ticks(above.xaxis)
+
+
+def _plain_ticks(axis: Any) -> None:
+    """Marks at 1, 2 and 5, or of a long range at 1, of a logarithmic axis as plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    long = low > 0 and math.log10(high / low) > LONG
+    axis.set_major_locator(LogLocator(subs=(1.0,) if long else (1.0, 2.0, 5.0), numticks=30))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.12g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _safe(x: Any) -> Any:
+    import numpy as np
+
+    return np.maximum(x, 1e-9)
+
+
+def _label_points(axes: Any, curve: Curve, key: str, published: bool) -> None:
+    """The setting beside every point."""
+    for point in curve.points:
+        if point.get(key) and point["params"]:
+            value = next(iter(point["params"].values()))
+            axes.annotate(
+                f"{value:.3g}",
+                (point["coded_bytes"], point[key]),
+                xytext=(4, -9 if published else 4),
+                textcoords="offset points",
+                fontsize=6.5,
+                color="0.35",
+            )

@@ -1,0 +1,324 @@
+"""The codecs of a clip over their whole range: points, interpolations, deltas, speeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mcz.bench.cases import Case, Variant, load
+from mcz.bench.ladder import N_POINTS
+from mcz.bench.measure import Record
+from mcz.bench.tables import Table, setting
+from mcz.bench.tasks import Runner, Task
+from mcz.bjontegaard import bd_rate, bd_sqnr, front
+from mcz.codecs import by_name
+
+ZFP = "zfp, tolerance"
+AT_ERRORS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # cm, or length units where these are unknown
+AT_MSES = (0.1, 0.25, 0.5, 1.0, 2.0)
+AT_RATIOS = (20.0, 40.0, 60.0, 80.0, 120.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """The points of one codec on one clip, fine to coarse, its speeds, or why there are none."""
+
+    label: str
+    points: tuple[Record, ...] = ()
+    variant: Variant | None = None  # None: a peer
+    speeds: Record = field(default_factory=dict)
+    error: str | None = None
+
+    @property
+    def lossless(self) -> bool:
+        return self.variant is not None and by_name(self.variant.codec).lossless
+
+    def pairs(self, key: str) -> list[tuple[float, float]]:
+        """(bytes, figure) of the points that have both."""
+        return [(p["coded_bytes"], p[key]) for p in self.points if p.get(key)]
+
+    def document(self) -> dict[str, Any]:
+        variant = self.variant
+        return {
+            "label": self.label,
+            "codec": variant.codec if variant else None,
+            "params": dict(variant.params) if variant else {},
+            "points": list(self.points),
+            "speeds": self.speeds or None,
+            "error": self.error,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class ClipResult:
+    """All that was measured on one clip."""
+
+    name: str
+    case: Case
+    source_bytes: int
+    n_frames: int
+    n_channels: int
+    unit_cm: float | None
+    curves: tuple[Curve, ...]
+    peers: tuple[Record, ...]
+
+    @property
+    def error_key(self) -> str:
+        return "mean_position_error" + ("_cm" if self.unit_cm else "")
+
+    @property
+    def unit(self) -> str:
+        return "cm" if self.unit_cm else "length units"
+
+    @property
+    def lossy(self) -> list[Curve]:
+        return [c for c in self.curves if c.points and not c.lossless]
+
+    @property
+    def drawn(self) -> list[Curve]:
+        """Lossy codecs, and zfp with bounds where it ran."""
+        bounded = tuple(p for p in self.peers if p["peer"] == ZFP)
+        return [*self.lossy, *([Curve(ZFP, bounded)] if bounded else [])]
+
+    def deltas(self) -> list[dict[str, Any]]:
+        """Bjontegaard deltas of every codec against every other."""
+        found = []
+        for a in self.lossy:
+            for b in self.lossy:
+                if a is not b:
+                    pair = a.pairs("sqnr_db"), b.pairs("sqnr_db")
+                    row = {"reference": a.label, "other": b.label, "bd_rate_pct": bd_rate(*pair)}
+                    found.append(row | {"bd_sqnr_db": bd_sqnr(*pair)})
+        return found
+
+    def document(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "path": self.case.path,
+            "source_bytes": self.source_bytes,
+            "n_frames": self.n_frames,
+            "n_channels": self.n_channels,
+            "unit_cm": self.unit_cm,
+            "codecs": [curve.document() for curve in self.curves],
+            "peers": list(self.peers),
+            "deltas": self.deltas(),
+        }
+
+
+def measured(
+    runner: Runner,
+    cases: Mapping[str, Case],
+    variants: Sequence[Variant],
+    *,
+    speeds: bool,
+    peers: tuple[str, ...],
+) -> list[ClipResult]:
+    """Everything, clip by clip: sizes and errors first, then speeds with nothing beside them."""
+    tasks = [Task("sweep", c, v, (N_POINTS,)) for c in cases.values() for v in variants]
+    swept = runner.run(tasks)
+    timed = {}
+    for task in tasks if speeds else ():
+        if isinstance(swept[task], list):
+            params = _middle(swept[task])["params"]
+            timed[task] = Task("speeds", task.case, task.variant, tuple(params.items()))
+    asked = {case: Task("peers", case, arguments=peers) for case in cases.values() if peers}
+    found = runner.run([*timed.values(), *asked.values()])
+    results = []
+    for name, case in cases.items():
+        curves = []
+        for task in tasks:
+            if task.case == case:
+                speed = found.get(timed[task], {}) if task in timed else {}
+                curves.append(_curve(task.variant, swept[task], speed))
+        others = found[asked[case]] if case in asked else []
+        loaded = load(case)
+        motion = loaded.motion
+        facts = (len(loaded.data), motion.n_frames, motion.signals[0].n_channels)
+        unit = motion.skeleton.unit_cm
+        rest = (tuple(curves), tuple(others) if isinstance(others, list) else ())
+        results.append(ClipResult(name, case, *facts, unit, *rest))
+    return results
+
+
+def _middle(points: Sequence[Record]) -> Record:
+    return points[len(points) // 2]
+
+
+def _curve(variant: Variant, swept: Any, speeds: Any) -> Curve:
+    if not isinstance(swept, list):
+        return Curve(variant.label, variant=variant, error=swept["error"])
+    error = speeds.get("error")
+    return Curve(variant.label, tuple(swept), variant, {} if error else speeds, error)
+
+
+def tables(clip: ClipResult) -> Iterator[Table]:
+    yield _points(clip)
+    if clip.lossy:
+        yield from _at_equal(clip)
+    if len(clip.lossy) > 1:
+        yield from _delta_tables(clip)
+    if any(curve.speeds for curve in clip.curves):
+        yield _speeds(clip)
+    if clip.peers:
+        yield _peers(clip)
+
+
+def _about(clip: ClipResult) -> str:
+    return (
+        f"Clip {clip.name}: {clip.n_frames:,} frames, {clip.n_channels} channels, "
+        f"{clip.source_bytes:,} bytes of source"
+    )
+
+
+NUMERATORS = (
+    "CR: cr_source (bytes of the source file), cr_float32 (4 bytes a value), cr_40B (40 bytes a "
+    "joint and frame), each / payload and overhead, cr_source of a lossless codec / all that "
+    "restores the file"
+)
+
+
+def _points(clip: ClipResult) -> Table:
+    unit = clip.unit
+    columns = (
+        *(("codec", ""), ("setting", ""), ("bytes", ",d"), ("cr_source", ".2f")),
+        *(("cr_float32", ".2f"), ("cr_40B", ".2f"), ("MSE", ".4g")),
+        *((f"mean {unit}", ".4f"), (f"max {unit}", ".3f")),
+        *(("markers mean cm", ".4f"), ("markers max cm", ".3f"), ("SQNR dB", ".2f")),
+    )
+    caption = (
+        f"{_about(clip)}. {NUMERATORS}. MSE: channels, degrees and length units squared. mean, "
+        f"max: position error of the joints' points in {unit}; markers: of three virtual markers "
+        "a joint."
+    )
+    table = Table(f"{clip.name}: points", caption, columns)
+    keys = (
+        *("coded_bytes", "cr_source", "cr_float32", "cr_40B", "mse"),
+        *(clip.error_key, clip.error_key.replace("mean", "max")),
+        *("virtual_marker_mean_cm", "virtual_marker_max_cm", "sqnr_db"),
+    )
+    for curve in clip.curves:
+        for point in curve.points:
+            row = (point.get(key) for key in keys)
+            table.rows.append((curve.label, setting(point["params"]), *row))
+    return table
+
+
+def at_error(curve: Curve, key: str, wanted: float) -> float | None:
+    """Bytes at which the figure ``key`` is ``wanted``: straight in logarithms between points."""
+    sizes, errors = _front(curve, key)
+    if len(sizes) < 2 or not errors[-1] <= wanted <= errors[0]:
+        return None
+    where = np.interp(math.log(wanted), np.log(errors[::-1]), np.log(sizes[::-1]))
+    return float(math.exp(where))
+
+
+def at_size(curve: Curve, key: str, size: float) -> float | None:
+    """The figure ``key`` at so many bytes, likewise."""
+    sizes, errors = _front(curve, key)
+    if len(sizes) < 2 or not sizes[0] <= size <= sizes[-1]:
+        return None
+    return float(math.exp(np.interp(math.log(size), np.log(sizes), np.log(errors))))
+
+
+def _front(curve: Curve, key: str) -> tuple[Any, Any]:
+    """Sizes ascending and errors descending of the points that no smaller one matches."""
+    sizes, negative = front((size, -error) for size, error in curve.pairs(key))
+    return sizes, -negative
+
+
+BETWEEN = "between measured points, straight in logarithms; - where the codec does not reach it"
+
+
+def _at_equal(clip: ClipResult) -> Iterator[Table]:
+    yield _at_error(clip, "position error", clip.error_key, AT_ERRORS, clip.unit)
+    yield _at_error(clip, "MSE", "mse", AT_MSES, "")
+    caption = f"{_about(clip)}. {clip.error_key} in {clip.unit} at cr_source of, {BETWEEN}."
+    heads = tuple((f"CR {value:g}", ".4f") for value in AT_RATIOS)
+    table = Table(f"{clip.name}: position error at equal size", caption, (("codec", ""), *heads))
+    for curve in clip.drawn:
+        sizes = (clip.source_bytes / ratio for ratio in AT_RATIOS)
+        errors = (at_size(curve, clip.error_key, size) for size in sizes)
+        table.rows.append((curve.label, *errors))
+    yield table
+
+
+def _at_error(clip: ClipResult, title: str, key: str, wanted: Sequence[float], unit: str) -> Table:
+    where = f"{key} in {unit}" if unit else key
+    caption = f"{_about(clip)}. cr_source at {where} of, {BETWEEN}."
+    heads = tuple((f"{value:g} {unit}".strip(), ".1f") for value in wanted)
+    table = Table(f"{clip.name}: CR at equal {title}", caption, (("codec", ""), *heads))
+    for curve in clip.drawn:
+        sizes = (at_error(curve, key, value) for value in wanted)
+        table.rows.append((curve.label, *(clip.source_bytes / s if s else None for s in sizes)))
+    return table
+
+
+def _delta_tables(clip: ClipResult) -> Iterator[Table]:
+    found = {(d["reference"], d["other"]): d for d in clip.deltas()}
+    labels = [curve.label for curve in clip.lossy]
+    for title, key, unit in (
+        ("Bjontegaard delta rate", "bd_rate_pct", "percent of bytes, below 0 is better"),
+        ("Bjontegaard delta SQNR", "bd_sqnr_db", "dB, above 0 is better"),
+    ):
+        caption = f"{_about(clip)}. The codec of the row against that of the column, in {unit}."
+        heads = tuple((label, ".2f") for label in labels)
+        table = Table(f"{clip.name}: {title}", caption, (("codec", ""), *heads))
+        for row in labels:
+            cells = (found.get((column, row), {}).get(key) for column in labels)
+            table.rows.append((row, *cells))
+        yield table
+
+
+def _speeds(clip: ClipResult) -> Table:
+    names = ("encode", "decode", "write", "read")
+    columns = (
+        *(("codec", ""), ("setting", "")),
+        *((f"{name} f/s", ",d") for name in names),
+        *((f"{name} / parse", ".3f") for name in names),
+        *(("encode peak MB", ".1f"), ("decode peak MB", ".1f")),
+    )
+    caption = (
+        f"{_about(clip)}. f/s: frames a second of CPU time, warm, the fastest of several runs, "
+        "nothing of ours beside it. encode, decode: the codec alone, memory to memory; write, "
+        "read: a whole file in memory with all its hashes. / parse: as a ratio to parsing the "
+        "source file in the same run. Peak: memory of the codec alone, beside the values."
+    )
+    table = Table(f"{clip.name}: speed and memory", caption, columns)
+    for curve in clip.curves:
+        if found := curve.speeds:
+            rates = (found[f"{name}_fps"] for name in names)
+            ratios = (found[f"{name}_to_parse"] for name in names)
+            peaks = (found[f"{name}_peak_bytes"] / 1e6 for name in ("encode", "decode"))
+            table.rows.append((curve.label, setting(found["params"]), *rates, *ratios, *peaks))
+    return table
+
+
+def _peers(clip: ClipResult) -> Table:
+    columns = (
+        *(("peer", ""), ("what is coded", ""), ("bytes", ",d"), ("cr_source", ".2f")),
+        *(("cr_float32", ".2f"), ("cr_40B", ".2f"), (f"mean {clip.unit}", ".4f")),
+        ("encode f/s", ",d"),
+    )
+    caption = (
+        f"{_about(clip)}. The same numerators / all bytes of the peer. A matrix has no skeleton, "
+        "names or spelling. Rotations are unwrapped in it."
+    )
+    table = Table(f"{clip.name}: peers", caption, columns)
+    for curve in clip.curves:
+        if curve.lossless and curve.points:
+            point = curve.points[0]
+            ratios = (point[key] for key in ("coded_bytes", "cr_source", "cr_float32", "cr_40B"))
+            table.rows.append((f"mcz {curve.label}", "source file", *ratios, 0.0, _fps(curve)))
+    for record in clip.peers:
+        keys = ("peer", "coded", "coded_bytes", "cr_source", "cr_float32", "cr_40B")
+        error = record.get(clip.error_key)
+        table.rows.append((*(record[key] for key in keys), error, record.get("encode_fps")))
+    return table
+
+
+def _fps(curve: Curve) -> float | None:
+    return curve.speeds.get("encode_fps")

@@ -1,0 +1,83 @@
+"""Tables as data, and as people read them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+Cell = float | int | str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows of raw values; the caption says clip, numerator, metric and unit.
+
+    ``columns`` are pairs of heading and format; a format is that of ``format()``, "" for text.
+    """
+
+    title: str
+    caption: str
+    columns: tuple[tuple[str, str], ...]
+    rows: list[Sequence[Cell]] = field(default_factory=list)
+
+    def document(self) -> dict[str, Any]:
+        """For JSON: the raw values."""
+        heads = [head for head, _ in self.columns]
+        return {
+            "title": self.title,
+            "caption": self.caption,
+            "columns": heads,
+            "rows": [list(row) for row in self.rows],
+        }
+
+    def cells(self) -> list[list[str]]:
+        """Headings, then rows, as text."""
+        formats = [spec for _, spec in self.columns]
+        body = [
+            [shown(value, spec) for value, spec in zip(row, formats, strict=True)]
+            for row in self.rows
+        ]
+        return [[head for head, _ in self.columns], *body]
+
+    @property
+    def right(self) -> str:
+        """Which columns are numbers: ``r``, others ``l``."""
+        return "".join("r" if spec else "l" for _, spec in self.columns)
+
+    def markdown(self) -> Iterator[str]:
+        yield f"### {self.title}"
+        yield ""
+        yield self.caption
+        yield ""
+        head, *body = self.cells()
+        yield _row(head)
+        yield _row(["---:" if side == "r" else "---" for side in self.right])
+        yield from map(_row, body)
+        yield ""
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def shown(value: Cell, spec: str) -> str:
+    """
+    >>> shown(12.345, ".1f"), shown(None, ".1f"), shown("a", ""), shown(5, ",d"), shown(0.1, ",d")
+    ('12.3', '-', 'a', '5', '0')
+    """
+    if value is None:
+        return "-"
+    if isinstance(value, str) or not spec:
+        return str(value)
+    return format(round(value), spec) if spec.endswith("d") else format(value, spec)
+
+
+def setting(params: dict[str, Any]) -> str:
+    """
+    >>> setting({"T_g": 0.25, "Q": 1})
+    'T_g=0.25 Q=1'
+    """
+    return " ".join(
+        f"{k}={v:.4g}" if isinstance(v, float) else f"{k}={v}" for k, v in params.items()
+    )

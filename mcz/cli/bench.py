@@ -1,0 +1,130 @@
+"""``mcz bench``: every codec on the same clips, and the papers' tables with ours beside."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from mcz.cli.common import Exit, Failure, about, existing, print_json, printable, say, table
+from mcz.cli.options import UNITS, json_option
+from mcz.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from mcz.bench.run import Outcome
+
+TABLES = ("khan2014", "khan2016", "all")
+
+
+@click.command(short_help="Compare codecs: size, error, speed, memory.")
+@click.argument("clips", metavar="CLIPS...", nargs=-1, required=True, type=click.Path())
+@click.option(
+    "--codecs",
+    metavar="A,B",
+    help="Codecs, each with its presets; qbc:khan2014 or qbc:delta=40 is that alone. Default: all.",
+)
+@click.option(
+    "--tables", "papers", type=click.Choice(TABLES), help="A paper's tables, instead of the sweep."
+)
+@click.option("--sweep", "with_sweep", is_flag=True, help="The sweep beside --tables.")
+@click.option("--peers", is_flag=True, help="General compressors too, those that are installed.")
+@click.option(
+    "--speeds/--no-speeds", default=True, help="Measure speed and memory in the sweep. Default: do."
+)
+@click.option("--unit", type=click.Choice(UNITS), help="Length unit of files that say none.")
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Write results.json, report.md and plots into DIR, over those of an earlier run.",
+)
+@click.option(
+    "--jobs", metavar="N", type=click.IntRange(1), help="Processes. Default: one a processor."
+)
+@click.option("--cache/--no-cache", default=True, help="Reuse earlier results. Default: do.")
+@json_option
+def command(
+    clips: tuple[str, ...],
+    codecs: str | None,
+    papers: str | None,
+    with_sweep: bool,
+    peers: bool,
+    speeds: bool,
+    unit: str | None,
+    out: Path | None,
+    jobs: int | None,
+    cache: bool,
+    as_json: bool,
+) -> Exit:
+    """Sweep the quality of every codec on CLIPS: files, or folders of .amc, .bvh and .c3d.
+
+    Prints sizes by three numerators, errors of channels and positions, what codecs reach at equal
+    error and at equal size, Bjontegaard deltas, speed as a ratio to parsing the text, and memory.
+    With --tables only the clips of that paper are taken. Results are kept in the user's cache
+    folder, by what they depend on; speeds are measured one at a time.
+    """
+    from mcz.bench.cache import Cache, default_folder
+    from mcz.bench.run import PAPERS, bench
+    from mcz.bench.tasks import Runner
+
+    for path in clips:
+        if not Path(path).is_dir():
+            existing(path)
+    chosen = tuple(PAPERS) if papers == "all" else (papers,) if papers else ()
+    with about(clips[0], *clips), Progress() as progress:
+        runner = Runner(jobs or os.cpu_count() or 1, Cache(default_folder() if cache else None))
+        runner.progress = progress
+        outcome = bench(
+            clips,
+            runner,
+            codecs=[name for name in (codecs or "").split(",") if name],
+            papers=chosen,
+            with_sweep=with_sweep or not chosen,
+            with_peers=peers,
+            speeds=speeds,
+            unit=unit,
+        )
+    document = outcome.document() | {"files": _write(outcome, out) if out else []}
+    if as_json:
+        print_json(document)
+        return Exit.FINE
+    for line in _lines(outcome):
+        click.echo(printable(line))
+    for note in outcome.notes:
+        say(note)
+    for path in document["files"]:
+        click.echo(printable(path))
+    return Exit.FINE
+
+
+def _lines(outcome: Outcome) -> Iterator[str]:
+    for found in outcome.tables:
+        yield found.title
+        yield from (f"  {line}" for line in table(found.cells(), found.right).split("\n"))
+        yield f"  {found.caption}"
+        yield ""
+
+
+def _write(outcome: Outcome, folder: Path) -> list[str]:
+    """Write the files of a report; return their paths."""
+    from mcz.bench import plots
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        drawn: list[Path] = []
+        if plots.can_draw():
+            drawn = list(plots.draw(outcome.clips, folder))
+        elif outcome.clips:
+            outcome.notes.append(plots.MISSING)
+        text = "\n".join(outcome.markdown([path.name for path in drawn]))
+        report, results = folder / "report.md", folder / "results.json"
+        report.write_text(text, "utf-8")
+        document = json.dumps(outcome.document(), indent=1, ensure_ascii=False, allow_nan=False)
+        results.write_text(document + "\n", "utf-8")
+    except OSError as error:
+        raise Failure(f"{folder}: {error.strerror or error}") from None
+    return [str(path) for path in (results, report, *drawn)]

@@ -1,0 +1,206 @@
+"""The two streams of one joint in one segment: its marks, and the curves between them.
+
+SPEC.md, "Codec 3: qbc", is normative; names are its field names.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.coding.start import start_state
+from mcz.errors import FormatError
+
+Ints = NDArray[np.int64]
+Loop = Callable[[Ints, NDArray[np.uint8]], bool]  # whether all went well
+
+START_TABLE = Path(__file__).with_name("qbc_start.json")
+MARKS, DETAILS = 0, 1  # the sets of the start table
+MAX_SCALE = 63
+
+# The head of a stream of marks, and of one of curves: (name, type, meaning).
+MARKS_FIELDS = (("scale", "u8", "first scale of marks, in half octaves, 0 to 63"),)
+CURVES_FIELDS = (
+    ("break_scale", "u8", "first scale of breaks, in half octaves, 0 to 63"),
+    ("middle_scale", "u8", "first scale of middle points, in half octaves, 0 to 63"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """Curves one after the other: frames of each, the point at its end, its middle point."""
+
+    lengths: Ints  # (curves,)
+    ends: Ints  # (curves, channels)
+    mids: Ints  # (curves, channels)
+
+
+@cache
+def _kernels() -> tuple[Any, Any]:
+    from mcz.codecs import _qbc_kernels
+    from mcz.coding import kernels
+
+    return _qbc_kernels, kernels
+
+
+@cache
+def _start_states() -> tuple[Ints, ...]:
+    return tuple(start_state(table) for table in json.loads(START_TABLE.read_text())["sets"])
+
+
+def scale_of(halves: int) -> int:
+    """The scale that a byte stands for: about 2^(h / 2)."""
+    return (2 + (halves & 1)) << (halves >> 1) >> 1
+
+
+def halves_of(errors: Ints) -> int:
+    """The byte of a scale of about the mean absolute error."""
+    typical = float(np.abs(errors).mean()) if errors.size else 0.0
+    return next((h for h in range(MAX_SCALE) if scale_of(h) >= typical), MAX_SCALE)
+
+
+def build_marks(points: Ints) -> bytes:
+    """The stream of marks (k, channels)."""
+    if not points.any():
+        return b""
+    halves = halves_of(np.diff(points, axis=0))
+    loops, _ = _kernels()
+    body = _code(
+        MARKS,
+        points.size,
+        lambda state, data: (
+            loops.code_marks(state, data, points.copy(), len(points), scale_of(halves)) < 0
+        ),
+    )
+    return bytes((halves,)) + body
+
+
+def parse_marks(stream: bytes, count: int, n_channels: int, name: str) -> Ints:
+    """All ``count`` marks; raises FormatError on bad bytes."""
+    points = np.zeros((count, n_channels), np.int64)
+    if not stream:
+        return points
+    halves = _scale(stream, 0, name)
+    loops, _ = _kernels()
+    _uncode(
+        stream[1:],
+        _start_states()[MARKS].copy(),
+        lambda state, data: loops.code_marks(state, data, points, count, scale_of(halves)) < 0,
+        name,
+        whole=True,
+    )
+    return points
+
+
+def parse_first_mark(stream: bytes, n_channels: int, name: str) -> Ints:
+    """The first of some marks, (1, channels), which takes no context."""
+    points = np.zeros((1, n_channels), np.int64)
+    if stream:
+        _scale(stream, 0, name)
+        loops, coder = _kernels()
+        _uncode(
+            stream[1:],
+            np.zeros(coder.SQUASH, np.int64),
+            lambda state, data: loops.code_marks(state, data, points, 1, 1) < 0,
+            name,
+            whole=False,
+        )
+    return points
+
+
+def straight(marks: Ints, frames: Ints) -> Curves:
+    """One straight curve from each mark to the next."""
+    return Curves(np.diff(frames), marks[1:], (marks[:-1] + marks[1:]) >> 1)
+
+
+def build_curves(marks: Ints, frames: Ints, curves: Curves) -> bytes:
+    """The stream of the curves between marks (k, channels) at ``frames`` (k,)."""
+    plain = straight(marks, frames)
+    if len(plain.lengths) == len(curves.lengths) and (plain.mids == curves.mids).all():
+        return b""
+    starts = np.concatenate([marks[:1], curves.ends[:-1]])
+    inner = ~np.isin(np.cumsum(curves.lengths) + frames[0], frames)
+    steps = (curves.ends - starts)[inner]
+    bends = (curves.mids - ((starts + curves.ends) >> 1))[curves.lengths > 1]
+    halves = np.array([halves_of(steps // 2), halves_of(bends)])
+    scales = np.array([scale_of(int(h)) for h in halves])
+    loops, _ = _kernels()
+    body = _code(
+        DETAILS,
+        2 * curves.ends.size + len(curves.lengths),
+        lambda state, data: (
+            loops.code_details(
+                state,
+                data,
+                marks,
+                frames,
+                curves.lengths.copy(),
+                curves.ends.copy(),
+                curves.mids.copy(),
+                scales,
+            )
+            == len(curves.lengths)
+        ),
+    )
+    return bytes(halves.astype(np.uint8)) + body
+
+
+def parse_curves(stream: bytes, marks: Ints, frames: Ints, name: str, *, whole: bool) -> Curves:
+    """The curves between marks; raises FormatError on bad bytes."""
+    if not stream:
+        return straight(marks, frames)
+    scales = np.array([scale_of(_scale(stream, at, name)) for at in range(2)])
+    most = int(frames[-1] - frames[0])
+    lengths = np.zeros(most, np.int64)
+    ends = np.zeros((most, marks.shape[1]), np.int64)
+    mids = np.zeros_like(ends)
+    found = [0]
+    loops, _ = _kernels()
+
+    def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
+        found[0] = loops.code_details(state, data, marks, frames, lengths, ends, mids, scales)
+        return found[0] >= 0
+
+    _uncode(stream[2:], _start_states()[DETAILS].copy(), loop, name, whole=whole)
+    n = found[0]
+    return Curves(lengths[:n], ends[:n], mids[:n])
+
+
+def _scale(stream: bytes, at: int, name: str) -> int:
+    if at >= len(stream) or stream[at] > MAX_SCALE:
+        raise FormatError(f"{name}: no scale at {at} of a stream of {len(stream)} bytes")
+    return stream[at]
+
+
+def _code(number: int, count: int, loop: Loop) -> bytes:
+    """The bits that ``loop`` writes, from the start of set ``number``."""
+    _, coder = _kernels()
+    size = 4 * count + 256
+    while True:
+        data = np.zeros(size, np.uint8)
+        state = _start_states()[number].copy()
+        coder.start(state, data, 1)
+        if not loop(state, data):
+            raise AssertionError("qbc: a control point has no code")
+        used = coder.finish(state, data)
+        if used <= size:
+            return data[:used].tobytes()
+        size = used + 256
+
+
+def _uncode(stream: bytes, state: Ints, loop: Loop, name: str, *, whole: bool) -> None:
+    """Let ``loop`` read ``stream``; raises FormatError where it is no code, or has other bytes."""
+    _, coder = _kernels()
+    data = np.frombuffer(stream, np.uint8).copy()  # compiled once: for writable bytes
+    coder.start(state, data, 0)
+    if not loop(state, data):
+        raise FormatError(f"{name}: a control point or a length is out of range")
+    if whole and coder.coded_size(state) != len(data):
+        raise FormatError(f"{name}: a stream of {len(data)} bytes takes another number")

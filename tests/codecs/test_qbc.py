@@ -1,0 +1,666 @@
+"""Codec 3, ``qbc``: the bound, parts, odd clips, parameters, hostile bytes, published figures."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.angles import unwrap
+from mcz.codecs import _qbc_streams as streams
+from mcz.codecs import by_name, qbc
+from mcz.codecs._qbc_plan import SCALED, STEP_SHARE
+from mcz.memory import MemorySource
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.schema import parse
+from tests.codecs import lossy
+from tests.codecs.lossy import Direct, bones, bytes_of, clip_of, gapped, wandering
+from tests.motions import smooth
+from tests.repair import flipped, flips, joined, parts_of, replaced, use
+
+Array = np.ndarray
+POSITION = ("tx", "ty", "tz")
+
+
+def saved(motion: Motion, **params: object) -> bytes:
+    return lossy.saved("qbc", motion, **params)
+
+
+def decoded(motion: Motion, **params: object) -> Array:
+    return lossy.decoded("qbc", motion, **params)
+
+
+def coded(motion: Motion, **params: object) -> Direct:
+    return Direct("qbc", motion, **params)
+
+
+def joints_of(sizes: list[int]) -> Skeleton:
+    """A joint each of so many channels, some of them none."""
+    kinds = ("rx", "tx", "ry", "sx")
+    found = [tuple(Channel(kinds[c % 4], f"c{c}") for c in range(size)) for size in sizes]
+    return Skeleton(tuple(Joint(f"j{j}", j - 1, channels=c) for j, c in enumerate(found)))
+
+
+def jointed(n_frames: int, sizes: list[int], seed: int = 0, roughness: float = 4.0) -> Motion:
+    """Random walks of joints with so many channels."""
+    random = np.random.default_rng(seed)
+    steps = random.normal(0, roughness, (n_frames, sum(sizes)))
+    values = np.cumsum(steps, axis=0) + random.normal(0, 100, sum(sizes))
+    return Motion(joints_of(sizes), (Signal(values),), name="clip")
+
+
+def of_any(values: list[float]) -> Motion:
+    """A joint of two channels with just these values."""
+    pairs = np.array(values[: len(values) // 2 * 2], np.float64).reshape(-1, 2)
+    skeleton = Skeleton((Joint("j", channels=(Channel("tx"), Channel("ty"))),))
+    return Motion(skeleton, (Signal(pairs),), name="clip")
+
+
+SIZES = st.lists(st.integers(0, 7), min_size=1, max_size=3).filter(any)
+FRAMES = st.one_of(st.integers(1, 12), st.integers(1, 150))
+SETTINGS = st.fixed_dictionaries(
+    {
+        "d2_lmt": st.sampled_from([1e-4, 0.5, 9.0, 400.0]),
+        "delta": st.sampled_from([1, 2, 7, 16, 40, 200]),
+        "breaks": st.sampled_from(["split", "fewest"]),
+        "middle": st.sampled_from(["least-squares", "published"]),
+    },
+    optional={"Q": st.sampled_from([0, 2, 4])},
+)
+
+
+# The bound
+
+
+def curves_of(clip: Direct, group: int) -> list[tuple[int, int]]:
+    """First and last frame of each curve of a joint, from the streams."""
+    fields = parse(qbc.QBC_HEADER, clip.header, "header")
+    n_channels = len(clip.layout.groups[group])
+    found = []
+    for index, span in enumerate(clip.spans):
+        frames = qbc.marks_of(span.first, span.stop, fields.coded_frames, fields.delta)
+        own = len(frames) - (span.stop < fields.coded_frames)
+        marks = streams.parse_marks(clip.stream(index, 0, group), own, n_channels, "qbc")
+        if own < len(frames):
+            after = streams.parse_first_mark(clip.stream(index + 1, 0, group), n_channels, "qbc")
+            marks = np.concatenate([marks, after])
+        curves = streams.parse_curves(
+            clip.stream(index, 1, group), marks, frames, "qbc", whole=True
+        )
+        ends = int(frames[0]) + np.cumsum([0, *curves.lengths])
+        found += [(int(a), int(b)) for a, b in zip(ends, ends[1:], strict=False)]
+    return found
+
+
+def step_of(clip: Direct) -> float:
+    fields = parse(qbc.QBC_HEADER, clip.header, "header")
+    return float(fields.step if fields.decimals == SCALED else 10.0**-fields.decimals)
+
+
+def check_bound(motion: Motion, limit: float, clip: Direct, *, closed: bool) -> None:
+    """No frame is farther from its curve than SPEC.md allows, all channels of a joint together."""
+    errors = clip.read() - unwrap(motion.values, motion.skeleton)
+    slack = 1e-9 * (1 + np.abs(motion.values).max(initial=0.0))
+    for group, columns in enumerate(clip.layout.groups):
+        distances = np.sqrt((errors[:, list(columns)] ** 2).sum(axis=1))
+        rounding = math.sqrt(len(columns)) * step_of(clip) / 2
+        if not closed:
+            assert distances.max() <= math.sqrt(limit) + rounding + slack
+            continue
+        touching: dict[int, int] = {}  # the longest curve that has the frame
+        for a, b in curves_of(clip, group):
+            for frame in range(a, b + 1):
+                touching[frame] = max(touching.get(frame, 0), b - a)
+        for frame, distance in enumerate(distances):
+            single = touching.get(frame, 0) < 2
+            assert distance <= (max(rounding, math.sqrt(limit)) if single else limit**0.5) + slack
+
+
+@given(FRAMES, SIZES, SETTINGS, st.integers(0, 99), st.sampled_from([0.01, 1.0, 30.0]))
+def test_the_bound_holds(n_frames, sizes, settings, seed, roughness) -> None:
+    motion = jointed(n_frames, sizes, seed, roughness)
+    check_bound(motion, settings["d2_lmt"], coded(motion, **settings), closed=True)
+
+
+@given(
+    st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=60),
+    SETTINGS,
+    st.sampled_from(["default", "khan2014"]),
+)
+def test_the_bound_holds_for_any_values(values, settings, preset) -> None:
+    motion = of_any(values)
+    clip = coded(motion, **settings, preset=preset)
+    check_bound(motion, settings["d2_lmt"], clip, closed=preset == "default")
+
+
+@given(FRAMES, SIZES, SETTINGS, st.integers(0, 99))
+def test_the_bound_of_the_preset_holds_before_rounding(n_frames, sizes, settings, seed) -> None:
+    motion = jointed(n_frames, sizes, seed)
+    clip = coded(motion, **settings, preset="khan2014")
+    check_bound(motion, settings["d2_lmt"], clip, closed=False)
+
+
+@given(FRAMES, SIZES, SETTINGS, st.integers(0, 99))
+def test_fewest_breaks_are_no_more(n_frames, sizes, settings, seed) -> None:
+    motion = jointed(n_frames, sizes, seed)
+    counts = [
+        [len(curves_of(clip, group)) for group in range(len(clip.layout.groups))]
+        for breaks in ("split", "fewest")
+        for clip in (coded(motion, **{**settings, "breaks": breaks}),)
+    ]
+    assert all(fewest <= split for split, fewest in zip(*counts, strict=True))
+
+
+def test_fewest_breaks_take_fewer_bytes() -> None:
+    motion = jointed(800, [3, 3, 3, 6], roughness=0.3)
+    assert coded(motion, breaks="fewest").n_bytes < 0.97 * coded(motion).n_bytes
+
+
+def test_a_limit_of_0_keeps_what_decimals_hold() -> None:
+    motion = smooth(90)
+    found = decoded(motion, d2_lmt=0, Q=4)
+    np.testing.assert_allclose(found, motion.values, rtol=0, atol=1e-9)
+
+
+def test_a_parabola_is_one_curve() -> None:
+    frames = np.arange(41.0)[:, None]
+    motion = clip_of(np.hstack([frames**2 / 40, 3 * frames - 7]), ["tx", "ty"])
+    for middle in qbc.MIDDLES:
+        clip = coded(motion, d2_lmt=1e-3, middle=middle)
+        assert [curves_of(clip, group) for group in range(2)] == [[(0, 40)]] * 2
+        np.testing.assert_allclose(clip.read(), motion.values, rtol=0, atol=0.04)
+
+
+def test_the_step_follows_from_the_limit() -> None:
+    for limit in (1e-6, 1.0, 50.0):
+        assert step_of(coded(smooth(20), d2_lmt=limit)) == STEP_SHARE * limit**0.5
+
+
+# A part is the same as in the whole
+
+
+@given(FRAMES, SIZES, SETTINGS, st.one_of(st.none(), st.integers(1, 90)), st.data())
+def test_part_equals_whole(n_frames, sizes, settings, segment_frames, data) -> None:
+    extra = {} if segment_frames is None else {"segment_frames": segment_frames}
+    clip = coded(jointed(n_frames, sizes), **settings, **extra)
+    groups_of = clip.layout.groups
+    resolution = data.draw(st.integers(0, 1))
+    whole = clip.read(resolution=resolution)
+    for _ in range(3):
+        start = data.draw(st.integers(0, n_frames))
+        stop = data.draw(st.integers(start, n_frames))
+        groups = tuple(data.draw(st.lists(st.integers(0, len(groups_of) - 1), unique=True)))
+        columns = [column for group in groups for column in groups_of[group]]
+        part = clip.read(start, stop, groups, resolution)
+        assert part.tobytes() == np.ascontiguousarray(whole[start:stop][:, columns]).tobytes()
+
+
+@given(FRAMES, SIZES, SETTINGS, st.integers(1, 90))
+def test_segments_do_not_matter(n_frames, sizes, settings, segment_frames) -> None:
+    motion = jointed(n_frames, sizes)
+    one = coded(motion, **settings, segment_frames=n_frames)
+    many = coded(motion, **settings, segment_frames=segment_frames)
+    length = -(-segment_frames // settings["delta"]) * settings["delta"]
+    assert len(one.segments) == 1
+    assert len(many.segments) == -(-n_frames // length)
+    assert many.read().tobytes() == one.read().tobytes()
+    assert many.read(resolution=1).tobytes() == one.read(resolution=1).tobytes()
+
+
+def test_a_long_clip_is_cut_into_segments_by_size() -> None:
+    """Noise fills 64 KiB soon: segments get shorter, the values stay those of one segment."""
+    random = np.random.default_rng(3)
+    motion = clip_of(random.normal(0, 1000, (6000, 20)))
+    many, one = coded(motion), coded(motion, segment_frames=6000)
+    assert len(many.segments) > 2 and len(one.segments) == 1
+    assert all(sum(map(len, segment.streams)) < 2**16 for segment in many.segments)
+    assert all(segment.lead == min(segment.first, 39) for segment in many.segments)
+    assert many.read().tobytes() == one.read().tobytes()
+
+
+def test_a_part_fetches_the_next_segment_only_where_it_must() -> None:
+    clip = coded(smooth(100), delta=10, segment_frames=20)
+    for start, stop, resolution, meant in (
+        (25, 31, 0, {(1, 0), (1, 1)}),
+        (25, 32, 0, {(1, 0), (1, 1), (2, 0)}),
+        (25, 31, 1, {(1, 0)}),
+        (30, 31, 1, {(1, 0)}),
+        (38, 41, 0, {(1, 0), (1, 1), (2, 0), (2, 1)}),
+        (99, 100, 0, {(4, 0), (4, 1)}),
+    ):
+        asked = set()
+
+        def fetch(segment: int, stored: int, group: int, asked: Any = asked) -> bytes:
+            assert group == 2
+            asked.add((segment, stored))
+            return clip.stream(segment, stored, group)
+
+        clip.read(start, stop, (2,), resolution, {"fetch": fetch})
+        assert asked == meant, (start, stop)
+
+
+def test_marks_are_the_same_at_both_resolutions() -> None:
+    clip = coded(smooth(333), segment_frames=80)
+    marks = [*range(0, 333, 40), 332]
+    np.testing.assert_array_equal(clip.read()[marks], clip.read(resolution=1)[marks])
+    assert (clip.read() != clip.read(resolution=1)).any()
+
+
+@pytest.mark.parametrize("resolution", [0, 1])
+@pytest.mark.parametrize("frames", [None, (0, 60), (40, 41), (90, 170), (205, None), (7, 7)])
+@pytest.mark.parametrize("joints", [None, ["spine"], ["knee", "hips"]])
+def test_what_is_extracted_has_the_same_values(resolution, frames, joints) -> None:
+    if (resolution, frames, joints) == (0, None, None):
+        return  # nothing to extract
+    data = saved(smooth(210), segment_frames=40, delta=8)
+    out = io.BytesIO()
+    mcz.extract(data, out, resolution=resolution, frames=frames, joints=joints)
+    start, stop = frames or (0, 210)
+    with mcz.open(data) as whole, mcz.open(out.getvalue()) as part:
+        kept = ["hips", "spine", "fixed", "knee"] if joints is None else sorted(joints)
+        meant = whole.only_clip().read((start, 210 if stop is None else stop), kept, resolution)
+        clip = part.only_clip()
+        assert clip.read().tobytes() == meant.tobytes()
+        assert clip.signals[0].counts.n_resolutions == 2 - resolution
+
+
+# Clips out of the ordinary
+
+
+CASES: tuple[dict[str, object], ...] = (
+    {},
+    {"preset": "khan2014"},
+    {"Q": 3, "d2_lmt": 0, "delta": 1},
+    {"breaks": "fewest"},
+)
+
+
+@pytest.mark.parametrize("n_frames", [0, 1, 2, 3])
+@pytest.mark.parametrize("settings", CASES)
+def test_few_frames(n_frames: int, settings: dict[str, object]) -> None:
+    motion = wandering(n_frames, ["tx", "rx"])
+    found = decoded(motion, **settings)
+    assert found.shape == (n_frames, 2)
+    np.testing.assert_allclose(found, unwrap(motion.values, motion.skeleton), atol=2.0)
+
+
+@pytest.mark.parametrize("settings", CASES)
+def test_constant_and_zero_channels(settings: dict[str, object]) -> None:
+    values = np.tile([0.0, 77.5, -123.0], (300, 1))
+    clip = coded(clip_of(values), **settings)
+    np.testing.assert_allclose(clip.read(), values, atol=0.4)
+    assert all(len(stream) < 8 for segment in clip.segments for stream in segment.streams)
+    assert not any(clip.stream(0, resolution, 0) for resolution in range(2))
+
+
+@pytest.mark.parametrize("settings", CASES)
+def test_all_zero_clips_have_empty_streams(settings: dict[str, object]) -> None:
+    clip = coded(clip_of(np.zeros((5000, 7))), **settings)
+    assert clip.n_bytes == 0
+    assert not clip.read().any()
+
+
+@pytest.mark.parametrize("settings", CASES)
+def test_no_channels_at_all(settings: dict[str, object]) -> None:
+    motion = Motion(Skeleton((Joint("rock"),)), (Signal(np.zeros((40, 0))),), name="still")
+    assert decoded(motion, **settings).shape == (40, 0)
+
+
+def test_joints_without_channels_read_as_nothing() -> None:
+    with mcz.open(saved(smooth(60))) as file:
+        assert file.only_clip().read(joints=["fixed"]).shape == (60, 0)
+
+
+@pytest.mark.parametrize("settings", CASES)
+def test_masks_are_kept_and_gaps_are_filled(settings: dict[str, object]) -> None:
+    motion = gapped()
+    mask = motion.signals[0].mask
+    with mcz.open(saved(motion, **{"d2_lmt": 0.01, **settings}, segment_frames=40)) as file:
+        values, found = file.only_clip().read_masked()
+        np.testing.assert_array_equal(found, mask)
+        assert np.isfinite(values).all()
+        np.testing.assert_allclose(values[mask], motion.signals[0].values[mask], atol=0.13)
+        assert np.abs(values[~mask]).max() < 200
+        shown = file.only_clip().read((40, 70), ["RASI"])
+        np.testing.assert_array_equal(np.isnan(shown), ~mask[40:70, 3:])
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_values_that_are_not_finite_are_refused(bad: float) -> None:
+    values = np.zeros((600, 2))
+    values[300, 1] = bad
+    with pytest.raises(mcz.MotionError, match="qbc: frames 0:600 hold a value that is not"):
+        saved(clip_of(values))
+    with pytest.raises(mcz.MotionError, match="frames 281:321"):
+        saved(clip_of(values), segment_frames=40)
+
+
+@pytest.mark.parametrize("huge", [1e13, 1e20, 1e300, 1.7e308, -1.7e308])
+@pytest.mark.parametrize("kind", ["rx", "tx"])
+@pytest.mark.parametrize("settings", CASES)
+def test_huge_values_are_refused(huge: float, kind: str, settings: dict[str, object]) -> None:
+    values = np.ones((60, 2))
+    values[20, 1], values[21, 1] = huge, -huge
+    with pytest.raises(mcz.MotionError, match="exceeds"):
+        saved(clip_of(values, [kind, kind]), **settings)
+
+
+def test_points_up_to_the_limit_are_coded() -> None:
+    values = np.array([[2.0**40, -(2.0**40)], [-(2.0**40), 2.0**40], [0, 1], [2.0**40, 5]])
+    found = decoded(clip_of(values, ["tx", "ty"]), Q=0, d2_lmt=0, delta=1)
+    np.testing.assert_array_equal(found, values)
+    with pytest.raises(mcz.MotionError, match="exceeds"):  # a middle point lies beyond
+        saved(clip_of(values, ["tx", "ty"]), Q=0, d2_lmt=0, delta=2)
+    with pytest.raises(mcz.MotionError, match="exceeds"):
+        saved(clip_of(values + 1, ["tx", "ty"]), Q=0, d2_lmt=0)
+
+
+@given(st.data())
+def test_streams_of_any_integers(data) -> None:
+    """Both streams give back any points and lengths."""
+    n_channels, delta = data.draw(st.integers(1, 4)), data.draw(st.integers(1, 9))
+    n_marks = data.draw(st.integers(1, 5))
+    sizes = st.integers(0, 40).map(lambda bits: 2**bits)
+    one = sizes.flatmap(lambda size: st.integers(-size, size))
+    points = st.lists(one, min_size=n_channels, max_size=n_channels)
+    marks = np.array([data.draw(points) for _ in range(n_marks)], np.int64)
+    frames = np.arange(n_marks) * delta
+    lengths: list[int] = []
+    for _ in range(n_marks - 1):
+        left = delta
+        while left:
+            lengths.append(data.draw(st.integers(1, left)))
+            left -= lengths[-1]
+    shape = len(lengths), n_channels
+    ends, mids = (
+        np.array([data.draw(points) for _ in lengths], np.int64).reshape(shape) for _ in range(2)
+    )
+    at_mark = np.flatnonzero(np.cumsum(lengths) % delta == 0)
+    ends[at_mark] = marks[1:]
+    starts = np.concatenate([marks[:1], ends[:-1]])[: len(lengths)]
+    single = np.array(lengths, np.int64) == 1
+    mids[single] = (starts[single] + ends[single]) >> 1
+    packed = streams.build_marks(marks)
+    np.testing.assert_array_equal(streams.parse_marks(packed, n_marks, n_channels, "qbc"), marks)
+    first = streams.parse_first_mark(packed, n_channels, "qbc")
+    np.testing.assert_array_equal(first, marks[:1])
+    curves = streams.Curves(np.array(lengths, np.int64), ends, mids)
+    fine = streams.build_curves(marks, frames, curves)
+    found = streams.parse_curves(fine, marks, frames, "qbc", whole=True)
+    np.testing.assert_array_equal(found.lengths, curves.lengths)
+    np.testing.assert_array_equal(found.ends, ends)
+    np.testing.assert_array_equal(found.mids, mids)
+
+
+def test_memory_limits_of_a_segment_are_kept() -> None:
+    codec = by_name("qbc")
+    for settings, meant in (
+        ({"delta": 16}, 48),
+        ({"delta": 50}, 50),
+        ({"delta": 16, "segment_frames": 500}, 48),
+        ({"delta": 40, "preset": "khan2014"}, 40),
+    ):
+        source = MemorySource(clip_of(np.zeros((500, 3))), 0, codec, 24 * 50)
+        found = codec.encode(source, codec.options(settings))
+        assert {segment.n_frames for segment in found.segments} <= {meant, 500 % meant}
+    with pytest.raises(mcz.OptionError, match="delta 51 is more than the 50 frames that a segment"):
+        codec.encode(source, codec.options({"delta": 51})).segments.__next__()
+    short = MemorySource(clip_of(np.zeros((50, 3))), 0, codec, 24 * 50)
+    found = codec.encode(short, codec.options({"delta": 51}))
+    assert [segment.n_frames for segment in found.segments] == [50]
+
+
+def wide(n_frames: int, n_joints: int) -> Motion:
+    joints = tuple(Joint(f"p{i}", channels=tuple(map(Channel, POSITION))) for i in range(n_joints))
+    steps = np.random.default_rng(0).normal(0, 1, (n_frames, 3 * n_joints))
+    return Motion(Skeleton(joints, unit_cm=1.0), (Signal(np.cumsum(steps, axis=0)),), name="wide")
+
+
+def test_500_channels() -> None:
+    motion = wide(64, 167)
+    clip = coded(motion, d2_lmt=0.5)
+    whole = clip.read()
+    assert whole.shape == (64, 501)
+    part = clip.read(10, 20, (166, 0))
+    assert part.tobytes() == whole[10:20][:, [498, 499, 500, 0, 1, 2]].tobytes()
+
+
+@pytest.mark.long
+def test_10000_channels() -> None:
+    """Long and wide: segments stay below the limits."""
+    motion = wide(900, 3334)
+    with mcz.open(saved(motion, d2_lmt=4), max_decoded=2**40) as file:
+        clip = file.only_clip()
+        assert len(clip.signals[0].rows) > 1
+        np.testing.assert_allclose(clip.read((100, 110)), motion.values[100:110], atol=2)
+
+
+def test_rotations_come_back_unwrapped() -> None:
+    values = (np.arange(300.0)[:, None] * 7 + 180) % 360 - 180
+    found = decoded(clip_of(values), d2_lmt=0.01)
+    np.testing.assert_allclose(found[:, 0], np.arange(300.0) * 7, atol=0.2)
+
+
+def test_what_a_lossy_signal_cannot_be() -> None:
+    motion = clip_of(np.zeros((10, 2)))
+    with pytest.raises(mcz.MotionError, match="one sample a frame"):
+        saved(replace(motion, signals=(Signal(np.zeros((10, 2)), samples_per_frame=2),)))
+    with pytest.raises(mcz.MotionError, match="integers"):
+        saved(replace(motion, signals=(Signal(np.zeros((10, 2), np.int64)),)))
+
+
+# Parameters
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("d2_lmt", v) for v in (-1, -1e-9, 2.0**40 + 1, "much", math.nan, math.inf)),
+        *(("delta", v) for v in (0, -1, 2**20 + 1, "all", 2.5, math.nan)),
+        *(("Q", v) for v in (-1, 16, "two", 1.5, math.nan)),
+        *(("middle", v) for v in ("", "least squares", 1)),
+        *(("breaks", v) for v in ("", "Split", "most", 2, None)),
+        *(("preset", v) for v in ("", "khan", "khan2016", None)),
+        *(("segment_frames", v) for v in (0, -5, 2**40 + 1, "all", math.inf)),
+    ],
+)
+def test_bad_parameters_are_refused_by_name(name: str, value: object) -> None:
+    with pytest.raises(mcz.OptionError, match=f"^{name} |'{name}'"):
+        saved(smooth(20), **{name: value})
+
+
+def test_unknown_parameters_are_refused() -> None:
+    with pytest.raises(mcz.OptionError, match="qbc has no parameter 'limit'; it has preset"):
+        saved(smooth(20), limit=4)
+
+
+@pytest.mark.parametrize("limit", [0, 0.0, 5e-324, 1e-60])
+def test_a_step_is_needed(limit: float) -> None:
+    with pytest.raises(mcz.OptionError, match="d2_lmt .*step"):
+        saved(smooth(20), d2_lmt=limit)
+    assert saved(smooth(20), d2_lmt=limit, Q=1)
+
+
+def test_fewest_breaks_need_marks_near_each_other() -> None:
+    with pytest.raises(mcz.OptionError, match="breaks fewest need a delta of at most 512"):
+        saved(smooth(20), breaks="fewest", delta=513)
+
+
+def test_values_of_text_are_parsed() -> None:
+    given = {"d2_lmt": "0.5", "Q": "2", "delta": "8", "segment_frames": "16"}
+    plain = {"d2_lmt": 0.5, "Q": 2, "delta": 8, "segment_frames": 16}
+    assert saved(smooth(60), **given) == saved(smooth(60), **plain)
+
+
+def test_presets() -> None:
+    clip = coded(smooth(400), preset="khan2014")
+    fields = parse(qbc.QBC_HEADER, clip.header, "header")
+    assert (fields.delta, fields.decimals, fields.coded_frames) == (80, 2, 400)
+    assert len(clip.segments) == 1
+    same = {"d2_lmt": 4, "delta": 80, "Q": 2, "middle": "published"}
+    assert coded(smooth(400), preset="khan2014", **same).segments == clip.segments
+    default = parse(qbc.QBC_HEADER, coded(smooth(400)).header, "header")
+    assert (default.delta, default.decimals, default.step) == (40, SCALED, 0.75)
+
+
+# Hostile bytes
+
+
+SMALL: dict[str, dict[str, object]] = {
+    "default": {"delta": 6, "segment_frames": 12, "d2_lmt": 2.0},
+    "decimals": {"delta": 10, "Q": 1, "d2_lmt": 1.0},
+    "marks": {"delta": 1, "segment_frames": 9},
+}
+
+
+@cache
+def small(which: str) -> Direct:
+    return coded(jointed(20, [2, 0, 1]), **SMALL[which])
+
+
+def outcome(clip: Direct, changes: dict[str, Any]) -> str:
+    try:
+        clip.read(changes=changes)
+        clip.read(resolution=1, changes=changes)
+        clip.read(3, 9, (1,), changes=changes)
+    except mcz.MczError as error:
+        assert str(error)
+        return type(error).__name__
+    return "decoded"
+
+
+@pytest.mark.parametrize("which", SMALL)
+def test_every_prefix_of_a_stream(which: str) -> None:
+    """What is cut may spell other points, of just that many bytes; what ends in 0 never does."""
+    clip = small(which)
+    for place in clip.places():
+        data = clip.stream(*place)
+        for size in range(len(data)):
+            outcome(clip, clip.with_stream(place, data[:size]))
+        outcome(clip, clip.with_stream(place, data + b"\xff"))
+        for more in (b"\0", bytes(99)) if data else ():
+            assert outcome(clip, clip.with_stream(place, data + more)) == "FormatError"
+
+
+@pytest.mark.parametrize("which", SMALL)
+def test_every_bit_of_a_stream(which: str) -> None:
+    clip = small(which)
+    for place in clip.places():
+        data = clip.stream(*place)
+        for byte, bit in flips(len(data), 10**9, seed=0):
+            outcome(clip, clip.with_stream(place, flipped(data, byte, bit)))
+
+
+@pytest.mark.parametrize("which", SMALL)
+def test_every_prefix_and_bit_of_a_header(which: str) -> None:
+    clip = small(which)
+    for size in range(len(clip.header)):
+        found = outcome(clip, {"header": clip.header[:size]})
+        assert found in ("FormatError", "TruncatedError")
+    assert outcome(clip, {"header": clip.header + b"\0"}) == "FormatError"
+    for byte, bit in flips(len(clip.header), 10**9, seed=0):
+        outcome(clip, {"header": flipped(clip.header, byte, bit)})
+
+
+@given(st.data())
+def test_streams_of_any_bytes(data) -> None:
+    clip = small(data.draw(st.sampled_from(sorted(SMALL))))
+    place = data.draw(st.sampled_from(clip.places()))
+    outcome(clip, clip.with_stream(place, data.draw(st.binary(max_size=40))))
+
+
+def test_random_streams_of_many_points() -> None:
+    """The greatest integers that bits can spell."""
+    clip = coded(jointed(2000, [3]), segment_frames=2000, delta=500)
+    random = np.random.default_rng(5)
+    for scale in range(64):
+        data = bytes([scale, 63 - scale]) + random.integers(0, 256, 200, "u1").tobytes()
+        for resolution in range(2):
+            outcome(clip, clip.with_stream((0, resolution, 0), data))
+
+
+@pytest.mark.parametrize("which", SMALL)
+def test_layouts_that_do_not_fit(which: str) -> None:
+    clip = small(which)
+    for layout in (
+        replace(clip.layout, samples_per_frame=2),
+        replace(clip.layout, n_resolutions=3),
+    ):
+        assert outcome(clip, {"layout": layout}) == "FormatError"
+    span = clip.spans[0]
+    for wrong in (
+        replace(span, tail=1),
+        replace(span, lead=1),
+        replace(span, fresh=False),
+        replace(span, n_frames=span.n_frames + 20),
+    ):
+        assert outcome(clip, {"spans": [wrong]}) == "FormatError"
+
+
+def test_flipped_files_with_repaired_checksums() -> None:
+    data = saved(jointed(20, [2, 0, 1]), **SMALL["default"])
+    parts = parts_of(data)
+    for index, (_, payload) in enumerate(parts):
+        for byte, bit in flips(len(payload), 60, seed=index):
+            try:
+                use(joined(replaced(parts, index, flipped(payload, byte, bit))))
+            except mcz.MczError as error:
+                assert str(error)
+
+
+# Published figures
+
+
+def mse_of(motion: Motion, found: Array) -> float:
+    return float(((found - unwrap(motion.values, motion.skeleton)) ** 2).mean())
+
+
+@pytest.mark.real
+@pytest.mark.parametrize(
+    ("name", "limit", "published", "least_squares", "size", "ratio"),
+    [("10_03", 5, 0.2552, 0.2497, 288_143, 26.60), ("05_01", 24, 1.0875, 1.029, 479_866, 67.07)],
+)
+def test_figures_of_the_papers(
+    data: Path,
+    name: str,
+    limit: float,
+    published: float,
+    least_squares: float,
+    size: int,
+    ratio: float,
+) -> None:
+    """MSE of the published implementation, and 2.3 times the papers' compression ratio."""
+    motion = lossy.amc(data, name)
+    settings: dict[str, object] = {"preset": "khan2014", "d2_lmt": limit}
+    file = saved(motion, **settings)
+    with mcz.open(file) as opened:
+        assert mse_of(motion, opened.only_clip().read()) == pytest.approx(published, abs=5e-4)
+    assert size / bytes_of(file) >= 2.3 * ratio
+    found = decoded(motion, **settings, middle="least-squares")
+    assert mse_of(motion, found) == pytest.approx(least_squares, abs=5e-4)
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", ["10_03", "05_01"])
+@pytest.mark.parametrize("breaks", ["split", "fewest"])
+def test_the_bound_holds_for_real_clips(data: Path, name: str, breaks: str) -> None:
+    motion = lossy.amc(data, name)
+    for limit in (0.05, 1.0, 24.0):
+        check_bound(motion, limit, coded(motion, d2_lmt=limit, breaks=breaks), closed=True)
+
+
+def test_chain_of_single_channels() -> None:
+    """A joint of one channel is a curve in one dimension."""
+    motion = Motion(bones(["rx"] * 3), (Signal(wandering(60, ["rx"] * 3).values),), name="chain")
+    clip = coded(motion, d2_lmt=1.0)
+    assert clip.layout.groups == ((0,), (1,), (2,))
+    check_bound(motion, 1.0, clip, closed=True)

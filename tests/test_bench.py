@@ -1,0 +1,364 @@
+"""mcz bench: Bjontegaard deltas, ladders, the cache, the papers' tables, the report."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import PchipInterpolator
+
+import mcz
+from mcz import bjontegaard
+from mcz.bench import cache, khan2014, khan2016, ladder, peers, plots, tasks
+from mcz.bench.cases import Case, Variant, find_cases, load, preset_of, variants_of
+from mcz.bench.measure import cpu_seconds, peak_bytes, point, speeds
+from mcz.bench.run import bench
+from mcz.bench.tables import Table
+from mcz.bench.tasks import Runner, Task, perform
+from mcz.bjontegaard import bd_rate, bd_sqnr
+from mcz.cli.common import run as run_command
+from mcz.codecs import CODECS
+from mcz.codecs.base import Dial
+from mcz.errors import OptionError
+from mcz.motion import Motion
+from tests.motions import smooth
+
+SIZES = (1000.0, 2000.0, 4000.0, 8000.0, 16000.0)
+
+
+def line(factor: float = 1.0, lift: float = 0.0) -> list[tuple[float, float]]:
+    """A curve that gains 6 dB with each doubling of its size."""
+    return [(factor * size, 30 + lift + 6 * i) for i, size in enumerate(SIZES)]
+
+
+# Bjontegaard deltas
+
+
+def test_a_curve_of_half_the_bytes_is_50_percent_and_6_db_better() -> None:
+    assert bd_rate(line(), line(0.5)) == pytest.approx(-50)
+    assert bd_rate(line(0.5), line()) == pytest.approx(100)
+    assert bd_sqnr(line(), line(0.5)) == pytest.approx(6)
+    assert bd_sqnr(line(), line(lift=-2.5)) == pytest.approx(-2.5)
+    assert bd_rate(line(), line()) == pytest.approx(0)
+
+
+def test_curves_need_points_and_something_in_common() -> None:
+    assert bd_rate(line()[:3], line()) is None
+    assert bd_sqnr(line(), line(1000.0)) is None
+    assert bd_rate(line(), line(lift=100)) is None
+    assert bd_rate(line(), line(lift=24)) is None  # a single quality
+
+
+def test_points_that_a_smaller_one_matches_do_not_count() -> None:
+    bent = [*line(), (5000.0, 30.0), (2000.0, 10.0)]
+    assert bd_rate(line(), bent) == pytest.approx(0)
+
+
+@given(st.lists(st.floats(0.01, 10), min_size=4, max_size=12), st.integers(0, 2**32 - 1))
+def test_the_interpolation_is_that_of_scipy(steps: list[float], seed: int) -> None:
+    x = np.cumsum(steps)
+    y = np.cumsum(np.random.default_rng(seed).uniform(0.01, 10, len(x)))
+    low, high = x[0] + 0.1 * (x[-1] - x[0]), x[-1] - 0.2 * (x[-1] - x[0])
+    wanted = PchipInterpolator(x, y).integrate(low, high)
+    assert bjontegaard._integral(x, y, low, high) == pytest.approx(float(wanted), rel=1e-9)
+
+
+def test_sqnr_is_that_of_the_definition() -> None:
+    motion = smooth(20)
+    other = motion.with_values(motion.values + 0.5)
+    a, b = mcz.positions(motion), mcz.positions(other)
+    wanted = 10 * math.log10(np.sum(a**2) / np.sum((a - b) ** 2))
+    assert mcz.compare(motion, other).sqnr_db == pytest.approx(wanted, rel=1e-9)
+    assert mcz.compare(motion, motion).sqnr_db is None
+
+
+# Ladders
+
+
+@pytest.mark.parametrize("rises", [False, True])
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_ladder_has_evenly_spaced_sizes(rises: bool, whole: bool) -> None:
+    dial = Dial("q", 1.0 if whole else 2.0**-20, 2.0**20, rises=rises, whole=whole)
+
+    def size(setting: float) -> float:
+        return 50.0 * setting**0.5 if rises else 50_000.0 / setting**0.5
+
+    found = ladder.ladder(size, ladder.Settings(dial), (10_000.0, 1_000.0), 8)
+    sizes = [size(setting) for setting in found]
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[0] == pytest.approx(10_000, rel=0.2)
+    assert sizes[-1] == pytest.approx(1_000, rel=0.2)
+    ratios = [a / b for a, b in zip(sizes, sizes[1:], strict=False)]
+    assert max(ratios) < 1.7
+    assert not whole or all(setting == int(setting) for setting in found)
+
+
+def test_a_ladder_ends_where_the_dial_or_the_codec_does() -> None:
+    settings = ladder.Settings(Dial("q", 2.0**-20, 2.0**20))
+
+    def size(setting: float) -> float:
+        if setting > 100:
+            raise OptionError("too coarse")
+        return 5_000.0 / max(setting, 0.5)
+
+    found = ladder.ladder(size, settings, (1e6, 1.0), 6)
+    assert size(found[0]) == 10_000
+    assert 50 <= size(found[-1]) <= 100
+    assert ladder.ladder(lambda setting: 7.0, settings, (100.0, 10.0), 6) != []
+
+
+def test_a_dial_that_does_little_at_first_is_followed() -> None:
+    settings = ladder.Settings(Dial("a", 0.25, 2.0**20, rises=True))
+
+    def size(setting: float) -> float:
+        return 300.0 + 6 * math.sin(setting) if setting < 20 else 15.0 * setting
+
+    found = ladder.ladder(size, settings, (20_000.0, 800.0), 8)
+    assert len(found) == 8
+    assert 15_000 < size(found[0]) < 25_000
+
+
+# On generated clips
+
+
+@pytest.fixture(scope="module")
+def case(samples: Path) -> Case:
+    return Case(str(samples / "walk.amc"))
+
+
+def test_variants(monkeypatch: pytest.MonkeyPatch) -> None:
+    labels = [variant.label for variant in variants_of([])]
+    assert {"raw", "lossless", "mrdwt", "mrdwt khan2016"} <= set(labels)
+    (narrow,) = variants_of(["mrdwt:khan2016:N=3"])
+    assert narrow == Variant("mrdwt", (("preset", "khan2016"), ("N", 3)))
+    assert narrow.label == "mrdwt khan2016 N=3"
+    assert [v.label for v in variants_of(["raw", "raw"])] == ["raw"]
+    with pytest.raises(OptionError, match="no codec is called"):
+        variants_of(["nonsense"])
+    with pytest.raises(OptionError, match="has no parameter"):
+        variants_of(["raw:x=1"])
+
+
+def test_cases_of_folders(samples: Path, tmp_path: Path) -> None:
+    assert [Path(c.path).suffix for c in find_cases([str(samples)], None)] == [
+        *(".amc", ".bvh", ".c3d")
+    ]
+    (found,) = find_cases([str(samples)], "cm", ["walk", "run"])
+    assert found == Case(str(samples / "walk.amc"), "cm")
+    with pytest.raises(OptionError, match="no clip"):
+        find_cases([str(tmp_path)], None)
+
+
+def test_a_point_is_what_the_quality_record_says(case: Case, tmp_path: Path) -> None:
+    found = point(case, Variant("mrdwt"), {"T_g": 0.5})
+    mcz.write(load(case).motion, tmp_path / "a.mcz", codec="mrdwt", T_g=0.5)
+    with mcz.open(tmp_path / "a.mcz") as file:
+        quality = file.only_clip().quality
+    assert quality is not None
+    for key in ("mse", "sqnr_db", "mean_position_error_cm", "virtual_marker_max_cm"):
+        assert float(quality[key]) == pytest.approx(found[key], rel=1e-9)
+    assert found["cr_source"] == pytest.approx(len(load(case).data) / found["coded_bytes"])
+
+
+@pytest.mark.parametrize(("key", "wanted"), [("cr_source", 50.0), ("mean_position_error_cm", 0.3)])
+def test_a_figure_is_met_between_two_points(case: Case, key: str, wanted: float) -> None:
+    found = ladder.at_figure(case, Variant("mrdwt"), key, wanted, 4.0)
+    assert found[key] == pytest.approx(wanted)
+    around = [point(case, Variant("mrdwt"), {"T_g": T_g})[key] for T_g in found["bracket"]]
+    assert min(around) <= wanted <= max(around)
+
+
+def test_a_figure_out_of_reach_is_told(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    def of(case: Case, variant: Variant, params: dict[str, float], *, markers: bool) -> Any:
+        return {"mse": min(50.0, 1 + params["T_g"])}
+
+    monkeypatch.setattr(ladder, "point", of)
+    with pytest.raises(OptionError, match="mse 60 is not reached, 1 to 50 is"):
+        ladder.at_figure(case, Variant("mrdwt"), "mse", 60.0)
+
+
+def test_speeds_and_memory_are_of_the_codec(case: Case) -> None:
+    found = speeds(case, Variant("raw"), {})
+    for name in ("encode", "decode", "write", "read"):
+        wanted = found[f"{name}_fps"] / found["parse_fps"]
+        assert found[f"{name}_to_parse"] == pytest.approx(wanted)
+    assert found["decode_peak_bytes"] >= load(case).motion.values.nbytes // 2
+    assert peak_bytes(lambda: np.zeros(2**20, "u1")) >= 2**20
+    assert cpu_seconds(lambda: None) > 0
+
+
+def test_a_second_run_comes_from_the_cache(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = cache.Cache(tmp_path / "cache")
+    task = Task("point", case, preset_of("mrdwt", "khan2016"), (("T_g", 3.0),))
+    first = Runner(1, kept).run([task, task])
+    monkeypatch.setattr(tasks, "perform", lambda task: pytest.fail("measured again"))
+    again = Runner(1, kept)
+    assert again.run([task]) == first
+    assert (again.n_cached, again.n_run) == (1, 0)
+    for path in (tmp_path / "cache").rglob("*.json"):
+        path.write_text("{")
+    assert kept.get(tasks.key_of(task)) is None  # damaged is the same as not there
+
+
+def test_keys_tell_apart_what_matters(case: Case, samples: Path) -> None:
+    base = Task("point", case, Variant("mrdwt"), (("T_g", 3.0),))
+    others = [
+        Task("speeds", case, Variant("mrdwt"), (("T_g", 3.0),)),
+        Task("point", case, Variant("mrdwt"), (("T_g", 3.5),)),
+        Task("point", case, preset_of("mrdwt", "khan2016"), (("T_g", 3.0),)),
+        Task("point", Case(case.path, "cm"), Variant("mrdwt"), (("T_g", 3.0),)),
+        Task("point", Case(str(samples / "walk.bvh")), Variant("mrdwt"), (("T_g", 3.0),)),
+    ]
+    assert len({tasks.key_of(task) for task in (base, *others)}) == 1 + len(others)
+
+
+def test_a_cache_that_cannot_be_written_is_none(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    kept = cache.Cache(tmp_path / "file")
+    kept.put("a", 1)
+    assert kept.get("a") is None
+    assert cache.Cache(None).get("a") is None
+
+
+def test_what_a_codec_refuses_is_told(case: Case) -> None:
+    found = perform(Task("point", case, Variant("mrdwt"), (("T_g", -1.0),)))
+    assert "T_g" in found["error"]
+
+
+def test_peers_say_what_they_code(case: Case) -> None:
+    records = peers.measure(load(case))
+    assert {"gzip -9", "xz -9e"} <= {r["peer"] for r in records}
+    assert {r["coded"].split(",")[0] for r in records} == {peers.TEXT, peers.MATRIX}
+    assert all(r["coded_bytes"] > 0 for r in records)
+
+
+def test_whole_run_with_report(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    from mcz.cli.bench import command
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(cache, "default_folder", lambda: tmp_path / "cache")
+    out = tmp_path / "out"
+    arguments = [case.path, "--codecs", "lossless,mrdwt", "--no-speeds", "--jobs", "1"]
+    assert run_command(command, "bench", [*arguments, "--out", str(out)]) == 0
+    shown = capsys.readouterr().out
+    assert "walk: points" in shown
+    assert "Bjontegaard delta rate" in shown
+    results = json.loads((out / "results.json").read_text())
+    (clip,) = results["clips"]
+    assert [c["label"] for c in clip["codecs"]] == ["lossless", "mrdwt", "mrdwt khan2016"]
+    sizes = [p["coded_bytes"] for p in clip["codecs"][1]["points"]]
+    assert len(sizes) >= 8
+    assert sizes == sorted(sizes, reverse=True)
+    assert len(clip["codecs"][0]["points"]) == 1
+    report = (out / "report.md").read_text()
+    assert "| codec | setting |" in report
+    if plots.can_draw():
+        assert {path.name for path in out.glob("*.png")} == {"walk.png", "walk_mrdwt.png"}
+        assert "![walk.png](walk.png)" in report
+    # Without matplotlib: everything else, and a plain word about it.
+    monkeypatch.setattr(plots, "can_draw", lambda: False)
+    assert run_command(command, "bench", [*arguments, "--out", str(tmp_path / "bare")]) == 0
+    assert "matplotlib is not installed" in capsys.readouterr().err
+    assert not list((tmp_path / "bare").glob("*.png"))
+    assert run_command(command, "bench", [*arguments, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["clips"] == results["clips"]
+
+
+def test_errors_are_one_line(samples: Path, tmp_path: Path, capsys: Any) -> None:
+    from mcz.cli.bench import command
+
+    walk = str(samples / "walk.amc")
+    assert run_command(command, "bench", [str(tmp_path / "no.amc")]) == 1
+    assert run_command(command, "bench", [walk, "--codecs", "nonsense"]) == 2
+    assert run_command(command, "bench", [walk, "--tables", "khan2014", "--no-cache"]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 3
+    assert "none of its clips is here" in lines[2]
+
+
+def test_tables_escape_and_leave_out() -> None:
+    table = Table("t", "c", (("a|b", ""), ("n", ".1f")), [("x", None), ("y", 2.0)])
+    assert list(table.markdown())[4:8] == [
+        *("| a\\|b | n |", "| --- | ---: |", "| x | - |", "| y | 2.0 |")
+    ]
+    assert table.document()["rows"] == [["x", None], ["y", 2.0]]
+
+
+def test_the_papers_codecs_that_are_missing_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(khan2014, "CODECS", {2: CODECS[2]})
+    assert khan2014.here() == []
+    assert khan2014.missing() == ["qbc", "dwt", "awt", "pca"]
+    assert list(khan2014.tables({}, {})) == []
+
+
+# The papers' figures
+
+
+@pytest.mark.real
+def test_khan_2016_row(data: Path) -> None:
+    outcome = _tables(data, khan2016, "17_10", [12])
+    (row,) = [row for row in outcome.rows if row[0] == 12]
+    T_g, paper_cr, cr, times, paper_eps, eps = row[:6]
+    assert (paper_cr, paper_eps) == (64.5, 0.2041)
+    assert eps == pytest.approx(paper_eps, abs=0.0001)
+    assert isinstance(cr, float)
+    assert cr > 2 * 64.5
+    assert times == pytest.approx(cr / 64.5)
+    assert T_g == 12
+
+
+def _tables(data: Path, module: Any, clip: str, thresholds: list[int]) -> Table:
+    """Fig. 7 of a clip at some thresholds alone."""
+    (case,) = find_cases([str(data)], None, [clip])
+    wanted = [module._threshold(case, T_g) for T_g in thresholds]
+    known = Runner(1, cache.Cache(None)).run(wanted)
+    every = {task: {} for task in module.tasks({clip: case})} | known
+    found = [t for t in module.tables({clip: case}, every) if "Fig. 7" in t.title]
+    return found[0]
+
+
+@pytest.mark.real
+def test_khan_2014_figures(data: Path) -> None:
+    (case,) = find_cases([str(data)], None, ["10_03"])
+    for codec, mse, within in (("qbc", 0.2552, 0.0005), ("dwt", 0.265, 0.002)):
+        if codec in khan2014.here():
+            row = khan2014._Row("10_03", case, codec)
+            assert perform(row.preset)["mse"] == pytest.approx(mse, abs=within)
+
+
+def test_a_clip_without_unit_has_length_units(samples: Path, tmp_path: Path) -> None:
+    outcome = bench(
+        [str(samples / "walk.bvh")],
+        Runner(1, cache.Cache(None)),
+        codecs=["mrdwt:khan2016"],
+        speeds=False,
+    )
+    (clip,) = outcome.clips
+    assert (clip.unit_cm, clip.unit, clip.error_key) == (
+        None,
+        "length units",
+        "mean_position_error",
+    )
+    assert any("length units" in table.caption for table in outcome.tables)
+    if plots.can_draw():
+        assert [path.name for path in plots.draw(outcome.clips, tmp_path)] == [
+            *("walk.png", "walk_mrdwt.png")
+        ]
+
+
+def test_a_clip_of_markers(samples: Path) -> None:
+    case = Case(str(samples / "walk.c3d"))
+    motion: Motion = load(case).motion
+    (found,) = [perform(Task("point", case, Variant("mrdwt"), (("T_g", 1.0),)))]
+    assert found["cr_float32"] > 1
+    assert (found["cr_source"] is None) == (len(motion.signals) > 1)
