@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from mcz.archive import Outcome, Report, append, pack, unpack
     from mcz.clip import Clip
     from mcz.conversion import convert
+    from mcz.editing import Replacement, replace
     from mcz.errors import (
         AccessError,
         ChecksumError,
@@ -40,6 +41,7 @@ _HOMES = {
     "mcz.archive": ("Outcome", "Report", "append", "pack", "unpack"),
     "mcz.clip": ("Clip",),
     "mcz.conversion": ("convert",),
+    "mcz.editing": ("Replacement", "replace"),
     "mcz.errors": (
         "AccessError",
         "ChecksumError",
@@ -84,6 +86,7 @@ __all__ = [
     "OptionError",
     "Outcome",
     "Problem",
+    "Replacement",
     "Report",
     "Signal",
     "Skeleton",
@@ -101,6 +104,7 @@ __all__ = [
     "positions",
     "read",
     "read_skeleton",
+    "replace",
     "unpack",
     "verify",
     "write",

@@ -70,7 +70,7 @@ def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
     except (OSError, ValueError) as error:
         raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     with stream:
-        _lock(stream, path)
+        lock(stream, path)
         container, tail = _whole_part(stream, path, salvage, force)
         end = container.directory.end  # the writer moves it
         added = io.BytesIO()
@@ -79,7 +79,7 @@ def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
         _write(stream, end, added.getbuffer())
 
 
-def _lock(stream: BinaryIO, path: Path) -> None:
+def lock(stream: BinaryIO, path: Path) -> None:
     """Take the file for this process until ``stream`` closes; not every file system can."""
     try:
         if sys.platform == "win32":

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +34,15 @@ from mcz.signal_info import SignalInfo, read_signal
 from mcz.signals import SignalReader
 from mcz.views import ClipValues
 
+if TYPE_CHECKING:
+    from mcz.editing import Replacement
+
 
 class Clip:
     """One clip; nothing is decoded before it is asked for."""
 
     def __init__(self, container: Container, row: ClipRow) -> None:
-        self._container = container
+        self.container = container
         self._row = row
         self.name = row.name
         self.n_frames = row.n_frames
@@ -49,11 +52,11 @@ class Clip:
 
     @cached_property
     def _fields(self) -> Any:
-        return self._container.clip(self._row)
+        return self.container.clip(self._row)
 
     @cached_property
     def _cend(self) -> Any:
-        fields = self._container.cend(self._row)
+        fields = self.container.cend(self._row)
         if fields is not None and len(fields.source_sha256) != len(self._fields.source):
             raise FormatError(f"clip {self.name!r}: a source without a hash, or a hash without it")
         return fields
@@ -61,8 +64,8 @@ class Clip:
     @cached_property
     def skeleton(self) -> Skeleton:
         """The skeleton of the clip, its own source file not read."""
-        fields = self._container.shared(b"SKEL", self._row.skeleton, payloads.SKEL)
-        return parse_skeleton(fields, self._container.profile, f"SKEL {self._row.skeleton.hex()}")
+        fields = self.container.shared(b"SKEL", self._row.skeleton, payloads.SKEL)
+        return parse_skeleton(fields, self.container.profile, f"SKEL {self._row.skeleton.hex()}")
 
     @property
     def skeleton_id(self) -> bytes:
@@ -89,7 +92,7 @@ class Clip:
     def frame_numbers(self) -> NDArray[np.int64]:
         """The number of every frame; 1, 2, 3, ... unless the metadata say otherwise."""
         where = f"clip {self.name!r}: frame numbers"
-        check_decoded(where, 8 * self.n_frames, self._container.max_decoded)
+        check_decoded(where, 8 * self.n_frames, self.container.max_decoded)
         return parse_frame_numbers(
             self.metadata.get("frame-numbers", "1"), self.n_frames, self.name
         )
@@ -107,7 +110,7 @@ class Clip:
             raise FormatError(f"clip {self.name!r} has no signal")
         skeleton, rate = self.skeleton, self.frame_rate
         return tuple(
-            read_signal(self._container, self._row, fields, index, skeleton, rate)
+            read_signal(self.container, self._row, fields, index, skeleton, rate)
             for index in range(len(fields.signals))
         )
 
@@ -144,7 +147,7 @@ class Clip:
         """The quality record, None where the clip has none."""
         for chunk in self._row.ancillary:
             if chunk.type == b"QUAL":
-                fields = parse(payloads.QUAL, self._container.payload(chunk), chunk.label)
+                fields = parse(payloads.QUAL, self.container.payload(chunk), chunk.label)
                 return {entry.key: entry.value for entry in fields.entries}
         return None
 
@@ -190,16 +193,15 @@ class Clip:
         info = self._info(signal)
         start, stop = self._range(frames)
         self._check_resolution(info, resolution)
-        columns = self._columns(info, joints)
-        groups, places = _groups_of(info.layout, columns)
-        reader = SignalReader(self._container, info, groups, resolution, self.name)
+        groups, places = self.places(info, joints)
+        reader = SignalReader(self.container, info, groups, resolution, self.name)
         values, mask = reader.read(start + info.skip, stop + info.skip)
         if joints is not None:
             values = values[:, places]
             mask = mask[:, places] if mask is not None else None
         whole = (start, stop) == (0, self.n_frames) and joints is None and resolution == 0
-        if whole and not self._container.salvage:
-            self._check_hash(info, values, mask)
+        if whole and not self.container.salvage:
+            self.check_hash(info, values, mask)
         return values, mask
 
     def _info(self, signal: int) -> SignalInfo:
@@ -222,6 +224,12 @@ class Clip:
             )
         return start, stop
 
+    def places(
+        self, info: SignalInfo, joints: Sequence[int | str] | None
+    ) -> tuple[tuple[int, ...], list[int]]:
+        """The groups that hold the channels of these joints, and where each is among theirs."""
+        return _groups_of(info.layout, self._columns(info, joints))
+
     def _columns(self, info: SignalInfo, joints: Sequence[int | str] | None) -> list[int]:
         if joints is None:
             return list(range(info.layout.n_channels))
@@ -229,9 +237,10 @@ class Clip:
             raise OptionError(f"signal {info.name!r} has channels of its own, no joints")
         return [c for j in joints for c in self.skeleton.columns(self.skeleton.find(j))]
 
-    def _check_hash(
+    def check_hash(
         self, info: SignalInfo, values: NDArray[Any], mask: NDArray[np.bool_] | None
     ) -> None:
+        """Raise ChecksumError where these are not the values and the mask of a whole signal."""
         hashes = self._cend.value_sha256
         if len(hashes) != len(self.signals):
             raise FormatError(
@@ -265,9 +274,9 @@ class Clip:
     def _sourced_skeleton(self) -> Skeleton:
         """The skeleton with its own source file, unless salvage finds that damaged."""
         try:
-            return replace(self.skeleton, source=skeleton_source(self._container, self.skeleton_id))
+            return replace(self.skeleton, source=skeleton_source(self.container, self.skeleton_id))
         except FormatError:
-            if not self._container.salvage:
+            if not self.container.salvage:
                 raise
             return self.skeleton
 
@@ -293,11 +302,11 @@ class Clip:
         resolution = info.coarser(resolution)
         values, mask = self.read_masked((start, stop), resolution=resolution, signal=info.index)
         groups = range(len(info.layout.groups))
-        reader = SignalReader(self._container, info, tuple(groups), resolution, self.name)
+        reader = SignalReader(self.container, info, tuple(groups), resolution, self.name)
         start, stop = start + info.skip, stop + info.skip
         exceptions, changes = reader.exceptions(start, stop)
         binary = not info.is_integer and any(not grid.is_text for grid in info.grids)
-        keep = binary and info.codec.domain == "ordinals" and not self._container.salvage
+        keep = binary and info.codec.domain == "ordinals" and not self.container.salvage
         return Signal(
             values=values,
             grids=info.grids,
@@ -317,10 +326,41 @@ class Clip:
         skip = self.signals[0].skip
         frames = range(start + skip, stop + skip, step)
         fields = self._fields.source[0]
-        source = read_source(self._container, fields, info, self.signals[0], frames)
+        source = read_source(self.container, fields, info, self.signals[0], frames)
         if (start, stop, resolution) == (0, self.n_frames, 0):
             return source
         return of_no_file(source)
+
+    def preview(
+        self, joints: Sequence[int | str] | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[Any]]:
+        """What can be read without decoding the rest: frames, counted from 0, and their values.
+
+        The values, of shape (frames, channels of the joints), are those that ``read`` gives for
+        these frames where the codec has some that it stores apart (qbc: its marks); otherwise
+        they are its coarsest resolution. Raises OptionError where there is no such thing.
+        """
+        from mcz.preview import preview
+
+        found = preview(self, joints)
+        return found.frames, found.masked()
+
+    def replace(
+        self,
+        joint: int | str,
+        values: NDArray[Any],
+        target: Any,
+        *,
+        on_grid: bool = False,
+        force: bool = False,
+    ) -> Replacement:
+        """Write the file anew to ``target``, with other values of one joint; see ``mcz.replace``.
+
+        This clip and its open file stay what they are.
+        """
+        from mcz.editing import replace_in
+
+        return replace_in(self.container, self, joint, values, target, on_grid, force)
 
     def source_bytes(
         self,
@@ -337,10 +377,10 @@ class Clip:
         info = self.source
         if info is None:
             raise OptionError(f"clip {self.name!r} has no source file; choose a format with --to")
-        check_decoded(f"clip {self.name!r}: source", info.size, self._container.max_decoded)
+        check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
         data: bytes = FORMATS[info.format].write(self._motion(frames, resolution, decimate))
         lossless = all(signal.codec.lossless for signal in self.signals)
-        if frames is None and not resolution and lossless and not self._container.salvage:
+        if frames is None and not resolution and lossless and not self.container.salvage:
             self._check_source(data, info)
         return data
 

@@ -15,7 +15,7 @@ from mcz.container import payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
-from mcz.errors import OptionError
+from mcz.errors import MotionError, OptionError
 from mcz.frames import KEY, frame_number_metadata
 from mcz.motion import Skeleton
 from mcz.schema import build, parse
@@ -115,7 +115,10 @@ def _kept_joints(clip: Clip, joints: Sequence[int | str]) -> frozenset[int] | No
     skeleton = clip.skeleton
     if clip.signals[0].channels is not None:
         raise OptionError(f"clip {clip.name!r}: its motion has channels of its own, no joints")
-    kept = frozenset(skeleton.find(joint) for joint in joints)
+    try:
+        kept = frozenset(skeleton.find(joint) for joint in joints)
+    except MotionError as error:
+        raise MotionError(f"clip {clip.name!r}: {error}") from None
     others = (joint for index, joint in enumerate(skeleton.joints) if index not in kept)
     return kept if any(joint.channels for joint in others) else None
 

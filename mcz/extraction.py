@@ -10,7 +10,7 @@ import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, BinaryIO
 
 from mcz.container import payloads
 from mcz.container.chunks import (
@@ -80,6 +80,7 @@ def extract(
     frames: tuple[int, int | None] | None = None,
     clip: str | None = None,
     force: bool = False,
+    max_decoded: int | None = None,
     progress: Progress | None = None,
 ) -> Extraction:
     """Write what is left of the MCZ file ``source`` when all else is cut, without re-encoding.
@@ -87,30 +88,31 @@ def extract(
     ``resolution``: the number of finest resolutions to leave out. ``joints``: those whose channels
     are kept; all joints stay in the skeleton. ``frames``: a <= f < b, b None for the end.
     ``clip``: take out this clip alone; otherwise all clips are cut alike, and attachments kept.
+    ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
     Raises OptionError or MotionError for what cannot be cut so, FormatError for bad bytes; nothing
     is left under the target's name then.
     """
     if not resolution and joints is None and frames is None and clip is None:
         raise OptionError("nothing to extract: give a resolution, joints, frames or a clip")
-    with open(source) as file:
+    with open(source, max_decoded=max_decoded) as file:
         clips = [file.only_clip(clip)] if clip is not None else list(file.clips.values())
         if not clips:
             raise OptionError(f"{file.name} has no clip to extract from")
         cuts = [plan_cut(one, frames, joints, resolution) for one in clips]
         with replacing(target, force=force) as stream:
-            head = parse(payloads.HEAD, file.container.directory.head, "HEAD")
-            writer = Writer(
-                stream, profile=file.container.profile, head_extension=bytes(head.extension)
-            )
-            return _Extractor(file, writer, progress).run(cuts, alone=clip is not None)
+            return Copier(file, stream, progress).run(cuts, alone=clip is not None)
 
 
-class _Extractor:
-    """Copies the parts of a file to ``writer``."""
+class Copier:
+    """Copies what is left of a file to ``stream``."""
 
-    def __init__(self, file: File, writer: Writer, progress: Progress | None) -> None:
-        self.file, self.writer, self.progress = file, writer, progress
+    def __init__(self, file: File, stream: BinaryIO, progress: Progress | None) -> None:
+        self.file, self.progress = file, progress
         self.container: Container = file.container
+        head = parse(payloads.HEAD, self.container.directory.head, "HEAD")
+        self.writer = Writer(
+            stream, profile=self.container.profile, head_extension=bytes(head.extension)
+        )
         self.found = Extraction()
         self.done = self.total = 0  # segments
 
@@ -120,32 +122,32 @@ class _Extractor:
             if kind == b"MODL":  # which one a clip needs, its codec alone knows
                 self.writer.shared(kind, self.container.payload(chunk))
             elif kind == b"SKEL" and not alone:
-                self._skeleton(id_)
+                self.skeleton(id_)
         if not alone:
             for chunk in self._before_clips():
-                self._ancillary(chunk)
+                self.ancillary(chunk)
             for name, row in self.container.directory.attachments.items():
                 parts = [self.container.payload(part) for part in row.parts]
                 self.writer.attachment_parts(name, row.size, parts)
         for cut in cuts:
-            self._clip(cut)
+            self.clip(cut)
         self._aliases({cut.clip.name: cut for cut in cuts}, alone)
         self.writer.finish()
         self.found.size = self.writer.offset
         return self.found
 
-    def _skeleton(self, id_: bytes) -> bytes:
+    def skeleton(self, id_: bytes) -> bytes:
         """Copy a SKEL after its bases and their templates; return its payload."""
         chain = [(id_, self._shared(b"SKEL", id_))]
         while base := parse(payloads.SKEL, chain[-1][1], "SKEL").base:
             chain.append((bytes(base[0]), self._shared(b"SKEL", bytes(base[0]))))
         for _, payload in reversed(chain):
             for source in parse(payloads.SKEL, payload, "SKEL").source:
-                self._template(bytes(source.template))
+                self.template(bytes(source.template))
             self.writer.shared(b"SKEL", payload)
         return chain[0][1]
 
-    def _template(self, id_: bytes) -> None:
+    def template(self, id_: bytes) -> None:
         self.writer.shared(b"SRCE", self._shared(b"SRCE", id_))
 
     def _shared(self, kind: bytes, id_: bytes) -> bytes:
@@ -170,11 +172,16 @@ class _Extractor:
                 yield chunk
             at += chunk.size
 
-    def _clip(self, cut: ClipCut) -> None:
+    def is_same(self, cut: ClipCut) -> bool:
+        """Whether the clip stays what it was."""
+        return cut.is_whole
+
+    def clip(self, cut: ClipCut) -> None:
+        """Write one clip."""
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
         fields = self.container.clip(row)
         skeleton = clip.skeleton_id
-        payload = self._skeleton(skeleton)
+        payload = self.skeleton(skeleton)
         if cut.joints is not None:
             payload = cut_skeleton(payload, skeleton, cut.joints)
             skeleton = self.writer.shared(b"SKEL", payload)
@@ -185,8 +192,7 @@ class _Extractor:
             for part in cut.signals
         ]
         self.writer.begin_clip(new, n_channels)
-        for chunk in _inside(self.container, row):
-            self._ancillary(chunk)
+        self.inside(row)
         self._segments(cut, noted=bool(new["source"]))
         cend = self.container.cend(row)
         self.writer.end_clip(cut.n_frames, source, hashes, bytes(cend.extension))
@@ -203,7 +209,7 @@ class _Extractor:
             pairs = new["metadata"]
             new["metadata"] = [{"key": key, "value": pairs[key]} for key in sorted(pairs)]
         for held in new["source"]:
-            self._template(bytes(held["template"]))
+            self.template(bytes(held["template"]))
         return source, hashes
 
     def _decoded(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
@@ -265,9 +271,14 @@ class _Extractor:
             self.writer.ancillary(b"QUAL", build(payloads.QUAL, fields, "quality record"))
         for chunk in row.ancillary:
             if cut.is_whole or chunk.type != b"QUAL":
-                self._ancillary(read_chunk(self.container.source, chunk.offset))
+                self.ancillary(read_chunk(self.container.source, chunk.offset))
 
-    def _ancillary(self, chunk: Chunk) -> None:
+    def inside(self, row: ClipRow) -> None:
+        """Copy the ancillary chunks between CLIP and CEND."""
+        for chunk in _inside(self.container, row):
+            self.ancillary(chunk)
+
+    def ancillary(self, chunk: Chunk) -> None:
         """Copy an ancillary chunk where that is safe."""
         if chunk.flags & SAFE_TO_COPY:
             self.writer.ancillary(chunk.type, self.container.payload(chunk))
@@ -299,10 +310,8 @@ class _Extractor:
                 cut = cuts.get(target.decode("utf-8", "replace"))
                 if cut is None:
                     continue  # of a clip that was not chosen
-                if not cut.is_whole:
-                    text = (
-                        f"{name}, a file identical to that of clip {cut.clip.name} before the cut"
-                    )
+                if not self.is_same(cut):
+                    text = f"{name}, a file identical to that of clip {cut.clip.name} before"
                     self.found.left_out.append(text)
                     continue
             elif of == payloads.OF_SKELETON:
@@ -328,7 +337,7 @@ def cut_quality(cut: ClipCut, old: dict[str, str]) -> list[dict[str, str]]:
     if cut.names is not None:
         now["cut-joints"] = ",".join(cut.names)
     for key, value in old.items():
-        if key.startswith(("param.", "uncut_")) or key == "codec":
+        if key.startswith(("param.", "uncut_")) or key in ("codec", "edit-joints"):
             now[key] = value
         elif not key.startswith("cut-"):
             now[f"uncut_{key}"] = value

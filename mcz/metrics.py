@@ -47,6 +47,7 @@ class Comparison:
     max_position_error: Number = None
     where: tuple[int, str] | None = None
     mismatched_points: int | None = None
+    sqnr_db: Number = None
     virtual_marker_mean_cm: Number = None
     virtual_marker_max_cm: Number = None
     signals: Mapping[str, Number] = field(default_factory=dict)
@@ -80,6 +81,7 @@ class Comparison:
             "max_position_error_frame": frame,
             "max_position_error_point": point,
             "mismatched_points": self.mismatched_points,
+            "sqnr_db": self.sqnr_db,
             "virtual_marker_mean_cm": self.virtual_marker_mean_cm,
             "virtual_marker_max_cm": self.virtual_marker_max_cm,
             **{f"signal.{name}.mse": value for name, value in self.signals.items()},
@@ -132,6 +134,7 @@ def compare(original: Motion, decoded: Motion, *, virtual_markers: bool = True) 
         max_position_error=points.greatest,
         where=points.place(original.skeleton, a.samples_per_frame),
         mismatched_points=points.mismatched if placed else None,
+        sqnr_db=points.sqnr_db,
         virtual_marker_mean_cm=_times(markers.mean, unit),
         virtual_marker_max_cm=_times(markers.greatest, unit),
         signals=further,
@@ -170,7 +173,7 @@ class _PointErrors:
 
     def __init__(self) -> None:
         self._n = self.mismatched = 0
-        self._distances, self._squares = 0.0, 0.0
+        self._distances, self._squares, self._power = 0.0, 0.0, 0.0
         self._worst, self._where = -1.0, (0, 0)
 
     def add(self, start: int, left: Values, right: Values) -> None:
@@ -187,6 +190,8 @@ class _PointErrors:
         self._n += int(valid.sum())
         self._squares += float(squares.sum())
         self._distances += float(distances.sum())
+        x, y, z = np.moveaxis(left, 2, 0)
+        self._power += float(np.where(valid, x * x + y * y + z * z, 0.0).sum())
         if not valid.any():
             return
         row, point = divmod(int(np.argmax(np.where(valid, distances, -1.0))), valid.shape[1])
@@ -198,6 +203,13 @@ class _PointErrors:
     def rms(self) -> Number:
         mean = _mean(self._squares, 3 * self._n)
         return None if mean is None else math.sqrt(mean)
+
+    @property
+    def sqnr_db(self) -> Number:
+        noise, power = _mean(self._squares, self._n), _mean(self._power, self._n)
+        if not noise or not power:
+            return None
+        return 10 * (math.log10(power) - math.log10(noise))
 
     @property
     def mean(self) -> Number:
@@ -287,6 +299,14 @@ def _same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
         sets = f"{point_set(original.skeleton)}, {point_set(decoded.skeleton)}"
         notes.append(f"{counts[0]} and {counts[1]} points ({sets}): no errors of positions")
         return False
+    pairs = zip(point_names(original.skeleton), point_names(decoded.skeleton), strict=True)
+    apart = [pair for pair in pairs if pair[0] != pair[1]]
+    if apart:
+        first = " and ".join(map(repr, apart[0]))
+        notes.append(
+            f"points are compared in order, and {len(apart)} of {counts[0]} have other names on "
+            f"the other side, first {first}"
+        )
     return True
 
 

@@ -29,7 +29,7 @@ def quality_payload(
     remarks: Mapping[str, str],
 ) -> bytes:
     """The payload of QUAL; ``decoded`` are the values of every signal as a reader has them."""
-    signals = tuple(map(_with_values, original.signals, decoded))
+    signals = tuple(map(with_values, original.signals, decoded))
     entries = quality_entries(original, replace(original, signals=signals), codec_name, options)
     rows = [{"key": key, "value": value} for key, value in (entries | dict(remarks)).items()]
     return build(payloads.QUAL, {"entries": rows, "extension": b""}, "quality record")
@@ -44,10 +44,15 @@ def quality_entries(
     """
     settings = {f"param.{name}": value for name, value in options.items()}
     found = {"codec": codec_name, **settings, **compare(original, decoded).entries()}
-    return {key: _text(value) for key, value in found.items() if value is not None}
+    return texts_of(found)
 
 
-def _with_values(signal: Signal, values: NDArray[Any]) -> Signal:
+def texts_of(entries: Mapping[str, Any]) -> dict[str, str]:
+    """Settings or figures as text, without those that are None."""
+    return {key: _text(value) for key, value in entries.items() if value is not None}
+
+
+def with_values(signal: Signal, values: NDArray[Any]) -> Signal:
     """``signal`` with decoded values, which need not lie on its grids."""
     return replace(
         signal,

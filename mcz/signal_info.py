@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Any
 
 from mcz.codecs import by_id
-from mcz.codecs.base import Codec, Layout
+from mcz.codecs.base import Codec, Layout, Span
 from mcz.container import payloads
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.limits import check
@@ -50,6 +50,12 @@ class SignalInfo:
     @property
     def is_integer(self) -> bool:
         return bool(self.grids) and all(grid.kind == GridKind.INTEGER for grid in self.grids)
+
+    @property
+    def spans(self) -> list[Span]:
+        """What a codec is told of the segments."""
+        headers = [row.header for row in self.rows]
+        return [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h in headers]
 
     def covering(self, start: int, stop: int) -> list[int]:
         """The segments whose own frames meet the stored frames start <= f < stop."""

@@ -15,7 +15,7 @@ from mcz.codecs.base import Request, Span
 from mcz.container import payloads
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
-from mcz.container.segments import FRESH, StreamTable
+from mcz.container.segments import StreamTable
 from mcz.errors import FormatError, UnsupportedError
 from mcz.masks import parse_mask
 from mcz.motion import Exceptions, grid_blocks
@@ -91,30 +91,20 @@ class SignalReader:
             self.info.layout,
             spans,
             Request(start, stop, self.groups, self.resolution),
-            self._fetch,
+            self.fetch,
         )
 
     def _prepare(self, start: int, stop: int) -> list[Span]:
         """The spans of all segments, after the limit was checked and near ones were read."""
         self._check_size(start, stop)
         info = self.info
-        spans = [
-            Span(
-                r.header.first,
-                r.header.n_frames,
-                r.header.lead,
-                r.header.tail,
-                bool(r.header.flags & FRESH),
-            )
-            for r in info.rows
-        ]
         covering = info.covering(start, stop)
         self.container.source.read_ahead(
             (info.rows[i].chunk().offset, info.rows[i].chunk().size)
             for i in covering
             if not info.rows[i].packet
         )
-        return spans
+        return info.spans
 
     def _check_size(self, start: int, stop: int) -> None:
         """Raise LimitError for more than may be decoded; a codec of whole clips decodes all."""
@@ -150,12 +140,13 @@ class SignalReader:
                 break
         return values, mask
 
-    def _fetch(self, segment: int, resolution: int, group: int) -> bytes:
+    def fetch(self, segment: int, resolution: int, group: int) -> bytes:
+        """One stream of the codec."""
         table, streams = self._streams(segment)
         index = table.codec(resolution, group)
         if index not in streams:  # a group that another depends upon
             streams.update(
-                self.container.streams(self.info.rows[segment], table.counts, [index])[1]
+                self.container.streams(self.info.rows[segment], table.counts, [index], table)[1]
             )
         return streams[index]
 
@@ -163,10 +154,11 @@ class SignalReader:
         if segment not in self._cache:
             row, counts = self.info.rows[segment], self.info.counts
             everything = len(self.groups) == counts.n_groups and not self.resolution
-            wanted = None
+            table = wanted = None
             if not everything:
-                wanted = self._wanted(self.container.table(row, counts))
-            self._cache[segment] = self.container.streams(row, counts, wanted)
+                table = self.container.table(row, counts)
+                wanted = self._wanted(table)
+            self._cache[segment] = self.container.streams(row, counts, wanted, table)
             while len(self._cache) > 4:  # neighbors only: memory is bounded by segments
                 self._cache.pop(next(iter(self._cache)))
         return self._cache[segment]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import stat
@@ -14,6 +15,7 @@ from typing import Any, BinaryIO
 from mcz.errors import AccessError, ExistsError, OptionError
 
 SHOWN = 48  # characters of a name in that of its temporary file: 192 bytes of 255 at most
+FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)  # errors that only writing has
 
 
 @contextmanager
@@ -92,9 +94,11 @@ def _temporary(path: Path, force: bool) -> Iterator[BinaryIO]:
         os.chmod(name, 0o666 & ~umask)  # mkstemp made it private
         _give_name(name, path, force)
         _sync_directory(path.parent)
-    except BaseException:
+    except BaseException as error:
         with suppress(OSError):
             os.unlink(name)
+        if isinstance(error, OSError) and error.errno in FULL and error.filename is None:
+            raise AccessError(f"{path}: {error.strerror}") from error
         raise
 
 

@@ -37,7 +37,7 @@ Point = tuple[float, float]  # a setting and its figure
 class Target:
     """What was asked for; the figure of that name must not exceed ``limit``.
 
-    ``falls``: the figure falls as the dial goes up (a size), instead of rising (an error).
+    ``falls``: the figure falls as the files get smaller (a size), instead of rising (an error).
     """
 
     name: str
@@ -71,7 +71,7 @@ def write_tuned(
         why = f"the range of {dial} ends there" if ended else f"no {dial} that was tried is nearer"
         remark = f"{target.name} {target.limit:g}: {reached:g} was reached; {why}"
     remarks = {"target_reached": repr(reached)} | ({"target_remark": remark} if remark else {})
-    found = dict(params) | {codec.dial.parameter: setting}
+    found = dict(params) | {codec.dial.parameter: int(setting) if codec.dial.whole else setting}
     write_clip(writer, motion, codec, found, progress, remarks=remarks)
 
 
@@ -150,10 +150,13 @@ def search(
         return *meets, True
     best = meets
     for _ in range(MOST_TRIALS):
-        if meets[1] >= GOAL * target.limit or _ratio(meets[0], misses[0]) < CLOSE:
+        if meets[1] >= GOAL * target.limit or _neighboring(dial, meets[0], misses[0]):
             break
         setting = _between(meets, misses, target.limit)
-        found = setting, _figure(measure, target, setting)
+        if dial.whole:  # strictly between the two
+            low, high = sorted((meets[0], misses[0]))
+            setting = min(max(round(setting), low + 1), high - 1)
+        found = setting, _figure(dial, measure, target, setting)
         if found[1] <= target.limit:
             meets = found
             best = max(found, best, key=itemgetter(1))
@@ -170,9 +173,12 @@ def _beside(
     """A setting beside ``best`` that keeps the promise, or else the best of all."""
     middle = best[0]
     for power in range(1, NEIGHBORS + 1):
-        for setting in (middle * NEAR**power, middle / NEAR**power):
+        beside = (middle * NEAR**power, middle / NEAR**power)
+        if dial.whole:
+            beside = (middle + power, middle - power)
+        for setting in beside:
             if dial.low <= setting <= dial.high:
-                found = setting, _figure(measure, target, setting)
+                found = setting, _figure(dial, measure, target, setting)
                 if found[1] <= target.limit:
                     best = max(best, found, key=itemgetter(1))
         if best[1] >= PROMISED * target.limit:
@@ -185,9 +191,10 @@ def _bracket(
 ) -> tuple[Point, Point, bool]:
     """A setting that meets the target and one that does not, or the end of the range."""
     setting = min(max(1.0, dial.low), dial.high)
-    found = setting, _figure(measure, target, setting)
+    found = setting, _figure(dial, measure, target, setting)
     first_meets = found[1] <= target.limit
-    upwards = first_meets != target.falls  # where the other side of the target lies
+    falls = target.falls != dial.rises  # as the dial goes up
+    upwards = first_meets != falls  # where the other side of the target lies
     factor = 2.0
     while True:
         end = dial.high if upwards else dial.low
@@ -199,22 +206,34 @@ def _bracket(
                 f"gives {found[1]:g}"
             )
         moved = setting * factor if upwards else setting / factor
-        setting = min(max(moved, dial.low), dial.high)
+        setting = _fitting(dial, moved)
         factor = min(factor * 2, 2.0**8)
-        other = setting, _figure(measure, target, setting)
+        other = setting, _figure(dial, measure, target, setting)
         if (other[1] <= target.limit) != first_meets:
             return (found, other, False) if first_meets else (other, found, False)
         found = other
 
 
-def _figure(measure: Callable[[Target, float], float], target: Target, setting: float) -> float:
+def _figure(
+    dial: Dial, measure: Callable[[Target, float], float], target: Target, setting: float
+) -> float:
     """The figure of a setting; one that the codec refuses as too fine has no bound on its size."""
     try:
-        return measure(target, setting)
+        return measure(target, int(setting) if dial.whole else setting)
     except MotionError:
-        if target.falls and setting < 1:
+        if target.falls and (setting > 1 if dial.rises else setting < 1):
             return math.inf
         raise
+
+
+def _fitting(dial: Dial, setting: float) -> float:
+    """The setting of the dial nearest to the one that is wanted."""
+    return min(max(round(setting) if dial.whole else setting, dial.low), dial.high)
+
+
+def _neighboring(dial: Dial, a: float, b: float) -> bool:
+    """Whether no setting that would tell more lies between two."""
+    return _ratio(a, b) < CLOSE or (dial.whole and abs(a - b) <= 1)
 
 
 def _ratio(a: float, b: float) -> float:

@@ -19,7 +19,7 @@ START_SHA256 = "045535af7b86d95dc8eaaa9b6e9a45a16cedd5cdbe76577f320c009f335acffd
 
 
 def refuse(what: str) -> ValueError:
-    return ValueError(f"mrdwt: {what}")
+    return ValueError(what)
 
 
 # Conventions
@@ -179,13 +179,20 @@ def quarters(v: int) -> int:
     return min(4 * (bits(v) - 1) + (4 * v >> bits(v) - 1) % 4, 111)
 
 
-class Residuals(Model):
+class Residuals:
     """Residuals and what they depend upon; the codec sets near, other, side1 and side2."""
 
     near = other = side1 = side2 = 0
 
+    def __init__(self, model: Model, first_context: int = 0, first_mixer: int = 0) -> None:
+        self.model = model
+        self.first_context, self.first_mixer = first_context, first_mixer
+
+    def mixed(self, mixer: int, first: int, a: int, b: int, c: int) -> int:
+        return self.model.mixed(self.first_mixer + mixer, self.first_context + first, a, b, c)
+
     def residual(self, f: int, g: int) -> int:
-        """With minus = no, the only kind that this codec has."""
+        """With minus = no, the only kind that codecs of values have."""
         kf, ks = quarters(f + 1), quarters(g + 1)
         cf, bf = (kf, 0) if kf < 28 else (28 + kf % 4, (kf - 24) // 4)
         cs, bs = (ks, 0) if ks < 28 else (28 + ks % 4, (ks - 24) // 4)
@@ -203,7 +210,7 @@ class Residuals(Model):
             fast, slow = 8 * x + 2 * (kf % 4) + b, 128 + 8 * y + 2 * (ks % 4) + b
             v = 2 * v + self.mixed(15, THIRD, fast, slow, 256 + 2 * e + b)
         if n > 3:
-            v = v * 2 ** (n - 3) + self.coder.number(n - 3)
+            v = v * 2 ** (n - 3) + self.model.coder.number(n - 3)
         beside = 3 + 3 * self.side1 + self.side2
         return -v if self.mixed(16, SIDE, self.side1, beside, 12 + self.other) else v
 
@@ -347,16 +354,17 @@ def side(x: int) -> int:
     return 0 if x == 0 else 1 if x > 0 else 2
 
 
-def start_of(place: int) -> dict[str, Any]:
-    """The set of the ``place``-th band of a channel: 0 the approximation, 1 d_N, 2 d_(N-1) ..."""
-    text = (ANNEX / "wavelet_start.json").read_bytes()
-    if hashlib.sha256(text).hexdigest() != START_SHA256:
-        raise refuse("another annex")
-    chosen: dict[str, Any] = json.loads(text)["sets"][min(place, 4)]
-    return chosen
+def starts_of(name: str, sha256: str) -> list[dict[str, Any]]:
+    """The sets of an annex."""
+    text = (ANNEX / name).read_bytes()
+    if hashlib.sha256(text).hexdigest() != sha256:
+        raise refuse(f"another {name}")
+    sets: list[dict[str, Any]] = json.loads(text)["sets"]
+    return sets
 
 
-STARTS = [start_of(place) for place in range(5)]
+# The approximation's, d_N's, d_(N-1)'s, d_(N-2)'s, all finer ones'.
+STARTS = starts_of("wavelet_start.json", START_SHA256)
 
 
 def approximation(data: bytes, c: int, header: Header) -> tuple[list[int], int | None]:
@@ -374,7 +382,7 @@ def approximation(data: bytes, c: int, header: Header) -> tuple[list[int], int |
             raise refuse(f"an approximation of equals, form {form}")
         return [first] * c, step
     coder = Coder(fields.rest())
-    v = _approximation_bits(Residuals(STARTS[0], coder), form, first, c)
+    v = _approximation_bits(Residuals(Model(STARTS[0], coder)), form, first, c)
     coder.finish()
     return v, step
 
@@ -435,7 +443,8 @@ def detail(data: bytes, c: int, place: int, coarser: Coarser, header: Header) ->
     """The ``c`` coefficients of the band at ``place``, 1 for d_N."""
     if not data:
         return [0] * c
-    model = Residuals(STARTS[min(place, 4)], Coder(data))
+    coder = Coder(data)
+    model = Residuals(Model(STARTS[min(place, 4)], coder))
     v = []
     run = last = before = 0
     for i in range(c):
@@ -449,7 +458,7 @@ def detail(data: bytes, c: int, place: int, coarser: Coarser, header: Header) ->
         run = run + 1 if r == 0 else 0
         before, last = last, abs(r)
         model.side2, model.side1 = model.side1, side(r)
-    model.coder.finish()
+    coder.finish()
     return v
 
 

@@ -29,6 +29,7 @@ ALLOWED = {
     "kinematics": MODEL,
     "angles": MODEL,
     "metrics": MODEL | {"angles", "kinematics"},
+    "bjontegaard": GROUND,
     "coding": GROUND,
     "transforms": GROUND,
     "codecs": MODEL | {"angles", "kinematics", "metrics", "coding", "transforms"},
@@ -37,17 +38,21 @@ ALLOWED = {
     "sample": MODEL | {"formats"},
     "file": MODEL | {"kinematics", "metrics", "codecs", "container", "formats"},
     "cli": MODEL | {"kinematics", "metrics", "file", "sample"},
+    # On top of all: it measures every part by itself.
+    "bench": MODEL
+    | {"angles", "metrics", "bjontegaard", "codecs", "container", "formats", "file", ""},
     "": MODEL | {"kinematics", "metrics", "file"},  # mcz/__init__.py
 }
 FILE_HELPERS = {  # beside file.py, of one part with it
     *("archive", "clip", "encoding", "frames", "masks", "report", "signals", "sources", "targets"),
     *("appending", "clip_source", "cutting", "decimation", "extraction", "memory", "quality"),
     *("conversion", "signal_info", "sizes", "tuning", "views"),
+    *("editing", "preview", "recoding"),
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 
 BANNED_CONSTRUCTS = {"GreedyRange", "Enum", "Flag", "Padding", "VarInt", "Compressed"}
-HEAVY = {"numba", "rich", "fsspec", "pywt", "scipy"}
+HEAVY = {"numba", "rich", "fsspec", "pywt", "scipy", "matplotlib"}
 
 
 def name_of(path: Path) -> str:
@@ -98,6 +103,8 @@ def test_imports_follow_the_arrows(path: Path) -> None:
     allowed = ALLOWED[part] | {part} | COMPILER
     if part == "cli":
         allowed |= {""}  # the command line uses the public names
+    if name_of(path) == "cli.bench":
+        allowed |= {"bench"}
     if name_of(path) == "cli.conformance":
         allowed |= {"container"}  # a decoder under test looks at every chunk, too
     wrong = {name for name in imports(path) if part_of(name) not in allowed}
@@ -189,6 +196,7 @@ def test_importing_stays_light(module: str) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout
     assert not HEAVY & {name.partition(".")[0] for name in shown.split()}
+    assert "mcz.bench" not in shown.split()
 
 
 def test_the_version_is_one() -> None:

@@ -210,7 +210,8 @@ def test_whole_turns_change_nothing_and_sides_may_change(counts: list[int], seed
     for key, value in found.entries().items():
         if isinstance(value, float) and key != "mse_raw":
             assert turned.entries()[key] == pytest.approx(value, rel=1e-9), key
-            assert back.entries()[key] == pytest.approx(value, rel=1e-9), key
+            if key != "sqnr_db":  # the power of the other side
+                assert back.entries()[key] == pytest.approx(value, rel=1e-9), key
     assert (turned.mse_raw == pytest.approx(found.mse_raw)) == (not any(counts))
 
 

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import errno
 import io
+import os
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import mcz
 import mcz.formats.restore as restore_module
+from mcz.cli.common import run
+from mcz.cli.figures import figure_lines
 from mcz.cli.info import _tree
+from mcz.cli.main import cli
 from mcz.codecs import by_name
 from mcz.container import payloads
 from mcz.container.chunks import build_header
@@ -28,6 +34,7 @@ from mcz.report import validate
 from mcz.sample import write_samples
 from mcz.schema import parse, varint
 from mcz.targets import replacing
+from mcz.transforms import dwt
 from tests.motions import smooth
 from tests.repair import with_index_content
 
@@ -381,3 +388,83 @@ def test_odd_rates(tmp_path: Path, rate: object) -> None:
     (tmp_path / "a.bvh").write_text(BVH)
     with pytest.raises(mcz.OptionError, match="frame rate"):
         mcz.read(tmp_path / "a.bvh", rate=rate)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("to", ["bvh", "amc", "c3d"])
+def test_a_motion_without_frames_is_converted(tmp_path: Path, to: str) -> None:
+    write_samples(tmp_path)
+    for source in ("walk.amc", "walk.bvh"):
+        motion = mcz.read(tmp_path / source)
+        empty = replace(motion, signals=tuple(s.cut(0, 0) for s in motion.signals), source=None)
+        assert mcz.positions(empty).shape == (0, mcz.positions(motion).shape[1], 3)
+        converted = mcz.convert(replace(empty, frame_numbers=None), to, rate=120)
+        assert converted.n_frames == 0
+
+
+def test_reading_many_segments_is_not_quadratic(monkeypatch: pytest.MonkeyPatch) -> None:
+    counted = [0]
+
+    def counting(*args: Any) -> tuple[int, int]:
+        counted[0] += 1
+        return own_range(*args)
+
+    own_range = dwt.own_range
+    monkeypatch.setattr(dwt, "own_range", counting)
+    counts = []
+    for n_frames in (4096, 16384):
+        motion = replace(smooth(2), signals=(Signal(np.zeros((n_frames, 10))),))
+        motion = replace(motion, frame_numbers=None)
+        with mcz.open(written(motion, codec="mrdwt", segment_frames=16)) as file:
+            counted[0] = 0
+            file.clips[motion.name].read()
+        counts.append(counted[0])
+    assert counts[1] < 5 * counts[0]
+
+
+@pytest.mark.parametrize("name", ["T_g", "Q", "target_bytes", "mean_error_cm"])
+def test_a_truth_is_no_number(name: str) -> None:
+    with pytest.raises(mcz.OptionError, match=f"{name} is True, not"):
+        by_name("mrdwt").options({name: True})
+
+
+def test_a_full_disk_is_told_of_the_target(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    with (
+        pytest.raises(mcz.AccessError, match=r"a\.mcz: File too large"),
+        replacing(path, force=False),
+    ):
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+    assert not list(tmp_path.iterdir())
+
+
+def test_points_of_other_names_are_noted() -> None:
+    motion = smooth(3)
+    joints = tuple(replace(joint, name=f"{joint.name}!") for joint in motion.skeleton.joints)
+    other = replace(motion, skeleton=replace(motion.skeleton, joints=joints))
+    assert not any("other names" in note for note in mcz.compare(motion, motion).notes)
+    found = mcz.compare(motion, other)
+    assert found.mean_position_error == 0
+    assert any("other names" in note for note in found.notes)
+
+
+def test_extract_and_diff_take_a_limit_of_decoded_bytes(tmp_path: Path) -> None:
+    path, out = tmp_path / "a.mcz", tmp_path / "b.mcz"
+    path.write_bytes(written(smooth(100), codec="mrdwt"))
+    for limit, code in (("100", 1), ("1M", 0)):
+        options = ["--max-decoded", limit]
+        assert (
+            run(cli, "mcz", ["extract", str(path), str(out), "--frames", "0:90", *options]) == code
+        )
+        assert run(cli, "mcz", ["diff", str(path), str(path), *options]) == code
+        assert out.exists() == (code == 0)
+
+
+def test_figures_of_a_clip_that_was_cut_are_shown_in_cm() -> None:
+    entries = {"uncut_mean_position_error": 2.0, "uncut_mean_position_error_cm": 3.25}
+    (line,) = [line for line in figure_lines(entries) if "uncut" in line]
+    assert line.split() == ["uncut_mean_position_error", "2", "units", "3.25"]
+
+
+def test_extract_says_which_clip_lacks_a_joint() -> None:
+    with pytest.raises(mcz.MotionError, match="clip 'smooth': no joint 'tail' among"):
+        mcz.extract(written(smooth(3, name="smooth")), io.BytesIO(), joints=["tail"])

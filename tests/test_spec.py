@@ -131,7 +131,7 @@ def test_spec_never_defers(word: str) -> None:
     assert word not in SPEC
 
 
-@pytest.mark.parametrize("name", ["lossless_start.json", "wavelet_start.json"])
+@pytest.mark.parametrize("name", [f"{n}_start.json" for n in ("lossless", "pca", "qbc", "wavelet")])
 def test_annex_is_what_the_package_ships_and_the_text_names(name: str) -> None:
     import hashlib
 

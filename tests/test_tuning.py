@@ -18,7 +18,7 @@ import mcz
 from mcz.codecs.base import Dial
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.sizes import clip_sizes
-from mcz.tuning import PROMISED, Target, search
+from mcz.tuning import GOAL, PROMISED, Target, search
 
 DIAL = Dial("T_g", 2.0**-20, 2.0**20)
 
@@ -318,6 +318,92 @@ def test_errors_of_the_codec_come_through() -> None:
     values[3, 3] = math.nan
     with pytest.raises(mcz.MotionError, match="not finite"):
         saved(walk(50).with_values(values), target_bytes=1000)
+
+
+# Dials that go the other way, and dials of integers
+
+RISING = Dial("a_w", 2.0**-20, 2.0**20, rises=True)
+WHOLE = Dial("q", 1, 2**20, rises=True, whole=True)
+COUNTED = Dial("n", 1, 1000, whole=True)
+
+
+def turned(
+    dial: Dial, figure: Callable[[float], float], limit: float, falls: bool
+) -> tuple[float, float, bool, list[float]]:
+    asked: list[float] = []
+
+    def measure(target: Target, setting: float) -> float:
+        asked.append(setting)
+        assert dial.low <= setting <= dial.high
+        assert not dial.whole or isinstance(setting, int)
+        return figure(setting)
+
+    return *search(dial, Target("figure", limit, falls), measure), asked
+
+
+@given(st.floats(-15, 15).map(lambda x: 2.0**x), st.floats(0.05, 4), st.booleans())
+def test_rising_dials_are_turned_the_other_way(setting: float, power: float, falls: bool) -> None:
+    """A size grows with the dial, an error shrinks."""
+    sign = power if falls else -power
+    found, reached, ended, asked = turned(RISING, lambda t: t**sign, setting**sign, falls)
+    assert reached == found**sign <= setting**sign
+    assert not ended and reached >= PROMISED * setting**sign and len(asked) < 40
+
+
+@given(
+    st.sampled_from([WHOLE, COUNTED]),
+    st.integers(1, 1000),
+    st.floats(0, 0.999),
+    st.booleans(),
+)
+def test_integers_that_meet_the_target_are_the_nearest(dial, whole, more, falls) -> None:
+    """Of a figure without jumps no integer comes nearer, or it is near enough."""
+    rises = falls == dial.rises  # the figure, with the dial
+    figure: Callable[[float], float] = float if rises else (lambda n: 1.0 / n)
+    limit = whole + more if rises else 1 / (whole - more * 0.5)
+    found, reached, _, asked = turned(dial, figure, limit, falls)
+    assert reached == figure(found) <= limit
+    assert found == whole or reached >= GOAL * limit
+    assert len(set(asked)) < 120
+
+
+def test_a_whole_dial_ends_at_its_range() -> None:
+    assert turned(COUNTED, lambda n: 1.0, 5, falls=True)[:3] == (1, 1.0, True)
+    assert turned(COUNTED, lambda n: 1.0, 5, falls=False)[:3] == (1000, 1.0, True)
+    assert turned(WHOLE, lambda n: 1.0, 5, falls=True)[:3] == (2**20, 1.0, True)
+    assert turned(WHOLE, lambda n: 1.0, 5, falls=False)[:3] == (1, 1.0, True)
+    with pytest.raises(mcz.OptionError, match="cannot be met: q 1 gives 1"):
+        turned(WHOLE, lambda n: 1.0, 0.5, falls=True)
+
+
+def test_a_rising_setting_that_is_refused_as_too_fine_is_no_answer() -> None:
+    def figure(t: float) -> float:
+        if t > 100:
+            raise mcz.MotionError("a coefficient exceeds")
+        return t
+
+    found, reached, _, _ = turned(RISING, figure, 1000.0, falls=True)
+    assert reached == found <= 100
+    with pytest.raises(mcz.MotionError):
+        turned(RISING, lambda t: figure(t * 1e9), 1e-9, falls=False)
+
+
+@pytest.mark.parametrize("codec", ["pca", "dwt", "awt"])
+@pytest.mark.parametrize(
+    ("name", "limit"),
+    [("target_bytes", 2500), ("kbps", 3), ("mean_error_cm", 0.5), ("max_error_cm", 2)],
+)
+def test_targets_of_other_codecs(codec: str, name: str, limit: float) -> None:
+    out = io.BytesIO()
+    mcz.write(WALK, out, codec=codec, **{name: limit})
+    Found(WALK, out.getvalue()).check(name, limit)
+
+
+def test_targets_that_components_cannot_meet() -> None:
+    with pytest.raises(mcz.OptionError, match="target_bytes 10 cannot be met: q 1 gives"):
+        mcz.write(WALK, io.BytesIO(), codec="pca", target_bytes=10)
+    with pytest.raises(mcz.OptionError, match="mean_error_cm is asked for and q is given"):
+        mcz.write(WALK, io.BytesIO(), codec="pca", mean_error_cm=1, q=3)
 
 
 @pytest.mark.real

@@ -1,6 +1,6 @@
 """Train the start tables of lossy codecs: the states in which their coders begin.
 
-    python tools/train_tables.py wavelet OUT.json FILE...
+    python tools/train_tables.py wavelet|qbc|pca OUT.json FILE...
 
 The files are coded twice, with every setting below, by coders that are never reset; see
 ``tools/start_tables.py``.
@@ -19,7 +19,16 @@ from typing import Any
 import numpy as np
 
 import mcz
-from mcz.codecs import _wavelet_streams, mrdwt
+from mcz.codecs import (
+    _pca_kernels,
+    _pca_streams,
+    _qbc_kernels,
+    _qbc_streams,
+    _wavelet_streams,
+    mrdwt,
+    pca,
+    qbc,
+)
 from mcz.codecs.base import Codec
 from mcz.coding import residuals
 from mcz.memory import MemorySource
@@ -55,6 +64,37 @@ PLANS = {
             {"T_g": 1},
             {"T_g": 3, "N": 5},
             {"preset": "khan2016", "T_g": 30},
+        ),
+    ),
+    "qbc": Plan(
+        _qbc_streams,
+        qbc.CODEC,
+        (residuals.N_MIXERS, _qbc_kernels.N_DETAIL_MIXERS),
+        24,
+        (
+            {"d2_lmt": 0.1},
+            {"preset": "khan2014", "d2_lmt": 5},
+            {"d2_lmt": 1},
+            {"d2_lmt": 5, "delta": 120},
+            {"preset": "khan2014", "d2_lmt": 24},
+            {"d2_lmt": 24},
+            {"d2_lmt": 5, "breaks": "fewest"},
+        ),
+    ),
+    "pca": Plan(
+        _pca_streams,
+        pca.CODEC,
+        (_pca_kernels.N_SETS * residuals.N_MIXERS,),
+        24,
+        (
+            {"q": 30},
+            {"preset": "khan2014", "q": 22},
+            {"q": 16},
+            {"q": 20},
+            {"preset": "khan2014", "q": 13},
+            {"q": 24},
+            {"q": 40},
+            {"q": 12},
         ),
     ),
 }

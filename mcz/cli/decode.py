@@ -25,8 +25,10 @@ from mcz.cli.common import (
 from mcz.cli.options import decoded_option, force_option, json_option
 
 if TYPE_CHECKING:
+    from mcz.cli.export import Table
     from mcz.clip import Clip
     from mcz.file import File
+    from mcz.motion import Motion
 
 Output = tuple[str, str, bytes]  # kind, file name, content
 CONVERSIONS = ("bvh", "amc", "c3d")
@@ -64,6 +66,12 @@ class _Part(NamedTuple):
     "--decimate", is_flag=True, help="Write every 2^K-th frame alone, at the rate divided by 2^K."
 )
 @click.option(
+    "--preview",
+    "preview",
+    is_flag=True,
+    help="Only frames that can be read without decoding the rest (with --to).",
+)
+@click.option(
     "--to",
     "target",
     type=click.Choice(["csv", "npz", *CONVERSIONS]),
@@ -88,6 +96,7 @@ def command(
     joints: str | None,
     resolution: int,
     decimate: bool,
+    preview: bool,
     target: str | None,
     rate: Fraction | None,
     with_skeleton: bool,
@@ -102,6 +111,11 @@ def command(
     """
     if target in (None, *CONVERSIONS) and joints is not None:
         raise Failure("--joints needs --to csv or --to npz", Exit.USAGE)
+    if preview and (target is None or frames is not None or resolution or salvage):
+        raise Failure(
+            "--preview needs --to, and goes with none of --frames --resolution --salvage",
+            Exit.USAGE,
+        )
     if decimate and not resolution:
         raise Failure("--decimate needs --resolution", Exit.USAGE)
     if rate is not None and target not in CONVERSIONS:
@@ -115,9 +129,10 @@ def command(
             if target is None:
                 outputs = [_source(clip, part)]
             elif target in CONVERSIONS:
-                outputs = _converted(clip, part, target, rate, with_skeleton)
+                motion = _motion(clip, part, preview)
+                outputs = _converted(motion, target, rate, with_skeleton)
             else:
-                outputs = [_export(clip, target, part, joints)]
+                outputs = [_export(clip, target, part, joints, preview)]
             if with_skeleton and target != "amc":
                 outputs.append(_skeleton(held, clip.skeleton_id))
         elif target is not None or frames is not None:
@@ -144,46 +159,74 @@ def _source(clip: Clip, part: _Part) -> Output:
     return "source", PurePosixPath(path).name or f"{_stem(clip)}.out", data
 
 
+def _motion(clip: Clip, part: _Part, preview: bool) -> Motion:
+    if preview:
+        from mcz.preview import preview_motion
+
+        return preview_motion(clip)
+    return clip.motion(part.frames, part.resolution, decimate=part.decimate)
+
+
 def _converted(
-    clip: Clip, part: _Part, target: str, rate: Fraction | None, with_skeleton: bool
+    motion: Motion, target: str, rate: Fraction | None, with_skeleton: bool
 ) -> list[Output]:
-    """The clip as a plain file of another format, with its ASF where an AMC is to have one."""
+    """The motion as a plain file of another format, with its ASF where an AMC is to have one."""
     from mcz.conversion import converted_files
 
-    motion = clip.motion(part.frames, part.resolution, decimate=part.decimate)
     files = converted_files(motion, target, rate, with_skeleton)
     kinds = {"asf": "skeleton"}
-    return [(kinds.get(s, s), f"{_stem(clip)}.{s}", data) for s, data in files.items()]
+    return [(kinds.get(s, s), f"{_stem(motion)}.{s}", data) for s, data in files.items()]
 
 
-def _export(clip: Clip, target: str, part: _Part, joints: str | None) -> Output:
-    from mcz.cli.export import EXPORTS, Table, channel_names
-    from mcz.decimation import decimated_rows
+def _export(clip: Clip, target: str, part: _Part, joints: str | None, preview: bool) -> Output:
+    from mcz.cli.export import EXPORTS, channel_names
 
     chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]
-    values, mask = clip.read_masked(part.frames, chosen, part.resolution)
-    mask = np.ones(values.shape, np.bool_) if mask is None else mask
     names = channel_names(clip.skeleton, clip.signals[0].channels)
     if chosen is not None:
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
+    table = (_preview_table if preview else _table)(clip, part, chosen, names)
+    return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
+
+
+def _table(clip: Clip, part: _Part, joints: list[str] | None, names: list[str]) -> Table:
+    from mcz.cli.export import Table
+    from mcz.decimation import decimated_rows
+
+    values, mask = clip.read_masked(part.frames, joints, part.resolution)
+    mask = np.ones(values.shape, np.bool_) if mask is None else mask
     start, stop = part.frames or (0, clip.n_frames)
     numbers, rate = clip.frame_numbers[start:stop], clip.frame_rate
     if part.decimate:
         step, per_frame = 2**part.resolution, clip.signals[0].layout.samples_per_frame
         values, mask = (decimated_rows(rows, per_frame, step) for rows in (values, mask))
         numbers, rate = numbers[::step], rate and rate / step
-    table = Table(
+    return Table(
         names,
         np.asarray(values, dtype=np.float64),
         mask,
         np.repeat(numbers, len(values) // max(1, len(numbers))),  # a number for every row
         rate,
     )
-    return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
 
 
-def _stem(clip: Clip) -> str:
+def _preview_table(clip: Clip, part: _Part, joints: list[str] | None, names: list[str]) -> Table:
+    from mcz.cli.export import Table
+    from mcz.preview import preview
+
+    found = preview(clip, joints)
+    numbers, rate = clip.frame_numbers[found.frames], clip.frame_rate
+    return Table(
+        names,
+        np.asarray(found.values, dtype=np.float64),
+        np.ones(found.values.shape, np.bool_) if found.mask is None else found.mask,
+        np.repeat(numbers, len(found.values) // max(1, len(numbers))),
+        rate / found.step if rate is not None and found.is_regular else None,
+    )
+
+
+def _stem(clip: Clip | Motion) -> str:
     """The clip's name without folders, which must not lead out of the output's folder."""
     return PurePosixPath(clip.name).name.strip(".") or "clip"
 

@@ -22,7 +22,7 @@ from mcz.cli.common import (
     to_frames,
 )
 from mcz.cli.figures import figure_lines
-from mcz.cli.options import UNITS, json_option
+from mcz.cli.options import UNITS, decoded_option, json_option
 
 if TYPE_CHECKING:
     from mcz.file import File
@@ -49,6 +49,7 @@ Cut = tuple[int, int | None] | None
 @click.option(
     "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of an AMC."
 )
+@decoded_option
 @json_option
 def command(
     a: str,
@@ -57,6 +58,7 @@ def command(
     frames: Cut,
     unit: str | None,
     skeleton: str | None,
+    max_decoded: int | None,
     as_json: bool,
 ) -> Exit:
     """Compare B with A, the original: any two of .amc, .bvh, .c3d and .mcz.
@@ -68,7 +70,7 @@ def command(
     if (a, b) == ("-", "-"):
         raise Failure("only one of A and B can be standard input", Exit.USAGE)
     with ExitStack() as stack:
-        left, right = (_Side(path, stack, unit, skeleton) for path in (a, b))
+        left, right = (_Side(path, stack, unit, skeleton, max_decoded) for path in (a, b))
         pairs = list(_pairs(left, right, names))
         documents = [_compared(left, right, *pair, frames) for pair in pairs]
     only = {
@@ -100,11 +102,18 @@ class _Loaded:
 class _Side:
     """A or B: a source file, or an .mcz that stays open."""
 
-    def __init__(self, path: str, stack: ExitStack, unit: str | None, skeleton: str | None) -> None:
+    def __init__(
+        self,
+        path: str,
+        stack: ExitStack,
+        unit: str | None,
+        skeleton: str | None,
+        max_decoded: int | None,
+    ) -> None:
         self.path, self._unit, self._skeleton = path, unit, skeleton
         self.file: File | None = None
         if path == "-" or PurePath(path).suffix.lower() == ".mcz":
-            self.file = stack.enter_context(opened(path))
+            self.file = stack.enter_context(opened(path, max_decoded=max_decoded))
         else:
             existing(path)
 

@@ -24,7 +24,7 @@ from mcz.cli.options import chosen, encoding_options, force_option, json_option
 from mcz.cli.progress import Progress
 
 
-@click.command(short_help="A .bvh, .amc or .asf file to .mcz.")
+@click.command(short_help="A .bvh, .amc, .c3d or .asf file to .mcz.")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
 @click.option(
     "-o",
@@ -50,7 +50,7 @@ def command(
     as_json: bool,
     **options: Any,
 ) -> Exit:
-    """Encode SRC (.bvh, .amc or .asf) into OUT.mcz; an ASF alone makes a file of a skeleton."""
+    """Encode SRC (.bvh, .amc, .c3d or .asf) into OUT.mcz; an ASF alone makes one of a skeleton."""
     import mcz
     from mcz.report import decoded_bytes, info
 

@@ -19,7 +19,7 @@ from mcz.cli.common import (
     say,
     to_frames,
 )
-from mcz.cli.options import force_option, json_option
+from mcz.cli.options import decoded_option, force_option, json_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     "--frames", metavar="A:B", callback=to_frames, help="Keep frames A <= f < B, counted from 0."
 )
 @click.option("--clip", "name", metavar="NAME", help="Take out this clip alone. Default: all.")
+@decoded_option
 @force_option
 @json_option
 def command(
@@ -52,6 +53,7 @@ def command(
     joints: str | None,
     frames: tuple[int, int | None] | None,
     name: str | None,
+    max_decoded: int | None,
     force: bool,
     as_json: bool,
 ) -> Exit:
@@ -74,6 +76,7 @@ def command(
             frames=frames,
             clip=name,
             force=force,
+            max_decoded=max_decoded,
             progress=progress,
         )
     if as_json:

@@ -13,6 +13,7 @@ SHOWN_ELSEWHERE = (
     *("max_position_error_frame", "max_position_error_point"),
 )
 WIDEST = 80  # characters that are shown of a key or value: records in files may say anything
+UNCUT = "uncut_"  # in front of the figures of a clip before it was cut
 DISTANCES = ("rms_coordinate_error", "mean_position_error", "max_position_error")
 
 
@@ -57,16 +58,17 @@ def _rows(held: Mapping[str, str]) -> Iterator[list[str]]:
         if key in held
     ]
     for key, value in held.items():
+        metric = key.removeprefix(UNCUT)
         beside = key.removesuffix("_cm") in held and key.endswith("_cm")
         if key in SHOWN_ELSEWHERE or key.startswith(SETTING) or beside:
             continue
         note = ", ".join(where) if key == "max_position_error" else ""
         if key.endswith("_cm"):
             yield [key.removesuffix("_cm"), "", "", _number(value), note]
-        elif key in DISTANCES:
+        elif metric in DISTANCES:
             yield [key, _number(value), "units", _number(held.get(f"{key}_cm", "")), note]
         else:
-            squared = "channels, squared" if key.rpartition(".")[2].startswith("mse") else ""
+            squared = "channels, squared" if metric.rpartition(".")[2].startswith("mse") else ""
             yield [key, _number(value), squared, "", note]
 
 

@@ -20,7 +20,9 @@ COMMANDS = (
     "unpack",
     "list",
     "extract",
+    "replace",
     "diff",
+    "bench",
 )
 
 

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from mcz.codecs import lossless, mrdwt, raw
+from mcz.codecs import awt, dwt, lossless, mrdwt, pca, qbc, raw
 from mcz.codecs.base import Codec
 from mcz.errors import OptionError, UnsupportedError
 
-CODECS: dict[int, Codec] = {codec.id: codec for codec in (raw.CODEC, lossless.CODEC, mrdwt.CODEC)}
+CODECS: dict[int, Codec] = {
+    codec.id: codec
+    for codec in (
+        raw.CODEC,
+        lossless.CODEC,
+        mrdwt.CODEC,
+        qbc.CODEC,
+        pca.CODEC,
+        dwt.CODEC,
+        awt.CODEC,
+    )
+}
 DEFAULT = lossless.CODEC.name  # the best lossless one there is
 
 

@@ -6,7 +6,7 @@ its encoder chooses a ``Plan``; to a decoder they are alike.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -18,11 +18,21 @@ from numpy.typing import NDArray
 from mcz.codecs._wavelet_frames import Frames
 from mcz.codecs._wavelet_quantizer import Quantizer, ratio_of
 from mcz.codecs._wavelet_streams import Coding, build_streams, parse_streams
-from mcz.codecs.base import Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
+from mcz.codecs.base import (
+    Encoded,
+    Fetch,
+    Layout,
+    Parameter,
+    Request,
+    Segment,
+    SignalSource,
+    Span,
+    integer,
+)
 from mcz.errors import FormatError
 from mcz.schema import UVARINT, build, counted, parse
 from mcz.transforms import dwt
-from mcz.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id
+from mcz.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id, by_name
 
 Floats = NDArray[np.float64]
 
@@ -56,21 +66,86 @@ WAVELET_HEADER = Struct(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What an encoder has decided before it codes the first segment."""
+Q = Parameter(
+    "Q",
+    None,
+    "decimals of coefficients; default: steps follow the thresholds",
+    integer("Q", 0, MAX_DECIMALS),
+)
+N = Parameter("N", None, "levels; default 4", integer("N", 0, MAX_LEVELS))
+WAVELET = Parameter("wavelet", None, "name as in PyWavelets; default bior4.4", str)
+SEGMENT_FRAMES_PARAMETER = Parameter(
+    "segment_frames",
+    None,
+    "frames a segment; default: as many as make 64 KiB, at most 4096",
+    integer("segment_frames", 1, 2**40),
+)
 
-    name: str
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """A wavelet, and the levels of a clip."""
+
     wavelet_id: int
     wavelet: Wavelet
     levels: int
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What an encoder has decided before it codes the first segment.
+
+    ``kept``: band by band of the clip, the coarsest first, which coefficients are not to become 0,
+    (coefficients, channels); None: the quantizer decides.
+    """
+
+    name: str
+    transform: Transform
     quantizer: Quantizer
     segment_frames: int  # 0: the size decides
+    kept: Sequence[NDArray[np.bool_]] | None = None
+
+    @property
+    def wavelet(self) -> Wavelet:
+        return self.transform.wavelet
+
+    @property
+    def levels(self) -> int:
+        return self.transform.levels
 
     @property
     def coding(self) -> Coding:
         scaled = self.quantizer.decimals is None
         return Coding(self.name, scaled, self.quantizer.least, (self.wavelet.n_taps - 2) // 2)
+
+
+def chosen_of(
+    presets: Mapping[str, Mapping[str, Any]], params: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What a preset has a say in, each value that was given in place of the preset's."""
+    values = presets[params["preset"]].items()
+    return {name: value if params[name] is None else params[name] for name, value in values}
+
+
+def transform_of(
+    layout: Layout, wavelet: str, levels: int, *, as_published: bool = False
+) -> Transform:
+    """The levels that are asked for; where the clip is too short for them, fewer.
+
+    ``as_published``: as many as are asked for, however short it is.
+    """
+    wavelet_id, found = by_name(wavelet)
+    levels = levels if layout.n_frames else 0
+    while levels and not as_published and layout.n_frames < (found.n_taps - 1) << levels:
+        levels -= 1
+    return Transform(wavelet_id, found, levels)
+
+
+def segment_frames_of(layout: Layout, given: int | None, *, as_published: bool = False) -> int:
+    """Frames a segment, 0: the size decides; published methods take the whole clip at once."""
+    if given is None:
+        return layout.n_frames if as_published else 0
+    return given
 
 
 def encode(source: SignalSource, plan: Plan) -> Encoded:
@@ -79,9 +154,9 @@ def encode(source: SignalSource, plan: Plan) -> Encoded:
     Raises MotionError for a value that is not finite.
     """
     scaled = plan.quantizer.decimals is None
-    inline = plan.wavelet_id == INLINE
+    inline = plan.transform.wavelet_id == INLINE
     fields = {
-        "wavelet": plan.wavelet_id,
+        "wavelet": plan.transform.wavelet_id,
         "lo": plan.wavelet.lo if inline else None,
         "hi": plan.wavelet.hi if inline else None,
         "levels": plan.levels,
@@ -104,7 +179,7 @@ def _segments(source: SignalSource, plan: Plan) -> Iterator[Segment]:
     first = 0
     while first < n_frames:
         stop = min(first + length, n_frames)
-        streams = _segment_streams(frames, plan, first, stop)
+        streams = segment_streams(frames, plan, first, stop)
         shorter = max(unit, length // 2 // unit * unit)
         too_large = not plan.segment_frames and sum(map(len, streams)) > TARGET_BYTES
         if too_large and LEAST_FRAMES <= shorter < length:
@@ -116,9 +191,14 @@ def _segments(source: SignalSource, plan: Plan) -> Iterator[Segment]:
         first = stop
 
 
-def _segment_streams(frames: Frames, plan: Plan, first: int, stop: int) -> tuple[bytes, ...]:
+def segment_streams(frames: Frames, plan: Plan, first: int, stop: int) -> tuple[bytes, ...]:
     """All streams of a segment: resolution by resolution, in each channel by channel."""
     bands = frames.coefficients(first, stop)
+    if plan.kept is not None:
+        levels = [plan.levels, *range(plan.levels, 0, -1)]
+        owns = [dwt.own_range(first, stop, level, frames.lengths) for level in levels]
+        masks = [kept[own[0] : own[1]] for kept, own in zip(plan.kept, owns, strict=True)]
+        bands = [np.where(mask, band, 0.0) for mask, band in zip(masks, bands, strict=True)]
     by_channel = []
     for channel in range(bands[0].shape[1]):
         indices = [
@@ -187,7 +267,13 @@ class _Decoder:
         wanted = [ranges[levels], *(ranges[levels + 1 - band] for band in range(1, n_bands))]
         bands = [np.zeros((stop - start, len(request.groups))) for start, stop in wanted]
         due = wanted[0][0]
+        # Frames whose coefficients are wanted; the last segment has those beyond the end, too.
+        scales = [self._level(band) for band in range(n_bands)]
+        low = min(need[0] << level for need, level in zip(wanted, scales, strict=True))
+        high = max(need[1] << level for need, level in zip(wanted, scales, strict=True))
         for index, span in enumerate(self.spans):
+            if span.first >= high or (span.stop <= low and span.stop != self.lengths[0]):
+                continue
             owns = [
                 dwt.own_range(span.first, span.stop, self._level(band), self.lengths)
                 for band in range(n_bands)

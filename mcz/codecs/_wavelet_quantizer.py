@@ -82,13 +82,17 @@ def code_of(ratio: float) -> int:
     )
 
 
-def make_quantizer(weights: Floats, T_g: float, decimals: int | None) -> Quantizer:
-    """The quantizer whose thresholds are T_g times ``weights``."""
+def make_quantizer(
+    weights: Floats, T_g: float, decimals: int | None, name: str = "T_g"
+) -> Quantizer:
+    """The quantizer whose thresholds are T_g times ``weights``; ``name`` is that of T_g."""
     thresholds = T_g * weights
     unit = T_g / DEAD_ZONE if T_g > 0 else 1.0
     codes = tuple(code_of(float(weight)) for weight in weights)
     if decimals is None and (not T_g > 0 or unit < LEAST_UNIT):
-        raise OptionError(f"T_g is {T_g:g} and Q is not given, so that there is no quantizer step")
+        raise OptionError(
+            f"{name} is {T_g:g} and Q is not given, so that there is no quantizer step"
+        )
     return Quantizer(thresholds, decimals, unit, codes)
 
 

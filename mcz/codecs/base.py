@@ -130,12 +130,15 @@ class Parameter:
 class Dial:
     """The one parameter that trades quality for size: the greater, the smaller the file.
 
-    A caller who names a size or an error instead has it searched for between ``low`` and ``high``.
+    ``rises``: the greater, the better the quality instead. ``whole``: it is an integer. A caller
+    who names a size or an error has it searched for between ``low`` and ``high``.
     """
 
     parameter: str
     low: float
     high: float
+    rises: bool = False
+    whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +161,19 @@ Cut = Callable[[bytes, Layout, int, int, tuple[int, ...]], bytes]
 # new ``numbers``. Looking up a group that is left out raises; the message is the caller's.
 Regroup = Callable[[bytes, Layout, int, Mapping[int, int]], bytes]
 
+# (header, source, groups, spans, options, fetch) -> of each span the streams of these groups, in
+# stored order, which a decoder reads under this header beside the streams of all other groups.
+# ``source`` holds the whole signal with its new values, ``options`` are the parameters, where they
+# were recorded, ``fetch`` gives the streams that are replaced.
+Recode = Callable[
+    [bytes, SignalSource, tuple[int, ...], Sequence[Span], Mapping[str, Any], Fetch],
+    Iterator[tuple[bytes, ...]],
+]
+
+# (header, layout, spans) -> the stored frames, ascending, that the coarsest resolution alone gives
+# exactly as all resolutions do.
+Preview = Callable[[bytes, Layout, Sequence[Span]], NDArray[np.int64]]
+
 
 @dataclass(frozen=True, slots=True)
 class Codec:
@@ -175,6 +191,10 @@ class Codec:
     not stored as zero. ``cut`` makes the header fit where it says something of frames or
     channels (None: it holds as it is); ``regroup`` a stream that names other groups (None: none
     does). Both are given the layout before the cut, and raise FormatError for bad bytes.
+
+    ``recode`` codes some groups anew (None: the codec cannot do that), of a codec with ``regroup``
+    in any of the segments, of others in all. ``preview`` says what can be read without decoding
+    the rest (None: nothing exactly).
     """
 
     id: int
@@ -191,6 +211,8 @@ class Codec:
     dial: Dial | None = None
     cut: Cut | None = None
     regroup: Regroup | None = None
+    recode: Recode | None = None
+    preview: Preview | None = None
 
     def options(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """All parameters, those given checked; raises OptionError for an unknown or bad one."""
@@ -248,7 +270,7 @@ def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
     def parse(text: Any) -> int:
         try:
             value = int(text)
-            if isinstance(text, float) and value != text:
+            if isinstance(text, bool) or (isinstance(text, float) and value != text):
                 raise ValueError
         except (TypeError, ValueError, OverflowError):
             raise OptionError(f"{name} is {text!r}, not an integer") from None
@@ -264,6 +286,8 @@ def number(name: str, low: float, high: float) -> Callable[[Any], float]:
 
     def parse(text: Any) -> float:
         try:
+            if isinstance(text, bool):
+                raise ValueError
             value = float(text)
         except (TypeError, ValueError, OverflowError):
             raise OptionError(f"{name} is {text!r}, not a number") from None

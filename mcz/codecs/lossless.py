@@ -121,24 +121,54 @@ def _build(
     ordinals: Ints,
     grids: Sequence[tuple[Grid, Grid]],
     group: int,
-    seen: dict[bytes, tuple[int, int]],
+    seen: dict[bytes, tuple[int, int]] | None,
 ) -> bytes:
-    """One stream: ``ordinals`` of one group, (rows, channels); grids in force and of the clip."""
+    """One stream: ``ordinals`` of one group, (rows, channels); grids in force and of the clip.
+
+    ``seen``: where a channel was coded that a later one may repeat; None: there shall be no copies.
+    """
     heads, plans, coded = [], [], []
     for channel, column in enumerate(ordinals.T):
         column = np.ascontiguousarray(column)
         key = column.tobytes()
         if (column == column[0]).all():
             heads.append(_constant_head(int(column[0])))
-        elif key in seen:
+        elif seen is not None and key in seen:
             heads.append(bytes((COPY,)) + b"".join(map(varint, seen[key])))
         else:
-            seen[key] = group, channel
+            if seen is not None:
+                seen[key] = group, channel
             head, plan, numbers = _coded_head(column, *grids[channel])
             heads.append(head)
             plans.append(plan)
             coded.append(numbers)
     return b"".join(heads) + (_code(np.stack(coded, axis=1), plans) if plans else b"")
+
+
+def recode(
+    header: bytes,
+    source: SignalSource,
+    groups: tuple[int, ...],
+    spans: Sequence[Span],
+    options: Mapping[str, Any],
+    fetch: Fetch,
+) -> Iterator[tuple[bytes, ...]]:
+    """The streams of some groups with new values, without copies.
+
+    What such a stream repeated, or who repeated it, need not be looked at then.
+    """
+    layout = source.layout
+    for span in spans:
+        ordinals, grids = source.ordinals(span.first, span.stop), source.grids(span.first)
+        yield tuple(
+            _build(
+                ordinals[:, list(layout.groups[group])],
+                [(grids[c], layout.grids[c]) for c in layout.groups[group]],
+                group,
+                None,
+            )
+            for group in groups
+        )
 
 
 def _constant_head(ordinal: int) -> bytes:
@@ -311,6 +341,7 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     regroup=regroup,
+    recode=recode,
     delay=0,
     parameters=(
         Parameter(

@@ -12,26 +12,35 @@ that SPEC.md states). A stream holds one channel at one resolution of one segmen
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from mcz.codecs import _wavelet_codec
-from mcz.codecs._wavelet_codec import MAX_DECIMALS, Plan
+from mcz.codecs import _wavelet_codec, _wavelet_recode
+from mcz.codecs._wavelet_codec import (
+    SEGMENT_FRAMES_PARAMETER,
+    WAVELET,
+    N,
+    Plan,
+    Q,
+    chosen_of,
+    segment_frames_of,
+    transform_of,
+)
 from mcz.codecs._wavelet_frames import sample
 from mcz.codecs._wavelet_quantizer import RULES, SAMPLED_FRAMES, make_quantizer, weights_of
 from mcz.codecs.base import (
     Codec,
     Dial,
     Encoded,
+    Fetch,
     Parameter,
     SignalSource,
+    Span,
     choice,
-    integer,
     number,
 )
 from mcz.errors import MotionError
-from mcz.transforms.wavelets import MAX_LEVELS, by_name
 
 PRESETS: dict[str, dict[str, Any]] = {
     # Exactly as published: T_g in the units of the source for positions too, the whole clip at
@@ -55,15 +64,8 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     layout, preset = source.layout, params["preset"]
     if layout.samples_per_frame != 1 or layout.skeleton is None:
         raise MotionError("mrdwt: only signals of one sample a frame")
-    chosen = {
-        name: value if params[name] is None else params[name]
-        for name, value in PRESETS[preset].items()
-    }
-    published = preset == "khan2016"
-    wavelet_id, wavelet = by_name(chosen["wavelet"])
-    levels = chosen["N"] if layout.n_frames else 0
-    while levels and not published and layout.n_frames < (wavelet.n_taps - 1) << levels:
-        levels -= 1
+    chosen, published = chosen_of(PRESETS, params), preset == "khan2016"
+    transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
     weights = weights_of(
         layout.skeleton,
         sample(source, SAMPLED_FRAMES),
@@ -71,11 +73,32 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
         unit_aware=not published,
     )
     quantizer = make_quantizer(weights, chosen["T_g"], chosen["Q"])
-    frames = params["segment_frames"]
-    if frames is None:
-        frames = layout.n_frames if published else 0
-    plan = Plan("mrdwt", wavelet_id, wavelet, levels, quantizer, frames)
+    frames = segment_frames_of(layout, params["segment_frames"], as_published=published)
+    plan = Plan("mrdwt", transform, quantizer, frames)
     return _wavelet_codec.encode(source, plan)
+
+
+def recode(
+    header: bytes,
+    source: SignalSource,
+    groups: tuple[int, ...],
+    spans: Sequence[Span],
+    options: Mapping[str, Any],
+    fetch: Fetch,
+) -> Iterator[tuple[bytes, ...]]:
+    """The streams of some channels with new values, with the steps of the header."""
+    layout, preset = source.layout, PRESETS[options["preset"]]
+    assert layout.skeleton is not None
+    weights = weights_of(
+        layout.skeleton,
+        sample(source, SAMPLED_FRAMES),
+        options["threshold_rule"] or preset["threshold_rule"],
+        unit_aware=options["preset"] != "khan2016",
+    )
+    T_g = options["T_g"]
+    if T_g is None and options["preset"] == "khan2016":
+        T_g = preset["T_g"]
+    return _wavelet_recode.recode("mrdwt", weights, T_g, header, source, groups, spans, fetch)
 
 
 CODEC = Codec(
@@ -87,6 +110,7 @@ CODEC = Codec(
     encode=encode,
     decode=partial(_wavelet_codec.decode, "mrdwt"),
     cut=partial(_wavelet_codec.cut, "mrdwt"),
+    recode=recode,
     grouping="channel",
     dial=Dial("T_g", 2.0**-20, 2.0**20),
     parameters=(
@@ -102,25 +126,15 @@ CODEC = Codec(
             "global threshold, degrees for a rotation of average effect; default 0.2",
             number("T_g", 0, 2.0**20),
         ),
-        Parameter(
-            "Q",
-            None,
-            "decimals of coefficients; default: steps follow the thresholds",
-            integer("Q", 0, MAX_DECIMALS),
-        ),
-        Parameter("N", None, "levels; default 4", integer("N", 0, MAX_LEVELS)),
-        Parameter("wavelet", None, "name as in PyWavelets; default bior4.4", str),
+        Q,
+        N,
+        WAVELET,
         Parameter(
             "threshold_rule",
             None,
             f"{', '.join(RULES)}; default sensitivity",
             choice("threshold_rule", RULES),
         ),
-        Parameter(
-            "segment_frames",
-            None,
-            "frames a segment; default: as many as make 64 KiB, at most 4096",
-            integer("segment_frames", 1, 2**40),
-        ),
+        SEGMENT_FRAMES_PARAMETER,
     ),
 )

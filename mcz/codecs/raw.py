@@ -82,6 +82,20 @@ def _build(ordinals: NDArray[np.int64]) -> bytes:
     return b"".join(parts)
 
 
+def recode(
+    header: bytes,
+    source: SignalSource,
+    groups: tuple[int, ...],
+    spans: Sequence[Span],
+    options: Mapping[str, Any],
+    fetch: Fetch,
+) -> Iterator[tuple[bytes, ...]]:
+    """The streams of some groups with new values."""
+    for span in spans:
+        ordinals = source.ordinals(span.first, span.stop)
+        yield tuple(_build(ordinals[:, list(source.layout.groups[group])]) for group in groups)
+
+
 def decode(
     header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
 ) -> NDArray[np.int64]:
@@ -128,6 +142,7 @@ CODEC = Codec(
     lossless=True,
     encode=encode,
     decode=decode,
+    recode=recode,
     delay=0,
     parameters=(
         Parameter(

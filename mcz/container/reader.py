@@ -35,7 +35,7 @@ from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.schema import parse
 
-TABLE_PEEK = 256  # bytes of a segment that are read to find its table
+TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
 
 
 class Container:
@@ -184,7 +184,7 @@ class Container:
     def table(self, row: SegmentRow, counts: StreamCounts) -> StreamTable:
         """The stream table of a segment, with as little read as will do."""
         self._check_row(row)
-        size = min(row.size, TABLE_PEEK)
+        size = min(row.size, TABLE_PEEK + counts.total(row.header.flags) * 7 // 4)
         while True:
             try:
                 table = parse_table(self.source.read(row.offset, size), counts)
@@ -197,16 +197,21 @@ class Container:
         return table
 
     def streams(
-        self, row: SegmentRow, counts: StreamCounts, wanted: Sequence[int] | None
+        self,
+        row: SegmentRow,
+        counts: StreamCounts,
+        wanted: Sequence[int] | None,
+        table: StreamTable | None = None,
     ) -> tuple[StreamTable, dict[int, bytes]]:
         """The streams with the indices ``wanted`` (None: all), read together where they are near.
 
+        ``table`` is that of the segment where it was read before.
         A chunk that is read whole is checked by its crc; otherwise it counts as unverified.
         """
         self._check_row(row)
         if wanted is None or self.source.remote:
             return self._all_streams(row, counts)
-        table = self.table(row, counts)
+        table = table or self.table(row, counts)
         self.unverified += 1
         got: dict[int, bytes] = {}
         for run in _runs(table, sorted(wanted), self.source.gap):

@@ -25,7 +25,7 @@ def to_c3d(motion: Motion) -> Motion:
     unit_cm = skeleton.unit_cm
     if unit_cm is not None:
         points *= unit_cm * MM_PER_CM
-    values = points.reshape(len(points), -1)
+    values = points.reshape(len(points), points.shape[1] * points.shape[2])
     valid = ~np.isnan(values)
     channels = tuple(Channel(kind) for kind in POSITION_KINDS)
     converted = Skeleton(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -230,6 +231,29 @@ class Chain:
 IDENTITY: Floats = np.eye(3)[:, :, None]
 
 
+class _Same:
+    """A skeleton as a key: the very same object, for comparing thousands of joints takes long."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+
+    def __hash__(self) -> int:
+        return id(self.skeleton)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.skeleton is self.skeleton
+
+
+def chain_of(skeleton: Skeleton) -> Chain:
+    """``Chain(skeleton)``, prepared once where it is asked for block after block."""
+    return _chain_of(_Same(skeleton))
+
+
+@lru_cache(maxsize=4)
+def _chain_of(key: _Same) -> Chain:
+    return Chain(key.skeleton)
+
+
 def _components(
     kinds: list[str], names: tuple[str, ...], start: int
 ) -> tuple[tuple[int, int], ...]:
@@ -256,7 +280,7 @@ def turned(axes: Floats, axis: int, angle: Floats) -> Floats:
     """``axes`` R, R the rotation by ``angle`` in radians, (F,), about axis 0, 1 or 2."""
     j, k = (axis + 1) % 3, (axis + 2) % 3
     cosine, sine = np.cos(angle), np.sin(angle)
-    result = np.empty((3, 3, max(axes.shape[2], len(angle))))
+    result = np.empty((3, 3, len(angle) if axes.shape[2] == 1 else axes.shape[2]))
     result[:, axis] = axes[:, axis]
     np.multiply(axes[:, j], cosine, out=result[:, j])
     result[:, j] += axes[:, k] * sine

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics.chain import Chain, Floats, Pose
+from mcz.kinematics.chain import Chain, Floats, Pose, chain_of
 from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton
 
 MARKER_DISTANCE_CM = 3.0  # of a virtual marker from its joint's point
@@ -56,7 +56,7 @@ class _Places:
         self._firsts = dict(reversed(self._list)) if markers else {}  # earlier points replace later
         self.points = np.empty((len(values), len(self._list) if points else 0, 3))
         self.markers = np.empty((len(values), 3 * len(self._firsts), 3))
-        chain = Chain(skeleton)
+        chain = chain_of(skeleton)
         for rows, columns, pose in chain.poses(values):
             self._place(chain, rows, columns, pose)
 

@@ -1,0 +1,141 @@
+"""``mcz replace``: other values for one joint of an .mcz, nothing else coded anew."""
+
+from __future__ import annotations
+
+import csv
+import io
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    existing,
+    print_json,
+    printable,
+    say,
+)
+from mcz.cli.options import force_option, json_option
+from mcz.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from mcz.clip import Clip
+
+
+@click.command(short_help="Other values for one joint of an .mcz.")
+@click.argument("file", metavar="IN.mcz", type=click.Path(readable=False))
+@click.argument("output", metavar="OUT.mcz", type=click.Path(readable=False))
+@click.option("--joint", metavar="J", required=True, help="The joint, by name or index.")
+@click.option(
+    "--values",
+    "table",
+    metavar="FILE",
+    required=True,
+    type=click.Path(readable=False),
+    help="Its new values, a .csv or .npz as decode --to writes them.",
+)
+@click.option("--clip", "name", metavar="NAME", help="Which clip; needed where there are several.")
+@click.option(
+    "--on-grid", is_flag=True, help="Round to what the source prints. Default: every digit is kept."
+)
+@force_option
+@json_option
+def command(
+    file: str,
+    output: str,
+    joint: str,
+    table: str,
+    name: str | None,
+    on_grid: bool,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    """Give one joint of a clip other values; all other streams are copied byte for byte.
+
+    The table has a row for every frame and the columns of the joint, by their names or nothing
+    else. OUT.mcz may be IN.mcz, with --force.
+    """
+    import mcz
+
+    if "-" in (file, output, table):
+        raise Failure("replace reads and writes files, not standard streams", Exit.USAGE)
+    existing(file)
+    existing(table)
+    with about(file, output, table):
+        with mcz.open(file) as held:
+            values = read_values(table, held.only_clip(name), joint)
+        in_place = force and Path(output).exists() and Path(output).samefile(file)
+        target = None if in_place else output
+        with Progress() as progress:
+            found = mcz.replace(
+                file,
+                name,
+                joint,
+                values,
+                target,
+                on_grid=on_grid,
+                force=force,
+                progress=progress,
+            )
+    if as_json:
+        print_json({"output": output, **asdict(found)})
+        return Exit.FINE
+    line = f"{output}: {found.size:,} bytes; {found.joint} of {found.clip}: {found.joint_bytes:,}"
+    click.echo(printable(f"{line} of {found.joint_bytes_before:,} bytes, {found.codec}"))
+    if found.recoded:
+        click.echo(printable(f"  coded anew, as they repeated it: {' '.join(found.recoded)}"))
+    for text in found.left_out:
+        say(f"left out: {text}")
+    return Exit.FINE
+
+
+def read_values(path: str, clip: Clip, joint: str) -> Any:
+    """The columns of the joint in a table, NaN where it says invalid; raises Failure."""
+    from mcz.cli.export import channel_names
+
+    all_names = channel_names(clip.skeleton, clip.signals[0].channels)
+    wanted = [all_names[column] for column in clip.skeleton.columns(clip.skeleton.find(joint))]
+    reading = _read_npz if Path(path).suffix.lower() == ".npz" else _read_csv
+    try:
+        names, values = reading(Path(path))
+    except (ValueError, KeyError, OSError, EOFError, csv.Error, zipfile.BadZipFile) as error:
+        raise Failure(f"{path}: not a table of numbers: {' '.join(str(error).split())}") from None
+    missing = [name for name in wanted if name not in names]
+    if not missing:
+        return values[:, [names.index(name) for name in wanted]]
+    if any(name in names for name in all_names) or values.shape[1] != len(wanted):
+        raise Failure(f"{path}: no column {missing[0]}, and not {len(wanted)} columns alone")
+    return values
+
+
+def _read_npz(path: Path) -> tuple[list[str], Any]:
+    with np.load(path, allow_pickle=False) as held:
+        values = np.asarray(held["values"], np.float64)
+        if values.ndim != 2:
+            raise ValueError(f"values of shape {values.shape}")
+        if "mask" in held:
+            values = np.where(held["mask"], values, np.nan)
+        return [str(name) for name in held["names"]] if "names" in held else [], values
+
+
+def _read_csv(path: Path) -> tuple[list[str], Any]:
+    rows = list(csv.reader(io.StringIO(path.read_text("utf-8-sig"))))
+    names = rows.pop(0) if rows and not _is_number(rows[0][0] if rows[0] else "") else []
+    values = [[float(cell) if cell.strip() else np.nan for cell in row] for row in rows if row]
+    if len({len(row) for row in values}) > 1:
+        raise ValueError("rows of different lengths")
+    return names, np.array(values, np.float64).reshape(len(values), -1)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,177 @@
+"""The stream of one segment of principal components: means, basis, coefficients.
+
+SPEC.md, "Codec 4: pca", is normative; names are its field names.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs._wavelet_streams import choose_predictor, scale_of
+from mcz.coding.start import start_state
+from mcz.errors import FormatError, MotionError
+from mcz.schema import read_varint, varint
+
+Ints = NDArray[np.int64]
+Loop = Callable[[Ints, NDArray[np.uint8]], bool]  # whether all went well
+
+START_TABLE = Path(__file__).with_name("pca_start.json")
+MAX_INDEX = 2**40
+MAX_SHIFT = 40
+MAX_SCALE = 62
+
+# The head of a stream, as SPEC.md's table has it: (name, type, meaning).
+PCA_FIELDS = (
+    ("step", "u8", "quantizer step, only where decimals is 255; see the steps below"),
+    ("mean_scale", "u8", "first scale of means, in half octaves, 0 to 62"),
+    ("count", "varint", "components"),
+    ("shifts", "u8 each", "for every component the binary digits of its basis row, 0 to 40"),
+    ("forms", "u8 each", "for every component bits 0-5: first scale, 0 to 62; 6-7: predictor"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Components:
+    """One segment in integers: means (channels,), basis (count, channels) and its shifts (count,),
+    coefficients (frames, count), and the step code, 0 where there is none.
+    """
+
+    step: int
+    means: Ints
+    shifts: Ints
+    basis: Ints
+    coefficients: Ints
+
+
+@cache
+def _kernels() -> tuple[Any, Any]:
+    from mcz.codecs import _pca_kernels
+    from mcz.coding import kernels
+
+    return _pca_kernels, kernels
+
+
+@cache
+def _start_states() -> tuple[Ints, ...]:
+    return tuple(start_state(table) for table in json.loads(START_TABLE.read_text())["sets"])
+
+
+def build_stream(found: Components, *, scaled: bool) -> bytes:
+    """The stream of a segment; raises MotionError where an integer is too large."""
+    parts = (found.means, found.basis, found.coefficients)
+    if any(len(part) and np.abs(part).max(initial=0) > MAX_INDEX for part in parts):
+        raise MotionError("pca: a coefficient exceeds 2^40 quantizer steps")
+    if not found.means.any() and not len(found.basis):
+        return b""
+    mean_scale = halves_of(found.means)
+    several = len(found.coefficients) > 1  # a first coefficient is not predicted
+    forms = [choose_predictor(column) if several else (0, 0) for column in found.coefficients.T]
+    head = bytes((found.step,)) if scaled else b""
+    sides = bytes(found.shifts.tolist())
+    sides += bytes(min(halves, MAX_SCALE) | predictor << 6 for predictor, halves in forms)
+    head += bytes((mean_scale,)) + varint(len(found.basis)) + sides
+    count = found.means.size + found.basis.size + found.coefficients.size
+    copies = found.means.copy(), found.basis.copy(), found.coefficients.copy()
+    return head + _code(count, lambda s, d: _loop(s, d, *copies, sides, mean_scale))
+
+
+def parse_stream(
+    stream: bytes, n_channels: int, n_frames: int, wanted: int, *, scaled: bool
+) -> Components:
+    """The first ``wanted`` of ``n_frames`` frames; raises FormatError on bad bytes."""
+    means = np.zeros(n_channels, np.int64)
+    if not stream:
+        nothing = np.zeros(0, np.int64)
+        return Components(0, means, nothing, nothing.reshape(0, n_channels), nothing.reshape(0, 0))
+    at = 1 if scaled else 0
+    step, mean_scale = _byte(stream, 0) if scaled else 0, _byte(stream, at)
+    count, at = read_varint(stream, at + 1)
+    if count > min(n_channels, n_frames + 1):
+        raise FormatError(f"pca: {count} components of {n_channels} channels, {n_frames} frames")
+    sides = stream[at : at + 2 * count]
+    if len(sides) < 2 * count:
+        raise FormatError(f"pca: a stream of {len(stream)} bytes ends in its head")
+    if max(sides[:count], default=0) > MAX_SHIFT or mean_scale > MAX_SCALE:
+        raise FormatError(f"pca: a scale of {mean_scale} or a shift is out of range")
+    if any(form & 63 > MAX_SCALE for form in sides[count:]):
+        raise FormatError("pca: the form of a component has the scale 63")
+    basis = np.zeros((count, n_channels), np.int64)
+    rows = np.zeros((wanted, count), np.int64)
+    _uncode(
+        stream[at + 2 * count :],
+        lambda state, data: _loop(state, data, means, basis, rows, sides, mean_scale),
+        whole=wanted == n_frames,
+    )
+    shifts = np.frombuffer(sides[:count], "u1").astype(np.int64)
+    return Components(step, means, shifts, basis, rows)
+
+
+def _loop(
+    state: Ints,
+    data: NDArray[np.uint8],
+    means: Ints,
+    basis: Ints,
+    rows: Ints,
+    sides: bytes,
+    mean_scale: int,
+) -> bool:
+    """Code all of a segment; ``sides`` are its shifts and forms."""
+    loops, _ = _kernels()
+    count, n_channels = basis.shape
+    scales = np.array([scale_of(mean_scale)])
+    if loops.code_table(state, data, means[None], scales, 0):
+        return False
+    scales = np.array([(1 << b) >> (n_channels.bit_length() // 2) for b in sides[:count]], np.int64)
+    if loops.code_table(state, data, basis, scales, 1):
+        return False
+    forms = sides[count:]
+    predictors = np.array([form >> 6 for form in forms], np.int64)
+    scales = np.array([scale_of(form & 63) for form in forms], np.int64)
+    return bool(loops.code_coefficients(state, data, rows, predictors, scales) < 0)
+
+
+def halves_of(values: Ints) -> int:
+    """The byte of a scale of about the mean absolute value."""
+    typical = float(np.abs(values).mean()) if values.size else 0.0
+    return next((h for h in range(MAX_SCALE) if scale_of(h) >= typical), MAX_SCALE)
+
+
+def _byte(stream: bytes, at: int) -> int:
+    if at >= len(stream):
+        raise FormatError(f"pca: a stream of {len(stream)} bytes ends in its head")
+    return stream[at]
+
+
+def _code(count: int, loop: Loop) -> bytes:
+    """The bits that ``loop`` writes."""
+    _, coder = _kernels()
+    size = 4 * count + 256
+    while True:
+        data = np.zeros(size, np.uint8)
+        state = _start_states()[0].copy()
+        coder.start(state, data, 1)
+        if not loop(state, data):
+            raise AssertionError("pca: a coefficient has no code")
+        used = coder.finish(state, data)
+        if used <= size:
+            return data[:used].tobytes()
+        size = used + 256
+
+
+def _uncode(stream: bytes, loop: Loop, *, whole: bool) -> None:
+    _, coder = _kernels()
+    data = np.frombuffer(stream, np.uint8).copy()  # compiled once: for writable bytes
+    state = _start_states()[0].copy()
+    coder.start(state, data, 0)
+    if not loop(state, data):
+        raise FormatError("pca: a mean, a basis or a coefficient is out of range")
+    if whole and coder.coded_size(state) != len(data):
+        raise FormatError(f"pca: a stream of {len(data)} bytes takes another number")

@@ -1,0 +1,155 @@
+"""Codec 6, ``awt``: a wavelet transform in time, coefficients shared out among the channels.
+
+SPEC.md, "Codec 6: awt", is normative; ``_wavelet_codec.py`` has what a decoder needs, this file
+what an encoder chooses.
+Source: P. Beaudoin, P. Poulin, M. van de Panne, Adapting wavelet compression to human motion
+capture clips, 2007, as M. A. Khan, An efficient algorithm for compression of motion capture signal
+using multidimensional quadratic Bezier curve break-and-fit method, 2014, section 5, describes it;
+the preset ``khan2014`` is the method of the latter, the defaults improve upon it.
+
+Exactness: lossy; decoding is bit-exact, as that of codec 2. A stream holds one channel at one
+resolution of one segment. An encoder needs the whole clip in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import _wavelet_codec, _wavelet_recode
+from mcz.codecs._awt_choice import choose, coefficients_of, quantizer_of
+from mcz.codecs._wavelet_codec import (
+    SEGMENT_FRAMES_PARAMETER,
+    WAVELET,
+    N,
+    Plan,
+    Q,
+    chosen_of,
+    segment_frames_of,
+    transform_of,
+)
+from mcz.codecs._wavelet_frames import sample
+from mcz.codecs._wavelet_quantizer import SAMPLED_FRAMES, weights_of
+from mcz.codecs.base import (
+    Codec,
+    Dial,
+    Encoded,
+    Fetch,
+    Parameter,
+    SignalSource,
+    Span,
+    choice,
+    integer,
+    number,
+)
+from mcz.errors import MotionError
+
+Floats = NDArray[np.float64]
+
+FRAMES_A_COEFFICIENT = 8  # where a_w is not given
+DISTORTIONS = ("positions", "channels")
+PRESETS: dict[str, dict[str, Any]] = {
+    # As published: any coefficient may be dropped, the whole clip at once, and the levels that
+    # were asked for however short it is.
+    "khan2014": {"a_w": 40.0, "Q": 2, "N": 4, "wavelet": "db2", "distortion": "channels"},
+    "default": {"a_w": None, "Q": None, "N": 4, "wavelet": "bior4.4", "distortion": "positions"},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
+    """
+    layout, published = source.layout, params["preset"] == "khan2014"
+    if layout.samples_per_frame != 1 or layout.skeleton is None:
+        raise MotionError("awt: only signals of one sample a frame")
+    chosen = chosen_of(PRESETS, params)
+    average = chosen["a_w"]
+    if average is None:
+        average = -(-layout.n_frames // FRAMES_A_COEFFICIENT)
+    transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
+    weights = _weights(source, chosen["distortion"])
+    found = choose(
+        coefficients_of("awt", source, transform),
+        weights,
+        average,
+        whole_approximation=not published,
+        iterations=params["iterations"],
+        seed=params["seed"],
+    )
+    quantizer = quantizer_of(found, weights, chosen["Q"])
+    frames = segment_frames_of(layout, params["segment_frames"], as_published=published)
+    return _wavelet_codec.encode(source, Plan("awt", transform, quantizer, frames, found.kept))
+
+
+def _weights(source: SignalSource, distortion: str) -> Floats:
+    """The threshold of each channel that goes with one of 1, (n_channels,)."""
+    layout = source.layout
+    if distortion == "channels" or layout.skeleton is None:
+        return np.ones(layout.n_channels)
+    frames = sample(source, SAMPLED_FRAMES)
+    return weights_of(layout.skeleton, frames, "sensitivity", unit_aware=True)
+
+
+def recode(
+    header: bytes,
+    source: SignalSource,
+    groups: tuple[int, ...],
+    spans: Sequence[Span],
+    options: Mapping[str, Any],
+    fetch: Fetch,
+) -> Iterator[tuple[bytes, ...]]:
+    """The streams of some channels with new values, with the steps of the header."""
+    weights = _weights(source, chosen_of(PRESETS, options)["distortion"])
+    return _wavelet_recode.recode("awt", weights, None, header, source, groups, spans, fetch)
+
+
+CODEC = Codec(
+    id=6,
+    name="awt",
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=partial(_wavelet_codec.decode, "awt"),
+    cut=partial(_wavelet_codec.cut, "awt"),
+    recode=recode,
+    grouping="channel",
+    dial=Dial("a_w", 2.0**-20, 2.0**40, rises=True),
+    parameters=(
+        Parameter(
+            "preset",
+            "default",
+            "default, or khan2014 for the published method",
+            choice("preset", tuple(PRESETS)),
+        ),
+        Parameter(
+            "a_w",
+            None,
+            "coefficients a channel, on average; default: one for 8 frames",
+            number("a_w", 0, 2.0**40),
+        ),
+        Parameter(
+            "distortion",
+            None,
+            "what is lowered: positions (default), or the squared error of channels",
+            choice("distortion", DISTORTIONS),
+        ),
+        Parameter(
+            "iterations",
+            None,
+            "moves of the annealing; default 4000 a channel",
+            integer("iterations", 0, 2**40),
+        ),
+        Parameter("seed", 0, "of the annealing", integer("seed", 0, 2**31 - 1)),
+        Q,
+        N,
+        WAVELET,
+        SEGMENT_FRAMES_PARAMETER,
+    ),
+)

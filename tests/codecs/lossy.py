@@ -1,0 +1,136 @@
+"""Clips, and a codec without a container, for the tests of lossy codecs."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import mcz
+from mcz.codecs import by_name
+from mcz.codecs.base import Encoded, Layout, Request, Segment, Span
+from mcz.memory import MemorySource
+from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.sizes import clip_sizes
+
+Array = np.ndarray
+
+
+def bones(kinds: list[str], angle_unit: str = "deg") -> Skeleton:
+    """A chain of joints of one channel each."""
+    joints = tuple(
+        Joint(f"j{i}", i - 1, (0.0, 2.0, 0.5) if i else (0.0, 0.0, 0.0), channels=(Channel(kind),))
+        for i, kind in enumerate(kinds)
+    )
+    return Skeleton(joints, unit_cm=2.0, angle_unit=angle_unit)
+
+
+def clip_of(values: Array, kinds: list[str] | None = None, angle_unit: str = "deg") -> Motion:
+    values = np.asarray(values, np.float64)
+    skeleton = bones(kinds or ["rx"] * values.shape[1], angle_unit)
+    return Motion(skeleton, (Signal(values),), frame_rate=Fraction(60), name="clip")
+
+
+def wandering(n_frames: int, kinds: list[str], seed: int = 0) -> Motion:
+    """Random walks, the rotations wrapped to -180 to 180 as files have them."""
+    random = np.random.default_rng(seed)
+    steps = random.normal(0, 4, (n_frames, len(kinds)))
+    values = np.cumsum(steps, axis=0) + random.normal(0, 100, len(kinds))
+    turns = np.array([kind[0] == "r" for kind in kinds])
+    return clip_of(np.where(turns, (values + 180) % 360 - 180, values), kinds)
+
+
+def gapped(n_frames: int = 100) -> Motion:
+    """Two markers of which the second is away at both ends and twice between."""
+    joints = tuple(
+        Joint(name, channels=tuple(map(Channel, POSITION_KINDS))) for name in ("LASI", "RASI")
+    )
+    values = 100 + np.cumsum(np.random.default_rng(1).normal(0, 2, (n_frames, 6)), axis=0)
+    mask = np.ones(values.shape, bool)
+    for start, stop in ((0, 5), (30, 31), (44, 61), (97, n_frames)):
+        mask[start:stop, 3:] = False
+    values = np.where(mask, values, np.nan)
+    values[50, 4] = 1e300  # what lies beneath a mask is not coded
+    return Motion(Skeleton(joints, unit_cm=0.1), (Signal(values, mask=mask),), name="markers")
+
+
+def saved(codec: str, motion: Motion, **params: object) -> bytes:
+    out = io.BytesIO()
+    mcz.write(motion, out, codec=codec, **params)
+    return out.getvalue()
+
+
+def decoded(codec: str, motion: Motion, **params: object) -> Array:
+    with mcz.open(saved(codec, motion, **params), max_decoded=2**40) as file:
+        return file.only_clip().read()
+
+
+def bytes_of(data: bytes) -> int:
+    """Payload and overhead."""
+    with mcz.open(data) as file:
+        sizes = clip_sizes(file.container, file.only_clip())
+    return sizes.payload + sizes.overhead
+
+
+def amc(data: Path, name: str) -> Motion:
+    subject = name.split("_", maxsplit=1)[0]
+    return mcz.read(data / f"cmu/amc/{name}.amc", skeleton=data / f"cmu/asf/{subject}.asf")
+
+
+class Direct:
+    """A clip coded and decoded by the codec alone."""
+
+    def __init__(self, codec: str, motion: Motion, **params: object) -> None:
+        self.codec = by_name(codec)
+        source = MemorySource(motion, 0, self.codec, 2**26)
+        coded: Encoded = self.codec.encode(source, self.codec.options(params))
+        self.header = coded.header
+        self.segments: list[Segment] = list(coded.segments)
+        self.layout: Layout = replace(source.layout, n_resolutions=coded.n_resolutions)
+        self.spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in self.segments]
+
+    @property
+    def n_bytes(self) -> int:
+        return sum(len(stream) for segment in self.segments for stream in segment.streams)
+
+    def stream(self, segment: int, resolution: int, group: int) -> bytes:
+        return self.segments[segment].streams[resolution * len(self.layout.groups) + group]
+
+    def places(self) -> list[tuple[int, int, int]]:
+        """(segment, resolution, group) of every stream."""
+        counts = len(self.segments), self.layout.n_resolutions, len(self.layout.groups)
+        return [tuple(map(int, place)) for place in np.ndindex(counts)]  # type: ignore[misc]
+
+    def read(
+        self,
+        start: int = 0,
+        stop: int | None = None,
+        groups: tuple[int, ...] | None = None,
+        resolution: int = 0,
+        changes: Mapping[str, Any] | None = None,
+    ) -> Array:
+        if groups is None:
+            groups = tuple(range(len(self.layout.groups)))
+        request = Request(start, self.layout.n_frames if stop is None else stop, groups, resolution)
+        given = {
+            "header": self.header,
+            "layout": self.layout,
+            "spans": self.spans,
+            "fetch": self.stream,
+        } | dict(changes or {})
+        found = self.codec.decode(
+            given["header"], given["layout"], given["spans"], request, given["fetch"]
+        )
+        n_columns = sum(len(self.layout.groups[group]) for group in groups)
+        assert found.shape == (request.stop - request.start, n_columns)
+        assert np.isfinite(found).all()
+        return found
+
+    def with_stream(self, place: tuple[int, int, int], data: bytes) -> dict[str, Any]:
+        """The change of one stream."""
+        return {"fetch": lambda *at: data if at == place else self.stream(*at)}

@@ -1,0 +1,235 @@
+"""Codec 6, ``awt``: the allocation that annealing finds, and the published figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.angles import unwrap
+from mcz.codecs import _awt_choice as choice
+from mcz.codecs._wavelet_codec import WAVELET_HEADER, transform_of
+from mcz.codecs.awt import CODEC
+from mcz.codecs.base import SignalSource
+from mcz.memory import MemorySource
+from mcz.metrics import compare
+from mcz.motion import Motion
+from mcz.schema import parse
+from mcz.transforms import wavelets
+from tests import plain_wavelets
+from tests.codecs.lossy import Direct, amc, bytes_of, saved, wandering
+from tests.motions import smooth
+
+KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx"]), min_size=1, max_size=5)
+NEAR = 1.001  # of the least distortion there is: where annealing ends
+
+
+def source_of(motion: Motion) -> SignalSource:
+    return MemorySource(motion, 0, CODEC, 2**26)
+
+
+def chosen(motion: Motion, average: float, **changes: Any) -> tuple[choice.Choice, list]:
+    source = source_of(motion)
+    bands = choice.coefficients_of("awt", source, transform_of(source.layout, "db2", 3))
+    given_ = {"whole_approximation": False, "iterations": None, "seed": 0} | changes
+    weights = given_.pop("weights", np.ones(source.layout.n_channels))
+    return choice.choose(bands, weights, average, **given_), bands
+
+
+def least_distortion(bands: list, kept: int) -> float:
+    """That of the global largest coefficients, relative as ``Choice`` has it."""
+    sizes = np.abs(np.concatenate(bands))
+    energies = np.sort((sizes / (sizes.max() or 1.0)).ravel() ** 2)
+    return float(energies[: max(0, sizes.size - kept)].sum())
+
+
+# The allocation
+
+
+@given(st.integers(1, 150), KINDS, st.floats(0.5, 200), st.booleans(), st.integers(0, 2**31 - 1))
+def test_annealing_ends_near_the_optimum(n_frames, kinds, average, whole, seed) -> None:
+    motion = wandering(n_frames, kinds)
+    found, bands = chosen(motion, average, whole_approximation=whole, seed=seed)
+    assert found.after <= found.before + 1e-12
+    assert found.after <= NEAR * least_distortion(bands, int(found.counts.sum())) + 1e-9
+    n_each = sum(map(len, bands))
+    assert abs(int(found.counts.sum()) - min(average, n_each) * len(kinds)) <= 1
+    kept, sizes = np.concatenate(found.kept), np.abs(np.concatenate(bands))
+    free = slice(len(bands[0]) if whole else 0, None)
+    assert kept[: free.start].all()
+    if not whole:
+        np.testing.assert_array_equal(kept.sum(axis=0), found.counts)
+    for column in range(len(kinds)):  # the largest are kept
+        mask, own = kept[free, column], sizes[free, column]
+        assert own[mask].min(initial=np.inf) >= own[~mask].max(initial=0.0)
+
+
+def test_annealing_is_deterministic_and_needs_its_seed() -> None:
+    motion = wandering(400, ["tx", "rx", "ry", "rz"] * 8)
+    first, _ = chosen(motion, 30, seed=7, iterations=3000)
+    again, _ = chosen(motion, 30, seed=7, iterations=3000)
+    other, _ = chosen(motion, 30, seed=8, iterations=3000)
+    np.testing.assert_array_equal(first.counts, again.counts)
+    assert (first.counts != other.counts).any()
+    assert saved("awt", motion, seed=3) == saved("awt", motion, seed=3)
+
+
+def test_without_iterations_channels_keep_as_many() -> None:
+    motion = wandering(300, ["tx", "rx", "ry", "rz"])
+    found, _ = chosen(motion, 30, iterations=0)
+    assert found.counts.tolist() == [30] * 4 and found.after == found.before
+    found, _ = chosen(motion, 30.5, iterations=0)
+    assert sorted(found.counts.tolist()) == [30, 30, 31, 31]
+
+
+def test_weights_move_coefficients() -> None:
+    motion = wandering(300, ["rx", "ry"])
+    light, _ = chosen(motion, 80, weights=np.array([4.0, 1.0]))
+    heavy, _ = chosen(motion, 80, weights=np.array([0.25, 1.0]))
+    assert heavy.counts[0] > light.counts[0]
+    assert heavy.counts.sum() == light.counts.sum() == 160
+
+
+@pytest.mark.parametrize(
+    ("most", "average", "counts"),
+    [
+        ([9, 9], 3, [3, 3]),
+        ([1, 9], 3, [1, 5]),
+        ([0, 9], 3, [0, 6]),
+        ([2, 2], 1e300, [2, 2]),
+        ([9, 9, 9], 1.34, [2, 1, 1]),
+        ([9, 9], 0, [0, 0]),
+        ([], 5, []),
+    ],
+)
+def test_equal_counts(most, average, counts) -> None:
+    assert choice.equal_counts(np.array(most, np.int64), average).tolist() == counts
+
+
+# What is coded
+
+
+@given(st.integers(1, 150), KINDS, st.floats(0.5, 200), st.sampled_from([0, 2, None]))
+def test_what_is_dropped_is_zero(n_frames, kinds, average, decimals) -> None:
+    """Decoded values are the synthesis of the coefficients that are kept, to a step."""
+    motion = wandering(n_frames, kinds)
+    settings = {} if decimals is None else {"Q": decimals}
+    coded = Direct("awt", motion, a_w=average, **settings)
+    meant = unwrap(motion.values, motion.skeleton)
+    assert np.abs(coded.read() - meant).max() <= 40 * (np.abs(meant).max() + 1)
+    fields = parse(WAVELET_HEADER, coded.header, "header")
+    assert fields.least >= 1 and (fields.decimals == 255) == (decimals is None)
+
+
+@pytest.mark.parametrize(
+    "settings", [{"preset": "khan2014"}, {"distortion": "channels"}, {"N": 2, "Q": 3}]
+)
+def test_more_coefficients_lower_the_error(settings) -> None:
+    motion = wandering(500, ["rx", "ry", "rz", "ry"])
+    meant = unwrap(motion.values, motion.skeleton)
+    errors, sizes = [], []
+    for a_w in (0, 20, 40, 80, 160, 320, 10**9):
+        coded = Direct("awt", motion, a_w=a_w, **settings)
+        errors.append(float(np.mean((coded.read() - meant) ** 2)))
+        sizes.append(coded.n_bytes)
+    if settings.get("distortion") or "preset" in settings:
+        assert errors == sorted(errors, reverse=True)
+    assert sizes == sorted(sizes) and errors[-1] < 1e-3
+
+
+def test_positions_are_better_for_it() -> None:
+    motion = smooth(400)
+    errors = []
+    for distortion in ("positions", "channels"):
+        with mcz.open(saved("awt", motion, a_w=40, distortion=distortion)) as file:
+            quality = file.only_clip().quality
+        errors.append(float(quality["mean_position_error_cm"]))
+    assert errors[0] < errors[1]
+
+
+def test_presets() -> None:
+    published = Direct("awt", smooth(100), preset="khan2014", a_w=20)
+    fields = parse(WAVELET_HEADER, published.header, "header")
+    assert (fields.wavelet, fields.levels, fields.decimals) == (wavelets.IDS["db2"], 4, 2)
+    assert len(published.segments) == 1
+    default = parse(WAVELET_HEADER, Direct("awt", smooth(400)).header, "header")
+    assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)
+
+
+def test_segments_do_not_matter() -> None:
+    """What is kept is chosen of the whole clip."""
+    motion = wandering(500, ["tx", "rx", "ry"])
+    one = Direct("awt", motion, a_w=50, segment_frames=500)
+    many = Direct("awt", motion, a_w=50, segment_frames=64)
+    assert len(many.segments) == 8 and many.read().tobytes() == one.read().tobytes()
+
+
+def test_long_clips_are_analyzed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = source_of(wandering(700, ["tx", "rx"]))
+    transform = transform_of(source.layout, "db3", 4)
+    whole = choice.coefficients_of("awt", source, transform)
+    monkeypatch.setattr(choice, "BLOCK_FRAMES", 100)
+    for a, b in zip(whole, choice.coefficients_of("awt", source, transform), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_plain_decoder_of_codec_2_reads_it() -> None:
+    for settings in ({"preset": "khan2014", "a_w": 10}, {"segment_frames": 16}):
+        coded = Direct("awt", smooth(50), **settings)
+        rows = plain_wavelets.decode(
+            coded.header,
+            coded.layout.n_channels,
+            coded.layout.n_frames,
+            coded.layout.n_resolutions,
+            [(s.first, s.n_frames, s.streams) for s in coded.segments],
+            0,
+            50,
+        )
+        assert np.array(rows, "<f8").tobytes() == coded.read().astype("<f8").tobytes()
+
+
+# The published figures
+
+
+SIZES = {"10_03": 288_143, "05_01": 479_866}  # of the .amc with its line ends
+TABLE_4 = {"10_03": (53, 0.259, 18.46), "05_01": (41, 1.046, 41.71)}  # a_w, MSE, CR
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", TABLE_4)
+def test_table_4_of_khan2014(data: Path, name: str) -> None:
+    """With as many coefficients, a smaller error and at least 2.3 times the ratio."""
+    a_w, mse, ratio = TABLE_4[name]
+    motion = amc(data, name)
+    stored = saved("awt", motion, preset="khan2014", a_w=a_w)
+    with mcz.open(stored) as file:
+        found = compare(motion, file.only_clip().motion(), virtual_markers=False).mse
+    assert found < 0.5 * mse
+    assert SIZES[name] / bytes_of(stored) >= 2.3 * ratio
+    stored = saved("awt", motion, preset="khan2014", a_w=a_w, iterations=0)
+    with mcz.open(stored) as file:
+        found = compare(motion, file.only_clip().motion(), virtual_markers=False).mse
+    assert found == pytest.approx(mse, rel=0.05)
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", TABLE_4)
+def test_annealing_of_real_clips_ends_near_the_optimum(data: Path, name: str) -> None:
+    found, bands = chosen(amc(data, name), TABLE_4[name][0])
+    optimum = least_distortion(bands, int(found.counts.sum()))
+    assert found.after <= NEAR * optimum < found.before
+
+
+@pytest.mark.real
+def test_positions_of_a_real_clip_are_better_for_it(data: Path) -> None:
+    errors = []
+    for distortion in ("positions", "channels"):
+        stored = saved("awt", amc(data, "05_01"), a_w=60, distortion=distortion)
+        with mcz.open(stored) as file:
+            errors.append(float(file.only_clip().quality["mean_position_error_cm"]))
+    assert errors[0] < 0.5 * errors[1]

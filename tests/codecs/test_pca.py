@@ -1,0 +1,236 @@
+"""Codec 4, ``pca``: components, bounds, steps, and the published figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.angles import unwrap
+from mcz.codecs import _pca_streams as streams
+from mcz.codecs._pca_fit import components_of, principal
+from mcz.codecs._pca_streams import Components
+from mcz.codecs.base import Layout, Request, Span
+from mcz.codecs.pca import CODEC
+from mcz.metrics import compare
+from tests.codecs.lossy import Direct, amc, bytes_of, clip_of, decoded, saved, wandering
+from tests.motions import smooth
+
+KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx"]), min_size=1, max_size=8)
+
+
+# Bounds
+
+
+@given(
+    st.integers(1, 150),
+    KINDS,
+    st.integers(0, 6),
+    st.sampled_from(["default", "khan2014"]),
+    st.one_of(st.none(), st.integers(1, 60)),
+)
+def test_all_components_lose_only_rounding(
+    n_frames, kinds, decimals, preset, segment_frames
+) -> None:
+    """Half a step for each component, the mean, and the basis that is rounded."""
+    motion = wandering(n_frames, kinds)
+    extra = {} if segment_frames is None else {"segment_frames": segment_frames}
+    found = decoded("pca", motion, preset=preset, q=len(kinds), Q=decimals, **extra)
+    meant = unwrap(motion.values, motion.skeleton)
+    most = (len(kinds) + 1) * 1.1 * 10.0**-decimals + 1e-9 * (1 + np.abs(meant).max())
+    assert np.abs(found - meant).max() <= most
+
+
+@given(st.integers(2, 150), KINDS, st.integers(1, 8))
+def test_the_error_is_near_that_of_the_components_left_out(n_frames, kinds, q) -> None:
+    motion = wandering(n_frames, kinds)
+    meant = unwrap(motion.values, motion.skeleton)
+    rest = meant - meant.mean(axis=0)
+    lost = float((np.linalg.svd(rest, compute_uv=False)[q:] ** 2).sum()) / rest.size
+    found = float(np.mean((decoded("pca", motion, q=q, Q=5) - meant) ** 2))
+    assert found <= lost * 1.001 + 1e-8
+    coarse = float(np.mean((decoded("pca", motion, q=q) - meant) ** 2))
+    assert coarse <= 12 * lost + 1e-4 * (1 + float(np.mean(meant**2)))
+
+
+def test_more_components_lower_the_error() -> None:
+    motion = wandering(300, ["rx", "ry", "tx"] * 6)
+    meant = unwrap(motion.values, motion.skeleton)
+    for settings in ({}, {"preset": "khan2014"}):
+        found = [
+            float(np.mean((decoded("pca", motion, q=q, **settings) - meant) ** 2))
+            for q in (1, 2, 4, 8, 12, 18, 99)
+        ]
+        assert found == sorted(found, reverse=True) and found[-1] < 1e-3
+
+
+def test_principal_components_are_those_of_the_covariance() -> None:
+    rest = np.random.default_rng(0).normal(size=(200, 6)) * np.array([9, 5, 3, 2, 1, 0])
+    rest -= rest.mean(axis=0)
+    vectors, energies = principal(rest)
+    assert vectors.shape == (5, 6)  # one has no energy
+    np.testing.assert_allclose(vectors @ vectors.T, np.eye(5), atol=1e-12)
+    meant = np.linalg.eigvalsh(rest.T @ rest)[::-1]
+    np.testing.assert_allclose(energies, meant[:5], rtol=1e-9)
+    assert (np.take_along_axis(vectors, np.abs(vectors).argmax(1)[:, None], 1) > 0).all()
+    wide, _ = principal(rest.T)
+    assert wide.shape == (5, 200)
+
+
+def test_what_is_coded_of_a_line() -> None:
+    """Two channels that move alike are one component."""
+    line = np.outer(np.arange(40.0), [3.0, 4.0]) + np.array([7.0, -2.0])
+    found = components_of(line, 2, 3, by_frame=False)
+    assert found.basis.shape == (1, 2)
+    np.testing.assert_allclose(found.basis[0] * 2.0 ** -found.shifts[0], [0.6, 0.8], atol=1e-4)
+    np.testing.assert_array_equal(found.means, np.rint(line.mean(axis=0) * 1000))
+    assert components_of(line[:1], 2, 3, by_frame=False).basis.shape == (0, 2)
+
+
+def test_a_mean_of_each_frame_is_a_component_of_ones() -> None:
+    line = np.outer(np.arange(40.0), [3.0, 4.0, 8.0]) + np.array([7.0, -2.0, 1.0])
+    found = components_of(line, 1, 2, by_frame=True)
+    assert not found.means.any() and found.basis[0].tolist() == [1, 1, 1]
+    np.testing.assert_allclose(found.coefficients[:, 0], line.mean(axis=1) * 100, atol=1)
+
+
+# Streams
+
+
+def test_any_integers_survive() -> None:
+    random = np.random.default_rng(0)
+    for n_frames, n_channels, count in ((1, 1, 1), (1, 3, 2), (9, 3, 3), (40, 8, 5), (3, 9, 4)):
+        parts = []
+        for shape in ((n_channels,), (count, n_channels), (n_frames, count)):
+            powers = random.integers(0, 41, shape)
+            parts.append(np.rint(random.uniform(-1, 1, shape) * 2.0**powers).astype(np.int64))
+        shifts = random.integers(0, 41, count)
+        given_ = Components(200, parts[0], shifts, parts[1], parts[2])
+        data = streams.build_stream(given_, scaled=True)
+        for wanted in {0, 1, n_frames // 2, n_frames}:
+            found = streams.parse_stream(data, n_channels, n_frames, wanted, scaled=True)
+            assert found.step == 200
+            np.testing.assert_array_equal(found.means, parts[0])
+            np.testing.assert_array_equal(found.basis, parts[1])
+            np.testing.assert_array_equal(found.shifts, shifts)
+            np.testing.assert_array_equal(found.coefficients, parts[2][:wanted])
+
+
+def test_integers_beyond_the_limit_are_refused() -> None:
+    most = np.array([2**40], np.int64)
+    one, none = np.array([[1]], np.int64), np.zeros(1, np.int64)
+    for place in range(3):
+        parts = [none + 1, one, one]
+        parts[place] = np.broadcast_to(most, parts[place].shape)
+        fits = Components(0, parts[0], none, parts[1], parts[2])
+        data = streams.build_stream(fits, scaled=False)
+        found = streams.parse_stream(data, 1, 1, 1, scaled=False)
+        np.testing.assert_array_equal(found.coefficients, parts[2])
+        parts[place] = parts[place] + 1
+        with pytest.raises(mcz.MotionError, match="exceeds"):
+            streams.build_stream(Components(0, parts[0], none, parts[1], parts[2]), scaled=False)
+
+
+@pytest.mark.parametrize(
+    ("head", "words"),
+    [
+        (b"\x80", "ends in its head"),
+        (b"\x80\x00\x04", "4 components of 3 channels"),
+        (b"\x80\x00\x01\x00", "ends in its head"),
+        (b"\x80\x3f\x01\x00\x00", "scale of 63"),
+        (b"\x80\x00\x01\x29\x00", "out of range"),
+        (b"\x80\x00\x01\x00\x3f", "scale 63"),
+        (b"\x80\x00\x01\x00\xff", "scale 63"),
+    ],
+)
+def test_bad_heads(head: bytes, words: str) -> None:
+    with pytest.raises(mcz.FormatError, match=words):
+        streams.parse_stream(head, 3, 9, 9, scaled=True)
+
+
+def test_components_are_no_more_than_frames_and_one() -> None:
+    with pytest.raises(mcz.FormatError, match="3 components of 5 channels, 1 frames"):
+        streams.parse_stream(b"\x80\x00\x03" + bytes(6), 5, 1, 1, scaled=True)
+
+
+def test_the_greatest_values_are_finite() -> None:
+    """The greatest step, mean, basis and coefficient that bits can spell."""
+    most = np.full((1, 1), 2**40, np.int64)
+    data = streams.build_stream(
+        Components(255, most[0], np.zeros(1, np.int64), most, most), scaled=True
+    )
+    found = CODEC.decode(
+        b"\xff", Layout(1, ((0,),)), [Span(0, 1)], Request(0, 1, (0,)), lambda *_: data
+    )
+    assert np.isfinite(found).all() and found[0, 0] > 1e30
+
+
+@pytest.mark.parametrize(
+    "span", [Span(0, 20, 1), Span(0, 20, 0, 1), Span(0, 20, 0, 0, fresh=False)]
+)
+def test_segments_that_bear_upon_others_are_refused(span: Span) -> None:
+    coded = Direct("pca", smooth(20))
+    with pytest.raises(mcz.FormatError, match="bears upon"):
+        coded.read(changes={"spans": [span]})
+
+
+@pytest.mark.parametrize("header", [b"", b"\x10", b"\xfe", b"\x02\x00"])
+def test_bad_headers(header: bytes) -> None:
+    with pytest.raises(mcz.FormatError):
+        Direct("pca", smooth(20)).read(changes={"header": header})
+
+
+def test_a_segment_is_read_up_to_what_is_wanted() -> None:
+    """Frames behind it may be damaged."""
+    coded = Direct("pca", smooth(400), Q=5, q=9)
+    data = coded.stream(0, 0, 0)
+    cut = {"fetch": lambda *_: data[: len(data) * 3 // 4]}
+    assert coded.read(0, 90, changes=cut).tobytes() == coded.read(0, 90).tobytes()
+
+
+def test_long_clips_are_cut_by_size() -> None:
+    random = np.random.default_rng(3)
+    motion = clip_of(np.cumsum(random.normal(0, 50, (6000, 30)), axis=0), ["tx"] * 30)
+    coded = Direct("pca", motion, q=30, Q=1)
+    assert len(coded.segments) > 2
+    assert all(len(segment.streams[0]) < 2**16 for segment in coded.segments)
+    assert len(Direct("pca", motion, preset="khan2014", q=3).segments) == 1
+    np.testing.assert_allclose(coded.read(), motion.values, atol=2)
+
+
+def test_presets() -> None:
+    assert Direct("pca", smooth(100), preset="khan2014").header == b"\x02"
+    assert Direct("pca", smooth(100)).header == b"\xff"
+    assert Direct("pca", smooth(100), Q=3).header == b"\x03"
+
+
+# The published figures
+
+
+SIZES = {"10_03": 288_143, "05_01": 479_866}  # of the .amc with its line ends
+TABLE_4 = {"10_03": (22, 0.258, 7.919), "05_01": (13, 1.042, 14.37)}  # q, MSE, CR
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", TABLE_4)
+def test_table_4_of_khan2014(data: Path, name: str) -> None:
+    """The published error, at least 1.5 times the published ratio."""
+    q, mse, ratio = TABLE_4[name]
+    motion = amc(data, name)
+    stored = saved("pca", motion, preset="khan2014", q=q)
+    with mcz.open(stored) as file:
+        found = compare(motion, file.only_clip().motion(), virtual_markers=False).mse
+    assert found == pytest.approx(mse, abs=0.001)
+    assert SIZES[name] / bytes_of(stored) >= 3 * ratio
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", TABLE_4)
+def test_all_components_of_a_real_clip(data: Path, name: str) -> None:
+    motion = amc(data, name)
+    found = decoded("pca", motion, q=62, Q=4)
+    assert np.abs(found - unwrap(motion.values, motion.skeleton)).max() < 5e-4

@@ -1,0 +1,129 @@
+"""Invalid, one fault each: headers, segments and streams of codec 4, ``pca``.
+
+Where a reader can overlook the fault, the hash is that of what it then decodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+from mcz.codecs._pca_streams import MAX_INDEX
+from mcz.codecs.pca import SCALED
+from mcz.container import payloads
+from mcz.schema import varint
+from tools.vectors.components import (
+    HEADING,
+    Part,
+    Plan,
+    file_with,
+    motion_of,
+    part_of,
+    stream_of,
+)
+from tools.vectors.craft import Broken, Vector
+from tools.vectors.edits import headed, plus, put, stream
+
+SPEC = f"{HEADING}; Residuals"
+
+
+def vectors() -> Iterable[Vector]:
+    shelf = Broken("invalid/pca")
+    _headers(shelf)
+    _segments(shelf)
+    _heads(shelf)
+    _bits(shelf)
+    return shelf.vectors
+
+
+def _zeros(n_frames: int = 8, n_channels: int = 3) -> tuple[Plan, Any]:
+    plan = Plan((part_of(n_frames, n_channels, 1),), empty=(0,))
+    return plan, motion_of(plan)
+
+
+def _headers(shelf: Broken) -> None:
+    plan, motion = _zeros()
+    for name, header in (
+        ("decimals-16", b"\x10"),
+        ("decimals-254", b"\xfe"),
+        ("header-none", b""),
+        ("header-and-byte", b"\x02\x00"),
+    ):
+        purpose = f"The header {header.hex(' ') or 'of no bytes'}, over nothing but zeros."
+        said = put(payloads.CLIP, "signals.0.header", varint(len(header)) + header)
+        shelf.add(name, HEADING, purpose, file_with(plan, motion, CLIP=said))
+
+
+def _segments(shelf: Broken) -> None:
+    plan = Plan((part_of(5, 3, 1), part_of(5, 3, 1, 1)))
+    motion = motion_of(plan)
+    for name, purpose, edit in (
+        ("segment-lead", "A lead, which no segment has.", headed(1, lead=1)),
+        ("segment-tail", "A tail, which no segment has.", headed(0, tail=1)),
+        ("segment-not-fresh", "A segment that needs the one before.", headed(1, flags=0)),
+    ):
+        shelf.add(name, f"{HEADING}; DATA", purpose, file_with(plan, motion, segments=edit))
+
+
+def _heads(shelf: Broken) -> None:
+    good = part_of(6, 3, 2)
+    cases: tuple[tuple[str, str, Part], ...] = (
+        ("mean-scale-63", "A first scale of means of 63.", replace(good, mean_scale=63)),
+        ("shift-41", "A basis with 41 binary digits.", replace(good, shifts=(6, 41))),
+        ("form-63", "A first scale of coefficients of 63.", replace(good, forms=(9, 63))),
+        ("form-255", "The same with predictor 3.", replace(good, forms=(9, 255))),
+        ("count-varint", "2 components, said in two bytes.", replace(good, said=b"\x82\x00")),
+        ("count-huge", "2^40 components.", replace(good, said=b"\x80\x80\x80\x80\x80\x20")),
+    )
+    for name, purpose, part in cases:
+        shelf.add(name, HEADING, purpose, _with(part, 6, 3))
+    purpose = "4 components of 3 channels."
+    shelf.add("count-channels", HEADING, purpose, _with(part_of(6, 3, 4), 6, 3))
+    purpose = "3 components in 1 frame of 5 channels."
+    shelf.add("count-frames", HEADING, purpose, _with(part_of(1, 5, 3), 1, 5))
+    plan = Plan((good,), SCALED)
+    for size in range(6):
+        purpose = f"A stream that ends behind {size + 1} bytes of its head."
+
+        def cut(data: bytes, size: int = size) -> bytes:
+            return data[: size + 1]
+
+        data = file_with(plan, motion_of(plan), segments=stream(0, cut))
+        shelf.add(f"head-cut-{size + 1}", HEADING, purpose, data)
+
+
+def _with(part: Part, n_frames: int, n_channels: int) -> bytes:
+    """A file of one segment, in place of zeros."""
+    plan, motion = _zeros(n_frames, n_channels)
+    data = stream_of(part, plan.decimals)
+    return file_with(plan, motion, segments=stream(0, lambda _: data))
+
+
+def _bits(shelf: Broken) -> None:
+    plan = Plan((part_of(9, 3, 2),))
+    motion = motion_of(plan)
+    for name, purpose, edit in (
+        ("byte-behind", "A byte 255 behind the bits.", plus(b"\xff")),
+        ("byte-0-behind", "A byte 0 behind the bits.", plus(b"\0")),
+        ("byte-missing", "Bits without their last byte.", lambda data: data[:-1]),
+    ):
+        data = file_with(plan, motion, segments=stream(0, edit))
+        shelf.add(name, f"{HEADING}; Entropy coding", purpose, data)
+    beyond = MAX_INDEX + 1
+    one = {"shifts": (3,), "forms": (4,), "n_frames": 2, "faulty": True}
+    for name, purpose, part in (
+        ("mean-beyond", "A mean of 2^40 + 1.", Part((beyond,), ((1,),), ((1,), (2,)), **one)),
+        ("basis-beyond", "An entry of -2^40 - 1.", Part((1,), ((-beyond,),), ((1,), (2,)), **one)),
+        (
+            "first-beyond",
+            "A first coefficient of 2^40 + 1.",
+            Part((1,), ((1,),), ((beyond,), (2,)), **one),
+        ),
+        (
+            "coefficient-beyond",
+            "A coefficient of -2^40 - 1, which is -2^40 and -1 more.",
+            Part((1,), ((1,),), ((-MAX_INDEX,), (-beyond,)), **one),
+        ),
+    ):
+        shelf.add(name, SPEC, purpose, _with(part, 2, 1))
