@@ -10,10 +10,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mcz.archive import Outcome, Report, append, pack, unpack
-    from mcz.clip import Clip
-    from mcz.conversion import convert
-    from mcz.editing import Replacement, replace
     from mcz.errors import (
         AccessError,
         ChecksumError,
@@ -27,21 +23,25 @@ if TYPE_CHECKING:
         TruncatedError,
         UnsupportedError,
     )
-    from mcz.extraction import ExtractedClip, Extraction, extract
-    from mcz.file import Attachment, File, encode, open, read, write
+    from mcz.files.archive import Outcome, Report, append, pack, unpack
+    from mcz.files.clip import Clip
+    from mcz.files.conversion import convert
+    from mcz.files.editing import Replacement, replace
+    from mcz.files.extraction import ExtractedClip, Extraction, extract
+    from mcz.files.file import Attachment, File, encode, open, read, write
+    from mcz.files.report import Problem, verify
+    from mcz.files.sources import read_skeleton
     from mcz.kinematics import positions
     from mcz.metrics import Comparison, compare
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
-    from mcz.report import Problem, verify
-    from mcz.sources import read_skeleton
 
 __version__ = "0.2.0"
 
 _HOMES = {
-    "mcz.archive": ("Outcome", "Report", "append", "pack", "unpack"),
-    "mcz.clip": ("Clip",),
-    "mcz.conversion": ("convert",),
-    "mcz.editing": ("Replacement", "replace"),
+    "mcz.files.archive": ("Outcome", "Report", "append", "pack", "unpack"),
+    "mcz.files.clip": ("Clip",),
+    "mcz.files.conversion": ("convert",),
+    "mcz.files.editing": ("Replacement", "replace"),
     "mcz.errors": (
         "AccessError",
         "ChecksumError",
@@ -55,13 +55,13 @@ _HOMES = {
         "TruncatedError",
         "UnsupportedError",
     ),
-    "mcz.extraction": ("ExtractedClip", "Extraction", "extract"),
-    "mcz.file": ("Attachment", "File", "encode", "open", "read", "write"),
+    "mcz.files.extraction": ("ExtractedClip", "Extraction", "extract"),
+    "mcz.files.file": ("Attachment", "File", "encode", "open", "read", "write"),
     "mcz.kinematics": ("positions",),
-    "mcz.report": ("Problem", "verify"),
+    "mcz.files.report": ("Problem", "verify"),
     "mcz.metrics": ("Comparison", "compare"),
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
-    "mcz.sources": ("read_skeleton",),
+    "mcz.files.sources": ("read_skeleton",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

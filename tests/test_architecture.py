@@ -16,8 +16,7 @@ import mcz
 PACKAGE = Path(mcz.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
-# What a part may import; a part is the first name after ``mcz.``, private helpers beside
-# a module of the same layer included. Each part may import itself.
+# What a part may import; a part is the first name after ``mcz.``. Each may import itself.
 GROUND = {"errors", "schema", "numbers"}
 MODEL = GROUND | {"motion"}
 ALLOWED = {
@@ -36,18 +35,12 @@ ALLOWED = {
     "container": MODEL,
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},
-    "file": MODEL | {"kinematics", "metrics", "codecs", "container", "formats"},
-    "cli": MODEL | {"kinematics", "metrics", "file", "sample"},
+    "files": MODEL | {"kinematics", "metrics", "codecs", "container", "formats"},
+    "cli": MODEL | {"kinematics", "metrics", "files", "sample"},
     # On top of all: it measures every part by itself.
     "bench": MODEL
-    | {"angles", "metrics", "bjontegaard", "codecs", "container", "formats", "file", ""},
-    "": MODEL | {"kinematics", "metrics", "file"},  # mcz/__init__.py
-}
-FILE_HELPERS = {  # beside file.py, of one part with it
-    *("archive", "clip", "encoding", "frames", "masks", "report", "signals", "sources", "targets"),
-    *("appending", "clip_source", "cutting", "decimation", "extraction", "memory", "quality"),
-    *("conversion", "signal_info", "sizes", "tuning", "views"),
-    *("editing", "preview", "recoding"),
+    | {"angles", "metrics", "bjontegaard", "codecs", "container", "formats", "files", ""},
+    "": MODEL | {"kinematics", "metrics", "files"},  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 
@@ -62,10 +55,7 @@ def name_of(path: Path) -> str:
 
 
 def part_of(name: str) -> str:
-    part = name.partition(".")[0]
-    if part in FILE_HELPERS:
-        return "file"
-    return part
+    return name.partition(".")[0]
 
 
 def tree_of(path: Path) -> ast.Module:

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.archive import safe_path
 from mcz.container.chunks import FOOT
+from mcz.files.archive import safe_path
 from mcz.motion import joint_columns
 from mcz.sample import write_samples
 
@@ -204,7 +204,7 @@ def test_remote_archive_costs_few_requests(samples: Path) -> None:
 
     from mcz.codecs import by_name
     from mcz.container.writer import Writer
-    from mcz.encoding import write_clip
+    from mcz.files.encoding import write_clip
 
     out = io.BytesIO()
     writer = Writer(out)

@@ -139,7 +139,7 @@ def test_runner_passes_our_adapter() -> None:
 # What may go wrong in a decoder: each edit of ours is caught by the vectors that it names.
 WRONG = {
     "ignores exceptions": (
-        "mcz.signals._values_of_texts = lambda texts, name: 0.0",
+        "mcz.files.signals._values_of_texts = lambda texts, name: 0.0",
         ["valid/notes/exceptions"],
     ),
     "ignores hashes": ("", ["invalid/clip/value-hash", "invalid/raw/another-value"]),
@@ -182,7 +182,7 @@ WRONG = {
     ),
     "shows frames from the first that is stored": (
         (
-            "S = mcz.signals.SignalReader; f = S.read\n"
+            "S = mcz.files.signals.SignalReader; f = S.read\n"
             "S.read = lambda s, a, b: f(s, a - s.info.skip, b - s.info.skip)"
         ),
         ["valid/mrdwt/cut-frames-21-30", "valid/cut/frames-1-5"],
@@ -192,10 +192,10 @@ LAX = """
 import sys
 from dataclasses import replace
 from unittest import mock
-import mcz.clip, mcz.signals, mcz.codecs
+import mcz.files.clip, mcz.files.signals, mcz.codecs
 from mcz.cli import conformance
 raw = mcz.codecs.CODECS[0]
-mcz.clip.Clip.check_hash = lambda *a: None
+mcz.files.clip.Clip.check_hash = lambda *a: None
 {edit}
 sys.exit(conformance.main())
 """

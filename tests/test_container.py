@@ -22,7 +22,6 @@ from mcz.container.segments import (
 )
 from mcz.container.source import ByteSource, open_source
 from mcz.container.writer import Writer
-from mcz.encoding import write_clip
 from mcz.errors import (
     ChecksumError,
     FormatError,
@@ -31,7 +30,8 @@ from mcz.errors import (
     TruncatedError,
     UnsupportedError,
 )
-from mcz.report import layout
+from mcz.files.encoding import write_clip
+from mcz.files.report import layout
 from mcz.schema import parse, read_varint, varint
 from tests.motions import smooth
 from tests.repair import joined, parts_of, use

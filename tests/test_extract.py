@@ -22,11 +22,11 @@ from mcz.container.scan import scan
 from mcz.container.segments import FRESH
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
-from mcz.encoding import canonical, write_clip
 from mcz.errors import FormatError
+from mcz.files.encoding import canonical, write_clip
+from mcz.files.report import validate
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.report import validate
 from mcz.schema import build, parse, varint
 from tests import overlap_codec
 from tests.motions import smooth
@@ -585,7 +585,7 @@ def test_resolution_beside_a_signal_without_any() -> None:
 
 
 def test_decimate_takes_whole_frames() -> None:
-    from mcz.decimation import decimated_rows
+    from mcz.files.decimation import decimated_rows
 
     values = np.arange(21)[:, None]
     assert decimated_rows(values, 3, 2)[:, 0].tolist() == [0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, 20]
@@ -595,7 +595,7 @@ def test_decimate_takes_whole_frames() -> None:
 
 @pytest.mark.parametrize("step", [2, 3, 8, 64])
 def test_decimated_motions(step: int) -> None:
-    from mcz.decimation import decimated
+    from mcz.files.decimation import decimated
 
     motion = rich()
     thin = decimated(motion, step)

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 
 import mcz
-from mcz.encoding import canonical
-from mcz.frames import frame_number_metadata, parse_frame_numbers
+from mcz.files.encoding import canonical
+from mcz.files.frames import frame_number_metadata, parse_frame_numbers
+from mcz.files.report import info
 from mcz.motion import Signal
 from mcz.numbers import Grid, GridKind
-from mcz.report import info
 from tests.motions import motions, skeleton, smooth
 
 

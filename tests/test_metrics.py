@@ -18,8 +18,8 @@ from mcz import codecs
 from mcz.angles import Unwrapper, turns, unwrap
 from mcz.codecs.base import Encoded, Segment
 from mcz.errors import MotionError
+from mcz.files.quality import quality_entries
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.quality import quality_entries
 from tests import overlap_codec
 from tests.motions import POSITIONS, motions, skeleton, smooth
 from tests.test_spec import SPEC

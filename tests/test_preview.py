@@ -17,11 +17,11 @@ from hypothesis import strategies as st
 import mcz
 from mcz import codecs
 from mcz.cli.main import main
-from mcz.clip import Clip
 from mcz.errors import OptionError
+from mcz.files.clip import Clip
+from mcz.files.preview import preview, preview_motion
+from mcz.files.signal_info import SignalInfo
 from mcz.motion import Motion, Signal
-from mcz.preview import preview, preview_motion
-from mcz.signal_info import SignalInfo
 from tests import overlap_codec
 from tests.motions import skeleton, smooth
 

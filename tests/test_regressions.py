@@ -24,16 +24,16 @@ from mcz.container import payloads
 from mcz.container.chunks import build_header
 from mcz.container.limits import BASE
 from mcz.container.writer import Writer
-from mcz.encoding import write_clip
+from mcz.files.encoding import write_clip
+from mcz.files.report import validate
+from mcz.files.targets import replacing
 from mcz.formats.cells import Cells
 from mcz.formats.hierarchy import write_hierarchy
 from mcz.formats.layout import MAX_RUNS, Layout, Pattern, Run, parse_layout
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.report import validate
 from mcz.sample import write_samples
 from mcz.schema import parse, varint
-from mcz.targets import replacing
 from mcz.transforms import dwt
 from tests.motions import smooth
 from tests.repair import with_index_content

@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 import mcz
 from mcz import codecs
 from mcz.cli.main import main
-from mcz.clip import Clip
 from mcz.codecs import lossless, mrdwt, raw
-from mcz.conversion import convert
-from mcz.editing import edited_quality
 from mcz.errors import AccessError, ExistsError, MotionError, OptionError
+from mcz.files.clip import Clip
+from mcz.files.conversion import convert
+from mcz.files.editing import edited_quality
+from mcz.files.recoding import recorded_options
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.recoding import recorded_options
 from tests import overlap_codec
 from tests.motions import motions, smooth
 
@@ -525,7 +525,7 @@ def test_a_stranger_among_copies() -> None:
 
 
 def test_edited_quality_adds_the_codec(tmp_path: Path) -> None:
-    from mcz.recoding import recode
+    from mcz.files.recoding import recode
 
     data = written(smooth(30), "qbc")
     with mcz.open(data) as file:

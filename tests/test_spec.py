@@ -105,7 +105,7 @@ def test_worked_example_is_the_smallest_clip() -> None:
     with mcz.open(data) as file:
         clip = file.clips["a"]
         assert clip.read().tolist() == [[1.5], [-2.0]]
-        from mcz.report import validate
+        from mcz.files.report import validate
 
         assert validate(file) == []
 

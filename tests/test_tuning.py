@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs.base import Dial
+from mcz.files.sizes import clip_sizes
+from mcz.files.tuning import GOAL, PROMISED, Target, search
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
-from mcz.sizes import clip_sizes
-from mcz.tuning import GOAL, PROMISED, Target, search
 
 DIAL = Dial("T_g", 2.0**-20, 2.0**20)
 

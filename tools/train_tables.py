@@ -31,7 +31,7 @@ from mcz.codecs import (
 )
 from mcz.codecs.base import Codec
 from mcz.coding import residuals
-from mcz.memory import MemorySource
+from mcz.files.memory import MemorySource
 from mcz.motion import Motion
 from tools.start_tables import Kept, table, untrained
 

@@ -16,13 +16,13 @@ from mcz.codecs import by_name
 from mcz.codecs.base import Request, Span
 from mcz.container.limits import BASE
 from mcz.container.writer import Writer
-from mcz.encoding import write_clip
+from mcz.files.encoding import write_clip
+from mcz.files.memory import MemorySource
+from mcz.files.report import clip_ratios
+from mcz.files.sizes import clip_sizes
+from mcz.files.sources import read_source
 from mcz.formats import format_of
-from mcz.memory import MemorySource
 from mcz.motion import Motion
-from mcz.report import clip_ratios
-from mcz.sizes import clip_sizes
-from mcz.sources import read_source
 
 Record = dict[str, Any]
 

@@ -20,7 +20,7 @@ import click
 from mcz.errors import AccessError, ExistsError, MczError, OptionError
 
 if TYPE_CHECKING:
-    from mcz.file import File
+    from mcz.files.file import File
 
 
 class Exit(IntEnum):
@@ -207,7 +207,7 @@ def binary_output() -> BinaryIO:
 
 def write_output(path: Path, data: bytes, force: bool) -> None:
     """Write ``data`` under its name in one step, never over an existing file without ``force``."""
-    from mcz.targets import replacing
+    from mcz.files.targets import replacing
 
     try:
         with about(str(path)), replacing(path, force=force) as stream:

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from mcz.errors import LimitError, MczError, UnsupportedError
 
 if TYPE_CHECKING:
-    from mcz.clip import Clip
-    from mcz.file import File
+    from mcz.files.clip import Clip
+    from mcz.files.file import File
 
 OPTIONS = ("--clip", "--frames", "--joints", "--resolution")
 MAX_LINE = 2**20
@@ -129,7 +129,7 @@ def _part(clip: str, signal: str, array: str, values: NDArray[Any]) -> Part:
 
 def _sources(file: File) -> Iterator[Part]:
     """Every file that is held under a name: of clips, attached, and further names."""
-    from mcz.archive import named_files
+    from mcz.files.archive import named_files
 
     for path, restore in named_files(file):
         data = restore()

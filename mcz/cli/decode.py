@@ -26,8 +26,8 @@ from mcz.cli.options import decoded_option, force_option, json_option
 
 if TYPE_CHECKING:
     from mcz.cli.export import Table
-    from mcz.clip import Clip
-    from mcz.file import File
+    from mcz.files.clip import Clip
+    from mcz.files.file import File
     from mcz.motion import Motion
 
 Output = tuple[str, str, bytes]  # kind, file name, content
@@ -161,7 +161,7 @@ def _source(clip: Clip, part: _Part) -> Output:
 
 def _motion(clip: Clip, part: _Part, preview: bool) -> Motion:
     if preview:
-        from mcz.preview import preview_motion
+        from mcz.files.preview import preview_motion
 
         return preview_motion(clip)
     return clip.motion(part.frames, part.resolution, decimate=part.decimate)
@@ -171,7 +171,7 @@ def _converted(
     motion: Motion, target: str, rate: Fraction | None, with_skeleton: bool
 ) -> list[Output]:
     """The motion as a plain file of another format, with its ASF where an AMC is to have one."""
-    from mcz.conversion import converted_files
+    from mcz.files.conversion import converted_files
 
     files = converted_files(motion, target, rate, with_skeleton)
     kinds = {"asf": "skeleton"}
@@ -192,7 +192,7 @@ def _export(clip: Clip, target: str, part: _Part, joints: str | None, preview: b
 
 def _table(clip: Clip, part: _Part, joints: list[str] | None, names: list[str]) -> Table:
     from mcz.cli.export import Table
-    from mcz.decimation import decimated_rows
+    from mcz.files.decimation import decimated_rows
 
     values, mask = clip.read_masked(part.frames, joints, part.resolution)
     mask = np.ones(values.shape, np.bool_) if mask is None else mask
@@ -213,7 +213,7 @@ def _table(clip: Clip, part: _Part, joints: list[str] | None, names: list[str]) 
 
 def _preview_table(clip: Clip, part: _Part, joints: list[str] | None, names: list[str]) -> Table:
     from mcz.cli.export import Table
-    from mcz.preview import preview
+    from mcz.files.preview import preview
 
     found = preview(clip, joints)
     numbers, rate = clip.frame_numbers[found.frames], clip.frame_rate

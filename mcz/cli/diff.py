@@ -25,7 +25,7 @@ from mcz.cli.figures import figure_lines
 from mcz.cli.options import UNITS, decoded_option, json_option
 
 if TYPE_CHECKING:
-    from mcz.file import File
+    from mcz.files.file import File
     from mcz.motion import Motion
 
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
@@ -124,8 +124,8 @@ class _Side:
     def load(self, name: str | None, frames: Cut) -> _Loaded:
         """The motion called ``name``, or the only one, cut to ``frames``."""
         import mcz
-        from mcz.report import clip_ratios
-        from mcz.sources import with_facts
+        from mcz.files.report import clip_ratios
+        from mcz.files.sources import with_facts
 
         with about(self.path):
             if self.file is None:

@@ -52,7 +52,7 @@ def command(
 ) -> Exit:
     """Encode SRC (.bvh, .amc, .c3d or .asf) into OUT.mcz; an ASF alone makes one of a skeleton."""
     import mcz
-    from mcz.report import decoded_bytes, info
+    from mcz.files.report import decoded_bytes, info
 
     existing(source)
     target = output or str(Path(source).with_suffix(".mcz"))

@@ -50,7 +50,7 @@ def command(
     file: str, as_json: bool, show_layout: bool, check: bool, max_decoded: int | None
 ) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz."""
-    from mcz import report
+    from mcz.files import report
 
     if check:
         return _validate(file, max_decoded, as_json)
@@ -69,7 +69,7 @@ def command(
 
 
 def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
-    from mcz import report
+    from mcz.files import report
 
     size = 0
     try:

@@ -22,8 +22,8 @@ from mcz.cli.common import Exit, code_of, run
 from mcz.cli.main import cli
 from mcz.codecs import by_name
 from mcz.container.writer import Writer
-from mcz.encoding import write_clip
 from mcz.errors import AccessError, ExistsError
+from mcz.files.encoding import write_clip
 from mcz.motion import Signal
 from tests.motions import smooth
 
@@ -117,7 +117,7 @@ def test_sigterm_leaves_nothing_behind(tmp_path: Path) -> None:
     program = (
         "import sys, time, click\n"
         "from mcz.cli.common import run\n"
-        "from mcz.targets import replacing\n"
+        "from mcz.files.targets import replacing\n"
         "@click.command()\n"
         "def command():\n"
         "    with replacing('out.mcz', force=False) as stream:\n"

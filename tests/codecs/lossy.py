@@ -14,9 +14,9 @@ import numpy as np
 import mcz
 from mcz.codecs import by_name
 from mcz.codecs.base import Encoded, Layout, Request, Segment, Span
-from mcz.memory import MemorySource
+from mcz.files.memory import MemorySource
+from mcz.files.sizes import clip_sizes
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
-from mcz.sizes import clip_sizes
 
 Array = np.ndarray
 

@@ -16,7 +16,7 @@ from mcz.codecs import _awt_choice as choice
 from mcz.codecs._wavelet_codec import WAVELET_HEADER, transform_of
 from mcz.codecs.awt import CODEC
 from mcz.codecs.base import SignalSource
-from mcz.memory import MemorySource
+from mcz.files.memory import MemorySource
 from mcz.metrics import compare
 from mcz.motion import Motion
 from mcz.schema import parse

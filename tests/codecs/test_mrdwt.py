@@ -23,11 +23,11 @@ from mcz.codecs import by_name, mrdwt
 from mcz.codecs._wavelet_codec import WAVELET_HEADER
 from mcz.codecs._wavelet_quantizer import code_of, ratio_of
 from mcz.codecs.base import Encoded, Layout, Request, Segment, Span
-from mcz.memory import MemorySource
+from mcz.files.memory import MemorySource
+from mcz.files.sizes import clip_sizes
 from mcz.metrics import compare
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, joint_columns
 from mcz.schema import build, parse
-from mcz.sizes import clip_sizes
 from mcz.transforms import wavelets
 from mcz.transforms.dwt import own_range
 from tests.formats.c3d_files import INTEL, SGI, made
@@ -1038,7 +1038,7 @@ SIZE_OF_17_10 = 2_214_137
 
 
 def amc(data: Path, name: str) -> Motion:
-    from mcz.file import read
+    from mcz.files.file import read
 
     subject = name.split("_", maxsplit=1)[0]
     asf = data / "cmu" / "asf" / f"{subject}.asf"

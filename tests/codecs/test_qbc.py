@@ -19,7 +19,7 @@ from mcz.angles import unwrap
 from mcz.codecs import _qbc_streams as streams
 from mcz.codecs import by_name, qbc
 from mcz.codecs._qbc_plan import SCALED, STEP_SHARE
-from mcz.memory import MemorySource
+from mcz.files.memory import MemorySource
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import parse
 from tests.codecs import lossy

@@ -17,9 +17,9 @@ import pytest
 import mcz
 from mcz.codecs.base import Request, Span
 from mcz.errors import FormatError
+from mcz.files.signal_info import SignalInfo
 from mcz.motion import Motion, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.signal_info import SignalInfo
 from tests import plain_qbc
 from tests.motions import smooth
 

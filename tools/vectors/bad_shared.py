@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from mcz.container import payloads
-from mcz.encoding import write_skeleton
+from mcz.files.encoding import write_skeleton
 from mcz.schema import varint
 from tools.vectors.craft import Broken, Crafter, Vector, file_of, finished
 from tools.vectors.edits import Edit, plus, put, span

@@ -8,7 +8,7 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.segments import FRAME_NOTES
-from mcz.encoding import write_skeleton
+from mcz.files.encoding import write_skeleton
 from mcz.formats import amc, asf
 from mcz.formats.layout import DETAIL, TEMPLATE
 from mcz.formats.notes import NOTES

@@ -23,7 +23,7 @@ from mcz.container.limits import BASE, Profile
 from mcz.container.packets import END, SEGMENT, Packet, build_packet
 from mcz.container.segments import SegmentHeader, build_segment
 from mcz.container.writer import Writer, payload_id
-from mcz.encoding import canonical, write_clip
+from mcz.files.encoding import canonical, write_clip
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import build, deflate, inflate, parse, varint
 from tools.vectors.edits import Edit, Made, put

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.container import payloads
-from mcz.encoding import write_skeleton
+from mcz.files.encoding import write_skeleton
 from mcz.formats import amc, asf, bvh
 from mcz.formats.layout import TEMPLATE
 from mcz.motion import Motion, Skeleton

@@ -10,7 +10,7 @@ import numpy as np
 
 from mcz.container import payloads
 from mcz.container.limits import ARCHIVE
-from mcz.encoding import write_skeleton
+from mcz.files.encoding import write_skeleton
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import build
 from tools.vectors.craft import Crafter, Vector, Whole, file_of, finished, partial

@@ -11,7 +11,7 @@ import numpy as np
 
 from mcz.codecs import lossless
 from mcz.container import payloads
-from mcz.extraction import extract
+from mcz.files.extraction import extract
 from mcz.formats import bvh
 from mcz.formats.notes import join_notes
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton, Source

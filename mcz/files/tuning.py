@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any
 
-from mcz.clip import Clip
 from mcz.codecs.base import Codec, Dial
 from mcz.container.reader import Container
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
-from mcz.encoding import Progress, asked, write_clip
 from mcz.errors import MotionError, OptionError
+from mcz.files.clip import Clip
+from mcz.files.encoding import Progress, asked, write_clip
+from mcz.files.sizes import clip_sizes
 from mcz.metrics import compare
 from mcz.motion import Motion
-from mcz.sizes import clip_sizes
 
 GOAL = 0.985  # of a target: near enough to stop
 PROMISED = 0.97  # of a target: what is less is remarked upon

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mcz.codecs.base import Codec, Layout
 from mcz.container import payloads
 from mcz.errors import MotionError
-from mcz.masks import build_mask
+from mcz.files.masks import build_mask
 from mcz.motion import Exceptions, Motion, Signal, Skeleton
 from mcz.numbers import Grid, values_of_texts
 from mcz.schema import build

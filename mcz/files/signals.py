@@ -17,11 +17,11 @@ from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.segments import StreamTable
 from mcz.errors import FormatError, UnsupportedError
-from mcz.masks import parse_mask
+from mcz.files.masks import parse_mask
+from mcz.files.signal_info import SignalInfo
 from mcz.motion import Exceptions, grid_blocks
 from mcz.numbers import Grid, GridKind, values_of_texts
 from mcz.schema import parse
-from mcz.signal_info import SignalInfo
 
 BLOCK_ROWS = 2048  # decoded at a time, at least
 

@@ -10,16 +10,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mcz.clip import Clip
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.errors import MotionError, OptionError
-from mcz.frames import KEY, frame_number_metadata
+from mcz.files.clip import Clip
+from mcz.files.frames import KEY, frame_number_metadata
+from mcz.files.signal_info import SignalInfo
 from mcz.motion import Skeleton
 from mcz.schema import build, parse
-from mcz.signal_info import SignalInfo
 
 WITHOUT_SOURCE = "the source file was left out when joints were cut"
 WITHOUT_CHANNELS = "the channels of other joints were cut"

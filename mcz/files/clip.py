@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clip_source import SourceInfo, of_no_file, read_source, skeleton_source
 from mcz.codecs import by_id
 from mcz.codecs.base import Layout
 from mcz.container import payloads
@@ -23,19 +22,20 @@ from mcz.container.directory import ClipRow
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.skeletons import parse_skeleton
-from mcz.decimation import decimated, decimated_rows
-from mcz.encoding import value_hash
 from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
+from mcz.files.clip_source import SourceInfo, of_no_file, read_source, skeleton_source
+from mcz.files.decimation import decimated, decimated_rows
+from mcz.files.encoding import value_hash
+from mcz.files.frames import parse_frame_numbers
+from mcz.files.signal_info import SignalInfo, read_signal
+from mcz.files.signals import SignalReader
+from mcz.files.views import ClipValues
 from mcz.formats import FORMATS, format_by_id
-from mcz.frames import parse_frame_numbers
 from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.schema import parse
-from mcz.signal_info import SignalInfo, read_signal
-from mcz.signals import SignalReader
-from mcz.views import ClipValues
 
 if TYPE_CHECKING:
-    from mcz.editing import Replacement
+    from mcz.files.editing import Replacement
 
 
 class Clip:
@@ -340,7 +340,7 @@ class Clip:
         these frames where the codec has some that it stores apart (qbc: its marks); otherwise
         they are its coarsest resolution. Raises OptionError where there is no such thing.
         """
-        from mcz.preview import preview
+        from mcz.files.preview import preview
 
         found = preview(self, joints)
         return found.frames, found.masked()
@@ -358,7 +358,7 @@ class Clip:
 
         This clip and its open file stay what they are.
         """
-        from mcz.editing import replace_in
+        from mcz.files.editing import replace_in
 
         return replace_in(self.container, self, joint, values, target, on_grid, force)
 

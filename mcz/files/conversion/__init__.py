@@ -8,14 +8,14 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
-from mcz.conversion.acclaim import to_amc
-from mcz.conversion.hierarchy import to_bvh
-from mcz.conversion.markers import to_c3d
 from mcz.errors import OptionError
+from mcz.files.conversion.acclaim import to_amc
+from mcz.files.conversion.hierarchy import to_bvh
+from mcz.files.conversion.markers import to_c3d
+from mcz.files.sources import plain_source, with_facts
 from mcz.formats import FORMATS
 from mcz.kinematics import point_set
 from mcz.motion import Motion
-from mcz.sources import plain_source, with_facts
 
 __all__ = ["TARGETS", "convert", "converted_files"]
 

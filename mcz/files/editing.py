@@ -15,26 +15,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mcz.appending import lock
-from mcz.clip import Clip
-from mcz.clip_source import of_no_file
 from mcz.container import payloads
 from mcz.container.chunks import read_chunk
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeader
-from mcz.cutting import ClipCut, add_note, cut_segment, plan_cut
-from mcz.encoding import Progress, value_hash
 from mcz.errors import AccessError, MotionError, OptionError
-from mcz.extraction import Copier
-from mcz.file import File, open
+from mcz.files.appending import lock
+from mcz.files.clip import Clip
+from mcz.files.clip_source import of_no_file
+from mcz.files.cutting import ClipCut, add_note, cut_segment, plan_cut
+from mcz.files.encoding import Progress, value_hash
+from mcz.files.extraction import Copier
+from mcz.files.file import File, open
+from mcz.files.quality import CHUNK, texts_of
+from mcz.files.recoding import Recoded, recode
+from mcz.files.targets import replacing
 from mcz.formats import FORMATS
 from mcz.metrics import compare
 from mcz.motion import Motion
-from mcz.quality import CHUNK, texts_of
-from mcz.recoding import Recoded, recode
 from mcz.schema import build, parse
-from mcz.targets import replacing
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clip import Clip
 from mcz.errors import OptionError
+from mcz.files.clip import Clip
+from mcz.files.signal_info import SignalInfo
+from mcz.files.signals import SignalReader
 from mcz.motion import Motion, Signal
-from mcz.signal_info import SignalInfo
-from mcz.signals import SignalReader
 
 
 @dataclass(frozen=True, slots=True)

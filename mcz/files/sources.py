@@ -23,11 +23,11 @@ from mcz.container.directory import Directory
 from mcz.container.limits import Profile
 from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
-from mcz.encoding import Progress, write_skeleton
 from mcz.errors import LimitError, MczError, MotionError, OptionError, SourceError
+from mcz.files.encoding import Progress, write_skeleton
+from mcz.files.tuning import write_tuned
 from mcz.formats import FORMATS, Format, find_asf, format_of
 from mcz.motion import Motion, Skeleton
-from mcz.tuning import write_tuned
 
 Digest = bytes | Callable[[], bytes]
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}

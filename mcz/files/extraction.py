@@ -27,7 +27,8 @@ from mcz.container.directory import ClipRow
 from mcz.container.packets import read_packets
 from mcz.container.reader import Container
 from mcz.container.writer import Writer, payload_id
-from mcz.cutting import (
+from mcz.errors import ChecksumError, FormatError, MotionError, OptionError
+from mcz.files.cutting import (
     WITHOUT_SOURCE,
     ClipCut,
     SignalCut,
@@ -37,13 +38,12 @@ from mcz.cutting import (
     cut_skeleton,
     plan_cut,
 )
-from mcz.encoding import Progress, canonical, value_hash
-from mcz.errors import ChecksumError, FormatError, MotionError, OptionError
-from mcz.file import File, open
+from mcz.files.encoding import Progress, canonical, value_hash
+from mcz.files.file import File, open
+from mcz.files.signals import SignalReader
+from mcz.files.targets import replacing
 from mcz.formats import FORMATS
 from mcz.schema import build, parse
-from mcz.signals import SignalReader
-from mcz.targets import replacing
 
 
 @dataclass(frozen=True, slots=True)

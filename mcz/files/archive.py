@@ -11,17 +11,17 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from mcz.appending import growing
 from mcz.codecs import DEFAULT
 from mcz.container import payloads
 from mcz.container.reader import Container
 from mcz.container.strict import check_path
-from mcz.encoding import Progress
 from mcz.errors import AccessError, ExistsError, FormatError, MczError, OptionError, SourceError
-from mcz.file import File, open, profile_of
+from mcz.files.appending import growing
+from mcz.files.encoding import Progress
+from mcz.files.file import File, open, profile_of
+from mcz.files.sources import Digest, Draft, Entry, check_name, read_bytes
+from mcz.files.targets import replacing
 from mcz.formats import FORMATS
-from mcz.sources import Digest, Draft, Entry, check_name, read_bytes
-from mcz.targets import replacing
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,11 +24,11 @@ from mcz.container.skeletons import build_skeleton, channel_fields
 from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
+from mcz.files.frames import KEY, frame_number_metadata
+from mcz.files.memory import MemorySource, place
+from mcz.files.quality import CHUNK, quality_payload
 from mcz.formats import FORMATS
-from mcz.frames import KEY, frame_number_metadata
-from mcz.memory import MemorySource, place
 from mcz.motion import Motion, Signal, Skeleton, Source
-from mcz.quality import CHUNK, quality_payload
 from mcz.schema import MAX_COUNT
 
 Progress = Callable[[int, int, str], None]

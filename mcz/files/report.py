@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from mcz.clip import Clip
 from mcz.container import payloads
 from mcz.container.chunks import CRC, FOOT, HEADER, SIGNATURE, Chunk
 from mcz.container.directory import ClipRow
@@ -17,10 +16,11 @@ from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import StreamTable
 from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
-from mcz.file import File, open
+from mcz.files.clip import Clip
+from mcz.files.file import File, open
+from mcz.files.sizes import Sizes, clip_sizes
 from mcz.motion import Skeleton
 from mcz.schema import parse
-from mcz.sizes import Sizes, clip_sizes
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from mcz.clip import Clip
-from mcz.clip_source import skeleton_source
 from mcz.codecs import DEFAULT, by_name
 from mcz.container import payloads
 from mcz.container.directory import AttachmentRow
@@ -27,14 +25,16 @@ from mcz.container.reader import Container
 from mcz.container.skeletons import parse_skeleton
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
-from mcz.encoding import Progress
 from mcz.errors import AccessError, ChecksumError, MczError, OptionError
+from mcz.files.clip import Clip
+from mcz.files.clip_source import skeleton_source
+from mcz.files.encoding import Progress
+from mcz.files.sources import Draft, Entry, name_skeleton, read_source, skeleton_of, with_facts
+from mcz.files.targets import replacing
+from mcz.files.tuning import write_tuned
 from mcz.formats import FORMATS, format_of
 from mcz.motion import Motion, Skeleton
 from mcz.schema import parse
-from mcz.sources import Draft, Entry, name_skeleton, read_source, skeleton_of, with_facts
-from mcz.targets import replacing
-from mcz.tuning import write_tuned
 
 
 class Attachment:

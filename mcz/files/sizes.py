@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from mcz.clip import Clip
 from mcz.container import payloads
 from mcz.container.chunks import FRAMING
 from mcz.container.reader import Container
+from mcz.files.clip import Clip
 from mcz.schema import build
 
 

@@ -10,10 +10,10 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.reader import Container
-from mcz.decimation import picked_notes
+from mcz.files.decimation import picked_notes
+from mcz.files.signal_info import SignalInfo
 from mcz.formats import Format, format_by_id
 from mcz.motion import FrameNotes, Source
-from mcz.signal_info import SignalInfo
 
 
 @dataclass(frozen=True, slots=True)

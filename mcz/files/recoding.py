@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clip import Clip
 from mcz.codecs.base import TARGETS, Codec, Request
-from mcz.cutting import joint_of_column
 from mcz.errors import MotionError, OptionError
-from mcz.memory import MAX_INTEGER, MemorySource, place
+from mcz.files.clip import Clip
+from mcz.files.cutting import joint_of_column
+from mcz.files.memory import MAX_INTEGER, MemorySource, place
+from mcz.files.quality import with_values
+from mcz.files.signal_info import SignalInfo
+from mcz.files.signals import SignalReader
 from mcz.motion import Motion, Signal
-from mcz.quality import with_values
-from mcz.signal_info import SignalInfo
-from mcz.signals import SignalReader
 
 Streams = dict[tuple[int, int], tuple[bytes, ...]]  # (segment, group) -> by stored resolution
 
