@@ -33,21 +33,26 @@ class Header(NamedTuple):
     coded_frames: int
     decimals: int
     step: float
+    position_step: float
 
-    def value(self, v: int) -> float:
-        """A coordinate of a control point."""
-        return v * self.step if self.decimals == 255 else v / 10**self.decimals
+    def point(self, point: Point, positions: Sequence[bool]) -> list[float]:
+        """The coordinates of a control point; ``positions`` says which of them are lengths."""
+        if self.decimals != 255:
+            return [v / 10**self.decimals for v in point]
+        steps = [self.position_step if position else self.step for position in positions]
+        return [v * step for v, step in zip(point, steps, strict=True)]
 
 
 def parse_header(data: bytes) -> Header:
     fields = Bytes(data)
     delta, coded_frames, decimals = fields.varint(), fields.varint(), fields.u8()
-    step = fields.binary64() if decimals == 255 else 1.0
-    if not 1 <= delta <= 2**20 or 15 < decimals < 255 or not 2.0**-100 <= step <= 2.0**100:
-        raise refuse(f"delta {delta}, {decimals} decimals, step {step}")
+    steps = [fields.binary64() if decimals == 255 else 1.0 for _ in range(2)]
+    sound = all(2.0**-100 <= step <= 2.0**100 for step in steps)
+    if not 1 <= delta <= 2**20 or 15 < decimals < 255 or not sound:
+        raise refuse(f"delta {delta}, {decimals} decimals, steps {steps}")
     if fields.rest():
         raise refuse("bytes after the header")
-    return Header(delta, coded_frames, decimals, step)
+    return Header(delta, coded_frames, decimals, *steps)
 
 
 def check_segments(header: Header, n_frames: int, segments: Sequence[Segment]) -> None:
@@ -210,9 +215,9 @@ class Curves:
 # Values
 
 
-def values_of(header: Header, curve: Curve) -> list[list[float]]:
+def values_of(header: Header, curve: Curve, positions: Sequence[bool]) -> list[list[float]]:
     rows = []
-    ends = [[header.value(v) for v in point] for point in curve[2:]]
+    ends = [header.point(point, positions) for point in curve[2:]]
     for i in range(curve.n_frames):
         t = i / curve.n_frames
         u = 1 - t
@@ -223,9 +228,10 @@ def values_of(header: Header, curve: Curve) -> list[list[float]]:
 
 
 def joint_rows(
-    header: Header, n_channels: int, segments: Sequence[Segment], stop: int
+    header: Header, positions: Sequence[bool], segments: Sequence[Segment], stop: int
 ) -> list[list[float]]:
     """Frames 0 to ``stop`` - 1 of a joint from its marks, and curves where there are any."""
+    n_channels = len(positions)
     joined: list[tuple[list[int], list[Point], bytes]] = []
     for first, size, streams in segments:
         frames = marks_in(header, first, first + size)
@@ -245,9 +251,9 @@ def joint_rows(
         else:
             curves = straight(frames, points)
         for curve in curves:
-            rows += values_of(header, curve)
+            rows += values_of(header, curve, positions)
         if i + 1 == len(joined):
-            rows.append([header.value(v) for v in points[-1]])
+            rows.append(header.point(points[-1], positions))
     if stop > len(rows):
         raise refuse(f"frames behind the last mark, at {len(rows)}")
     return rows[:stop]
@@ -255,7 +261,7 @@ def joint_rows(
 
 def decode(
     header: bytes,
-    group_sizes: Sequence[int],
+    groups: Sequence[Sequence[bool]],
     n_frames: int,
     n_resolutions: int,
     segments: Sequence[Segment],
@@ -264,12 +270,14 @@ def decode(
 ) -> list[list[float]]:
     """Rows 0 to ``stop`` - 1 of a signal; resolution 1 leaves out the curves.
 
+    ``groups`` say of each channel whether it is a length.
+
     ``segments`` hold ``n_frames``; without ``stop`` these are all wanted. Raises ValueError where
     a reader must refuse.
     """
     fields = parse_header(header)
     stop = n_frames if stop is None else stop
-    n_groups = len(group_sizes)
+    n_groups = len(groups)
     if not 1 <= n_resolutions <= 2 or not 0 <= resolution < n_resolutions:
         raise refuse(f"resolution {resolution} of {n_resolutions}")
     check_segments(fields, n_frames, segments)
@@ -277,8 +285,8 @@ def decode(
         raise refuse(f"not {n_resolutions} streams a joint")
     wanted = n_groups * (n_resolutions - resolution)  # those of the curves come last
     rows: list[list[float]] = [[] for _ in range(stop)]
-    for group, n_channels in enumerate(group_sizes):
+    for group, positions in enumerate(groups):
         own = [(first, n, streams[group:wanted:n_groups]) for first, n, streams in segments]
-        for row, values in zip(rows, joint_rows(fields, n_channels, own, stop), strict=True):
+        for row, values in zip(rows, joint_rows(fields, positions, own, stop), strict=True):
             row += values
     return rows

@@ -5,6 +5,7 @@ SPEC.md, "Choices of an encoder of qbc", describes it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.base import Layout
 from mcz.errors import MotionError, OptionError
+from mcz.kinematics import reach
+from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -20,6 +24,7 @@ Ints = NDArray[np.int64]
 MAX_INDEX = 2**40
 SCALED = 255
 LEAST_STEP = 2.0**-100
+LEAST_LEVER = 2.0**-30
 STEP_SHARE = 0.75  # of the distance that is allowed, a step, where no decimals are given
 FEWEST_MOST = 512  # frames between marks up to which the fewest breaks are looked for
 
@@ -39,6 +44,7 @@ class Plan:
     delta: int
     decimals: int | None
     step: float
+    lever: float  # of a length unit, where steps are scaled: a position counts as value / lever
     method: int
     closed: bool  # the bound holds for decoded points, not for those before rounding
     fewest: bool
@@ -63,7 +69,23 @@ class Plan:
         return np.asarray(indices / per if per else indices * step, np.float64)
 
 
-def plan_of_options(params: Mapping[str, Any], n_frames: int) -> Plan:
+def position_channels(layout: Layout) -> NDArray[np.bool_]:
+    """Which channels are lengths, and so have the position step."""
+    if layout.skeleton is None:
+        return np.zeros(layout.n_channels, np.bool_)
+    kinds = (channel.kind for channel in layout.skeleton.channels)
+    return np.array([kind in (*POSITION_KINDS, "length") for kind in kinds], np.bool_)
+
+
+def _lever(skeleton: Skeleton | None) -> float:
+    """How far the farthest point moves when a root turns by one angle unit; 1 without rotations."""
+    if skeleton is None or not any(c.kind in ROTATION_KINDS for c in skeleton.channels):
+        return 1.0
+    lever = reach(skeleton) * (math.pi / 180 if skeleton.angle_unit != "rad" else 1.0)
+    return lever if LEAST_LEVER <= lever <= 1 / LEAST_LEVER else 1.0
+
+
+def plan_of_options(params: Mapping[str, Any], layout: Layout) -> Plan:
     """The plan for a clip; raises OptionError for parameters that do not fit."""
     preset = params["preset"]
     chosen = {
@@ -77,17 +99,19 @@ def plan_of_options(params: Mapping[str, Any], n_frames: int) -> Plan:
     if fewest and chosen["delta"] > FEWEST_MOST:
         raise OptionError(f"qbc: breaks fewest need a delta of at most {FEWEST_MOST}")
     step = STEP_SHARE * limit**0.5 if decimals is None else 1.0
-    if step < LEAST_STEP:
+    lever = _lever(layout.skeleton) if decimals is None else 1.0
+    if step < LEAST_STEP or step * lever < LEAST_STEP:
         raise OptionError(f"qbc: d2_lmt {limit} is too small for a step; Q says decimals")
     published = preset == "khan2014"
     frames = params["segment_frames"]
     if frames is None:
-        frames = n_frames if published else 0
+        frames = layout.n_frames if published else 0
     return Plan(
         limit,
         chosen["delta"],
         decimals,
         step,
+        lever,
         MIDDLES.index(chosen["middle"]) ^ 1,
         not published,
         fewest,
@@ -107,6 +131,7 @@ def plan_of_header(fields: Any, options: Mapping[str, Any]) -> Plan:
         fields.delta,
         None if scaled else fields.decimals,
         fields.step if scaled else 1.0,
+        fields.position_step / fields.step if scaled else 1.0,
         MIDDLES.index(options["middle"] or preset["middle"]) ^ 1,
         options["preset"] != "khan2014",
         options["breaks"] == "fewest" and fields.delta <= FEWEST_MOST,

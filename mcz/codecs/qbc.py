@@ -31,6 +31,7 @@ from mcz.codecs._qbc_plan import (
     Plan,
     plan_of_header,
     plan_of_options,
+    position_channels,
 )
 from mcz.codecs._qbc_streams import (
     Curves,
@@ -68,6 +69,11 @@ SEGMENT_FRAMES = 4096
 LEAST_FRAMES = 240  # of a segment: in fewer, hundreds of channels would cost more than they save
 TARGET_BYTES = 62_000  # of a segment: under the 64 KiB that DATA should have, table included
 
+STEP = IfThenElse(
+    this.decimals == SCALED,
+    ExprValidator(Float64l, lambda obj, ctx: LEAST_STEP <= obj <= 1 / LEAST_STEP),
+    Pass,
+)
 QBC_HEADER = Struct(
     "delta"
     / ExprValidator(UVARINT, lambda obj, ctx: 1 <= obj <= MAX_DELTA)
@@ -75,14 +81,9 @@ QBC_HEADER = Struct(
     "coded_frames" / UVARINT * "frames of the signal that was coded, from frame 0 on",
     "decimals"
     / ExprValidator(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED)
-    * "decimals of control points, 0 to 15; 255: they are multiples of step",
-    "step"
-    / IfThenElse(
-        this.decimals == SCALED,
-        ExprValidator(Float64l, lambda obj, ctx: LEAST_STEP <= obj <= 1 / LEAST_STEP),
-        Pass,
-    )
-    * "2^-100 to 2^100, only where decimals is 255",
+    * "decimals of control points, 0 to 15; 255: they are multiples of steps",
+    "step" / STEP * "2^-100 to 2^100, only where decimals is 255",
+    "position_step" / STEP * "the same of the channels tx, ty, tz and length",
 )
 
 
@@ -91,12 +92,13 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
 
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
     """
-    plan = plan_of_options(params, source.layout.n_frames)
+    plan = plan_of_options(params, source.layout)
     fields = {
         "delta": plan.delta,
         "coded_frames": source.layout.n_frames,
         "decimals": SCALED if plan.decimals is None else plan.decimals,
         "step": plan.step if plan.decimals is None else None,
+        "position_step": plan.step * plan.lever if plan.decimals is None else None,
     }
     return Encoded(build(QBC_HEADER, fields, "qbc header"), _segments(source, plan), 2)
 
@@ -105,13 +107,14 @@ def _segments(source: SignalSource, plan: Plan) -> Iterator[Segment]:
     n_frames, delta = source.layout.n_frames, plan.delta
     reader = FrameReader("qbc", source)
     length = _segment_length(source.layout, plan)
+    levers = np.where(position_channels(source.layout), plan.lever, 1.0)
     ahead = reader.next(0)  # from the segment's first frame on
     first = 0
     while first < n_frames:
         stop = min(first + length, n_frames)
         end = min(stop + 1, n_frames)  # the first mark of the next segment
         if end > reader.at:
-            ahead = np.concatenate([ahead, reader.next(end)])
+            ahead = np.concatenate([ahead, reader.next(end) / levers])
         block = ahead[: end - first]
         marks = marks_of(first, stop, n_frames, delta)
         pairs = [
@@ -154,11 +157,12 @@ def recode(
     plan = plan_of_header(fields, options)
     part = Part(source, groups, fields.coded_frames)
     reader = FrameReader("qbc", part)
+    levers = np.where(position_channels(part.layout), plan.lever, 1.0)
     ahead = reader.next(0)
     for span in spans:
         end = min(span.stop + 1, fields.coded_frames)
         if end > reader.at:
-            ahead = np.concatenate([ahead, reader.next(end)])
+            ahead = np.concatenate([ahead, reader.next(end) / levers])
         block = ahead[: end - span.first]
         marks = marks_of(span.first, span.stop, fields.coded_frames, plan.delta) - span.first
         pairs = [
@@ -266,6 +270,7 @@ def _read_segment(
     # The next segment is not fetched where a part of this one can do without.
     whole = own == len(frames) or not (is_last or (stop < span.stop and not needs_next))
     frames = frames if whole else frames[:own]
+    is_position = position_channels(layout)
     column = 0
     for group in request.groups:
         n = len(layout.groups[group])
@@ -279,7 +284,12 @@ def _read_segment(
             if fine
             else straight(marks, frames)
         )
-        points = [_points(found, fields) for found in (marks, curves.mids, curves.ends)]
+        steps = None
+        if fields.decimals == SCALED:
+            steps = np.where(
+                is_position[list(layout.groups[group])], fields.position_step, fields.step
+            )
+        points = [_points(found, fields, steps) for found in (marks, curves.mids, curves.ends)]
         starts = np.concatenate([points[0][:1], points[2][:-1]])
         block = out[start - request.start : stop - request.start, column : column + n]
         _qbc_kernels.evaluate(
@@ -290,9 +300,9 @@ def _read_segment(
         column += n
 
 
-def _points(indices: Ints, fields: Any) -> Floats:
-    if fields.decimals == SCALED:
-        return np.asarray(indices * fields.step)
+def _points(indices: Ints, fields: Any, steps: Floats | None) -> Floats:
+    if steps is not None:
+        return np.asarray(indices * steps)
     return np.asarray(indices / 10.0**fields.decimals)
 
 

@@ -20,6 +20,7 @@ from mcz.codecs import _qbc_streams as streams
 from mcz.codecs import by_name, qbc
 from mcz.codecs._qbc_plan import SCALED, STEP_SHARE
 from mcz.files.memory import MemorySource
+from mcz.kinematics import reach
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import parse
 from tests.codecs import lossy
@@ -108,7 +109,11 @@ def step_of(clip: Direct) -> float:
 
 def check_bound(motion: Motion, limit: float, clip: Direct, *, closed: bool) -> None:
     """No frame is farther from its curve than SPEC.md allows, all channels of a joint together."""
+    fields = parse(qbc.QBC_HEADER, clip.header, "header")
     errors = clip.read() - unwrap(motion.values, motion.skeleton)
+    if fields.decimals == SCALED:
+        lengths = [c.kind in ("tx", "ty", "tz", "length") for c in motion.skeleton.channels]
+        errors = errors / np.where(lengths, fields.position_step / fields.step, 1.0)
     slack = 1e-9 * (1 + np.abs(motion.values).max(initial=0.0))
     for group, columns in enumerate(clip.layout.groups):
         distances = np.sqrt((errors[:, list(columns)] ** 2).sum(axis=1))
@@ -510,6 +515,8 @@ def test_presets() -> None:
     assert coded(smooth(400), preset="khan2014", **same).segments == clip.segments
     default = parse(qbc.QBC_HEADER, coded(smooth(400)).header, "header")
     assert (default.delta, default.decimals, default.step) == (40, SCALED, 0.75)
+    lever = reach(smooth(1).skeleton) * math.pi / 180
+    assert default.position_step == 0.75 * lever
 
 
 # Hostile bytes

@@ -41,6 +41,7 @@ REAL_SETTINGS: tuple[dict[str, Any], ...] = (
 )
 
 
+LENGTHS = ("tx", "ty", "tz", "length")
 REAL_CLIPS = ("cmu/amc/05_01.amc", "cmu/bvh-daz/09_01.bvh", "other/ezc3d-testfiles/FP_Type1.c3d")
 
 
@@ -56,7 +57,7 @@ class Stored(NamedTuple):
         stop = layout.n_frames - self.info.spare
         rows = plain_qbc.decode(
             self.info.header,
-            [len(group) for group in layout.groups],
+            [[layout.skeleton.channels[c].kind in LENGTHS for c in g] for g in layout.groups],
             layout.n_frames,
             layout.n_resolutions,
             self.segments,

@@ -78,7 +78,7 @@ def _headers(shelf: Broken) -> None:
     """Headers over nothing but zeros, which any reading of them gives."""
     plan = Plan(16, decimals=3)
     scaled = replace(plan, decimals=SCALED)
-    none = dict.fromkeys(("delta", "coded_frames", "decimals", "step"), b"")
+    none = dict.fromkeys(("delta", "coded_frames", "decimals", "step", "position_step"), b"")
     long = varint(MAX_DELTA + 1)
     cases: tuple[tuple[str, str, Plan, dict[str, bytes]], ...] = (
         ("delta-0", "Marks 0 frames apart.", plan, {"delta": b"\0"}),
@@ -91,7 +91,7 @@ def _headers(shelf: Broken) -> None:
         ("header-cut", "A header without its last field.", plan, {"decimals": b""}),
         ("header-and-byte", "A byte behind the header.", plan, {"decimals": b"\3\0"}),
         ("header-and-step", "A step where decimals are said.", plan, {"step": _binary64(1.0)}),
-        ("step-missing", "No step.", scaled, {"step": b""}),
+        ("step-missing", "One step.", scaled, {"step": b""}),
         ("step-cut", "Half of a step.", scaled, {"step": _binary64(1.0)[:4]}),
     )
     for name, purpose, made, parts in cases:
@@ -107,6 +107,9 @@ def _headers(shelf: Broken) -> None:
     for name, step in steps.items():
         edit = _says(header(scaled, step=_binary64(step)))
         shelf.add(f"step-{name}", HEADING, f"A step of {step!r}.", _silent(scaled, CLIP=edit))
+        edit = _says(header(scaled, position_step=_binary64(step)))
+        purpose = f"A step of positions of {step!r}."
+        shelf.add(f"position-step-{name}", HEADING, purpose, _silent(scaled, CLIP=edit))
 
 
 def _signal(shelf: Broken) -> None:

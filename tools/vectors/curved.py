@@ -68,9 +68,14 @@ class Plan:
     delta: int = 8
     decimals: int = 2
     step: float = 1.0
+    position_step: float | None = None  # None: that of the others
     ends: tuple[int, ...] = ()
     coded: int | None = None
     n_resolutions: int = 2
+
+    @property
+    def own_position_step(self) -> float:
+        return self.step if self.position_step is None else self.position_step
 
     @property
     def coded_frames(self) -> int:
@@ -95,6 +100,9 @@ def header(plan: Plan, **parts: bytes) -> bytes:
         "coded_frames": varint(plan.coded_frames),
         "decimals": bytes((plan.decimals,)),
         "step": struct.pack("<d", plan.step) if plan.decimals == SCALED else b"",
+        "position_step": struct.pack("<d", plan.own_position_step)
+        if plan.decimals == SCALED
+        else b"",
     }
     return b"".join((fields | parts).values())
 
@@ -242,12 +250,14 @@ def codec_of(plan: Plan, made: Sequence[Path]) -> Codec:
     return replace(qbc.CODEC, encode=encode, parameters=raw.CODEC.parameters, dial=None)
 
 
-def values_of(plan: Plan, made: Sequence[Path], resolution: int = 0) -> NDArray[np.float64]:
-    """The values of all frames."""
+def values_of(
+    plan: Plan, made: Sequence[Path], resolution: int = 0, skeleton: Skeleton | None = None
+) -> NDArray[np.float64]:
+    """The values of all frames; ``skeleton`` says which channels are positions, by default none."""
     found, n = segments_of(plan, made), len(made)
     ends = np.cumsum([0, *(sizes_of(made))]).tolist()
     groups = tuple(tuple(range(a, b)) for a, b in zip(ends, ends[1:], strict=False))
-    layout = Layout(plan.n_frames, groups, n_resolutions=plan.n_resolutions)
+    layout = Layout(plan.n_frames, groups, skeleton=skeleton, n_resolutions=plan.n_resolutions)
     spans = [Span(s.first, s.n_frames, s.lead) for s in found]
     request = Request(0, plan.n_frames, tuple(range(n)), resolution)
 
@@ -268,7 +278,8 @@ def motion_of(plan: Plan, made: Sequence[Path], **changes: Any) -> Motion:
         Joint(f"dial {j}", channels=tuple(Channel("", f"needle {c}") for c in range(size)))
         for j, size in enumerate(sizes_of(made))
     )
-    signal = Signal(values_of(plan, made), mask=changes.pop("mask", None))
+    values = values_of(plan, made, skeleton=changes.get("skeleton"))
+    signal = Signal(values, mask=changes.pop("mask", None))
     fields = {"skeleton": Skeleton(joints, name="dials"), "signals": (signal,), "name": "curve"}
     return Motion(**(fields | changes))
 
@@ -309,7 +320,7 @@ def request(
     joints: Sequence[int] | None,
 ) -> Any:
     """Arguments and arrays of a partial read, of resolution 1 without the curves."""
-    first = replace(motion.signals[0], values=values_of(plan, made, resolution))
+    first = replace(motion.signals[0], values=values_of(plan, made, resolution, motion.skeleton))
     coarse = replace(motion, signals=(first, *motion.signals[1:]))
     arguments, arrays = partial(coarse, frames, joints)
     return (*arguments, "--resolution", str(resolution)), arrays

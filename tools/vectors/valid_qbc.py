@@ -99,6 +99,10 @@ def _grids_of_points(shelf: Curves) -> None:
         plan = Plan(20, decimals=SCALED, step=step)
         purpose = f"Control points are multiples of {step!r}."
         shelf.curve(f"step-{name}", purpose, plan, requests=[(1, (2, 9), None)])
+    plan = Plan(40, decimals=SCALED, step=0.25, position_step=1 / 3)
+    made = paths(plan, (4, 2))
+    purpose = "Positions and rotations have steps of their own."
+    shelf.curve("step-positions", purpose, plan, made, motion=dance_of(plan, made))
     plan = Plan(200, 100, decimals=SCALED, step=0.1)
     purpose = "Frames that another order, or a fused product, would round to another number."
     shelf.curve("rounding", purpose, plan, paths(plan, (5, 4)))
