@@ -195,7 +195,7 @@ def read(
     else:
         source_format = format_of(path)
         if source_format.is_skeleton:
-            raise OptionError(f"{path}: a skeleton without motion; use mcz.read_skeleton")
+            raise OptionError(f"{path}: a skeleton without motion (mcz.read_skeleton reads it)")
         motion = read_source(path, source_format, skeleton_of(path, source_format, skeleton))
     return with_facts(motion, rate, unit)
 
