@@ -186,7 +186,10 @@ def _export(clip: Clip, target: str, part: _Part, joints: str | None, preview: b
     if chosen is not None:
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
-    table = (_preview_table if preview else _table)(clip, part, chosen, names)
+    if preview:
+        table = _preview_table(clip, chosen, names)
+    else:
+        table = _table(clip, part, chosen, names)
     return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
 
 
@@ -211,7 +214,7 @@ def _table(clip: Clip, part: _Part, joints: list[str] | None, names: list[str]) 
     )
 
 
-def _preview_table(clip: Clip, part: _Part, joints: list[str] | None, names: list[str]) -> Table:
+def _preview_table(clip: Clip, joints: list[str] | None, names: list[str]) -> Table:
     from mcz.cli.export import Table
     from mcz.files.preview import preview
 

@@ -100,9 +100,10 @@ def principal(rest: Floats) -> tuple[Floats, Floats]:
     if n_channels <= n_frames:
         vectors = np.linalg.eigh(scaled.T @ scaled)[1].T
     else:
-        vectors = (scaled.T @ np.linalg.eigh(scaled @ scaled.T)[1]).T
-        lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-        vectors = vectors / np.where(lengths > 0, lengths, 1.0)
+        # The longest first: where one is nothing but rounding, as there always is when means have
+        # been taken away, it must not come back at unit length along another.
+        spanned = (scaled.T @ np.linalg.eigh(scaled @ scaled.T)[1])[:, ::-1]
+        vectors = np.linalg.qr(spanned)[0].T
     energies = ((scaled @ vectors.T) ** 2).sum(axis=0)  # more exact than eigenvalues
     order = np.argsort(-energies, kind="stable")
     order = order[energies[order] > energies[order[0]] * NEGLIGIBLE]

@@ -9,10 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs._qbc_kernels import code_first, side_of
 from mcz.coding import residuals
 from mcz.coding.kernels import Bytes, Ints
-from mcz.coding.residuals import FAULT, bits, clamp, code_residual
+from mcz.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
 from mcz.jit import inner, kernel
 
 Floats = NDArray[np.float64]

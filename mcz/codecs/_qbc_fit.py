@@ -14,7 +14,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 PUBLISHED, LEAST_SQUARES = 0, 1  # how a middle point is found
-BROKEN, FEWEST = 0, 1  # how breaks are found
 
 
 @inner

@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding import residuals
-from mcz.coding.kernels import Bytes, Ints, mixed, number
-from mcz.coding.residuals import FAULT, bits, clamp, code_residual
+from mcz.coding.kernels import Bytes, Ints, mixed
+from mcz.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
 from mcz.jit import inner, kernel
 
 Floats = NDArray[np.float64]
 
 MAX_INDEX = 1 << 40  # of a control point
-LENGTH_BITS = 6  # of the bits of a first point
 
 # Residuals of a detail stream: lengths of curves, inner breaks, middle points; then one flag.
 LENGTHS = 0, 0
@@ -25,26 +24,9 @@ BREAKS = residuals.N_CONTEXTS, residuals.N_MIXERS
 MIDDLES = 2 * residuals.N_CONTEXTS, 2 * residuals.N_MIXERS
 KINDS = BREAKS, MIDDLES
 C_LAST, M_LAST = 3 * residuals.N_CONTEXTS, 3 * residuals.N_MIXERS
-N_DETAIL_CONTEXTS, N_DETAIL_MIXERS = C_LAST + 32, M_LAST + 1
+N_DETAIL_MIXERS = M_LAST + 1
 
 FAST, SLOW, SIDE_1, SIDE_2, TRACK_SIZE = range(5)  # what is remembered of a channel
-
-
-@inner
-def side_of(value: int) -> int:
-    return 0 if value == 0 else 1 if value > 0 else 2
-
-
-@inner
-def code_first(state: Ints, data: Bytes, value: int) -> int:
-    """Code a number of which nothing is known: its length, its bits, its sign."""
-    length = number(state, data, bits(abs(value)), LENGTH_BITS)
-    if length > 41:
-        return FAULT
-    if length == 0:
-        return 0
-    found = 1 << (length - 1) | number(state, data, abs(value), length - 1)
-    return -found if number(state, data, 1 if value < 0 else 0, 1) else found
 
 
 @inner

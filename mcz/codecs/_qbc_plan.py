@@ -32,7 +32,7 @@ PRESETS: dict[str, dict[str, Any]] = {
     "default": {"d2_lmt": 1.0, "delta": 40, "Q": None, "middle": "least-squares"},
     "khan2014": {"d2_lmt": 4.0, "delta": 80, "Q": 2, "middle": "published"},
 }
-MIDDLES = ("least-squares", "published")
+MIDDLES = ("published", "least-squares")  # the methods of _qbc_fit, in order of their numbers
 BREAKS = ("split", "fewest")
 
 
@@ -112,7 +112,7 @@ def plan_of_options(params: Mapping[str, Any], layout: Layout) -> Plan:
         decimals,
         step,
         lever,
-        MIDDLES.index(chosen["middle"]) ^ 1,
+        MIDDLES.index(chosen["middle"]),
         not published,
         fewest,
         frames,
@@ -132,7 +132,7 @@ def plan_of_header(fields: Any, options: Mapping[str, Any]) -> Plan:
         None if scaled else fields.decimals,
         fields.step if scaled else 1.0,
         fields.position_step / fields.step if scaled else 1.0,
-        MIDDLES.index(options["middle"] or preset["middle"]) ^ 1,
+        MIDDLES.index(options["middle"] or preset["middle"]),
         options["preset"] != "khan2014",
         options["breaks"] == "fewest" and fields.delta <= FEWEST_MOST,
         0,

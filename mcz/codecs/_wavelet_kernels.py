@@ -7,16 +7,11 @@ serves encoder and decoder. Imported on first use only.
 from __future__ import annotations
 
 from mcz.coding.kernels import Bytes, Ints
-from mcz.coding.residuals import FAULT, bits, clamp, code_residual
+from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
 from mcz.jit import inner, kernel
 
 MAX_INDEX = 1 << 40  # of a coefficient: sums of neighbors then stay far below 2^53
 OWN = 0, 0  # a stream has contexts and mixers of its own
-
-
-@inner
-def side_of(value: int) -> int:
-    return 0 if value == 0 else 1 if value > 0 else 2
 
 
 @inner

@@ -188,9 +188,10 @@ class Codec:
     segments at its ends, groups, and the streams of the finest resolutions are left out, and what
     is left is renumbered from 0. ``decode`` then is given the numbers of frames, groups and
     resolutions that are left, MUST give the same values as before, and takes details that are
-    not stored as zero. ``cut`` makes the header fit where it says something of frames or
-    channels (None: it holds as it is); ``regroup`` a stream that names other groups (None: none
-    does). Both are given the layout before the cut, and raise FormatError for bad bytes.
+    not stored as those that a request leaves out. ``cut`` makes the header fit where it says
+    something of frames or channels (None: it holds as it is); ``regroup`` a stream that names other
+    groups (None: none does). Both are given the layout before the cut, and raise FormatError for
+    bad bytes.
 
     ``recode`` codes some groups anew (None: the codec cannot do that), of a codec with ``regroup``
     in any of the segments, of others in all. ``preview`` says what can be read without decoding

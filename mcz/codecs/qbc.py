@@ -7,8 +7,8 @@ multidimensional quadratic Bezier curve break-and-fit method, 2014 and 2017. The
 squares, and the bound holds for what is decoded.
 
 Exactness: lossy; decoding is bit-exact (integers, then binary64 in the order that SPEC.md states).
-Resolution 0 has a stream of marks for each joint, the points every ``delta`` frames; resolution 1
-the curves between them.
+The coarse resolution has a stream of marks for each joint, the points every ``delta`` frames; the
+fine one has the curves between them.
 """
 
 from __future__ import annotations

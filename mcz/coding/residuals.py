@@ -14,6 +14,7 @@ C_BELOW, C_LESS, C_MORE, C_SECOND, C_THIRD, C_SIDE, N_CONTEXTS = 0, 72, 152, 207
 M_BELOW, M_LESS, M_MORE, M_SECOND, M_THIRD, M_SIDE, N_MIXERS = 0, 1, 2, 14, 15, 16, 17
 
 FAULT = -(1 << 62)
+LENGTH_BITS = 6  # of the length of a first number
 
 
 @inner
@@ -36,6 +37,24 @@ def quarters(value: int) -> int:
 @inner
 def clamp(value: int, low: int, high: int) -> int:
     return min(max(value, low), high)
+
+
+@inner
+def side_of(value: int) -> int:
+    """0 for 0, 1 above it, 2 below."""
+    return 0 if value == 0 else 1 if value > 0 else 2
+
+
+@inner
+def code_first(state: Ints, data: Bytes, value: int) -> int:
+    """Code a number of which nothing is known: its length, its bits, its sign."""
+    length = number(state, data, bits(abs(value)), LENGTH_BITS)
+    if length > 41:
+        return FAULT
+    if length == 0:
+        return 0
+    found = 1 << (length - 1) | number(state, data, abs(value), length - 1)
+    return -found if number(state, data, 1 if value < 0 else 0, 1) else found
 
 
 @inner

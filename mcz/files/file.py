@@ -1,4 +1,4 @@
-"""The one place where motion, codec and container meet: open, read, write, encode.
+"""Where motion, codec and container meet, its entry: open, read, write, encode.
 
 ``sources.py`` reads source files, ``encoding.py`` turns a Motion into chunks, ``clip.py`` turns
 chunks back into values; this file opens and closes the files around them. Archives of many clips

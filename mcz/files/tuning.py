@@ -62,7 +62,7 @@ def write_tuned(
     if not targets or codec.dial is None:
         write_clip(writer, motion, codec, params, progress)
         return
-    target = _target(motion, codec, codec.dial, options, targets)
+    target = _target(motion, codec.dial, options, targets)
     trial = _Trials(motion, codec, params, writer)
     setting, reached, ended = search(codec.dial, target, trial)
     remark = None
@@ -76,7 +76,7 @@ def write_tuned(
 
 
 def _target(
-    motion: Motion, codec: Codec, dial: Dial, options: Mapping[str, Any], targets: Mapping[str, Any]
+    motion: Motion, dial: Dial, options: Mapping[str, Any], targets: Mapping[str, Any]
 ) -> Target:
     if len(targets) > 1:
         raise OptionError(f"{' and '.join(targets)} are asked for, only one can be")
@@ -99,7 +99,6 @@ class _Trials:
         self.motion, self.codec, self.params, self.writer = motion, codec, params, writer
         self.alone = replace(motion, signals=motion.signals[:1])
         self.others = 0.0  # bytes of the further signals, which no dial changes
-        self.other_payload = 0.0
 
     def __call__(self, target: Target, setting: float) -> float:
         figures = self._measure(self.alone, target, setting)

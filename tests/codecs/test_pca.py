@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import mcz
@@ -46,6 +46,7 @@ def test_all_components_lose_only_rounding(
 
 
 @given(st.integers(2, 150), KINDS, st.integers(1, 8))
+@example(2, ["rx"] * 4, 1)
 def test_the_error_is_near_that_of_the_components_left_out(n_frames, kinds, q) -> None:
     motion = wandering(n_frames, kinds)
     meant = unwrap(motion.values, motion.skeleton)
@@ -79,6 +80,14 @@ def test_principal_components_are_those_of_the_covariance() -> None:
     assert (np.take_along_axis(vectors, np.abs(vectors).argmax(1)[:, None], 1) > 0).all()
     wide, _ = principal(rest.T)
     assert wide.shape == (5, 200)
+
+
+@pytest.mark.parametrize("shape", [(2, 3), (2, 4), (5, 20), (60, 100)])
+def test_few_frames_have_a_component_less_than_frames(shape) -> None:
+    values = np.random.default_rng(1).normal(size=shape).cumsum(axis=0)
+    vectors, energies = principal(values - values.mean(axis=0))
+    assert len(vectors) == len(energies) == shape[0] - 1
+    np.testing.assert_allclose(vectors @ vectors.T, np.eye(len(vectors)), atol=1e-9)
 
 
 def test_what_is_coded_of_a_line() -> None:

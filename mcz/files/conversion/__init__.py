@@ -1,6 +1,6 @@
 """A motion for another format: the same points over time, said in its words.
 
-Part of the joint between motion, codec and container (see ``mcz/file.py``).
+Part of the joint between motion, codec and container (see ``mcz/files``).
 """
 
 from __future__ import annotations
