@@ -6,7 +6,6 @@ SPEC.md, "Codec 4: pca", is normative; names are its field names.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -15,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs._wavelet_streams import choose_predictor, scale_of
+from mcz.codecs._wavelet_streams import choose_predictor
 from mcz.coding.start import start_state
+from mcz.coding.streams import code, halves_of, scale_of, uncode
 from mcz.errors import FormatError, MotionError
 from mcz.schema import read_varint, varint
 
 Ints = NDArray[np.int64]
-Loop = Callable[[Ints, NDArray[np.uint8]], bool]  # whether all went well
 
 START_TABLE = Path(__file__).with_name("pca_start.json")
 MAX_INDEX = 2**40
@@ -52,11 +51,10 @@ class Components:
 
 
 @cache
-def _kernels() -> tuple[Any, Any]:
+def _kernels() -> Any:
     from mcz.codecs import _pca_kernels
-    from mcz.coding import kernels
 
-    return _pca_kernels, kernels
+    return _pca_kernels
 
 
 @cache
@@ -71,7 +69,7 @@ def build_stream(found: Components, *, scaled: bool) -> bytes:
         raise MotionError("pca: a coefficient exceeds 2^40 quantizer steps")
     if not found.means.any() and not len(found.basis):
         return b""
-    mean_scale = halves_of(found.means)
+    mean_scale = halves_of(float(np.abs(found.means).mean()), MAX_SCALE)
     several = len(found.coefficients) > 1  # a first coefficient is not predicted
     forms = [choose_predictor(column) if several else (0, 0) for column in found.coefficients.T]
     head = bytes((found.step,)) if scaled else b""
@@ -79,8 +77,20 @@ def build_stream(found: Components, *, scaled: bool) -> bytes:
     sides += bytes(min(halves, MAX_SCALE) | predictor << 6 for predictor, halves in forms)
     head += bytes((mean_scale,)) + varint(len(found.basis)) + sides
     count = found.means.size + found.basis.size + found.coefficients.size
-    copies = found.means.copy(), found.basis.copy(), found.coefficients.copy()
-    return head + _code(count, lambda s, d: _loop(s, d, *copies, sides, mean_scale))
+    return head + code(
+        _start_states()[0],
+        4 * count + 256,
+        lambda state, data: _loop(
+            state,
+            data,
+            found.means.copy(),
+            found.basis.copy(),
+            found.coefficients.copy(),
+            sides,
+            mean_scale,
+        ),
+        "pca: a coefficient",
+    )
 
 
 def parse_stream(
@@ -105,9 +115,11 @@ def parse_stream(
         raise FormatError("pca: the form of a component has the scale 63")
     basis = np.zeros((count, n_channels), np.int64)
     rows = np.zeros((wanted, count), np.int64)
-    _uncode(
+    uncode(
         stream[at + 2 * count :],
+        _start_states()[0],
         lambda state, data: _loop(state, data, means, basis, rows, sides, mean_scale),
+        "pca: a mean, a basis or a coefficient",
         whole=wanted == n_frames,
     )
     shifts = np.frombuffer(sides[:count], "u1").astype(np.int64)
@@ -124,7 +136,7 @@ def _loop(
     mean_scale: int,
 ) -> bool:
     """Code all of a segment; ``sides`` are its shifts and forms."""
-    loops, _ = _kernels()
+    loops = _kernels()
     count, n_channels = basis.shape
     scales = np.array([scale_of(mean_scale)])
     if loops.code_table(state, data, means[None], scales, 0):
@@ -138,40 +150,7 @@ def _loop(
     return bool(loops.code_coefficients(state, data, rows, predictors, scales) < 0)
 
 
-def halves_of(values: Ints) -> int:
-    """The byte of a scale of about the mean absolute value."""
-    typical = float(np.abs(values).mean()) if values.size else 0.0
-    return next((h for h in range(MAX_SCALE) if scale_of(h) >= typical), MAX_SCALE)
-
-
 def _byte(stream: bytes, at: int) -> int:
     if at >= len(stream):
         raise FormatError(f"pca: a stream of {len(stream)} bytes ends in its head")
     return stream[at]
-
-
-def _code(count: int, loop: Loop) -> bytes:
-    """The bits that ``loop`` writes."""
-    _, coder = _kernels()
-    size = 4 * count + 256
-    while True:
-        data = np.zeros(size, np.uint8)
-        state = _start_states()[0].copy()
-        coder.start(state, data, 1)
-        if not loop(state, data):
-            raise AssertionError("pca: a coefficient has no code")
-        used = coder.finish(state, data)
-        if used <= size:
-            return data[:used].tobytes()
-        size = used + 256
-
-
-def _uncode(stream: bytes, loop: Loop, *, whole: bool) -> None:
-    _, coder = _kernels()
-    data = np.frombuffer(stream, np.uint8).copy()  # compiled once: for writable bytes
-    state = _start_states()[0].copy()
-    coder.start(state, data, 0)
-    if not loop(state, data):
-        raise FormatError("pca: a mean, a basis or a coefficient is out of range")
-    if whole and coder.coded_size(state) != len(data):
-        raise FormatError(f"pca: a stream of {len(data)} bytes takes another number")

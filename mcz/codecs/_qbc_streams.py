@@ -6,7 +6,6 @@ SPEC.md, "Codec 3: qbc", is normative; names are its field names.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.start import start_state
+from mcz.coding.streams import bare_state, code, halves_of, scale_of, uncode
 from mcz.errors import FormatError
 
 Ints = NDArray[np.int64]
-Loop = Callable[[Ints, NDArray[np.uint8]], bool]  # whether all went well
 
 START_TABLE = Path(__file__).with_name("qbc_start.json")
 MARKS, DETAILS = 0, 1  # the sets of the start table
@@ -43,11 +42,10 @@ class Curves:
 
 
 @cache
-def _kernels() -> tuple[Any, Any]:
+def _kernels() -> Any:
     from mcz.codecs import _qbc_kernels
-    from mcz.coding import kernels
 
-    return _qbc_kernels, kernels
+    return _qbc_kernels
 
 
 @cache
@@ -55,29 +53,24 @@ def _start_states() -> tuple[Ints, ...]:
     return tuple(start_state(table) for table in json.loads(START_TABLE.read_text())["sets"])
 
 
-def scale_of(halves: int) -> int:
-    """The scale that a byte stands for: about 2^(h / 2)."""
-    return (2 + (halves & 1)) << (halves >> 1) >> 1
-
-
-def halves_of(errors: Ints) -> int:
+def _halves(errors: Ints) -> int:
     """The byte of a scale of about the mean absolute error."""
-    typical = float(np.abs(errors).mean()) if errors.size else 0.0
-    return next((h for h in range(MAX_SCALE) if scale_of(h) >= typical), MAX_SCALE)
+    return halves_of(float(np.abs(errors).mean()) if errors.size else 0.0, MAX_SCALE)
 
 
 def build_marks(points: Ints) -> bytes:
     """The stream of marks (k, channels)."""
     if not points.any():
         return b""
-    halves = halves_of(np.diff(points, axis=0))
-    loops, _ = _kernels()
-    body = _code(
-        MARKS,
-        points.size,
+    halves = _halves(np.diff(points, axis=0))
+    loops = _kernels()
+    body = code(
+        _start_states()[MARKS],
+        4 * points.size + 256,
         lambda state, data: (
             loops.code_marks(state, data, points.copy(), len(points), scale_of(halves)) < 0
         ),
+        "qbc: a mark",
     )
     return bytes((halves,)) + body
 
@@ -88,12 +81,12 @@ def parse_marks(stream: bytes, count: int, n_channels: int, name: str) -> Ints:
     if not stream:
         return points
     halves = _scale(stream, 0, name)
-    loops, _ = _kernels()
-    _uncode(
+    loops = _kernels()
+    uncode(
         stream[1:],
-        _start_states()[MARKS].copy(),
+        _start_states()[MARKS],
         lambda state, data: loops.code_marks(state, data, points, count, scale_of(halves)) < 0,
-        name,
+        f"{name}: a mark",
         whole=True,
     )
     return points
@@ -104,12 +97,12 @@ def parse_first_mark(stream: bytes, n_channels: int, name: str) -> Ints:
     points = np.zeros((1, n_channels), np.int64)
     if stream:
         _scale(stream, 0, name)
-        loops, coder = _kernels()
-        _uncode(
+        loops = _kernels()
+        uncode(
             stream[1:],
-            np.zeros(coder.SQUASH, np.int64),
+            bare_state(),
             lambda state, data: loops.code_marks(state, data, points, 1, 1) < 0,
-            name,
+            f"{name}: a mark",
             whole=False,
         )
     return points
@@ -129,12 +122,12 @@ def build_curves(marks: Ints, frames: Ints, curves: Curves) -> bytes:
     inner = ~np.isin(np.cumsum(curves.lengths) + frames[0], frames)
     steps = (curves.ends - starts)[inner]
     bends = (curves.mids - ((starts + curves.ends) >> 1))[curves.lengths > 1]
-    halves = np.array([halves_of(steps // 2), halves_of(bends)])
+    halves = np.array([_halves(steps // 2), _halves(bends)])
     scales = np.array([scale_of(int(h)) for h in halves])
-    loops, _ = _kernels()
-    body = _code(
-        DETAILS,
-        2 * curves.ends.size + len(curves.lengths),
+    loops = _kernels()
+    body = code(
+        _start_states()[DETAILS],
+        8 * curves.ends.size + 4 * len(curves.lengths) + 256,
         lambda state, data: (
             loops.code_details(
                 state,
@@ -148,6 +141,7 @@ def build_curves(marks: Ints, frames: Ints, curves: Curves) -> bytes:
             )
             == len(curves.lengths)
         ),
+        "qbc: a curve",
     )
     return bytes(halves.astype(np.uint8)) + body
 
@@ -162,13 +156,13 @@ def parse_curves(stream: bytes, marks: Ints, frames: Ints, name: str, *, whole: 
     ends = np.zeros((most, marks.shape[1]), np.int64)
     mids = np.zeros_like(ends)
     found = [0]
-    loops, _ = _kernels()
+    loops = _kernels()
 
     def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
         found[0] = loops.code_details(state, data, marks, frames, lengths, ends, mids, scales)
         return found[0] >= 0
 
-    _uncode(stream[2:], _start_states()[DETAILS].copy(), loop, name, whole=whole)
+    uncode(stream[2:], _start_states()[DETAILS], loop, f"{name}: a curve", whole=whole)
     n = found[0]
     return Curves(lengths[:n], ends[:n], mids[:n])
 
@@ -177,30 +171,3 @@ def _scale(stream: bytes, at: int, name: str) -> int:
     if at >= len(stream) or stream[at] > MAX_SCALE:
         raise FormatError(f"{name}: no scale at {at} of a stream of {len(stream)} bytes")
     return stream[at]
-
-
-def _code(number: int, count: int, loop: Loop) -> bytes:
-    """The bits that ``loop`` writes, from the start of set ``number``."""
-    _, coder = _kernels()
-    size = 4 * count + 256
-    while True:
-        data = np.zeros(size, np.uint8)
-        state = _start_states()[number].copy()
-        coder.start(state, data, 1)
-        if not loop(state, data):
-            raise AssertionError("qbc: a control point has no code")
-        used = coder.finish(state, data)
-        if used <= size:
-            return data[:used].tobytes()
-        size = used + 256
-
-
-def _uncode(stream: bytes, state: Ints, loop: Loop, name: str, *, whole: bool) -> None:
-    """Let ``loop`` read ``stream``; raises FormatError where it is no code, or has other bytes."""
-    _, coder = _kernels()
-    data = np.frombuffer(stream, np.uint8).copy()  # compiled once: for writable bytes
-    coder.start(state, data, 0)
-    if not loop(state, data):
-        raise FormatError(f"{name}: a control point or a length is out of range")
-    if whole and coder.coded_size(state) != len(data):
-        raise FormatError(f"{name}: a stream of {len(data)} bytes takes another number")

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.start import start_state
+from mcz.coding.streams import code, halves_of, scale_of, uncode
 from mcz.errors import FormatError, MotionError
 from mcz.schema import read_varint, varint
 
 Ints = NDArray[np.int64]
-Loop = Callable[[Ints, NDArray[np.uint8]], int]  # (state, data) -> place of a fault or -1
 
 START_TABLE = Path(__file__).with_name("wavelet_start.json")
 MAX_INDEX = 2**40
@@ -50,22 +50,16 @@ class Coding:
 
 
 @cache
-def _kernels() -> tuple[Any, Any]:
+def _kernels() -> Any:
     from mcz.codecs import _wavelet_kernels
-    from mcz.coding import kernels
 
-    return _wavelet_kernels, kernels
+    return _wavelet_kernels
 
 
 @cache
 def _start_states() -> tuple[Ints, ...]:
     """The state of a coder before its first bit, by set; SPEC.md's annex has the numbers."""
     return tuple(start_state(table) for table in json.loads(START_TABLE.read_text())["sets"])
-
-
-def scale_of(halves: int) -> int:
-    """The scale that bits 0-5 of ``form`` stand for: about 2^(h / 2)."""
-    return (2 + (halves & 1)) << (halves >> 1) >> 1
 
 
 def build_streams(bands: Sequence[Ints], step: int, coding: Coding) -> list[bytes]:
@@ -137,14 +131,17 @@ def _build_approximations(band: Ints, step: int, coding: Coding, has_details: bo
     if (band == band[0]).all():
         return bytes((CONSTANT,)) + codes + first
     predictor, halves = choose_predictor(band)
-    loops, _ = _kernels()
-    body = _code(
-        coding,
-        0,
-        len(band),
-        lambda state, data: loops.code_approximations(
-            state, data, band.copy(), len(band), predictor, scale_of(halves)
+    loops = _kernels()
+    body = code(
+        _start_states()[0],
+        2 * len(band) + 256,
+        lambda state, data: (
+            loops.code_approximations(
+                state, data, band.copy(), len(band), predictor, scale_of(halves)
+            )
+            < 0
         ),
+        f"{coding.name}: an approximation",
     )
     return bytes((halves | predictor << 6,)) + codes + first + body
 
@@ -158,62 +155,24 @@ def choose_predictor(band: Ints) -> tuple[int, int]:
     errors = [np.abs(steps - guess)[1:] for guess in guesses]
     costs = [float(np.log2(e + 1 + e.mean() / 4).sum()) for e in errors]
     best = int(np.argmin(costs))
-    typical = float(errors[best].mean())
-    halves = next((h for h in range(CONSTANT) if scale_of(h) >= typical), CONSTANT - 1)
-    return best, halves
+    return best, halves_of(float(errors[best].mean()), CONSTANT - 1)
 
 
 def _build_details(band: Ints, coarser: Ints, number: int, coding: Coding) -> bytes:
     if not band.any():
         return b""
-    loops, _ = _kernels()
-    return _code(
-        coding,
-        number,
-        len(band),
-        lambda state, data: loops.code_details(
-            state, data, band.copy(), len(band), coarser, coding.shift, coding.least
+    loops = _kernels()
+    return code(
+        _start_states()[number],
+        2 * len(band) + 256,
+        lambda state, data: (
+            loops.code_details(
+                state, data, band.copy(), len(band), coarser, coding.shift, coding.least
+            )
+            < 0
         ),
+        f"{coding.name}: a detail",
     )
-
-
-def _code(
-    coding: Coding, number: int, count: int, loop: Callable[[Ints, NDArray[np.uint8]], int]
-) -> bytes:
-    """The bits that ``loop`` writes, from the start of set ``number``."""
-    _, coder = _kernels()
-    size = 2 * count + 256
-    while True:
-        data = np.zeros(size, np.uint8)
-        state = _start_states()[number].copy()
-        coder.start(state, data, 1)
-        fault = loop(state, data)
-        if fault >= 0:
-            raise AssertionError(f"{coding.name}: coefficient {fault} has no code")
-        used = coder.finish(state, data)
-        if used <= size:
-            return data[:used].tobytes()
-        size = used + 256
-
-
-def _uncode(
-    coding: Coding,
-    stream: bytes,
-    number: int,
-    loop: Loop,
-    *,
-    whole: bool,
-) -> None:
-    """Let ``loop`` read ``stream``; raises FormatError where it is no code, or has other bytes."""
-    _, coder = _kernels()
-    data = np.frombuffer(stream, np.uint8).copy()  # compiled once: for writable bytes
-    state = _start_states()[number].copy()
-    coder.start(state, data, 0)
-    fault = loop(state, data)
-    if fault >= 0:
-        raise FormatError(f"{coding.name}: coefficient {fault} of a band is out of range")
-    if whole and coder.coded_size(state) != len(data):
-        raise FormatError(f"{coding.name}: a stream of {len(data)} bytes takes another number")
 
 
 def _parse_approximations(
@@ -238,14 +197,14 @@ def _parse_approximations(
             raise FormatError(f"{coding.name}: form {form:#04x}, {len(stream) - at} bytes follow")
         return np.full(prefix, first, np.int64), step, True
     band[:1] = first
-    loops, _ = _kernels()
-    _uncode(
-        coding,
+    loops = _kernels()
+    uncode(
         stream[at:],
-        0,
-        lambda state, data: loops.code_approximations(
-            state, data, band, prefix, predictor, scale_of(halves)
+        _start_states()[0],
+        lambda state, data: (
+            loops.code_approximations(state, data, band, prefix, predictor, scale_of(halves)) < 0
         ),
+        f"{coding.name}: an approximation",
         whole=prefix == count,
     )
     return band, step, True
@@ -256,14 +215,15 @@ def _parse_details(
 ) -> Ints:
     band = np.zeros(prefix, np.int64)
     if stream:
-        loops, _ = _kernels()
-        _uncode(
-            coding,
+        loops = _kernels()
+        uncode(
             stream,
-            number,
-            lambda state, data: loops.code_details(
-                state, data, band, prefix, coarser, coding.shift, coding.least
+            _start_states()[number],
+            lambda state, data: (
+                loops.code_details(state, data, band, prefix, coarser, coding.shift, coding.least)
+                < 0
             ),
+            f"{coding.name}: a detail",
             whole=prefix == count,
         )
     return band

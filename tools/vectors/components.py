@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mcz.codecs import _pca_streams as streams
 from mcz.codecs import pca, raw
 from mcz.codecs.base import Codec, Encoded, Layout, Request, Segment, Span
+from mcz.coding import kernels
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import varint
 from tools.vectors.craft import Whole, file_of, partial
@@ -80,16 +81,15 @@ def stream_of(part: Part, decimals: int) -> bytes:
     sides = bytes((*part.shifts, *part.forms))
     head = bytes((part.step,)) if decimals == pca.SCALED else b""
     head += bytes((part.mean_scale,)) + (varint(count) if part.said is None else part.said) + sides
-    _, coder = streams._kernels()
     data, state = np.zeros(UNEXAMINED, np.uint8), streams._start_states()[0].copy()
-    coder.start(state, data, 1)
+    kernels.start(state, data, 1)
     # What a head may not say is coded as if it said the most that it may.
     spoken = bytes(min(b, streams.MAX_SHIFT) for b in part.shifts)
     spoken += bytes(f - (f & 63 > streams.MAX_SCALE) for f in part.forms)
     scale = min(part.mean_scale, streams.MAX_SCALE)
     done = streams._loop(state, data, means, basis, rows, spoken, scale)
     assert done != part.faulty
-    return head + data[: coder.finish(state, data)].tobytes()
+    return head + data[: kernels.finish(state, data)].tobytes()
 
 
 def segments_of(plan: Plan) -> list[Segment]:

@@ -18,6 +18,7 @@ from mcz.codecs import _qbc_streams as streams
 from mcz.codecs import qbc, raw
 from mcz.codecs._qbc_plan import SCALED
 from mcz.codecs.base import Codec, Encoded, Layout, Request, Segment, Span
+from mcz.coding import kernels
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import varint
 from tools.vectors.craft import Whole, file_of, partial
@@ -176,7 +177,7 @@ def curves_of(plan: Plan, path: Path, first: int, stop: int) -> tuple[Ints, Ints
 
 def coded_marks(marks: Ints, halves: int, *, faulty: bool = False) -> bytes:
     """A stream of marks; ``faulty``: its last point has no code."""
-    loops, _ = streams._kernels()
+    loops = streams._kernels()
     scale = streams.scale_of(min(halves, streams.MAX_SCALE))
     return bytes((halves,)) + _bits(
         streams.MARKS,
@@ -194,7 +195,7 @@ def coded_curves(
     faulty: bool = False,
 ) -> bytes:
     """A stream of curves; ``faulty``: its last point or length has no code."""
-    loops, _ = streams._kernels()
+    loops = streams._kernels()
     scales = np.array([streams.scale_of(min(h, streams.MAX_SCALE)) for h in halves])
 
     def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
@@ -206,11 +207,10 @@ def coded_curves(
 
 
 def _bits(number: int, loop: Callable[..., bool], *, faulty: bool) -> bytes:
-    _, coder = streams._kernels()
     data, state = np.zeros(UNEXAMINED, np.uint8), streams._start_states()[number].copy()
-    coder.start(state, data, 1)
+    kernels.start(state, data, 1)
     assert loop(state, data) != faulty
-    return data[: coder.finish(state, data)].tobytes()
+    return data[: kernels.finish(state, data)].tobytes()
 
 
 def segments_of(plan: Plan, made: Sequence[Path]) -> list[Segment]:

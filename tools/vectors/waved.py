@@ -18,6 +18,7 @@ from mcz.codecs import _wavelet_streams as streams
 from mcz.codecs import mrdwt, raw
 from mcz.codecs._wavelet_codec import SCALED
 from mcz.codecs.base import Codec, Encoded, Layout, Request, Segment, Span
+from mcz.coding import kernels
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import varint
 from mcz.transforms import dwt
@@ -187,7 +188,7 @@ def approximation(plan: Plan, band: Band, head: Head, *, faulty: bool = False) -
     data += varint(2 * band[0] if band[0] >= 0 else -2 * band[0] - 1)
     if head.halves == streams.CONSTANT:
         return data
-    loops, _ = streams._kernels()
+    loops = streams._kernels()
     scale = streams.scale_of(head.halves)
 
     def loop(state: Ints, out: NDArray[np.uint8]) -> int:
@@ -200,7 +201,7 @@ def approximation(plan: Plan, band: Band, head: Head, *, faulty: bool = False) -
 
 def detail(plan: Plan, bands: Sequence[Band], place: int, *, faulty: bool = False) -> bytes:
     """The stream of the detail ``bands[place]`` beside the band before it."""
-    loops, _ = streams._kernels()
+    loops = streams._kernels()
     coarser = np.array(bands[place - 1], np.int64)
     if place == 1:
         beside = streams._activity(coarser, len(coarser))
@@ -217,11 +218,10 @@ def detail(plan: Plan, bands: Sequence[Band], place: int, *, faulty: bool = Fals
 
 
 def _bits(number: int, loop: Callable[..., int], *, faulty: bool) -> bytes:
-    _, coder = streams._kernels()
     data, state = np.zeros(UNEXAMINED, np.uint8), streams._start_states()[number].copy()
-    coder.start(state, data, 1)
+    kernels.start(state, data, 1)
     assert (loop(state, data) >= 0) == faulty
-    return data[: coder.finish(state, data)].tobytes()
+    return data[: kernels.finish(state, data)].tobytes()
 
 
 # Files
