@@ -39,7 +39,17 @@ ALLOWED = {
     "cli": MODEL | {"kinematics", "metrics", "files", "sample"},
     # On top of all: it measures every part by itself.
     "bench": MODEL
-    | {"angles", "metrics", "bjontegaard", "codecs", "container", "formats", "files", ""},
+    | {
+        "angles",
+        "metrics",
+        "bjontegaard",
+        "transforms",
+        "codecs",
+        "container",
+        "formats",
+        "files",
+        "",
+    },
     "": MODEL | {"kinematics", "metrics", "files"},  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it

@@ -115,5 +115,11 @@ TABLE_4: dict[str, dict[str, tuple[float | None, float, float, int, int]]] = {
     "17_10": {"qbc": (None, 63.2, 1.73, 1030, 10794), "mrdwt": (12, 64.5, 0.204, 35746, 41132)},
     "85_12": {"qbc": (None, 60.0, 1.87, 948, 10470), "mrdwt": (12, 60.5, 0.225, 47782, 65996)},
 }
-TABLE_4_ELSE = ("14_02", "135_02", "13_29")  # the same columns, without figures of the paper
+TABLE_4_ELSE = (
+    "14_02",
+    "135_02",
+    "13_29",
+    "49_02",
+    "01_01",
+)  # the same columns, without figures of the paper
 FIG_8 = {0: 0.103, 2: 0.658, 3: 4.699}  # 09_01, rfoot rx: finest levels left out -> MSE

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any
 
-from mcz.bench import ladder, measure, peers
+from mcz.bench import deflated, ladder, measure, peers
 from mcz.bench.cache import Cache
 from mcz.bench.cases import Case, Variant, load, why
 from mcz.codecs import by_name
@@ -49,6 +49,10 @@ def _at(task: Task) -> Any:
     return ladder.at_figure(task.case, task.variant, *task.arguments)
 
 
+def _deflated(task: Task) -> Any:
+    return {"bytes": deflated.deflated_bytes(task.case, task.variant, *task.arguments)}
+
+
 def _resolutions(task: Task) -> Any:
     joint, *params = task.arguments
     return measure.resolutions(task.case, task.variant, dict(params), joint)
@@ -65,6 +69,7 @@ def _peers(task: Task) -> Any:
 KINDS = {
     "sweep": _sweep,  # n_points
     "point": _point,  # pairs of parameter and value
+    "deflated": _deflated,  # threshold
     "at": _at,  # metric, wanted, where to begin
     "resolutions": _resolutions,  # joint, pairs of parameter and value
     "speeds": _speeds,  # pairs of parameter and value
