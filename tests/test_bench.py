@@ -362,3 +362,13 @@ def test_a_clip_of_markers(samples: Path) -> None:
     (found,) = [perform(Task("point", case, Variant("mrdwt"), (("T_g", 1.0),)))]
     assert found["cr_float32"] > 1
     assert (found["cr_source"] is None) == (len(motion.signals) > 1)
+
+
+def test_without_clips_it_takes_a_walk_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    from mcz.cli.bench import command
+
+    options = ["--codecs", "qbc:khan2014", "--no-speeds", "--no-cache", "--jobs", "1", "--json"]
+    assert run_command(command, "bench", options) == 0
+    (clip,) = json.loads(capsys.readouterr().out)["clips"]
+    assert clip["name"] == "walk" and clip["codecs"][0]["points"]
+    assert run_command(command, "bench", ["--tables", "khan2016"]) == 2

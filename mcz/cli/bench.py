@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import click
@@ -21,7 +23,7 @@ TABLES = ("khan2014", "khan2016", "all")
 
 
 @click.command(short_help="Compare codecs: size, error, speed, memory.")
-@click.argument("clips", metavar="CLIPS...", nargs=-1, required=True, type=click.Path())
+@click.argument("clips", metavar="[CLIPS]...", nargs=-1, type=click.Path())
 @click.option(
     "--codecs",
     metavar="A,B",
@@ -62,6 +64,8 @@ def command(
 ) -> Exit:
     """Sweep the quality of every codec on CLIPS: files, or folders of .amc, .bvh and .c3d.
 
+    Without CLIPS on a walk that is made for it.
+
     Prints sizes by three numerators, errors of channels and positions, what codecs reach at equal
     error and at equal size, Bjontegaard deltas, speed as a ratio to parsing the text, and memory.
     With --tables only the clips of that paper are taken. Results are kept in the user's cache
@@ -74,8 +78,12 @@ def command(
     for path in clips:
         if not Path(path).is_dir():
             existing(path)
+    if not clips and papers:
+        raise Failure(f"--tables {papers} needs the clips of the paper", Exit.USAGE)
     chosen = tuple(PAPERS) if papers == "all" else (papers,) if papers else ()
-    with about(clips[0], *clips), Progress() as progress:
+    with TemporaryDirectory() as folder, Progress() as progress, ExitStack() as stack:
+        clips = clips or (_sample(folder),)
+        stack.enter_context(about(clips[0], *clips))
         runner = Runner(jobs or os.cpu_count() or 1, Cache(default_folder() if cache else None))
         runner.progress = progress
         outcome = bench(
@@ -99,6 +107,14 @@ def command(
     for path in document["files"]:
         click.echo(printable(path))
     return Exit.FINE
+
+
+def _sample(folder: str) -> str:
+    """The walk that this package makes itself."""
+    from mcz.sample import write_samples
+
+    write_samples(Path(folder))
+    return str(Path(folder) / "walk.amc")
 
 
 def _lines(outcome: Outcome) -> Iterator[str]:
