@@ -1,7 +1,7 @@
 """Run a decoder over the conformance vectors.
 
-    python -m conformance.run --decoder "CMD" [--only SUBSTRING] [--json] [--jobs N] [--timeout S]
-                              [--memory MIB] [--arrays-only]
+    python -m conformance.run --decoder "CMD" [--only SUBSTRING] [--every N] [--json] [--jobs N]
+                              [--timeout S] [--memory MIB] [--arrays-only]
 
 README.md beside this file is the contract. Standard library only, so that an implementation in any
 language can be tested without installing this package.
@@ -284,6 +284,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--decoder", required=True, help="the command to test, quoted as in a shell"
     )
     parser.add_argument("--only", default="", help="only vectors with this in their path")
+    parser.add_argument("--every", type=int, default=1, help="of these only every so many")
     parser.add_argument("--json", action="store_true", help="print one JSON document")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes at once")
     parser.add_argument("--timeout", type=float, default=60.0, help="seconds a vector")
@@ -291,6 +292,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--arrays-only", action="store_true", help="ask for no sources")
     given = parser.parse_args(arguments)
     vectors = [vector for vector in load_manifest() if given.only in vector["file"]]
+    vectors = vectors[:: max(1, given.every)]
     if given.arrays_only:
         vectors = [vector for vector in vectors if "arrays" in vector["modes"]]
     if not vectors:

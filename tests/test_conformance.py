@@ -222,6 +222,14 @@ def test_runner_ends_a_decoder_that_hangs(tmp_path: Path) -> None:
     assert "no answer in 0.5 s" in shown
 
 
+def test_runner_takes_every_so_many() -> None:
+    ours = f"{sys.executable} -m mcz.cli.conformance"
+    code, shown = runner("--decoder", ours, "--only", "valid/container", "--every", "9", "--json")
+    files = [v["file"] for v in json.loads(shown)["vectors"]]
+    found = [v["file"] for v in VECTORS if "valid/container" in v["file"]]
+    assert code == 0 and files == found[::9]
+
+
 def test_runner_without_vectors() -> None:
     assert runner("--decoder", "true", "--only", "no such vector")[0] == 2
 
