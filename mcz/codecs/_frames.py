@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.angles import Unwrapper
+from mcz.codecs._lossy import skeleton_of
 from mcz.codecs.base import SignalSource
 from mcz.errors import MotionError
 
@@ -18,9 +19,7 @@ class FrameReader:
     def __init__(self, name: str, source: SignalSource) -> None:
         self.name, self.source = name, source
         layout = source.layout
-        if layout.samples_per_frame != 1 or layout.skeleton is None:
-            raise MotionError(f"{name}: only signals of one sample a frame")
-        self._unwrapper = Unwrapper(layout.skeleton)
+        self._unwrapper = Unwrapper(skeleton_of(name, layout))
         self._last = np.full(layout.n_channels, np.nan)  # the values before
         self.at = 0
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs._lossy import SCALED, chosen_of, segment_frames_of
 from mcz.codecs.base import Layout
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import reach
@@ -22,7 +23,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MAX_INDEX = 2**40
-SCALED = 255
 LEAST_STEP = 2.0**-100
 LEAST_LEVER = 2.0**-30
 STEP_SHARE = 0.75  # of the distance that is allowed, a step, where no decimals are given
@@ -87,11 +87,7 @@ def _lever(skeleton: Skeleton | None) -> float:
 
 def plan_of_options(params: Mapping[str, Any], layout: Layout) -> Plan:
     """The plan for a clip; raises OptionError for parameters that do not fit."""
-    preset = params["preset"]
-    chosen = {
-        name: value if params[name] is None else params[name]
-        for name, value in PRESETS[preset].items()
-    }
+    chosen, published = chosen_of(PRESETS, params), params["preset"] == "khan2014"
     limit, decimals = chosen["d2_lmt"], chosen["Q"]
     if decimals is None and not limit > 0:
         raise OptionError("qbc: d2_lmt is 0 and no Q is given, so that there is no step")
@@ -102,10 +98,6 @@ def plan_of_options(params: Mapping[str, Any], layout: Layout) -> Plan:
     lever = _lever(layout.skeleton) if decimals is None else 1.0
     if step < LEAST_STEP or step * lever < LEAST_STEP:
         raise OptionError(f"qbc: d2_lmt {limit} is too small for a step; Q says decimals")
-    published = preset == "khan2014"
-    frames = params["segment_frames"]
-    if frames is None:
-        frames = layout.n_frames if published else 0
     return Plan(
         limit,
         chosen["delta"],
@@ -115,7 +107,7 @@ def plan_of_options(params: Mapping[str, Any], layout: Layout) -> Plan:
         MIDDLES.index(chosen["middle"]),
         not published,
         fewest,
-        frames,
+        segment_frames_of(layout, params["segment_frames"], as_published=published),
     )
 
 

@@ -6,7 +6,7 @@ its encoder chooses a ``Plan``; to a decoder they are alike.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -15,6 +15,13 @@ import numpy as np
 from construct import ExprValidator, Float64l, IfThenElse, Int8ul, Pass, Struct, this
 from numpy.typing import NDArray
 
+from mcz.codecs._lossy import (
+    MAX_DECIMALS,
+    SCALED,
+    SEGMENT_FRAMES,
+    TARGET_BYTES,
+    decimals_parameter,
+)
 from mcz.codecs._wavelet_frames import Frames
 from mcz.codecs._wavelet_quantizer import Quantizer, ratio_of
 from mcz.codecs._wavelet_streams import Coding, build_streams, parse_streams
@@ -36,11 +43,7 @@ from mcz.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id
 
 Floats = NDArray[np.float64]
 
-TARGET_BYTES = 62_000  # of a segment: under the 64 KiB that DATA should have, table included
-SEGMENT_FRAMES = 4096  # where that leaves it open
 LEAST_FRAMES = 256  # of a segment: in fewer, hundreds of channels would cost more than they save
-SCALED = 255  # in place of decimals: steps are unit times those of the channels
-MAX_DECIMALS = 15
 INWARD = 1 / 16  # of a step: how far a scaled detail is set back towards zero
 
 TAPS = counted(Float64l, MAX_TAPS)
@@ -66,20 +69,9 @@ WAVELET_HEADER = Struct(
 )
 
 
-Q = Parameter(
-    "Q",
-    None,
-    "decimals of coefficients; default: steps follow the thresholds",
-    integer("Q", 0, MAX_DECIMALS),
-)
+Q = decimals_parameter("decimals of coefficients; default: steps follow the thresholds")
 N = Parameter("N", None, "levels; default 4", integer("N", 0, MAX_LEVELS))
 WAVELET = Parameter("wavelet", None, "name as in PyWavelets; default bior4.4", str)
-SEGMENT_FRAMES_PARAMETER = Parameter(
-    "segment_frames",
-    None,
-    "frames a segment; default: as many as make 64 KiB, at most 4096",
-    integer("segment_frames", 1, 2**40),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,14 +111,6 @@ class Plan:
         return Coding(self.name, scaled, self.quantizer.least, (self.wavelet.n_taps - 2) // 2)
 
 
-def chosen_of(
-    presets: Mapping[str, Mapping[str, Any]], params: Mapping[str, Any]
-) -> dict[str, Any]:
-    """What a preset has a say in, each value that was given in place of the preset's."""
-    values = presets[params["preset"]].items()
-    return {name: value if params[name] is None else params[name] for name, value in values}
-
-
 def transform_of(
     layout: Layout, wavelet: str, levels: int, *, as_published: bool = False
 ) -> Transform:
@@ -139,13 +123,6 @@ def transform_of(
     while levels and not as_published and layout.n_frames < (found.n_taps - 1) << levels:
         levels -= 1
     return Transform(wavelet_id, found, levels)
-
-
-def segment_frames_of(layout: Layout, given: int | None, *, as_published: bool = False) -> int:
-    """Frames a segment, 0: the size decides; published methods take the whole clip at once."""
-    if given is None:
-        return layout.n_frames if as_published else 0
-    return given
 
 
 def encode(source: SignalSource, plan: Plan) -> Encoded:

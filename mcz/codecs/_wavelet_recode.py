@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs._lossy import SCALED
 from mcz.codecs._parts import Part
-from mcz.codecs._wavelet_codec import SCALED, WAVELET_HEADER, Plan, Transform, segment_streams
+from mcz.codecs._wavelet_codec import WAVELET_HEADER, Plan, Transform, segment_streams
 from mcz.codecs._wavelet_frames import Frames
 from mcz.codecs._wavelet_quantizer import DEAD_ZONE, Quantizer, code_of
 from mcz.codecs.base import Fetch, SignalSource, Span

@@ -22,14 +22,18 @@ from numpy.typing import NDArray
 
 from mcz.codecs import _wavelet_codec, _wavelet_recode
 from mcz.codecs._awt_choice import choose, coefficients_of, quantizer_of
-from mcz.codecs._wavelet_codec import (
+from mcz.codecs._lossy import (
     SEGMENT_FRAMES_PARAMETER,
+    chosen_of,
+    preset_parameter,
+    segment_frames_of,
+    skeleton_of,
+)
+from mcz.codecs._wavelet_codec import (
     WAVELET,
     N,
     Plan,
     Q,
-    chosen_of,
-    segment_frames_of,
     transform_of,
 )
 from mcz.codecs._wavelet_frames import sample
@@ -46,7 +50,6 @@ from mcz.codecs.base import (
     integer,
     number,
 )
-from mcz.errors import MotionError
 
 Floats = NDArray[np.float64]
 
@@ -66,8 +69,6 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
     """
     layout, published = source.layout, params["preset"] == "khan2014"
-    if layout.samples_per_frame != 1 or layout.skeleton is None:
-        raise MotionError("awt: only signals of one sample a frame")
     chosen = chosen_of(PRESETS, params)
     average = chosen["a_w"]
     if average is None:
@@ -90,10 +91,11 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
 def _weights(source: SignalSource, distortion: str) -> Floats:
     """The threshold of each channel that goes with one of 1, (n_channels,)."""
     layout = source.layout
-    if distortion == "channels" or layout.skeleton is None:
+    skeleton = skeleton_of("awt", layout)
+    if distortion == "channels":
         return np.ones(layout.n_channels)
     frames = sample(source, SAMPLED_FRAMES)
-    return weights_of(layout.skeleton, frames, "sensitivity", unit_aware=True)
+    return weights_of(skeleton, frames, "sensitivity", unit_aware=True)
 
 
 def recode(
@@ -122,12 +124,7 @@ CODEC = Codec(
     grouping="channel",
     dial=Dial("a_w", 2.0**-20, 2.0**40, rises=True),
     parameters=(
-        Parameter(
-            "preset",
-            "default",
-            "default, or khan2014 for the published method",
-            choice("preset", tuple(PRESETS)),
-        ),
+        preset_parameter(PRESETS),
         Parameter(
             "a_w",
             None,

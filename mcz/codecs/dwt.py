@@ -20,14 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import _wavelet_codec, _wavelet_recode
-from mcz.codecs._wavelet_codec import (
+from mcz.codecs._lossy import (
     SEGMENT_FRAMES_PARAMETER,
+    chosen_of,
+    preset_parameter,
+    segment_frames_of,
+    skeleton_of,
+)
+from mcz.codecs._wavelet_codec import (
     WAVELET,
     N,
     Plan,
     Q,
-    chosen_of,
-    segment_frames_of,
     transform_of,
 )
 from mcz.codecs._wavelet_quantizer import make_quantizer, weights_of
@@ -40,10 +44,8 @@ from mcz.codecs.base import (
     Parameter,
     SignalSource,
     Span,
-    choice,
     number,
 )
-from mcz.errors import MotionError
 
 Floats = NDArray[np.float64]
 
@@ -61,8 +63,6 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
     """
     layout, published = source.layout, params["preset"] == "khan2014"
-    if layout.samples_per_frame != 1 or layout.skeleton is None:
-        raise MotionError("dwt: only signals of one sample a frame")
     chosen = chosen_of(PRESETS, params)
     transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
     weights = _weights(layout, unit_aware=not published)
@@ -74,8 +74,7 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
 def _weights(layout: Layout, *, unit_aware: bool) -> Floats:
     """The threshold of each channel at t_w = 1, (n_channels,), in source units."""
     no_sample = np.zeros((0, layout.n_channels))
-    assert layout.skeleton is not None
-    return weights_of(layout.skeleton, no_sample, "flat", unit_aware=unit_aware)
+    return weights_of(skeleton_of("dwt", layout), no_sample, "flat", unit_aware=unit_aware)
 
 
 def recode(
@@ -106,12 +105,7 @@ CODEC = Codec(
     grouping="channel",
     dial=Dial("t_w", 2.0**-20, 2.0**20),
     parameters=(
-        Parameter(
-            "preset",
-            "default",
-            "default, or khan2014 for the published method",
-            choice("preset", tuple(PRESETS)),
-        ),
+        preset_parameter(PRESETS),
         Parameter("t_w", None, "threshold in degrees; default 0.2", number("t_w", 0, 2.0**20)),
         Q,
         N,

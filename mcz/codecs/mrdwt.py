@@ -17,14 +17,18 @@ from functools import partial
 from typing import Any
 
 from mcz.codecs import _wavelet_codec, _wavelet_recode
-from mcz.codecs._wavelet_codec import (
+from mcz.codecs._lossy import (
     SEGMENT_FRAMES_PARAMETER,
+    chosen_of,
+    preset_parameter,
+    segment_frames_of,
+    skeleton_of,
+)
+from mcz.codecs._wavelet_codec import (
     WAVELET,
     N,
     Plan,
     Q,
-    chosen_of,
-    segment_frames_of,
     transform_of,
 )
 from mcz.codecs._wavelet_frames import sample
@@ -40,7 +44,6 @@ from mcz.codecs.base import (
     choice,
     number,
 )
-from mcz.errors import MotionError
 
 PRESETS: dict[str, dict[str, Any]] = {
     # Exactly as published: T_g in the units of the source for positions too, the whole clip at
@@ -62,12 +65,11 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
     """
     layout, preset = source.layout, params["preset"]
-    if layout.samples_per_frame != 1 or layout.skeleton is None:
-        raise MotionError("mrdwt: only signals of one sample a frame")
+    skeleton = skeleton_of("mrdwt", layout)
     chosen, published = chosen_of(PRESETS, params), preset == "khan2016"
     transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
     weights = weights_of(
-        layout.skeleton,
+        skeleton,
         sample(source, SAMPLED_FRAMES),
         chosen["threshold_rule"],
         unit_aware=not published,
@@ -87,10 +89,9 @@ def recode(
     fetch: Fetch,
 ) -> Iterator[tuple[bytes, ...]]:
     """The streams of some channels with new values, with the steps of the header."""
-    layout, preset = source.layout, PRESETS[options["preset"]]
-    assert layout.skeleton is not None
+    preset = PRESETS[options["preset"]]
     weights = weights_of(
-        layout.skeleton,
+        skeleton_of("mrdwt", source.layout),
         sample(source, SAMPLED_FRAMES),
         options["threshold_rule"] or preset["threshold_rule"],
         unit_aware=options["preset"] != "khan2016",
@@ -114,12 +115,7 @@ CODEC = Codec(
     grouping="channel",
     dial=Dial("T_g", 2.0**-20, 2.0**20),
     parameters=(
-        Parameter(
-            "preset",
-            "default",
-            "default, or khan2016 for the published method",
-            choice("preset", tuple(PRESETS)),
-        ),
+        preset_parameter(PRESETS),
         Parameter(
             "T_g",
             None,

@@ -19,6 +19,17 @@ from construct import ExprValidator, Int8ul, Struct
 from numpy.typing import NDArray
 
 from mcz.codecs._frames import FrameReader
+from mcz.codecs._lossy import (
+    MAX_DECIMALS,
+    SCALED,
+    SEGMENT_FRAMES,
+    SEGMENT_FRAMES_PARAMETER,
+    TARGET_BYTES,
+    chosen_of,
+    decimals_parameter,
+    preset_parameter,
+    segment_frames_of,
+)
 from mcz.codecs._pca_fit import MEAN_STEPS, components_of
 from mcz.codecs._pca_streams import build_stream, parse_stream
 from mcz.codecs._wavelet_quantizer import ratio_of
@@ -33,7 +44,6 @@ from mcz.codecs.base import (
     Segment,
     SignalSource,
     Span,
-    choice,
     integer,
 )
 from mcz.errors import FormatError
@@ -41,11 +51,7 @@ from mcz.schema import build, parse
 
 Floats = NDArray[np.float64]
 
-MAX_DECIMALS = 15
-SCALED = 255
-SEGMENT_FRAMES = 4096
 LEAST_FRAMES = 256  # of a segment: in fewer the basis would cost more than it saves
-TARGET_BYTES = 62_000  # of a segment: under the 64 KiB that DATA should have, table included
 
 PCA_HEADER = Struct(
     "decimals"
@@ -65,13 +71,8 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     Raises MotionError for a value that is not finite, or is too large.
     """
     published = params["preset"] == "khan2014"
-    chosen = {
-        name: value if params[name] is None else params[name]
-        for name, value in PRESETS[params["preset"]].items()
-    }
-    frames = params["segment_frames"]
-    if frames is None:
-        frames = source.layout.n_frames if published else 0
+    chosen = chosen_of(PRESETS, params)
+    frames = segment_frames_of(source.layout, params["segment_frames"], as_published=published)
     decimals = SCALED if chosen["Q"] is None else chosen["Q"]
     header = build(PCA_HEADER, {"decimals": decimals}, "pca header")
     return Encoded(header, _segments(source, chosen["q"], chosen["Q"], frames, published))
@@ -164,24 +165,11 @@ CODEC = Codec(
     grouping="all",
     dial=Dial("q", 1, 2**20, rises=True, whole=True),
     parameters=(
-        Parameter(
-            "preset",
-            "default",
-            "default, or khan2014 for the published method",
-            choice("preset", tuple(PRESETS)),
-        ),
+        preset_parameter(PRESETS),
         Parameter("q", None, "components of a segment; default 20", integer("q", 1, 2**20)),
-        Parameter(
-            "Q",
-            None,
-            "decimals of means and coefficients; default: a step that suits what is left out",
-            integer("Q", 0, MAX_DECIMALS),
+        decimals_parameter(
+            "decimals of means and coefficients; default: a step that suits what is left out"
         ),
-        Parameter(
-            "segment_frames",
-            None,
-            "frames a segment; default: as many as make 64 KiB, at most 4096",
-            integer("segment_frames", 1, 2**40),
-        ),
+        SEGMENT_FRAMES_PARAMETER,
     ),
 )

@@ -21,13 +21,21 @@ from construct import ExprValidator, Float64l, IfThenElse, Int8ul, Pass, Struct,
 from numpy.typing import NDArray
 
 from mcz.codecs._frames import FrameReader
+from mcz.codecs._lossy import (
+    MAX_DECIMALS,
+    SCALED,
+    SEGMENT_FRAMES,
+    SEGMENT_FRAMES_PARAMETER,
+    TARGET_BYTES,
+    decimals_parameter,
+    preset_parameter,
+)
 from mcz.codecs._parts import Part
 from mcz.codecs._qbc_plan import (
     BREAKS,
     LEAST_STEP,
     MIDDLES,
     PRESETS,
-    SCALED,
     Plan,
     plan_of_header,
     plan_of_options,
@@ -64,10 +72,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MAX_DELTA = 2**20
-MAX_DECIMALS = 15
-SEGMENT_FRAMES = 4096
 LEAST_FRAMES = 240  # of a segment: in fewer, hundreds of channels would cost more than they save
-TARGET_BYTES = 62_000  # of a segment: under the 64 KiB that DATA should have, table included
 
 STEP = IfThenElse(
     this.decimals == SCALED,
@@ -326,12 +331,7 @@ CODEC = Codec(
     preview=preview,
     dial=Dial("d2_lmt", 2.0**-40, 2.0**40),
     parameters=(
-        Parameter(
-            "preset",
-            "default",
-            "default, or khan2014 for the published method",
-            choice("preset", tuple(PRESETS)),
-        ),
+        preset_parameter(PRESETS),
         Parameter(
             "d2_lmt",
             None,
@@ -341,19 +341,11 @@ CODEC = Codec(
         Parameter(
             "delta", None, "frames from mark to mark; default 40", integer("delta", 1, MAX_DELTA)
         ),
-        Parameter(
-            "Q",
-            None,
-            "decimals of control points; default: 3/4 of the distance allowed is a step",
-            integer("Q", 0, MAX_DECIMALS),
+        decimals_parameter(
+            "decimals of control points; default: 3/4 of the distance allowed is a step"
         ),
         Parameter("middle", None, f"{' or '.join(MIDDLES)}", choice("middle", MIDDLES)),
         Parameter("breaks", "split", f"{' or '.join(BREAKS)}", choice("breaks", BREAKS)),
-        Parameter(
-            "segment_frames",
-            None,
-            "frames a segment; default: as many as make 64 KiB, at most 4096",
-            integer("segment_frames", 1, 2**40),
-        ),
+        SEGMENT_FRAMES_PARAMETER,
     ),
 )

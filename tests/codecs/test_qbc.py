@@ -18,7 +18,8 @@ import mcz
 from mcz.angles import unwrap
 from mcz.codecs import _qbc_streams as streams
 from mcz.codecs import by_name, qbc
-from mcz.codecs._qbc_plan import SCALED, STEP_SHARE
+from mcz.codecs._lossy import SCALED
+from mcz.codecs._qbc_plan import STEP_SHARE
 from mcz.files.memory import MemorySource
 from mcz.kinematics import reach
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs._wavelet_codec import SCALED
+from mcz.codecs._lossy import SCALED
 from mcz.codecs._wavelet_streams import CONSTANT, MAX_INDEX
 from mcz.container import payloads
 from mcz.numbers import Grid, GridKind

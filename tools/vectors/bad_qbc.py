@@ -15,7 +15,8 @@ import numpy as np
 
 from mcz.codecs import _qbc_kernels as kernels
 from mcz.codecs import _qbc_streams as streams
-from mcz.codecs._qbc_plan import MAX_INDEX, SCALED
+from mcz.codecs._lossy import SCALED
+from mcz.codecs._qbc_plan import MAX_INDEX
 from mcz.codecs.qbc import MAX_DELTA
 from mcz.coding.kernels import mixed
 from mcz.coding.residuals import bits, code_residual

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs import _qbc_streams as streams
 from mcz.codecs import qbc, raw
-from mcz.codecs._qbc_plan import SCALED
+from mcz.codecs._lossy import SCALED
 from mcz.codecs.base import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.coding import kernels
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton

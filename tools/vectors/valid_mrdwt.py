@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from mcz.codecs._wavelet_codec import SCALED
+from mcz.codecs._lossy import SCALED
 from mcz.codecs._wavelet_streams import CONSTANT, MAX_INDEX
 from mcz.transforms.wavelets import MAX_LEVELS, MAX_TAP, MAX_TAPS, WAVELETS, Wavelet
 from tools.vectors.craft import Vector

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs._wavelet_codec import SCALED
+from mcz.codecs._lossy import SCALED
 from mcz.codecs._wavelet_streams import CONSTANT
 from mcz.container import payloads
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton

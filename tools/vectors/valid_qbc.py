@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs._qbc_plan import MAX_INDEX, SCALED
+from mcz.codecs._lossy import SCALED
+from mcz.codecs._qbc_plan import MAX_INDEX
 from mcz.codecs._qbc_streams import MAX_SCALE
 from mcz.codecs.qbc import MAX_DELTA
 from mcz.container import payloads
