@@ -1,4 +1,4 @@
-"""Forward kinematics: where the points of a skeleton lie, and what moves them.
+"""Kinematics: where the points of a skeleton lie, what moves them, and the way back.
 
 SPEC.md, "Kinematics", has the conventions and the point sets. Distances are in the length unit of
 the skeleton. Everything is vectorized over frames and works in blocks of them.
@@ -6,6 +6,7 @@ the skeleton. Everything is vectorized over frames and works in blocks of them.
 
 from __future__ import annotations
 
+from mcz.kinematics.inverse import solve_ik
 from mcz.kinematics.points import (
     MARKER_DISTANCE_CM,
     depths,
@@ -18,6 +19,7 @@ from mcz.kinematics.points import (
     virtual_markers_of,
 )
 from mcz.kinematics.sensitivity import sensitivities
+from mcz.kinematics.targets import unsolved_channels
 
 __all__ = [
     "MARKER_DISTANCE_CM",
@@ -29,5 +31,7 @@ __all__ = [
     "positions_of",
     "reach",
     "sensitivities",
+    "solve_ik",
+    "unsolved_channels",
     "virtual_markers_of",
 ]

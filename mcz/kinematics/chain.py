@@ -147,26 +147,35 @@ class Chain:
         """The pose of frames whose values are ``columns``, shape (n_channels, F)."""
         pose = Pose([], [], [], [])
         for link in self.links:
-            arm = self._arm(link, columns)
-            pose.arms.append(arm)
-            if link.parent < 0:
-                pose.origins.append(arm)
-                axes = IDENTITY if link.change is None else link.change
-            else:
-                above = pose.axes[link.parent]
-                arm = self.scaled(self.links[link.parent], arm, columns)
-                pose.origins.append(pose.origins[link.parent] + along(above, arm))
-                axes = above if link.change is None else times(above, link.change)
-            spins: list[Floats] = []
-            for axis, column in link.turns:
-                if axis == 3:
-                    axes = self._quaternion(axes, columns[list(link.quaternion)], spins)
-                else:
-                    spins.append(axes[:, axis])
-                    axes = turned(axes, axis, columns[column] * self.radians)
-            pose.axes.append(axes)
-            pose.spins.append(spins)
+            self.add(pose, link, self.hang(pose, link, columns), columns)
         return pose
+
+    def hang(self, pose: Pose, link: Link, columns: Floats) -> tuple[Floats, Floats, Floats]:
+        """Of the joint that follows those in ``pose``: its arm, its origin, its axes unturned."""
+        arm = self._arm(link, columns)
+        if link.parent < 0:
+            return arm, arm, IDENTITY if link.change is None else link.change
+        above = pose.axes[link.parent]
+        scaled = self.scaled(self.links[link.parent], arm, columns)
+        origin = pose.origins[link.parent] + along(above, scaled)
+        return arm, origin, above if link.change is None else times(above, link.change)
+
+    def add(
+        self, pose: Pose, link: Link, hung: tuple[Floats, Floats, Floats], columns: Floats
+    ) -> None:
+        """Add to ``pose`` the joint that ``hang`` has hung there, turned by its channels."""
+        arm, origin, axes = hung
+        spins: list[Floats] = []
+        for axis, column in link.turns:
+            if axis == 3:
+                axes = self._quaternion(axes, columns[list(link.quaternion)], spins)
+            else:
+                spins.append(axes[:, axis])
+                axes = turned(axes, axis, columns[column] * self.radians)
+        pose.arms.append(arm)
+        pose.origins.append(origin)
+        pose.axes.append(axes)
+        pose.spins.append(spins)
 
     def _arm(self, link: Link, columns: Floats) -> Floats:
         """From the parent's origin to the joint's own, lengthened by the parent, not yet scaled."""

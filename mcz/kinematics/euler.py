@@ -36,7 +36,7 @@ def euler_angles(turns: Floats, order: str) -> Floats:
     rest = turned(turns, k, -third)
     first = np.arctan2(sign * rest[k, j], rest[j, j])
     second = np.arctan2(sign * rest[i, k], rest[i, i])
-    return np.unwrap(_nearest(np.stack([first, second, third], axis=1)), axis=0)
+    return np.unwrap(nearest(np.stack([first, second, third], axis=1)), axis=0)
 
 
 def _sign(order: str) -> float:
@@ -54,7 +54,7 @@ def _held(angles: Floats, known: Floats) -> Floats:
     return np.where(last >= 0, angles[last], 0.0)
 
 
-def _nearest(angles: Floats) -> Floats:
+def nearest(angles: Floats) -> Floats:
     """Of each frame the solution (a, b, c) or (a + pi, pi - b, c + pi) nearest to the one before.
 
     Which of them is nearer does not depend on which of them the frame before took, as both change

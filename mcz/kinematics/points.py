@@ -52,7 +52,7 @@ class _Places:
         self, skeleton: Skeleton, values: Floats, *, points: bool = False, markers: bool = False
     ) -> None:
         self._list = list(_points(skeleton))
-        self._distance = _marker_distance(skeleton) if markers else 0.0
+        self._distance = marker_distance(skeleton) if markers else 0.0
         self._firsts = dict(reversed(self._list)) if markers else {}  # earlier points replace later
         self.points = np.empty((len(values), len(self._list) if points else 0, 3))
         self.markers = np.empty((len(values), 3 * len(self._firsts), 3))
@@ -76,7 +76,7 @@ class _Places:
         _forget(markers)
 
 
-def _marker_distance(skeleton: Skeleton) -> float:
+def marker_distance(skeleton: Skeleton) -> float:
     if skeleton.unit_cm is None:
         raise OptionError(
             f"skeleton {skeleton.name!r}: its length unit is unknown, and virtual markers lie 3 cm "

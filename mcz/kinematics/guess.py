@@ -1,0 +1,340 @@
+"""A first guess of inverse kinematics: joint after joint from the roots down, all frames at once.
+
+Each joint turns so that what is fastened to it points where it was seen, as well as its own
+channels can: by the rotation nearest to rest among the best (Kabsch's), or, where it has not all
+three freedoms, angle by angle, for the best of one angle is known in closed form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mcz.kinematics.chain import Floats, Link, Pose, times, turned
+from mcz.kinematics.euler import ORDERS, euler_angles
+from mcz.kinematics.targets import Targets
+
+FARTHER = 0.01  # the weight of what hangs on the next turning joint, where that is asked at all
+LINE = 1e-3  # second singular value, of the first: below it all lie on one line, the roll is open
+FAR_LINE = 0.3  # the same where other joints may have bent what hangs there
+TO_REST = 1e-6  # the weight of staying at rest, for what nothing else decides
+LINE_TO_REST = 1e-2  # the same for what lies on a line
+STARTS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
+SWEEPS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Fastened:
+    """What a joint carries: numbers of targets, their weights, their places along its axes (n, 3).
+
+    ``origin`` is the target at the joint's own origin, -1 where there is none.
+    """
+
+    numbers: list[int]
+    weights: Floats
+    places: Floats
+    origin: int
+    to_rest: float
+
+
+class Guess:
+    """Prepared once for a skeleton; ``columns`` gives values for a block of frames."""
+
+    def __init__(self, targets: Targets) -> None:
+        self.targets, self.chain = targets, targets.chain
+        neutral = targets.neutral(1)
+        pose = self.chain.pose(neutral)
+        places = targets.places(neutral, pose)[:, :, 0]
+        self.fastened = [
+            self._fastened(joint, pose, places) for joint in range(len(self.chain.links))
+        ]
+
+    def _fastened(self, joint: int, pose: Pose, places: Floats) -> Fastened:
+        """The targets that turn with the joint, and farther ones where those are on a line."""
+        origin = pose.origins[joint][:, 0]
+        axes = pose.axes[joint][:, :, 0]
+        below = [int(number) for number in self.targets.below[joint]]
+        steps = {number: self._steps(joint, number) for number in below}
+        numbers, spread = self._chosen(joint, steps, places - origin)
+        own = [n for n, t in enumerate(self.targets.list) if t.joint == joint and t.axis < 0]
+        at_origin = [n for n in own if self.targets.list[n].tail < 0]
+        if not at_origin:
+            at_origin = self._at_parents_tail(joint)
+        return Fastened(
+            numbers,
+            np.array(
+                [1.0 if steps[number] == steps[numbers[0]] else FARTHER for number in numbers]
+            ),
+            (places[numbers] - origin).reshape(-1, 3) @ axes,
+            at_origin[0] if at_origin else -1,
+            TO_REST if spread else LINE_TO_REST,
+        )
+
+    def _chosen(self, joint: int, steps: dict[int, int], arms: Floats) -> tuple[list[int], bool]:
+        """The targets to turn by, and whether they spread to two sides.
+
+        Those that nothing bends, where they do not all lie at the joint's origin. A root whose own
+        are on one line is turned about it by the nearest that are not, for it may face anywhere;
+        any other joint stays as near to rest as it can.
+        """
+        nearest: list[int] = []
+        for step in range(max(steps.values(), default=-1) + 1):
+            farther = [number for number in steps if steps[number] == step]
+            numbers = nearest + farther
+            sizes = np.linalg.svd(arms[numbers], compute_uv=False)
+            if len(sizes) > 1 and sizes[1] > (FAR_LINE if nearest else LINE) * sizes[0]:
+                return numbers, True
+            nearest = nearest or (farther if sizes.any() else [])
+            if nearest and self.chain.links[joint].parent >= 0:
+                break
+        return nearest, False
+
+    def _steps(self, joint: int, number: int) -> int:
+        """How many joints that turn or move lie between ``joint`` and the target of a number."""
+        steps, below = 0, self.targets.list[number].joint
+        while below != joint:
+            link = self.chain.links[below]
+            at_origin = self.targets.list[number].joint == below and self._is_origin(number)
+            steps += bool(link.moves or (link.turns and not at_origin))
+            below = link.parent
+        return steps
+
+    def _is_origin(self, number: int) -> bool:
+        target = self.targets.list[number]
+        return target.tail < 0 and target.axis < 0
+
+    def _at_parents_tail(self, joint: int) -> list[int]:
+        """The target that is the joint's origin because its parent ends there (Acclaim)."""
+        link, bone = self.chain.links[joint], self.targets.skeleton.joints[joint]
+        if link.parent < 0 or link.moves:
+            return []
+        tails = self.targets.skeleton.joints[link.parent].tails
+        return [
+            number
+            for number, target in enumerate(self.targets.list)
+            if target.joint == link.parent
+            and target.axis < 0
+            and target.tail >= 0
+            and tails[target.tail] == bone.offset
+        ]
+
+    def columns(self, seen: Floats, known: Floats) -> Floats:
+        """Values (n_channels, F) for places seen, (n_targets, 3, F), where ``known`` is 1, not 0.
+
+        A joint of which nothing is known holds the angles of the frame before.
+        """
+        columns = self.targets.neutral(seen.shape[2])
+        pose = Pose([], [], [], [])
+        for joint, link in enumerate(self.chain.links):
+            hung = self.chain.hang(pose, link, columns)
+            if link.turns or link.moves:
+                self._fit(joint, link, hung, seen, known, columns)
+                hung = self._moved(joint, link, hung, seen, known, columns, pose)
+            self.chain.add(pose, link, hung, columns)
+        return columns
+
+    def _fit(
+        self,
+        joint: int,
+        link: Link,
+        hung: tuple[Floats, Floats, Floats],
+        seen: Floats,
+        known: Floats,
+        columns: Floats,
+    ) -> None:
+        """Set the joint's angles so that what it carries lies in the directions seen."""
+        held = self.fastened[joint]
+        if not link.turns or not len(held.numbers):
+            return
+        weights = known[held.numbers] * held.weights[:, None]
+        moment = self._moment(joint, link, hung[1], seen, known, weights)
+        axes = np.broadcast_to(hung[2], (3, 3, columns.shape[1]))
+        local = times(np.swapaxes(axes, 0, 1), moment)
+        size = np.sqrt((local * local).sum(axis=(0, 1)))
+        local = local + np.eye(3)[:, :, None] * (held.to_rest * size + (size == 0))
+        _turn(link, local, columns, self.chain.radians)
+        _hold(link, size > 0, columns)
+
+    def _moment(
+        self,
+        joint: int,
+        link: Link,
+        origin: Floats,
+        seen: Floats,
+        known: Floats,
+        weights: Floats,
+    ) -> Floats:
+        """Sum of w b a', (3, 3, F): b as seen and a at rest, from the origin or from the mean."""
+        held = self.fastened[joint]
+        a = np.broadcast_to(held.places[:, :, None], (*held.places.shape, weights.shape[1]))
+        b = seen[held.numbers]
+        if held.origin >= 0:
+            own = known[held.origin] > 0
+            base = np.where(own, seen[held.origin], origin)
+        elif link.moves:  # wherever it is
+            total = np.maximum(weights.sum(axis=0), 1e-300)
+            a = a - (weights[:, None] * a).sum(axis=0) / total
+            base = (weights[:, None] * b).sum(axis=0) / total
+        else:
+            base = origin
+        weighted = weights[:, None] * (b - base)
+        moment: Floats = np.einsum("nif,njf->ijf", weighted, a)
+        return moment
+
+    def _moved(
+        self,
+        joint: int,
+        link: Link,
+        hung: tuple[Floats, Floats, Floats],
+        seen: Floats,
+        known: Floats,
+        columns: Floats,
+        pose: Pose,
+    ) -> tuple[Floats, Floats, Floats]:
+        """The joint hung where it was seen, its position channels set for that."""
+        held = self.fastened[joint]
+        if not link.moves:
+            return hung
+        if held.origin >= 0:
+            there, origin = known[held.origin] > 0, seen[held.origin]
+        elif held.numbers:
+            trial = Pose(list(pose.origins), list(pose.axes), list(pose.arms), list(pose.spins))
+            self.chain.add(trial, link, hung, columns)
+            arms = np.einsum("ijf,nj->nif", trial.axes[-1], held.places)
+            weights = known[held.numbers] * held.weights[:, None]
+            total, there = weights.sum(axis=0), weights.sum(axis=0) > 0
+            steps = weights[:, None] * (seen[held.numbers] - arms)
+            origin = steps.sum(axis=0) / np.where(there, total, 1.0)
+        else:
+            return hung
+        step = origin - hung[1]
+        if link.parent >= 0:
+            step = (np.swapaxes(pose.axes[link.parent], 0, 1) * step[None]).sum(axis=1)
+            if link.parent_back is not None:
+                step = link.parent_back.T @ step
+        done: set[int] = set()
+        for component, column in link.moves:
+            if component not in done:
+                columns[column] = np.where(there, step[component], 0.0)
+                _hold_column(columns[column], there)
+            done.add(component)
+        return self.chain.hang(pose, link, columns)
+
+
+def _turn(link: Link, moment: Floats, columns: Floats, radians: float) -> None:
+    """Set the angles of the joint for the greatest trace of R' ``moment``, (3, 3, F)."""
+    order = "".join("xyzq"[axis] for axis, _ in link.turns)
+    if order == "q":
+        columns[list(link.quaternion)] = _quaternion(_kabsch(moment))
+    elif order in ORDERS:
+        angles = small(euler_angles(_kabsch(moment), order))
+        for k, (_, column) in enumerate(link.turns):
+            columns[column] = angles[:, k] / radians
+    else:
+        turns = [(axis, column) for axis, column in link.turns if axis < 3]
+        angles = _angle_by_angle([axis for axis, _ in turns], moment)
+        for (_, column), angle in zip(turns, angles, strict=True):
+            columns[column] = angle / radians
+
+
+def _kabsch(moment: Floats) -> Floats:
+    """The rotations R with the greatest trace of R' ``moment``, (3, 3, F)."""
+    left, _, right = np.linalg.svd(np.moveaxis(moment, 2, 0))
+    turn = np.linalg.det(left) * np.linalg.det(right)
+    left[:, :, 2] *= turn[:, None]
+    result: Floats = np.ascontiguousarray(np.moveaxis(left @ right, 0, 2))
+    return result
+
+
+def small(angles: Floats) -> Floats:
+    """The same rotations by angles (n_frames, 3) nearer to zero on the whole, just as continuous.
+
+    Three angles (a, b, c) about different axes turn as (a + pi, pi - b, c + pi) do.
+    """
+    both = [centered(angles), centered(angles * [1, -1, 1] + np.pi)]
+    return min(both, key=lambda angles: float((angles * angles).sum()))
+
+
+def centered(angles: Floats) -> Floats:
+    """Angles, (n_frames, n), less whole turns: their means are within half a turn of zero."""
+    if not len(angles):
+        return angles
+    result: Floats = angles - 2 * np.pi * np.rint(angles.mean(axis=0) / (2 * np.pi))
+    return result
+
+
+def _quaternion(turns: Floats) -> Floats:
+    """The quaternions (w, x, y, z), (4, F), of rotation matrices."""
+    # The greatest of the four candidates is never small.
+    t = turns
+    squares = np.stack(
+        [
+            1 + t[0, 0] + t[1, 1] + t[2, 2],
+            1 + t[0, 0] - t[1, 1] - t[2, 2],
+            1 - t[0, 0] + t[1, 1] - t[2, 2],
+            1 - t[0, 0] - t[1, 1] + t[2, 2],
+        ]
+    )
+    wx, wy, wz = t[2, 1] - t[1, 2], t[0, 2] - t[2, 0], t[1, 0] - t[0, 1]
+    xy, xz, yz = t[1, 0] + t[0, 1], t[0, 2] + t[2, 0], t[2, 1] + t[1, 2]
+    rows = np.array(
+        [
+            [squares[0], wx, wy, wz],
+            [wx, squares[1], xy, xz],
+            [wy, xy, squares[2], yz],
+            [wz, xz, yz, squares[3]],
+        ]
+    )
+    best = squares.argmax(axis=0)
+    parts = rows[best, :, np.arange(t.shape[2])].T
+    parts = parts / np.sqrt((parts * parts).sum(axis=0))
+    signs = np.where((parts[:, 1:] * parts[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
+    signs = np.cumprod(np.concatenate([np.where(parts[0, :1] < 0, -1.0, 1.0), signs]))
+    result: Floats = parts * signs
+    return result
+
+
+def _angle_by_angle(axes: list[int], moment: Floats) -> Floats:
+    """Angles (n, F) about turned axes, first to last, for the greatest trace of R' ``moment``.
+
+    The best of several starts; each angle in turn is set to the best for the others as they are.
+    """
+    n_frames = moment.shape[2]
+    best = np.zeros((len(axes), n_frames))
+    most = np.full(n_frames, -np.inf)
+    for start in STARTS if len(axes) > 1 else (0.0,):
+        angles = np.zeros((len(axes), n_frames))
+        angles[-1:] = start
+        for _ in range(SWEEPS if len(axes) > 1 else 1):
+            for k, axis in enumerate(axes):
+                between = moment
+                for before in range(k):  # T1' moment, then T2' T1' moment
+                    between = _turned_left(between, axes[before], -angles[before])
+                for after in range(len(axes) - 1, k, -1):
+                    between = turned(between, axes[after], -angles[after])
+                i, j = (axis + 1) % 3, (axis + 2) % 3
+                sine, cosine = between[j, i] - between[i, j], between[i, i] + between[j, j]
+                angles[k] = np.arctan2(sine, cosine)
+                trace = np.hypot(sine, cosine) + between[axis, axis]
+        better = trace > most * (1 + 1e-9) + 1e-300
+        best, most = np.where(better, angles, best), np.where(better, trace, most)
+    return np.asarray(np.unwrap(best, axis=1))
+
+
+def _turned_left(matrix: Floats, axis: int, angle: Floats) -> Floats:
+    """R ``matrix``, R the rotation by ``angle`` about the axis."""
+    return np.swapaxes(turned(np.swapaxes(matrix, 0, 1), axis, -angle), 0, 1)
+
+
+def _hold(link: Link, known: Floats, columns: Floats) -> None:
+    columns_of = [c for axis, c in link.turns if axis < 3] + list(link.quaternion)
+    for column in columns_of:
+        _hold_column(columns[column], known)
+
+
+def _hold_column(track: Floats, known: Floats) -> None:
+    """Where not ``known``, a straight line in time between the frames that are."""
+    rows = np.flatnonzero(known)
+    if 0 < len(rows) < len(track):
+        track[:] = np.interp(np.arange(len(track)), rows, track[rows])

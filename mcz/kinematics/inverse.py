@@ -1,0 +1,227 @@
+"""Inverse kinematics: values whose points, and virtual markers, lie where they were seen.
+
+There is no right answer, only a good one: the least sum of squared distances, and of what meets
+them alike the values that are nearest to rest and to the frames around. All frames at once: a
+guess from the roots down (``guess.py``), a descent from there (``descent.py``), others for frames
+that ended far off, or stand out from those beside them, and, where distances remain, a last one
+that lets values that those hardly decide follow the frames around. A frame costs the same however
+many there are; of what is large only a block of frames is in memory.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError
+from mcz.kinematics.chain import Floats
+from mcz.kinematics.descent import refine
+from mcz.kinematics.euler import ORDERS, nearest
+from mcz.kinematics.guess import Guess, centered, small
+from mcz.kinematics.targets import Targets
+from mcz.motion import Skeleton
+
+Ints = NDArray[np.int64]
+
+MOST_STEPS, MENDING_STEPS, STEADY_STEPS = 50, 20, 10
+TO_GUESS = 1e-6  # the weight of staying near the guess, for what nothing else decides
+TRIES, FAR_OFF, BESIDE = 2, 0.1, 1.0  # times, typical levers (rms), radians (rms)
+GUESSED = 2**12  # frames at a time
+JUMP = 0.35  # radians from a frame to the next, more than what people do
+SHORT = 8  # frames between two jumps, whatever lies beside them
+BAD = 5.0  # times the usual distance: a frame that did not get there
+FEW = 0.3  # of all frames
+SAME, NOTHING = 1e-2, 1e-10  # of a sum of squares, of typical levers: no difference
+EXACT = 1e-5  # of the typical lever: distances that leave nothing to steady
+STEADY = 0.05  # radians: how far angles stray from their mean over the frames around
+AROUND = (8, 4)  # frames to each side, from coarse to fine
+LOOSER = 1.5  # times what all the freedom of the channels may have taken off the distances
+
+
+def solve_ik(skeleton: Skeleton, points: Floats, markers: Floats | None = None) -> Floats:
+    """Values (n_frames, n_channels) in source units that bring the points of a skeleton to places.
+
+    ``points`` are the places of its points, (n_frames, n_points, 3) in its length unit, as
+    ``positions_of`` gives them, ``markers`` those of its virtual markers if they are known. NaN
+    is a place that is not known. Plain scalars, and what else moves nothing, are 0.
+
+    Raises MotionError where the shapes do not match the skeleton, and where it has no kinematics;
+    OptionError for virtual markers without a length unit.
+    """
+    targets = Targets(skeleton, markers=markers is not None)
+    seen, known = _seen(targets, points, markers)
+    if not seen.shape[2]:
+        return np.zeros((0, skeleton.n_channels))
+    return _Solution(targets, seen, known).values()
+
+
+class _Solution:
+    """Values on their way from the guess to the best, (n_channels, F)."""
+
+    def __init__(self, targets: Targets, seen: Floats, known: Floats) -> None:
+        self.targets, self.seen, self.known = targets, seen, known
+        links = targets.chain.links
+        self.angles = np.array(
+            [c for link in links for axis, c in link.turns if axis < 3], np.int64
+        )
+        self.columns = self._guess()
+        self.errors = np.zeros(seen.shape[2])
+
+    def values(self) -> Floats:
+        """All steps; values (n_frames, n_channels)."""
+        weight = np.full((len(self.columns), 1), TO_GUESS)
+        self._take(self._refined(self.columns, self.columns, weight, MOST_STEPS), None)
+        self._again(weight)
+        self._continue()
+        self._mend(weight)
+        self._continue()
+        self._steady()
+        self._continue()
+        self.columns[self.targets.units == 0] = 0.0
+        return np.ascontiguousarray(self.columns.T)
+
+    def _guess(self) -> Floats:
+        guess, n_frames = Guess(self.targets), self.seen.shape[2]
+        parts = [slice(start, start + GUESSED) for start in range(0, n_frames, GUESSED)]
+        return np.concatenate(
+            [guess.columns(self.seen[:, :, rows], self.known[:, rows]) for rows in parts], axis=1
+        )
+
+    def _refined(
+        self, start: Floats, prior: Floats, weight: Floats, steps: int, frames: Ints | None = None
+    ) -> tuple[Floats, Floats]:
+        seen, known = self.seen, self.known
+        if frames is not None:
+            seen, known = seen[:, :, frames], known[:, frames]
+        return refine(self.targets, start, seen, known, prior, weight, steps)
+
+    def _take(
+        self, found: tuple[Floats, Floats], limit: Floats | None, frames: Any = slice(None)
+    ) -> None:
+        """Take what was found for ``frames``, where its errors are within ``limit``."""
+        columns, errors = found
+        taken = np.ones(len(errors), np.bool_) if limit is None else errors <= limit
+        self.columns[:, frames] = np.where(taken, columns, self.columns[:, frames])
+        self.errors[frames] = np.where(taken, errors, self.errors[frames])
+
+    def _again(self, weight: Floats) -> None:
+        """Frames that ended far off start again from angles beside those where they ended."""
+        random = np.random.default_rng(0)
+        for _ in range(TRIES):
+            frames = np.flatnonzero(self.errors > FAR_OFF**2 * self._unit_error())
+            if not len(frames):
+                return
+            start = self.columns[:, frames]
+            beside = random.normal(0.0, BESIDE, (len(self.angles), len(frames)))
+            start[self.angles] += beside / self.targets.chain.radians
+            found = self._refined(start, start, weight, MOST_STEPS, frames)
+            self._take(found, self.errors[frames], frames)
+
+    def _continue(self) -> None:
+        """Make angles continuous over time, by whole turns and by the other Euler angles."""
+        radians = self.targets.chain.radians
+        for link in self.targets.chain.links:
+            columns = [column for axis, column in link.turns if axis < 3]
+            angles = self.columns[columns].T * radians
+            if "".join("xyzq"[axis] for axis, _ in link.turns) in ORDERS:
+                angles = nearest(angles)
+                angles = small(np.unwrap(angles, axis=0))
+            else:
+                angles = centered(np.unwrap(angles, axis=0))
+            self.columns[columns] = angles.T / radians
+
+    def _mend(self, weight: Floats) -> None:
+        """Frames that stand out are sought anew, from a line between those beside them."""
+        odd = self._odd()
+        good = np.flatnonzero(~odd)
+        frames = np.flatnonzero(odd)
+        if not len(good) or not len(frames):
+            return
+        line = np.stack([np.interp(frames, good, track[good]) for track in self.columns])
+        limit = self.errors[frames] * (1 + SAME) + self._unit_error() * NOTHING
+        self._take(self._refined(line, line, weight, MENDING_STEPS, frames), limit, frames)
+
+    def _odd(self) -> NDArray[np.bool_]:
+        """Frames that miss more than usual, lack a target, or lie between two jumps.
+
+        What most frames do is not odd.
+        """
+        counts = self.known.sum(axis=0)
+        steps = np.diff(self.columns[self.angles], axis=1) * self.targets.chain.radians
+        jumps = np.flatnonzero((np.abs(steps) > JUMP).any(axis=0)) + 1
+        reasons = (
+            counts < counts.max(),
+            self.errors > BAD**2 * np.median(self.errors) + self._unit_error() * NOTHING,
+            _between(jumps, len(counts)),
+        )
+        odd = np.zeros(len(counts), np.bool_)
+        for reason in reasons:
+            if np.count_nonzero(reason) < FEW * len(counts):
+                odd |= reason
+        return odd
+
+    def _unit_error(self) -> float:
+        """The sum of squares where every target is a typical lever away."""
+        return max(1, len(self.targets)) * self.targets.lever**2
+
+    def _steady(self) -> None:
+        """Where distances remain, as of noise, values stay nearer to those of the frames around.
+
+        The remaining distances say how much a place is to be believed, and what people do says how
+        far angles stray from their mean over some frames.
+        """
+        n_free = np.count_nonzero(self.targets.units)
+        freedoms = 3 * self.known.sum() - n_free * self.known.shape[1]
+        if freedoms <= 0:
+            return
+        square = float(self.errors.sum() / freedoms)
+        if square < (EXACT * self.targets.lever) ** 2:
+            return
+        weight = np.full((len(self.columns), 1), square / (STEADY * self.targets.lever) ** 2)
+        limit = self.errors + LOOSER * n_free * square
+        for around in AROUND:
+            prior = _means(self.columns, around)
+            self._take(self._refined(self.columns, prior, weight, STEADY_STEPS), limit)
+
+
+def _between(jumps: Ints, n_frames: int) -> NDArray[np.bool_]:
+    """Frames between two jumps that are close, or closer than those on either side."""
+    between = np.zeros(n_frames, np.bool_)
+    borders = np.concatenate([[0], jumps, [n_frames]])
+    lengths = np.diff(borders)
+    for k in range(1, len(lengths) - 1):
+        if lengths[k] < max(SHORT, min(lengths[k - 1], lengths[k + 1])):
+            between[borders[k] : borders[k + 1]] = True
+    return between
+
+
+def _seen(targets: Targets, points: Floats, markers: Floats | None) -> tuple[Floats, Floats]:
+    """Places (n_targets, 3, F), 0 where not known, and 1 where they are, else 0, (n_targets, F)."""
+    skeleton = targets.skeleton
+    n_markers = 0 if markers is None else 3 * skeleton.n_joints
+    wanted = {"points": (points, len(targets) - n_markers), "virtual markers": (markers, n_markers)}
+    for what, (places, count) in wanted.items():
+        if places is not None and (places.ndim != 3 or places.shape[1:] != (count, 3)):
+            raise MotionError(
+                f"skeleton {skeleton.name!r} has {count} {what}, and their places are of shape "
+                f"{places.shape}, not (n_frames, {count}, 3)"
+            )
+    if markers is not None and len(markers) != len(points):
+        raise MotionError(f"{len(points)} frames of points, {len(markers)} of virtual markers")
+    places = points if markers is None else np.concatenate([points, markers], axis=1)
+    seen = np.array(np.moveaxis(places, 0, 2), np.float64, order="C")
+    finite: NDArray[np.bool_] = np.isfinite(seen)
+    known = np.logical_and.reduce(finite, axis=1)
+    return np.where(known[:, None], seen, 0.0), known.astype(np.float64)
+
+
+def _means(tracks: Floats, around: int) -> Floats:
+    """Of tracks (n, F) the means over the frames up to ``around`` before and after each."""
+    n_frames = tracks.shape[1]
+    sums = np.concatenate([np.zeros((len(tracks), 1)), np.cumsum(tracks, axis=1)], axis=1)
+    frames = np.arange(n_frames)
+    first, last = np.maximum(frames - around, 0), np.minimum(frames + around + 1, n_frames)
+    result: Floats = (sums[:, last] - sums[:, first]) / (last - first)
+    return result

@@ -1,0 +1,178 @@
+"""What inverse kinematics aims at: points and virtual markers, and how channels move them.
+
+A target is a place fastened to a joint: a point, or a virtual marker beside the joint's first
+point. Arrays of a block of frames have the frames last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.kinematics.chain import Chain, Floats, Link, Pose, along
+from mcz.kinematics.points import marker_distance, place, points_of, reach
+from mcz.motion import Skeleton
+
+TYPICAL_LEVER = 0.125  # of the reach: to turn by one radian counts as to move by so much
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A place of ``joint``: its tail of that number or, -1, its origin; ``axis`` of a marker."""
+
+    joint: int
+    tail: int
+    axis: int = -1
+
+
+class Targets:
+    """The targets of a skeleton in the order of their places: points, then virtual markers.
+
+    ``units``, (n_channels,): the source units of each channel that count as one length unit, in
+    which all steps are measured; 0 of channels that move nothing.
+    """
+
+    def __init__(self, skeleton: Skeleton, *, markers: bool) -> None:
+        self.skeleton, self.chain = skeleton, Chain(skeleton)
+        own = points_of(skeleton)
+        self.list = [Target(joint, tail) for joint, tails in enumerate(own) for tail in tails]
+        self.distance = marker_distance(skeleton) if markers else 0.0
+        if markers:
+            firsts = [tails[0] for tails in own]
+            self.list += [Target(j, tail, k) for j, tail in enumerate(firsts) for k in range(3)]
+        self.lever = TYPICAL_LEVER * reach(skeleton) or 1.0
+        self.units = self._units()
+        self.below = self._below()
+        self.children: list[list[int]] = [[] for _ in self.chain.links]
+        for joint, link in enumerate(self.chain.links):
+            if link.parent >= 0:
+                self.children[link.parent].append(joint)
+
+    def __len__(self) -> int:
+        return len(self.list)
+
+    def _units(self) -> Floats:
+        units = np.zeros(self.skeleton.n_channels)
+        for link in self.chain.links:
+            units[[c for _, c in link.moves]] = 1.0
+            if link.direction is not None:
+                units[list(link.lengths)] = 1.0
+            units[[c for _, c in link.scales] + list(link.quaternion)] = 1.0 / self.lever
+            angles = [column for axis, column in link.turns if axis < 3]
+            units[angles] = 1.0 / (self.chain.radians * self.lever)
+        return units
+
+    def _below(self) -> list[NDArray[np.int64]]:
+        """Of every joint the targets that are its own or of joints below it."""
+        below: list[list[int]] = [[] for _ in self.chain.links]
+        for number, target in enumerate(self.list):
+            joint = target.joint
+            while joint >= 0:
+                below[joint].append(number)
+                joint = self.chain.links[joint].parent
+        return [np.array(numbers, np.int64) for numbers in below]
+
+    def neutral(self, n_frames: int) -> Floats:
+        """Values that turn, move and stretch nothing, (n_channels, F)."""
+        columns = np.zeros((self.skeleton.n_channels, n_frames))
+        for link in self.chain.links:
+            columns[[c for _, c in link.scales]] = 1.0
+            columns[list(link.quaternion[:1])] = 1.0
+        return columns
+
+    def places(self, columns: Floats, pose: Pose) -> Floats:
+        """Where the targets are, (n_targets, 3, F)."""
+        places = np.empty((len(self.list), 3, columns.shape[1]))
+        for number, target in enumerate(self.list):
+            places[number] = place(self.chain, target.joint, target.tail, columns, pose)
+            if target.axis >= 0:
+                places[number] += self.distance * pose.axes[target.joint][:, target.axis]
+        return places
+
+    def jacobian(self, columns: Floats, pose: Pose, places: Floats) -> Floats:
+        """d places / d channels for a step of one of ``units``, (n_channels, n_targets, 3, F)."""
+        made = np.zeros((self.skeleton.n_channels, *places.shape))
+        for joint, link in enumerate(self.chain.links):
+            numbers = self.below[joint]
+            if not len(numbers):
+                continue
+            if link.turns:
+                arms = places[numbers] - pose.origins[joint]
+                for column, spin in self._spins(link, pose.spins[joint]):
+                    made[column, numbers] = _cross(spin / self.lever, arms)
+            for column, step in self._moves(link, columns, pose):
+                made[column, numbers] = step
+            for column, some, step in self._stretches(joint, link, columns, pose):
+                made[column, some] += step
+        return made
+
+    def _spins(self, link: Link, spins: list[Floats]) -> Iterator[tuple[int, Floats]]:
+        each = iter(spins)
+        for axis, column in link.turns:
+            for one in link.quaternion if axis == 3 else (column,):
+                yield one, next(each)
+
+    def _moves(self, link: Link, columns: Floats, pose: Pose) -> Iterator[tuple[int, Floats]]:
+        for component, column in link.moves:
+            step = np.zeros((3, 1))
+            step[component] = 1.0
+            if link.parent >= 0:
+                if link.parent_back is not None:
+                    step = link.parent_back @ step
+                step = self.chain.scaled(self.chain.links[link.parent], step, columns)
+                step = along(pose.axes[link.parent], step)
+            yield column, step
+
+    def _stretches(
+        self, joint: int, link: Link, columns: Floats, pose: Pose
+    ) -> Iterator[tuple[int, NDArray[np.int64], Floats]]:
+        """Lengths and scales: channel, the targets that it moves, and how far."""
+        if not link.lengths and not link.scales:
+            return
+        axes = pose.axes[joint]
+        tails = {
+            tail: np.array([n for n in self.below[joint] if self.list[n] in fastened], np.int64)
+            for tail, fastened in self._fastened(joint, link)
+        }
+        if link.direction is not None:
+            step = along(axes, self.chain.scaled(link, link.direction[:, None], columns))
+            moved = [*tails.values(), *(self.below[child] for child in self.children[joint])]
+            for column in link.lengths:
+                for some in moved:
+                    yield column, some, step
+        vectors = [
+            (some, self.chain.lengthened(link, link.tails[tail][:, None], columns))
+            for tail, some in tails.items()
+        ]
+        vectors += [(self.below[child], pose.arms[child]) for child in self.children[joint]]
+        for component, column in link.scales:
+            for some, vector in vectors:
+                yield column, some, axes[:, component] * (vector[component] / self.lever)
+
+    @staticmethod
+    def _fastened(joint: int, link: Link) -> Iterator[tuple[int, set[Target]]]:
+        for tail in range(len(link.tails)):
+            yield tail, {Target(joint, tail, axis) for axis in (-1, 0, 1, 2)}
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """a x b of vectors (3, F or 1) and (n, 3, F)."""
+    result = np.empty(np.broadcast_shapes(a[None].shape, b.shape))
+    result[:, 0] = a[1] * b[:, 2] - a[2] * b[:, 1]
+    result[:, 1] = a[2] * b[:, 0] - a[0] * b[:, 2]
+    result[:, 2] = a[0] * b[:, 1] - a[1] * b[:, 0]
+    return result
+
+
+def unsolved_channels(skeleton: Skeleton) -> tuple[str, ...]:
+    """The channels, ``joint.channel``, that inverse kinematics leaves at 0: they move nothing."""
+    names = (
+        f"{address}.{channel.label}"
+        for address, joint in zip(skeleton.addresses(), skeleton.joints, strict=True)
+        for channel in joint.channels
+    )
+    units = Targets(skeleton, markers=False).units
+    return tuple(name for name, unit in zip(names, units, strict=True) if not unit)
