@@ -25,10 +25,13 @@ if TYPE_CHECKING:
     )
     from mcz.files.archive import Outcome, Report, append, pack, unpack
     from mcz.files.clip import Clip
-    from mcz.files.conversion import convert
+    from mcz.files.conversion import Fit, convert, from_positions
     from mcz.files.editing import Replacement, replace
     from mcz.files.extraction import ExtractedClip, Extraction, extract
     from mcz.files.file import Attachment, File, encode, open, read, write
+    from mcz.files.following import live_frames
+    from mcz.files.live import LiveWriter
+    from mcz.files.positions import in_positions
     from mcz.files.report import Problem, verify
     from mcz.files.sources import read_skeleton
     from mcz.kinematics import positions
@@ -40,7 +43,7 @@ __version__ = "0.2.0"
 _HOMES = {
     "mcz.files.archive": ("Outcome", "Report", "append", "pack", "unpack"),
     "mcz.files.clip": ("Clip",),
-    "mcz.files.conversion": ("convert",),
+    "mcz.files.conversion": ("Fit", "convert", "from_positions"),
     "mcz.files.editing": ("Replacement", "replace"),
     "mcz.errors": (
         "AccessError",
@@ -57,6 +60,9 @@ _HOMES = {
     ),
     "mcz.files.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.files.file": ("Attachment", "File", "encode", "open", "read", "write"),
+    "mcz.files.positions": ("in_positions",),
+    "mcz.files.following": ("live_frames",),
+    "mcz.files.live": ("LiveWriter",),
     "mcz.kinematics": ("positions",),
     "mcz.files.report": ("Problem", "verify"),
     "mcz.metrics": ("Comparison", "compare"),
@@ -77,9 +83,11 @@ __all__ = [
     "ExtractedClip",
     "Extraction",
     "File",
+    "Fit",
     "FormatError",
     "Joint",
     "LimitError",
+    "LiveWriter",
     "MczError",
     "Motion",
     "MotionError",
@@ -99,6 +107,9 @@ __all__ = [
     "convert",
     "encode",
     "extract",
+    "from_positions",
+    "in_positions",
+    "live_frames",
     "open",
     "pack",
     "positions",

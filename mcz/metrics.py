@@ -107,6 +107,7 @@ def compare(original: Motion, decoded: Motion, *, virtual_markers: bool = True) 
     same = _same_channels(original, decoded, notes)
     placed = _same_points(original, decoded, notes)
     marked = placed and unit is not None and virtual_markers
+    marked = marked and _same_axes(original.skeleton, decoded.skeleton, notes)
     with np.errstate(all="ignore"):  # what overflows is no figure
         for start, left, right in _blocks(original, decoded):
             if same:
@@ -307,6 +308,15 @@ def _same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
             f"points are compared in order, and {len(apart)} of {counts[0]} have other names on "
             f"the other side, first {first}"
         )
+    return True
+
+
+def _same_axes(a: Skeleton, b: Skeleton, notes: list[str]) -> bool:
+    """Whether both have joints that turn, or both markers, whose axes are those of the world."""
+    sets = point_set(a), point_set(b)
+    if "markers" in sets and sets[0] != sets[1]:
+        notes.append(f"points of {sets[0]} and {sets[1]}: no errors of virtual markers")
+        return False
     return True
 
 

@@ -36,12 +36,15 @@ ALLOWED = {
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},
     "files": MODEL | {"kinematics", "metrics", "codecs", "container", "formats"},
-    "cli": MODEL | {"kinematics", "metrics", "files", "sample"},
+    "training": MODEL | {"kinematics", "transforms", "codecs"},
+    "cli": MODEL | {"kinematics", "metrics", "files", "sample", "training"},
     # On top of all: it measures every part by itself.
     "bench": MODEL
     | {
         "angles",
+        "kinematics",
         "metrics",
+        "training",
         "bjontegaard",
         "transforms",
         "codecs",

@@ -11,7 +11,7 @@ import mcz
 from mcz.codecs import by_name
 from mcz.container import chunks, payloads
 from mcz.container.chunks import ANCILLARY, FOOT, SAFE_TO_COPY, build_chunk, build_foot
-from mcz.container.packets import CODEC, END, Packet, build_packet, read_packets
+from mcz.container.packets import END, FRAME, Packet, build_packet, read_packets
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import (
@@ -184,7 +184,7 @@ def test_segment_table_round_trip() -> None:
 
 
 def test_packets_round_trip_and_order() -> None:
-    packets = [Packet(CODEC, 0, b"one"), Packet(CODEC, 1, b"", fresh=False)]
+    packets = [Packet(FRAME, 0, b"one"), Packet(FRAME, 1, b"", fresh=False)]
     data = b"".join(map(build_packet, [*packets, Packet(END, 2, b"")]))
     assert list(read_packets(io.BytesIO(data).read, 100)) == packets
     swapped = b"".join(map(build_packet, [packets[1], packets[0]]))

@@ -1,6 +1,6 @@
 """Train the start tables of lossy codecs: the states in which their coders begin.
 
-    python tools/train_tables.py wavelet|qbc|pca OUT.json FILE...
+    python tools/train_tables.py wavelet|qbc|pca|window|frame OUT.json FILE...
 
 The files are coded twice, with every setting below, by coders that are never reset; see
 ``tools/start_tables.py``.
@@ -8,6 +8,7 @@ The files are coded twice, with every setting below, by coders that are never re
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -20,18 +21,25 @@ import numpy as np
 
 import mcz
 from mcz.codecs import (
+    _frame_kernels,
     _pca_kernels,
     _pca_streams,
     _qbc_kernels,
     _qbc_streams,
     _wavelet_streams,
+    _window_kernels,
+    _window_streams,
+    lsdt_clip,
+    lsdt_frame,
     mrdwt,
     pca,
     qbc,
 )
 from mcz.codecs.base import Codec
 from mcz.coding import residuals
+from mcz.container.writer import Writer
 from mcz.files.memory import MemorySource
+from mcz.files.positions import as_codec_wants
 from mcz.motion import Motion
 from tools.start_tables import Kept, table, untrained
 
@@ -97,6 +105,36 @@ PLANS = {
             {"q": 12},
         ),
     ),
+    "window": Plan(
+        _window_streams,
+        lsdt_clip.CODEC,
+        (_window_kernels.N_SETS * residuals.N_MIXERS,),
+        60,  # of the few bits of a window
+        (
+            {"step": 0.02},
+            {"step": 0.5, "window": 60},
+            {"step": 0.1},
+            {"step": 0.05, "window": 120},
+            {"step": 1.0},
+            {"step": 0.2, "window": 120},
+            {"step": 0.3, "domain": "channels"},
+        ),
+    ),
+    "frame": Plan(
+        lsdt_frame,
+        lsdt_frame.CODEC,
+        (_frame_kernels.N_SETS * residuals.N_MIXERS,),
+        24,
+        (
+            {"step": 0.02},
+            {"step": 0.5},
+            {"step": 0.1},
+            {"step": 0.3, "domain": "channels"},
+            {"step": 0.05},
+            {"step": 1.0},
+            {"step": 0.2},
+        ),
+    ),
 }
 
 
@@ -110,8 +148,9 @@ def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
     for number, motion in enumerate([*motions, *motions]):
         sizes = []
         for setting in plan.settings:
-            source = MemorySource(motion, 0, plan.codec, SEGMENT_BYTES)
-            encoded = plan.codec.encode(source, plan.codec.options(setting))
+            options = plan.codec.options(setting)
+            source = MemorySource(given(plan.codec, options, motion), 0, plan.codec, SEGMENT_BYTES)
+            encoded = plan.codec.encode(source, options)
             sizes.append(sum(len(s) for part in encoded.segments for s in part.streams))
             if number >= len(motions):
                 rounds += 1
@@ -119,6 +158,11 @@ def train(plan: Plan, motions: Sequence[Motion]) -> list[np.ndarray]:
                     total += state
         print(f"{motion.name}: {sizes}", file=sys.stderr)
     return [total // rounds for total in totals]
+
+
+def given(codec: Codec, options: Mapping[str, Any], motion: Motion) -> Motion:
+    """What the codec is given of a clip."""
+    return as_codec_wants(Writer(io.BytesIO()), motion, codec, options)
 
 
 if __name__ == "__main__":

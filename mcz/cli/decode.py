@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 import numpy as np
@@ -27,6 +27,7 @@ from mcz.cli.options import decoded_option, force_option, json_option
 if TYPE_CHECKING:
     from mcz.cli.export import Table
     from mcz.files.clip import Clip
+    from mcz.files.conversion import Fit
     from mcz.files.file import File
     from mcz.motion import Motion
 
@@ -83,6 +84,12 @@ class _Part(NamedTuple):
     callback=to_rate,
     help="Frames a second (with --to bvh or c3d), where the clip does not know them.",
 )
+@click.option(
+    "--solve-ik",
+    "solve",
+    is_flag=True,
+    help="Fit the skeleton of a clip of positions to them (with --to amc or bvh).",
+)
 @click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
 @click.option("--salvage", is_flag=True, help="Write what a damaged file still holds.")
 @decoded_option
@@ -99,6 +106,7 @@ def command(
     preview: bool,
     target: str | None,
     rate: Fraction | None,
+    solve: bool,
     with_skeleton: bool,
     salvage: bool,
     max_decoded: int | None,
@@ -120,8 +128,11 @@ def command(
         raise Failure("--decimate needs --resolution", Exit.USAGE)
     if rate is not None and target not in CONVERSIONS:
         raise Failure(f"--rate needs --to {' or '.join(CONVERSIONS)}", Exit.USAGE)
+    if solve and target not in ("amc", "bvh"):
+        raise Failure("--solve-ik needs --to amc or --to bvh", Exit.USAGE)
     if output == "-" and (as_json or with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
+    fit: Fit | None = None
     with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
         if held.clips:
             clip = held.only_clip(name)
@@ -130,6 +141,10 @@ def command(
                 outputs = [_source(clip, part)]
             elif target in CONVERSIONS:
                 motion = _motion(clip, part, preview)
+                if solve:
+                    motion, fit = _solved(clip, motion)
+                elif target in ("amc", "bvh"):
+                    _check_moves(clip)
                 outputs = _converted(motion, target, rate, with_skeleton)
             else:
                 outputs = [_export(clip, target, part, joints, preview)]
@@ -140,7 +155,10 @@ def command(
         else:
             outputs = [_other(held, name)]
         damage = list(held.damage)
-    _deliver(file, output, outputs, force, as_json, damage)
+    facts = {"damage": damage} if fit is None else {"damage": damage, "fit": _facts(fit)}
+    _deliver(file, output, outputs, force, as_json, facts)
+    if fit is not None:
+        say(f"{file}: {_told(fit)}")
     for line in damage:
         say(f"{file}: salvage: {line}")
     return Exit.SALVAGED if damage else Exit.FINE
@@ -165,6 +183,63 @@ def _motion(clip: Clip, part: _Part, preview: bool) -> Motion:
 
         return preview_motion(clip)
     return clip.motion(part.frames, part.resolution, decimate=part.decimate)
+
+
+def _check_moves(clip: Clip) -> None:
+    """Raise Failure for positions of a skeleton that is here, too: it can be fitted to them."""
+    from mcz.kinematics import point_set
+
+    if clip.skeleton.base and point_set(clip.skeleton) == "markers":
+        raise Failure(
+            f"clip {clip.name!r} holds positions; --solve-ik fits its skeleton to them", Exit.USAGE
+        )
+
+
+def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
+    """The motion of the clip's base skeleton whose points lie where those of ``motion`` do."""
+    from mcz.files.conversion import from_positions
+
+    base = clip.base_skeleton
+    if base is None:
+        raise Failure(
+            f"clip {clip.name!r} names no skeleton that --solve-ik could fit to its positions",
+            Exit.USAGE,
+        )
+    return from_positions(motion, base)
+
+
+def _facts(fit: Fit) -> dict[str, Any]:
+    """What ``--json`` says of a fit."""
+    keys = ("mean_error", "max_error", "marker_mean_error", "marker_max_error")
+    distances = {name: getattr(fit, name) for key in keys for name in (key, f"{key}_cm")}
+    return {
+        "n_points": fit.n_points,
+        "n_markers": fit.n_markers,
+        **distances,
+        "frame": fit.frame,
+        "point": fit.point,
+        "unsolved": list(fit.unsolved),
+    }
+
+
+def _told(fit: Fit) -> str:
+    """A fit in words."""
+    scale, unit = (1.0, "units") if fit.unit_cm is None else (fit.unit_cm, "cm")
+    if fit.mean_error is None or fit.max_error is None:
+        told = "inverse kinematics: no position is known"
+    else:
+        told = (
+            f"inverse kinematics: {fit.n_points} points {fit.mean_error * scale:.3g} {unit} off on "
+            f"average, at most {fit.max_error * scale:.3g} {unit} (frame {fit.frame}, {fit.point})"
+        )
+    if fit.marker_mean_error is not None and fit.marker_max_error is not None:
+        told += (
+            f"; {fit.n_markers} virtual markers {fit.marker_mean_error * scale:.3g}, at most "
+            f"{fit.marker_max_error * scale:.3g} {unit}"
+        )
+    if fit.unsolved:
+        told += f"; left at 0: {', '.join(fit.unsolved)}"
+    return told
 
 
 def _converted(
@@ -260,7 +335,7 @@ def _deliver(
     outputs: list[Output],
     force: bool,
     as_json: bool,
-    damage: list[str],
+    facts: dict[str, Any],
 ) -> None:
     """Write the outputs where they belong and say so."""
     if output == "-":
@@ -276,7 +351,7 @@ def _deliver(
         write_output(path, data, force)
         rows.append({"path": str(path), "kind": kind, "bytes": len(data)})
     if as_json:
-        print_json({"outputs": rows, "damage": damage})
+        print_json({"outputs": rows, **facts})
     else:
         for row in rows:
             click.echo(printable(f"{row['path']}  {row['bytes']:,} bytes"))

@@ -39,6 +39,12 @@ from mcz.cli.progress import Progress
     help="The ASF of an AMC. Default: the same stem, the subject's prefix beside it, a sibling "
     "folder asf/, or the only ASF beside it.",
 )
+@click.option(
+    "--format",
+    "format_name",
+    type=click.Choice(("bvh", "amc", "c3d", "asf")),
+    help="What standard input is. Default: what it looks like; live BVH, or AMC with --skeleton.",
+)
 @encoding_options
 @force_option
 @json_option
@@ -48,13 +54,55 @@ def command(
     skeleton: str | None,
     force: bool,
     as_json: bool,
+    format_name: str | None,
     **options: Any,
 ) -> Exit:
-    """Encode SRC (.bvh, .amc, .c3d or .asf) into OUT.mcz; an ASF alone makes one of a skeleton."""
+    """Encode SRC (.bvh, .amc, .c3d or .asf) into OUT.mcz; an ASF alone makes one of a skeleton.
+
+    With SRC - standard input is read. A codec without delay then writes each frame of a BVH or AMC
+    before it reads the next, to standard output unless -o says otherwise.
+    """
+    if source == "-":
+        return _encode_piped(output, skeleton, force, as_json, format_name, **options)
+    if format_name is not None:
+        raise Failure("--format says what standard input is; SRC has a suffix", Exit.USAGE)
+    existing(source)
+    return _encode_file(source, output, skeleton, force, as_json, **options)
+
+
+def _encode_piped(
+    output: str | None,
+    skeleton: str | None,
+    force: bool,
+    as_json: bool,
+    format_name: str | None,
+    **options: Any,
+) -> Exit:
+    from mcz.cli.piped import encode_lines, stored
+    from mcz.files.arriving import codes_live
+
+    if options["codec"] is not None and codes_live(options["codec"]):
+        if as_json:
+            raise Failure("--json: what is coded frame by frame has no document", Exit.USAGE)
+        encode_lines(output, force, format_name, skeleton, **options)
+        return Exit.FINE
+    if output is None:
+        raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)
+    with stored(format_name) as path:
+        return _encode_file(path, output, skeleton, force, as_json, **options)
+
+
+def _encode_file(
+    source: str,
+    output: str | None,
+    skeleton: str | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> Exit:
     import mcz
     from mcz.files.report import decoded_bytes, info
 
-    existing(source)
     target = output or str(Path(source).with_suffix(".mcz"))
     unread = output == "-" or _is_special(target)
     if unread and as_json:

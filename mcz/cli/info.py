@@ -187,6 +187,9 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
     yield from (
         "  " + line for line in table([["part", "bytes", "share"], *rows], "lrr").split("\n")
     )
+    if clip["packets"]:
+        framing = f"{clip['packet_bytes']:,} bytes of the overhead"
+        yield f"  {plural(clip['packets'], 'packet')}, their framing {framing}"
     for key, against in RATIOS:
         if clip[key] is not None:
             yield f"  {clip[key]:7.2f} : 1 against {against}"

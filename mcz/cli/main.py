@@ -23,6 +23,7 @@ COMMANDS = (
     "replace",
     "diff",
     "bench",
+    "train",
 )
 
 

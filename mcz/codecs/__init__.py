@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from mcz.codecs import awt, dwt, lossless, mrdwt, pca, qbc, raw
+from mcz.codecs import (
+    awt,
+    dwt,
+    lossless,
+    lsdt_clip,
+    lsdt_frame,
+    mdtt,
+    mrdwt,
+    pca,
+    pca_rdo,
+    qbc,
+    raw,
+)
 from mcz.codecs.base import Codec
 from mcz.errors import OptionError, UnsupportedError
 
@@ -16,6 +28,10 @@ CODECS: dict[int, Codec] = {
         pca.CODEC,
         dwt.CODEC,
         awt.CODEC,
+        lsdt_frame.CODEC,
+        lsdt_clip.CODEC,
+        mdtt.CODEC,
+        pca_rdo.CODEC,
     )
 }
 DEFAULT = lossless.CODEC.name  # the best lossless one there is

@@ -62,6 +62,11 @@ def _start_states() -> tuple[Ints, ...]:
     return tuple(start_state(table) for table in json.loads(START_TABLE.read_text())["sets"])
 
 
+def basis_state() -> Ints:
+    """The state in which a coder begins that codes bases alone."""
+    return _start_states()[0]
+
+
 def build_stream(found: Components, *, scaled: bool) -> bytes:
     """The stream of a segment; raises MotionError where an integer is too large."""
     parts = (found.means, found.basis, found.coefficients)

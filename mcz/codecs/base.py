@@ -5,6 +5,7 @@ SPEC.md, "Codecs", is normative. A codec knows neither the container nor any sou
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -16,9 +17,12 @@ from numpy.typing import NDArray
 from mcz.errors import FormatError, OptionError
 from mcz.motion import Skeleton
 from mcz.numbers import Grid
+from mcz.schema import varint
 
 Domain = Literal["ordinals", "values"]
 Grouping = Literal["all", "joint", "channel"]
+
+ID_SIZE = 16  # bytes of the id of a model
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,28 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True)
+class Model:
+    """A learned model, as MODL has it: ``kind`` of the registry, ``data`` as the kind says."""
+
+    kind: int
+    data: bytes
+
+
+# id of a MODL -> the model, None where the file has none of that id.
+FindModel = Callable[[bytes], Model | None]
+
+
+def id_of(model: Model) -> bytes:
+    """The id that a clip names the model by: that of its MODL."""
+    return hashlib.sha256(varint(model.kind) + model.data).digest()[:ID_SIZE]
+
+
+def model_finder(models: Sequence[Model]) -> FindModel:
+    """Finds those that an encoder has made or named."""
+    return {id_of(model): model for model in models}.get
+
+
+@dataclass(frozen=True, slots=True)
 class Layout:
     """What encoder and decoder both know of a signal.
 
@@ -68,6 +94,7 @@ class Layout:
     grids: tuple[Grid, ...] = ()
     n_resolutions: int = 1
     segment_bytes: int = 2**53  # decoded, 8 a value: the most that a segment may have
+    find_model: FindModel | None = None  # in the file; a decoder's
 
     @property
     def most_frames(self) -> int:
@@ -143,11 +170,17 @@ class Dial:
 
 @dataclass(frozen=True, slots=True)
 class Encoded:
-    """An encoded signal: what goes into CLIP, then the segments as they are made."""
+    """An encoded signal: what goes into CLIP, then the segments as they are made.
+
+    ``models`` are written before the clip that refers to them, once a file. ``known`` are those of
+    SPEC.md's annexes that it refers to: a file of the archive profile has them, too.
+    """
 
     header: bytes
     segments: Iterator[Segment]
     n_resolutions: int = 1
+    models: tuple[Model, ...] = ()
+    known: tuple[Model, ...] = ()
 
 
 Encode = Callable[[SignalSource, Mapping[str, Any]], Encoded]
@@ -169,6 +202,39 @@ Recode = Callable[
     [bytes, SignalSource, tuple[int, ...], Sequence[Span], Mapping[str, Any], Fetch],
     Iterator[tuple[bytes, ...]],
 ]
+
+
+class LiveEncoder(Protocol):
+    """Codes frames as they come, each into the one stream of a segment of one frame.
+
+    ``header`` and ``models`` are known before the first frame. ``n_resolutions`` is 1, and there is
+    one group.
+    """
+
+    header: bytes
+    models: tuple[Model, ...]
+
+    def push(
+        self, values: NDArray[np.float64], valid: NDArray[np.bool_] | None = None
+    ) -> tuple[bytes, bool]:
+        """The stream of the next frame, (n_channels,), and whether its segment starts fresh."""
+        ...
+
+
+class LiveDecoder(Protocol):
+    """The inverse: raises FormatError on bad bytes, and is of no use any more then until a fresh
+    segment comes."""
+
+    def push(self, stream: bytes, fresh: bool) -> NDArray[np.float64]:
+        """The values of the next frame, (n_channels,)."""
+        ...
+
+
+Live = Callable[[Layout, Mapping[str, Any]], LiveEncoder]  # a layout of 0 frames, options
+Follow = Callable[[bytes, Layout], LiveDecoder]  # a header
+
+# (header) -> the ids of the models that it names; raises FormatError for bad bytes.
+Uses = Callable[[bytes], tuple[bytes, ...]]
 
 # (header, layout, spans) -> the stored frames, ascending, that the coarsest resolution alone gives
 # exactly as all resolutions do.
@@ -193,6 +259,11 @@ class Codec:
     groups (None: none does). Both are given the layout before the cut, and raise FormatError for
     bad bytes.
 
+    ``places``: it is made for places of points; of a clip of channels it is given the places of its
+    points, unless its parameter ``domain`` says ``channels``. ``uses``: the models that a header
+    names (None: there never are any). ``live`` and ``follow``: coding and
+    decoding frame by frame (None: the codec cannot).
+
     ``recode`` codes some groups anew (None: the codec cannot do that), of a codec with ``regroup``
     in any of the segments, of others in all. ``preview`` says what can be read without decoding
     the rest (None: nothing exactly).
@@ -214,6 +285,10 @@ class Codec:
     regroup: Regroup | None = None
     recode: Recode | None = None
     preview: Preview | None = None
+    places: bool = False
+    uses: Uses | None = None
+    live: Live | None = None
+    follow: Follow | None = None
 
     def options(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """All parameters, those given checked; raises OptionError for an unknown or bad one."""

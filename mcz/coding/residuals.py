@@ -21,10 +21,11 @@ LENGTH_BITS = 6  # of the length of a first number
 def bits(value: int) -> int:
     """Bits of ``value`` >= 0 without leading zeros."""
     n = 0
-    while value > 0:
-        value >>= 1
-        n += 1
-    return n
+    for half in (32, 16, 8, 4, 2, 1):  # far quicker than bit by bit
+        if value >> half:
+            value >>= half
+            n += half
+    return n + value
 
 
 @inner

@@ -12,11 +12,13 @@ from typing import Any
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, Chunk, build_chunk
 from mcz.container.limits import check
-from mcz.container.segments import SegmentHeader
+from mcz.container.packets import FRAME, SEGMENT
+from mcz.container.segments import FRESH, SegmentHeader
 from mcz.errors import FormatError
-from mcz.schema import build, deflate, inflate, parse, read_varint, varint
+from mcz.schema import MAX_COUNT, build, deflate, inflate, parse, read_varint, varint
 
-PACKET = 128  # set in the indexed flags of a segment that is a packet of an open DATA
+# Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
+PACKETS = {SEGMENT: 128, FRAME: 64}
 
 # Each segment in the "segments" field of an indexed clip: (name, type, meaning).
 INDEXED_SEGMENT_FIELDS = (
@@ -26,18 +28,22 @@ INDEXED_SEGMENT_FIELDS = (
     ("n_frames", "varint", "frames"),
     ("lead", "varint", "as in DATA"),
     ("tail", "varint", "as in DATA"),
-    ("flags", "varint", "as in DATA; 128 more where it is a packet of an open DATA"),
+    ("flags", "varint", "as in DATA; 128 more where it is a packet of kind 1, 64 where of kind 2"),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentRow:
-    """One segment: where its payload lies, and what it covers."""
+    """One segment: where its payload lies, and what it covers.
+
+    ``packet`` is the kind of its packet, 0 where it is a closed DATA. The payload of a packet of
+    kind 2 is a stream without a table.
+    """
 
     offset: int
     size: int
     header: SegmentHeader
-    packet: bool = False
+    packet: int = 0
 
     @property
     def stop(self) -> int:
@@ -62,6 +68,22 @@ class SignalRow:
     def stored(self, n_frames: int) -> int:
         """The frames that the segments of the signal cover, where the clip has ``n_frames``."""
         return self.skip + n_frames + self.spare
+
+
+def signal_rows(clip: Any, where: str) -> tuple[SignalRow, ...]:
+    """What the index says of the signals, from the fields of CLIP; raises FormatError."""
+    return tuple(_signal_row(fields, clip, where) for fields in clip.signals)
+
+
+def _signal_row(fields: Any, clip: Any, where: str) -> SignalRow:
+    cut = fields.skip, fields.spare
+    if clip.flags & payloads.OPEN_CLIP and any(cut):
+        raise FormatError(f"{where}: n_frames is open, but a signal has skip and spare {cut}")
+    if sum(cut) + clip.n_frames > MAX_COUNT:
+        raise FormatError(f"{where}: skip and spare {cut} of {clip.n_frames} frames")
+    n_channels = sum(run.n_channels for run in fields.grids)
+    codec = fields.codec, fields.codec_version
+    return SignalRow(n_channels, fields.samples_per_frame, *codec, *cut)
 
 
 @dataclass(slots=True)
@@ -138,7 +160,7 @@ def _clip_fields(clip: ClipRow) -> dict[str, Any]:
     for row in clip.segments:
         header = row.header
         fields = (row.offset - end, row.size, header.signal, header.n_frames)
-        flags = header.flags | (PACKET if row.packet else 0)
+        flags = header.flags | PACKETS.get(row.packet, 0)
         segments += b"".join(map(varint, (*fields, header.lead, header.tail, flags)))
         end = row.stop
     return {
@@ -220,7 +242,12 @@ def _parse_segments(data: bytes, end: int, n_signals: int, name: str) -> Iterabl
         gap, size, signal, n_frames, lead, tail, flags = fields
         if signal >= n_signals:
             raise FormatError(f"INDX: clip {name!r} has a segment of signal {signal}")
-        header = SegmentHeader(signal, first[signal], n_frames, lead, tail, flags & ~PACKET)
-        yield SegmentRow(end + gap, size, header, bool(flags & PACKET))
+        kind = next((kind for kind, bit in PACKETS.items() if flags & bit), 0)
+        header = SegmentHeader(
+            signal, first[signal], n_frames, lead, tail, flags & ~PACKETS.get(kind, 0)
+        )
+        if kind == FRAME and header != SegmentHeader(0, first[0], 1, flags=header.flags & FRESH):
+            raise FormatError(f"INDX: clip {name!r} has {header} as a packet of kind 2")
+        yield SegmentRow(end + gap, size, header, kind)
         first[signal] += n_frames
         end += gap + size

@@ -14,15 +14,17 @@ from mcz.container.limits import check
 from mcz.errors import ChecksumError, FormatError
 from mcz.schema import take_varint, varint
 
-END, SEGMENT, CODEC = 0, 1, 2  # kinds, bits 0 to 3 of the first byte
+END, SEGMENT, FRAME = 0, 1, 2  # kinds, bits 0 to 3 of the first byte
 FRESH = 0x80  # the packet needs none before it
+CHECK_SIZE = 2  # bytes of head_check, and of body_check
+MOST_NUMBER = 8  # bytes of a sequence number
 
 PACKET_FIELDS = (
-    ("kind", "u8", "bits 0-3: 0 end, 1 segment, 2 codec's own; bit 7: starts fresh; others 0"),
+    ("kind", "u8", "bits 0-3: 0 end, 1 segment, 2 frame; bit 7: starts fresh; others 0"),
     ("sequence", "varint", "number of the packet in its chunk, from 0"),
     ("length", "varint", "bytes of the body"),
     ("head_check", "u16", "low 16 bits of the CRC-32 of the three fields before"),
-    ("body", "bytes", "kind 1: a segment, as in a closed DATA; kind 2: the codec's"),
+    ("body", "bytes", "kind 1: a segment, as in a closed DATA; kind 2: its one stream"),
     ("body_check", "u16", "low 16 bits of the CRC-32 of the body"),
 )
 
@@ -39,10 +41,34 @@ def _check16(data: bytes) -> bytes:
     return struct.pack("<H", zlib.crc32(data) & 0xFFFF)
 
 
+def _head(kind: int, fresh: bool, sequence: int, length: int) -> bytes:
+    return bytes((kind | (FRESH if fresh else 0),)) + varint(sequence) + varint(length)
+
+
 def build_packet(packet: Packet) -> bytes:
-    first = packet.kind | (FRESH if packet.fresh else 0)
-    head = bytes((first,)) + varint(packet.sequence) + varint(len(packet.body))
+    head = _head(packet.kind, packet.fresh, packet.sequence, len(packet.body))
     return head + _check16(head) + packet.body + _check16(packet.body)
+
+
+def head_size(sequence: int, length: int) -> int:
+    """The bytes of a packet before its body of ``length`` bytes."""
+    return 1 + len(varint(sequence)) + len(varint(length)) + CHECK_SIZE
+
+
+def is_head(data: bytes, kind: int, fresh: bool, length: int) -> bool:
+    """Whether ``data`` ends with the head of such a packet, whatever its number in its chunk."""
+    first, ending = _head(kind, fresh, 0, length)[:1], varint(length)
+    for size in range(1, MOST_NUMBER + 1):
+        start = len(data) - CHECK_SIZE - len(ending) - size - 1
+        if start < 0:
+            return False
+        head = data[start:-CHECK_SIZE]
+        number = head[1 : 1 + size]
+        whole = number[-1] < 0x80 and all(byte >= 0x80 for byte in number[:-1])
+        fits = whole and (head[:1], head[1 + size :]) == (first, ending)
+        if fits and _check16(head) == data[-CHECK_SIZE:]:
+            return True
+    return False
 
 
 def read_packets(read: Callable[[int], bytes], limit: int) -> Iterator[Packet]:
@@ -75,7 +101,7 @@ def _read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
     if read(2) != _check16(bytes(head)):
         raise ChecksumError(f"head_check of packet {values[0]} is wrong")
     kind = head[0] & 0x0F
-    if kind > CODEC or head[0] & 0x70:
+    if kind > FRAME or head[0] & 0x70:
         raise FormatError(f"packet {values[0]}: kind {head[0]:#04x}")
     check(f"packet {values[0]}", values[1], limit)
     body = read(values[1])

@@ -25,15 +25,30 @@ from mcz.container.chunks import (
     read_chunk,
     read_payload,
 )
-from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, parse_index
+from mcz.container.directory import (
+    AttachmentRow,
+    ClipRow,
+    Directory,
+    SegmentRow,
+    parse_index,
+    signal_rows,
+)
 from mcz.container.limits import Profile, check, check_decoded, index_limit, output_limit
-from mcz.container.scan import parse_head, scan, signal_rows
-from mcz.container.segments import SegmentHeader, StreamCounts, StreamTable, parse_table
+from mcz.container.packets import CHECK_SIZE, FRAME, head_size, is_head
+from mcz.container.scan import parse_head, scan
+from mcz.container.segments import (
+    FRESH,
+    SegmentHeader,
+    StreamCounts,
+    StreamTable,
+    frame_table,
+    parse_table,
+)
 from mcz.container.source import ByteSource
 from mcz.container.strict import decoded
 from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, TruncatedError
-from mcz.schema import parse
+from mcz.schema import MAX_COUNT, parse
 
 TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
 
@@ -184,6 +199,8 @@ class Container:
     def table(self, row: SegmentRow, counts: StreamCounts) -> StreamTable:
         """The stream table of a segment, with as little read as will do."""
         self._check_row(row)
+        if row.packet == FRAME:
+            return frame_table(row.header, counts, row.size)
         size = min(row.size, TABLE_PEEK + counts.total(row.header.flags) * 7 // 4)
         while True:
             try:
@@ -230,6 +247,8 @@ class Container:
             payload = self._packet(row)
         else:
             payload = self.payload(row.chunk())
+        if row.packet == FRAME:
+            return frame_table(row.header, counts, row.size), {0: payload}
         try:
             table = parse_table(payload, counts)
         except TruncatedError as error:
@@ -241,16 +260,22 @@ class Container:
         }
 
     def _packet(self, row: SegmentRow) -> bytes:
-
-        data = self.source.read(row.offset, row.size + 2)
-        if zlib.crc32(data[:-2]) & 0xFFFF != int.from_bytes(data[-2:], "little"):
+        """The checked body of a packet; of kind 2 its head is what the row says of the segment."""
+        before = min(row.offset, head_size(MAX_COUNT, row.size)) if row.packet == FRAME else 0
+        data = self.source.read(row.offset - before, before + row.size + CHECK_SIZE)
+        body = data[before:-CHECK_SIZE]
+        if zlib.crc32(body) & 0xFFFF != int.from_bytes(data[-CHECK_SIZE:], "little"):
             raise ChecksumError(f"body_check of the packet at {row.offset} is wrong")
-        return data[:-2]
+        fresh = bool(row.header.flags & FRESH)
+        if row.packet == FRAME and not is_head(data[:before], FRAME, fresh, row.size):
+            raise FormatError(f"the packet at {row.offset} is not what the index says")
+        return body
 
     def _check_row(self, row: SegmentRow) -> None:
         if row.stop > self.source.size:
             raise FormatError(f"a segment is said to lie at {row.offset}, past the end of the file")
-        check(f"DATA at {row.offset}: bytes", row.size, self.profile.chunk_bytes)
+        limit = self.profile.packet_bytes if row.packet else self.profile.chunk_bytes
+        check(f"DATA at {row.offset}: bytes", row.size, limit)
 
 
 def _check_table(table: StreamTable, row: SegmentRow) -> None:

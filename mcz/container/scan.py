@@ -6,7 +6,7 @@ valid chunk and goes on. SPEC.md, "Grammar" and "Salvage", are normative.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,14 +25,20 @@ from mcz.container.chunks import (
     read_payload,
     resynchronize,
 )
-from mcz.container.directory import AttachmentRow, ClipRow, Directory, SegmentRow, SignalRow
+from mcz.container.directory import (
+    AttachmentRow,
+    ClipRow,
+    Directory,
+    SegmentRow,
+    signal_rows,
+)
 from mcz.container.limits import BASE, PROFILES, Profile, check, index_limit
-from mcz.container.packets import SEGMENT, read_packets
-from mcz.container.segments import FRESH, parse_header
-from mcz.container.source import ByteSource
+from mcz.container.packets import CHECK_SIZE, FRAME, Packet, read_packets
+from mcz.container.segments import FRESH, SegmentHeader, parse_header
+from mcz.container.source import ByteSource, Forward
 from mcz.container.writer import build_head, payload_id
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
-from mcz.schema import MAX_COUNT, parse
+from mcz.schema import parse
 
 LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that salvage may read in vain, in all
 PEEK = 64  # enough for the fields of a segment before its table
@@ -46,6 +52,7 @@ class Found:
     chunks: list[Chunk] = field(default_factory=list)
     feet: list[int] = field(default_factory=list)  # offsets of the FOOTs
     damage: list[str] = field(default_factory=list)
+    ends: dict[int, int] = field(default_factory=dict)  # of open DATA chunks, by their offsets
 
 
 def parse_head(payload: bytes) -> Profile:
@@ -70,7 +77,7 @@ def scan(source: ByteSource, *, salvage: bool = False, whole: bool = False) -> F
     Raises FormatError at the first fault unless ``salvage``; a TruncatedError carries the end
     of the last valid FOOT.
     """
-    walker = _Walker(source, salvage, whole or salvage)
+    walker = Walker(source, salvage, whole or salvage)
     try:
         walker.walk()
     except TruncatedError as error:
@@ -80,23 +87,9 @@ def scan(source: ByteSource, *, salvage: bool = False, whole: bool = False) -> F
     return walker.found
 
 
-def signal_rows(clip: Any, where: str) -> tuple[SignalRow, ...]:
-    """What the index says of the signals, from the fields of CLIP; raises FormatError."""
-    return tuple(_signal_row(fields, clip, where) for fields in clip.signals)
+class Walker:
+    """The state of a walk; ``chunk`` is the one that it is in."""
 
-
-def _signal_row(fields: Any, clip: Any, where: str) -> SignalRow:
-    cut = fields.skip, fields.spare
-    if clip.flags & payloads.OPEN_CLIP and any(cut):
-        raise FormatError(f"{where}: n_frames is open, but a signal has skip and spare {cut}")
-    if sum(cut) + clip.n_frames > MAX_COUNT:
-        raise FormatError(f"{where}: skip and spare {cut} of {clip.n_frames} frames")
-    n_channels = sum(run.n_channels for run in fields.grids)
-    codec = fields.codec, fields.codec_version
-    return SignalRow(n_channels, fields.samples_per_frame, *codec, *cut)
-
-
-class _Walker:
     def __init__(self, source: ByteSource, salvage: bool, whole: bool) -> None:
         self.source = source
         self.salvage = salvage
@@ -110,6 +103,7 @@ class _Walker:
         self.clip: ClipRow | None = None
         self.first: list[int] = []  # the next frame of each signal of the open clip
         self.index: Chunk | None = None  # an INDX that waits for its FOOT
+        self.chunk: Chunk | None = None
         self.sourced: set[tuple[int, bytes]] = set()  # what aliases may stand for
 
     def walk(self) -> None:
@@ -121,14 +115,16 @@ class _Walker:
             self._note(error)
         at: int | None = len(SIGNATURE)
         while at is not None and at != self._whole_until():
+            begin = at
             try:
-                at = self._step(at)
+                for end in self.steps(begin):
+                    at = end
             except FormatError as error:
                 if not self.salvage:
-                    error.offset = at
+                    error.offset = begin
                     raise
                 self._note(error)
-                at = self._skip(at)
+                at = self._skip(begin, at)
         self._finish()
 
     def _whole_until(self) -> int | None:
@@ -136,24 +132,30 @@ class _Walker:
         closed = self.found.directory.end == self.source.size and self.clip is None
         return self.source.size if closed else None
 
-    def _step(self, at: int) -> int:
-        """Take in what begins at ``at`` and return where the next thing begins."""
+    def steps(self, at: int) -> Iterator[int]:
+        """Take in what begins at ``at``; yields where it ends, of an open DATA packet by packet."""
+        self.chunk = None
         if at >= self.source.size:
             raise TruncatedError(f"the file ends at {at} without a FOOT")
         if is_foot_at(self.source, at):
-            return self._foot(at)
-        chunk = read_chunk(self.source, at)
+            yield self._foot(at)
+            return
+        chunk = self.chunk = read_chunk(self.source, at)
         if self.index is not None:
             raise FormatError(f"INDX is followed by {chunk.label}, not by a FOOT")
         if not (self.found.directory.head or self.salvage) and chunk.type != b"HEAD":
             raise FormatError(f"the first chunk is {chunk.label}, not HEAD")
-        end = self._take(chunk)
-        self.found.chunks.append(chunk)
-        return end
-
-    def _take(self, chunk: Chunk) -> int:
         if chunk.length is None and not chunk.flags:
-            return self._open_data(chunk)
+            end = chunk.payload_offset
+            for end in self._packets(chunk):
+                yield end
+            self.found.ends[chunk.offset] = end
+        else:
+            self._take(chunk)
+            yield chunk.offset + chunk.size
+        self.found.chunks.append(chunk)
+
+    def _take(self, chunk: Chunk) -> None:
         handlers: dict[bytes, Callable[[Chunk], None]] = {
             b"HEAD": self._head,
             b"SKEL": self._shared,
@@ -177,7 +179,6 @@ class _Walker:
             self._ancillary(chunk)
         else:
             raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")
-        return chunk.offset + chunk.size
 
     def _payload(self, chunk: Chunk) -> bytes:
         return read_payload(self.source, chunk, self.profile.chunk_bytes)
@@ -270,33 +271,38 @@ class _Walker:
             payload = self._payload(chunk)
         else:
             payload = self.source.read(chunk.payload_offset, min(chunk.length, PEEK))
-        self._segment(payload, chunk.payload_offset, chunk.length, packet=False)
+        row = SegmentRow(chunk.payload_offset, chunk.length, parse_header(payload)[0])
+        self._segment(row)
 
-    def _open_data(self, chunk: Chunk) -> int:
+    def _packets(self, chunk: Chunk) -> Iterator[int]:
+        """Take in the packets of an open DATA; yields where each one ends."""
         if self.clip is None:
             raise FormatError(f"chunk {chunk.label} is outside a clip")
-        at = chunk.payload_offset
-
-        def read(size: int) -> bytes:
-            nonlocal at
-            if at + size > self.source.size:
-                raise TruncatedError(f"the file ends at {self.source.size}, in a packet at {at}")
-            at += size
-            return self.source.read(at - size, size)
-
+        read = Forward(self.source, chunk.payload_offset)
+        told = False  # a segment of signal 0 has said which frame it is
         for packet in read_packets(read, self.profile.packet_bytes):
-            if packet.kind != SEGMENT:
-                raise UnsupportedError(f"chunk {chunk.label}: a packet of kind {packet.kind}")
-            start = at - 2 - len(packet.body)
-            self._segment(packet.body, start, len(packet.body), packet=True)
-            if packet.fresh != bool(self.clip.segments[-1].header.flags & FRESH):
-                raise FormatError(f"packet at {start}: it and its segment differ in starting fresh")
-        return at
+            start = read.at - CHECK_SIZE - len(packet.body)
+            header = self._header_of(packet, start, told)
+            self._segment(SegmentRow(start, len(packet.body), header, packet.kind))
+            told = told or header.signal == 0
+            yield read.at
+        yield read.at
 
-    def _segment(self, payload: bytes, offset: int, size: int, packet: bool) -> None:
+    def _header_of(self, packet: Packet, start: int, told: bool) -> SegmentHeader:
+        """What a packet says of its segment; ``told``: one before it said which frame is due."""
+        if packet.kind == FRAME:
+            if not told:
+                raise FormatError(f"packet at {start}: none before it in its DATA tells its frame")
+            return SegmentHeader(0, self.first[0], 1, flags=FRESH if packet.fresh else 0)
+        header, _ = parse_header(packet.body)
+        if packet.fresh != bool(header.flags & FRESH):
+            raise FormatError(f"packet at {start}: it and its segment differ in starting fresh")
+        return header
+
+    def _segment(self, row: SegmentRow) -> None:
+        header, offset = row.header, row.offset
         if self.clip is None:
             raise FormatError(f"DATA at {offset - HEADER.size} is outside a clip")
-        header, _ = parse_header(payload)
         if header.signal >= len(self.first):
             raise FormatError(f"DATA at {offset - HEADER.size}: signal {header.signal}")
         due = self.first[header.signal]
@@ -305,7 +311,7 @@ class _Walker:
                 f"DATA at {offset - HEADER.size}: first frame {header.first}, {due} is due"
             )
         self.first[header.signal] = header.stop
-        self.clip.segments.append(SegmentRow(offset, size, header, packet))
+        self.clip.segments.append(row)
 
     def _end_clip(self, chunk: Chunk) -> None:
         if self.clip is None:
@@ -381,8 +387,8 @@ class _Walker:
         if self.clip is not None:
             self.clip.damage.append(str(error))
 
-    def _skip(self, at: int) -> int | None:
-        """Where to go on after a fault in what begins at ``at``."""
+    def _skip(self, at: int, done: int) -> int | None:
+        """Where to go on after a fault in what begins at ``at`` and was good up to ``done``."""
         self.index = None
         try:
             chunk = read_chunk(self.source, at)
@@ -391,7 +397,9 @@ class _Walker:
         except FormatError:
             pass
         try:
-            return resynchronize(self.source, at + 1, self.profile.chunk_bytes, self._spend)
+            return resynchronize(
+                self.source, max(at + 1, done), self.profile.chunk_bytes, self._spend
+            )
         except LimitError as error:
             self._note(error)
             return None

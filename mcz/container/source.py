@@ -16,7 +16,7 @@ class ByteSource:
 
     ``gap``: two wanted ranges that lie at most this far apart are read as one. Zero suits a disk;
     over a network a request costs more than the bytes between. ``tail``: how many bytes at the end
-    are read at once when the file is opened.
+    are read at once when the file is opened. ``block``: what a ``Forward`` asks for at a time.
     """
 
     def __init__(
@@ -25,6 +25,7 @@ class ByteSource:
         self._stream = stream
         self._lock = Lock()  # seek and read belong together, whoever else reads
         self.gap = 64 * 1024 if remote else 0
+        self.block = 64 * 1024 if remote else 8 * 1024
         self.tail = 128 * 1024 if remote else 512
         self.remote = remote
         self.name = name
@@ -82,6 +83,25 @@ class ByteSource:
 
     def close(self) -> None:
         self._stream.close()
+
+
+class Forward:
+    """Reads on from offset ``at`` of a source, a block at a time, where small parts are wanted."""
+
+    def __init__(self, source: ByteSource, at: int) -> None:
+        self.at = at
+        self._source = source
+        self._start, self._block = at, b""
+
+    def __call__(self, size: int) -> bytes:
+        """The next ``size`` bytes; raises TruncatedError where the file ends before."""
+        first, stop = self.at - self._start, self.at - self._start + size
+        if stop > len(self._block):
+            block = max(size, min(self._source.block, self._source.size - self.at))
+            self._start, self._block = self.at, self._source.read(self.at, block)
+            first, stop = 0, size
+        self.at += size
+        return self._block[first:stop]
 
 
 def open_source(target: Any) -> ByteSource:

@@ -172,12 +172,13 @@ def _whole_until(source: ByteSource, start: int) -> int:
     """Where the last whole thing behind ``start`` ends; nothing counts behind the first fault."""
     end = at = start or len(SIGNATURE)
     inside = False
-    for chunk in scan(source, salvage=True).chunks:
+    found = scan(source, salvage=True)
+    for chunk in found.chunks:
         if chunk.offset < start:
             continue
-        if chunk.offset != at or chunk.length is None or chunk.type == b"INDX":
-            break  # an open DATA has no crc, and an INDX belongs to its FOOT
-        at += chunk.size
+        if chunk.offset != at or chunk.type == b"INDX":
+            break  # an INDX belongs to its FOOT
+        at = found.ends[at] if chunk.length is None else at + chunk.size
         inside = chunk.type == b"CLIP" or (inside and chunk.type != b"CEND")
         if not inside and _is_last_part(source, chunk):
             end = at

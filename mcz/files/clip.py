@@ -71,6 +71,16 @@ class Clip:
     def skeleton_id(self) -> bytes:
         return self._row.skeleton
 
+    @cached_property
+    def base_skeleton(self) -> Skeleton | None:
+        """The skeleton that this one was derived from, with its own source file if it has one."""
+        base = self.skeleton.base
+        if not base:
+            return None
+        fields = self.container.shared(b"SKEL", base, payloads.SKEL)
+        skeleton = parse_skeleton(fields, self.container.profile, f"SKEL {base.hex()}")
+        return replace(skeleton, source=skeleton_source(self.container, base))
+
     @property
     def frame_rate(self) -> Fraction | None:
         """Frames a second, None while unknown."""

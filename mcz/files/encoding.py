@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import DEFAULT, by_name
-from mcz.codecs.base import TARGETS, Codec, Encoded, Request, Segment, Span
+from mcz.codecs.base import TARGETS, Codec, Encoded, Request, Segment, Span, model_finder
 from mcz.container import payloads
-from mcz.container.limits import check
+from mcz.container.limits import ARCHIVE, check
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.skeletons import build_skeleton, channel_fields
 from mcz.container.strict import is_plain_path
@@ -29,7 +29,7 @@ from mcz.files.memory import MemorySource, place
 from mcz.files.quality import CHUNK, quality_payload
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal, Skeleton, Source
-from mcz.schema import MAX_COUNT
+from mcz.schema import MAX_COUNT, build
 
 Progress = Callable[[int, int, str], None]
 HASHED_ROWS = 4096  # at a time, so that hashing needs little memory
@@ -88,6 +88,8 @@ def write_clip(
         _coded(motion, index, codec, options, writer.profile.segment_bytes)
         for index in range(len(motion.signals))
     ]
+    for part in coded:
+        _write_models(writer, part.encoded)
     fields = _clip_fields(writer, motion, coded)
     writer.begin_clip(fields, [signal.n_channels for signal in motion.signals])
     decoded = [
@@ -102,6 +104,32 @@ def write_clip(
     if quality and not codec.lossless:
         payload = quality_payload(motion, decoded, codec.name, options, remarks)
         writer.ancillary(CHUNK, payload)
+
+
+def open_clip(
+    writer: Writer, motion: Motion, codec: Codec, encoded: Encoded, first_number: int = 1
+) -> None:
+    """Write the CLIP, and what it refers to, of a motion of which no frame is known yet.
+
+    ``first_number`` is that of its first frame.
+    """
+    check("channels", motion.signals[0].n_channels, writer.profile.channels)
+    _write_models(writer, encoded)
+    source = MemorySource(motion, 0, codec, writer.profile.segment_bytes)
+    fields = _clip_fields(writer, motion, [_Coded(source, codec, encoded)])
+    fields["flags"] |= payloads.OPEN_CLIP
+    numbers = frame_number_metadata(np.array([first_number], np.int64))
+    more = [{"key": key, "value": value} for key, value in numbers.items()]
+    fields["metadata"] = sorted(fields["metadata"] + more, key=lambda pair: pair["key"])
+    writer.begin_clip(fields, [motion.signals[0].n_channels])
+
+
+def _write_models(writer: Writer, encoded: Encoded) -> None:
+    """Write the models that a signal needs; well-known ones where all shall be in the file."""
+    known = encoded.known if writer.profile is ARCHIVE else ()
+    for model in (*encoded.models, *known):
+        fields = {"kind": model.kind, "data": model.data}
+        writer.shared(b"MODL", build(payloads.MODL, fields, "MODL"))
 
 
 def asked(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -260,7 +288,12 @@ def value_hash(values: NDArray[Any], mask: NDArray[np.bool_] | None) -> bytes:
 
 
 def _decoded(coded: _Coded, segments: Sequence[Segment]) -> NDArray[np.float64]:
-    layout = replace(coded.source.layout, n_resolutions=coded.encoded.n_resolutions)
+    encoded = coded.encoded
+    layout = replace(
+        coded.source.layout,
+        n_resolutions=encoded.n_resolutions,
+        find_model=model_finder((*encoded.models, *encoded.known)),
+    )
     spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
     n_groups = len(layout.groups)
     request = Request(0, layout.n_frames, tuple(range(n_groups)))

@@ -26,6 +26,7 @@ from mcz.container.chunks import (
 from mcz.container.directory import ClipRow
 from mcz.container.packets import read_packets
 from mcz.container.reader import Container
+from mcz.container.source import Forward
 from mcz.container.writer import Writer, payload_id
 from mcz.errors import ChecksumError, FormatError, MotionError, OptionError
 from mcz.files.cutting import (
@@ -38,7 +39,8 @@ from mcz.files.cutting import (
     cut_skeleton,
     plan_cut,
 )
-from mcz.files.encoding import Progress, canonical, value_hash
+from mcz.files.digest import ValueDigest
+from mcz.files.encoding import Progress, value_hash
 from mcz.files.file import File, open
 from mcz.files.signals import SignalReader
 from mcz.files.targets import replacing
@@ -236,16 +238,10 @@ class Copier:
 
     def _value_hash(self, cut: ClipCut, part: SignalCut) -> bytes:
         """The hash of what is left of a signal, a few segments in memory at a time."""
-        info, digest = part.info, hashlib.sha256()
-        masks: list[bytes | int] = []  # as bytes, or how many values, all of them valid
+        info, digest = part.info, ValueDigest()
         reader = SignalReader(self.container, info, part.groups, part.dropped, cut.clip.name)
         for _, _, values, mask in reader.blocks(cut.start + info.skip, cut.stop + info.skip):
-            digest.update(canonical(values))
-            valid = mask is None or bool(mask.all())
-            masks.append(values.size if mask is None or valid else mask.astype("u1").tobytes())
-        if any(isinstance(held, bytes) for held in masks):
-            for held in masks:
-                digest.update(held if isinstance(held, bytes) else b"\1" * held)
+            digest.update(values, mask)
         return digest.digest()
 
     def _segments(self, cut: ClipCut, *, noted: bool) -> None:
@@ -374,13 +370,7 @@ def _inside(container: Container, row: ClipRow) -> Iterator[Chunk]:
 
 
 def _end_of_packets(container: Container, chunk: Chunk) -> int:
-    at = chunk.offset + HEADER.size
-
-    def read(size: int) -> bytes:
-        nonlocal at
-        at += size
-        return container.source.read(at - size, size)
-
+    read = Forward(container.source, chunk.offset + HEADER.size)
     for _ in read_packets(read, container.profile.packet_bytes):
         pass
-    return at
+    return read.at

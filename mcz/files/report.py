@@ -14,7 +14,7 @@ from mcz.container.chunks import CRC, FOOT, HEADER, SIGNATURE, Chunk
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.container.scan import scan
-from mcz.container.segments import StreamTable
+from mcz.container.segments import GROUP_NOTES, StreamTable
 from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
 from mcz.files.clip import Clip
 from mcz.files.file import File, open
@@ -114,6 +114,8 @@ def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
         "metadata": dict(clip.metadata),
         "payload_bytes": sizes.payload,
         "overhead_bytes": sizes.overhead,
+        "packets": sum(row.packet > 0 for signal in clip.signals for row in signal.rows),
+        "packet_bytes": sizes.packets,
         "source_chunk_bytes": sizes.source,
         "hash_bytes": sizes.hashes,
         "quality_bytes": sizes.quality,
@@ -177,6 +179,8 @@ def exceptions_info(container: Container, clip: Clip) -> dict[str, Any]:
             signal.layout.n_frames * signal.layout.samples_per_frame * (signal.layout.n_channels)
         )
         for row in signal.rows:
+            if not row.header.flags & GROUP_NOTES:
+                continue
             table = container.table(row, signal.counts)
             wanted = [
                 i
@@ -246,7 +250,8 @@ def _chunk_places(
 def _segment_places(at: int, table: StreamTable) -> Iterator[tuple[int, int, str]]:
     header = table.header
     what = f"signal {header.signal}, frames {header.first}:{header.stop}"
-    yield at, table.size, f"stream table, {what}"
+    if table.size:
+        yield at, table.size, f"stream table, {what}"
     names = {table.frame_notes(): "frame notes"}
     for group in range(table.counts.n_groups):
         names[table.group_notes(group)] = f"notes of group {group}"

@@ -5,17 +5,20 @@ Part of the joint between motion, codec and container (see ``file.py``).
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 from mcz.codecs import by_id
-from mcz.codecs.base import Codec, Layout, Span
+from mcz.codecs.base import Codec, Layout, Model, Span
 from mcz.container import payloads
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.limits import check
+from mcz.container.packets import FRAME
 from mcz.container.reader import Container
-from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts
+from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
 from mcz.container.skeletons import parse_channels
 from mcz.errors import FormatError
 from mcz.motion import Channel, Skeleton
@@ -57,13 +60,10 @@ class SignalInfo:
         headers = [row.header for row in self.rows]
         return [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h in headers]
 
-    def covering(self, start: int, stop: int) -> list[int]:
+    def covering(self, start: int, stop: int) -> range:
         """The segments whose own frames meet the stored frames start <= f < stop."""
-        return [
-            index
-            for index, row in enumerate(self.rows)
-            if row.header.first < stop and start < row.header.stop
-        ]
+        low = bisect_right(self.rows, start, key=lambda row: row.header.stop)
+        return range(low, bisect_left(self.rows, stop, key=lambda row: row.header.first))
 
     def coarser(self, resolution: int) -> int:
         """The details to leave out of a signal beside the motion: no more than it has."""
@@ -97,6 +97,7 @@ def read_signal(
         frame_rate,
         parse_grids(own.grids, n_channels, where),
         own.n_resolutions,
+        find_model=partial(_model, container),
     )
     info = SignalInfo(
         index,
@@ -116,12 +117,22 @@ def read_signal(
     return info
 
 
+def _model(container: Container, id_: bytes) -> Model | None:
+    """The model with this id, None where the file has none."""
+    if (b"MODL", id_) not in container.directory.shared:
+        return None
+    fields = container.shared(b"MODL", id_, payloads.MODL)
+    return Model(fields.kind, bytes(fields.data))
+
+
 def _check_segments(container: Container, info: SignalInfo, noted: bool, where: str) -> None:
     """``noted``: frame notes are legal."""
     limit = container.profile.segment_bytes
     per_frame = max(1, info.layout.n_channels) * info.layout.samples_per_frame * 8
     due = 0
     for row in info.rows:
+        if row.packet == FRAME:
+            frame_table(row.header, info.counts, row.size)  # refuses what cannot be such a packet
         if row.header.flags & FRAME_NOTES and not noted:
             raise FormatError(f"{where}: frame notes, but no source that they belong to")
         if not (row.header.first or row.header.flags & FRESH):

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from mcz.codecs.base import Request, Span
 from mcz.container import payloads
 from mcz.container.limits import check_decoded
+from mcz.container.packets import FRAME
 from mcz.container.reader import Container
-from mcz.container.segments import StreamTable
-from mcz.errors import FormatError, UnsupportedError
+from mcz.container.segments import FRESH, StreamTable
+from mcz.errors import FormatError
 from mcz.files.masks import parse_mask
+from mcz.files.salvage import salvage
 from mcz.files.signal_info import SignalInfo
 from mcz.motion import Exceptions, grid_blocks
 from mcz.numbers import Grid, GridKind, values_of_texts
@@ -73,9 +75,12 @@ class SignalReader:
     def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
         """The range in blocks of a few segments, which bound the memory beside the result."""
         if self.info.codec.segmented:
+            rows = self.info.rows
             for index in self.info.covering(start, stop):
-                end = min(self.info.rows[index].header.stop, stop)
-                if (end - start) * self.info.layout.samples_per_frame >= BLOCK_ROWS:
+                end = min(rows[index].header.stop, stop)
+                full = (end - start) * self.info.layout.samples_per_frame >= BLOCK_ROWS
+                # A block that began amid what hangs together would be decoded from its start.
+                if full and index + 1 < len(rows) and rows[index + 1].header.flags & FRESH:
                     yield start, end
                     start = end
         if start < stop:
@@ -117,28 +122,23 @@ class SignalReader:
     def _salvage(
         self, spans: Sequence[Span], start: int, stop: int
     ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """What can be decoded segment by segment; the rest is invalid."""
+        """What can be decoded; the rest is invalid."""
         per_frame = self.info.layout.samples_per_frame
         n_columns = sum(len(self.info.layout.groups[g]) for g in self.groups)
         shape = (stop - start) * per_frame, n_columns
         values = np.zeros(shape, np.int64) if self.info.is_integer else np.full(shape, np.nan)
         mask = np.zeros(shape, np.bool_)
-        lead = max((span.lead for span in spans), default=0)
-        for index in self.info.covering(start, stop):
-            a, b = max(start, spans[index].first), min(stop, spans[index].stop)
-            # Frames that the segment after bears upon may be lost with it; the others are not.
-            for end in dict.fromkeys((b, min(b, max(a, spans[index].stop - lead)))):
-                try:
-                    part, valid = self._finish(self._decode(spans, a, end), a, end)
-                except UnsupportedError:
-                    raise
-                except FormatError as error:
-                    self.container.damage.append(f"clip {self.name!r}, frames {a}:{end}: {error}")
-                    continue
-                rows = slice((a - start) * per_frame, (end - start) * per_frame)
-                values[rows], mask[rows] = part, True if valid is None else valid
-                break
+
+        def rescue(a: int, b: int) -> None:
+            part, valid = self._finish(self._decode(spans, a, b), a, b)
+            rows = slice((a - start) * per_frame, (b - start) * per_frame)
+            values[rows], mask[rows] = part, True if valid is None else valid
+
+        salvage(spans, self.info.covering(start, stop), (start, stop), rescue, self._complain)
         return values, mask
+
+    def _complain(self, start: int, stop: int, reason: object) -> None:
+        self.container.damage.append(f"clip {self.name!r}, frames {start}:{stop}: {reason}")
 
     def fetch(self, segment: int, resolution: int, group: int) -> bytes:
         """One stream of the codec."""
@@ -207,6 +207,8 @@ class SignalReader:
         found: list[tuple[int, int, bytes]] = []
         changes: dict[int, dict[int, Grid]] = {}
         for index in self.info.covering(start, stop):
+            if self.info.rows[index].packet == FRAME:
+                continue  # it has no notes
             header = self.info.rows[index].header
             table, streams = self._streams(index)
             shift = (header.first - start) * per_frame
@@ -244,6 +246,8 @@ class SignalReader:
         layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
         mask: NDArray[np.bool_] | None = None
         for index in self.info.covering(start, stop):
+            if self.info.rows[index].packet == FRAME:
+                continue  # all of it is valid
             header = self.info.rows[index].header
             table, streams = self._streams(index)
             if table.mask(0) is None:
@@ -277,8 +281,10 @@ def _as_changes(
     rows: Mapping[int, Mapping[int, Grid]], baseline: Sequence[Grid]
 ) -> tuple[tuple[int, int, Grid], ...]:
     """Grids stated segment by segment as changes from the row before."""
+    changes: list[tuple[int, int, Grid]] = []
+    if not any(rows.values()):
+        return ()
     current = list(baseline)
-    changes = []
     for row in sorted(rows):
         for channel, grid in enumerate(baseline):
             wanted = rows[row].get(channel, grid)

@@ -6,25 +6,36 @@ ratios", is normative.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from mcz.container import payloads
-from mcz.container.chunks import FRAMING
+from mcz.container.chunks import FRAMING, HEADER
+from mcz.container.directory import SegmentRow
+from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.container.reader import Container
+from mcz.errors import FormatError, UnsupportedError
 from mcz.files.clip import Clip
+from mcz.files.signal_info import SignalInfo
 from mcz.schema import build
 
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """The bytes of one clip by part."""
+    """The bytes of one clip by part; ``models`` are those that its codecs need, in the file.
+
+    ``packets`` is the part of ``overhead`` that goes to framing open DATA and their packets.
+    """
 
     payload: int = 0
     overhead: int = 0
     source: int = 0
     hashes: int = 0
     quality: int = 0
+    models: int = 0
+    packets: int = 0
 
 
 def clip_sizes(container: Container, clip: Clip) -> Sizes:
@@ -48,9 +59,49 @@ def clip_sizes(container: Container, clip: Clip) -> Sizes:
     hashes = 16 + 32 * n_hashes
     clip_length = row.clip.length or 0
     own = clip_length - source - 16 - len(fields.extension) + cend - (hashes - 16)
-    overhead = n_chunks * FRAMING + tables + own
+    packets = packet_framing(row.segments)
+    overhead = n_chunks * FRAMING + packets + tables + own
     quality = sum(chunk.size for chunk in row.ancillary if chunk.type == b"QUAL")
-    return Sizes(payload - tables, overhead, template + source, hashes, quality)
+    models = sum(_model_sizes(container, clip).values())
+    return Sizes(payload - tables, overhead, template + source, hashes, quality, models, packets)
+
+
+def models_used(signal: SignalInfo) -> tuple[bytes, ...]:
+    """The ids of the models that a signal needs; none where its codec or header is not known."""
+    with suppress(UnsupportedError, FormatError):
+        if signal.codec.uses is not None:
+            return signal.codec.uses(signal.header)
+    return ()
+
+
+def _model_sizes(container: Container, clip: Clip) -> dict[bytes, int]:
+    """Of each model that a clip needs and the file has, the bytes of its chunk."""
+    sizes = {}
+    for signal in clip.signals:
+        for id_ in models_used(signal):
+            chunk = container.directory.shared.get((b"MODL", id_))
+            if chunk is not None:
+                sizes[id_] = chunk.size
+    return sizes
+
+
+def packet_framing(rows: Sequence[SegmentRow]) -> int:
+    """The bytes of open DATA beside the bodies of their packets; ``rows`` in file order."""
+    total = n_packets = end = 0
+    for row in rows:
+        if row.packet:
+            head = head_size(n_packets, row.size)
+            if not n_packets or row.offset - end != CHECK_SIZE + head:  # another DATA
+                total += _end_size(n_packets) + HEADER.size
+                n_packets, head = 0, head_size(0, row.size)
+            total += head + CHECK_SIZE
+            n_packets += 1
+        end = row.stop
+    return total + _end_size(n_packets)
+
+
+def _end_size(n_packets: int) -> int:
+    return head_size(n_packets, 0) + CHECK_SIZE if n_packets else 0
 
 
 def _source_fields_size(fields: Any) -> int:

@@ -20,6 +20,7 @@ from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
 from mcz.files.clip import Clip
 from mcz.files.encoding import Progress, asked, write_clip
+from mcz.files.positions import as_codec_wants
 from mcz.files.sizes import clip_sizes
 from mcz.metrics import compare
 from mcz.motion import Motion
@@ -58,6 +59,7 @@ def write_tuned(
     no meaning for this clip.
     """
     options = codec.options(params)
+    motion = as_codec_wants(writer, motion, codec, options)
     targets = asked(options)
     if not targets or codec.dial is None:
         write_clip(writer, motion, codec, params, progress)
@@ -122,7 +124,7 @@ class _Trials:
             return _error(target, compare(motion, clip.motion(), virtual_markers=False))
         sizes = clip_sizes(container, clip)
         if target.name == "target_bytes":
-            return float(sizes.payload + sizes.overhead)
+            return float(sizes.payload + sizes.overhead + sizes.models)
         assert motion.frame_rate is not None
         return float(sizes.payload * 8 * motion.frame_rate / motion.n_frames / 1000)
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,12 @@ from typing import Any
 
 from mcz.errors import FormatError, SourceError, UnsupportedError
 from mcz.formats import amc, asf, bvh, c3d
+from mcz.formats.arriving import Arriving
 from mcz.formats.find import find_asf
 from mcz.formats.notes import join_notes
 from mcz.motion import FrameNotes
 
-__all__ = ["FORMATS", "Format", "find_asf", "format_by_id", "format_of"]
+__all__ = ["FORMATS", "Format", "find_asf", "format_by_id", "format_of", "sniffed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +28,7 @@ class Format:
     ``read(data, name)`` gives a Motion, a Skeleton where ``is_skeleton``, and takes the Skeleton or
     None as a third argument where ``wants_skeleton``; it raises SourceError. ``write`` is its
     inverse; it raises MotionError or FormatError. ``join_notes`` is the inverse of the notes' cut.
+    ``arrive(lines, skeleton)`` reads what comes line by line, None where the format cannot.
     ``states_rate``: the template holds the frame rate, so that it does not suit another.
     """
 
@@ -38,14 +41,33 @@ class Format:
     is_skeleton: bool = False
     wants_skeleton: bool = False
     states_rate: bool = False
+    arrive: Callable[..., Arriving] | None = None
 
 
 FORMATS: dict[str, Format] = {
     f.name: f
     for f in (
         Format("asf", 1, (".asf",), asf.read, asf.write, is_skeleton=True),
-        Format("amc", 2, (".amc",), amc.read, amc.write, join_notes, wants_skeleton=True),
-        Format("bvh", 3, (".bvh",), bvh.read, bvh.write, join_notes, states_rate=True),
+        Format(
+            "amc",
+            2,
+            (".amc",),
+            amc.read,
+            amc.write,
+            join_notes,
+            wants_skeleton=True,
+            arrive=amc.arrive,
+        ),
+        Format(
+            "bvh",
+            3,
+            (".bvh",),
+            bvh.read,
+            bvh.write,
+            join_notes,
+            states_rate=True,
+            arrive=bvh.arrive,
+        ),
         Format("c3d", 4, (".c3d",), c3d.read, c3d.write, states_rate=True),
     )
 }
@@ -59,6 +81,18 @@ def format_of(path: str | Path) -> Format:
             return source_format
     known = ", ".join(s for f in FORMATS.values() for s in f.suffixes)
     raise SourceError(f"{Path(path).name}: no source format has the suffix {suffix!r}, but {known}")
+
+
+def sniffed(data: bytes) -> str | None:
+    """The name of the format that ``data`` seems to be of, None where it seems to be of none."""
+    start = data.lstrip()[:16].upper()
+    if start.startswith(b"HIERARCHY"):
+        return "bvh"
+    if data[1:2] == b"\x50" and not data[:1].isspace() and not start[:1].isalpha():
+        return "c3d"
+    if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", data):
+        return "asf"
+    return "amc" if amc.is_amc(data) else None
 
 
 def format_by_id(format_id: int, *, of_skeleton: bool = False) -> Format:

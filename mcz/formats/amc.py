@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from itertools import chain, islice
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mcz.errors import MotionError, SourceError
-from mcz.formats.bones import fit, flat
+from mcz.formats.arriving import Arriving, Frame, Lines
+from mcz.formats.bones import fit, flat, match_names
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.notes import RowNotes
 from mcz.formats.restore import restore
@@ -27,6 +30,7 @@ _FIRST_FRAME = re.compile(rb"(?m)^" + _BLANK + rb"*+[-+]?[0-9]++" + _BLANK + rb"
 _LINES = re.compile(rb"[^\n]+")
 _WORDS = re.compile(rb"[^\x00-\x20]+")
 _NUMBER = re.compile(rb"[-+]?[0-9]+")
+MOST_DIGITS = 15  # of a frame number, its sign included
 NO_SKELETON = "no ASF: a flat list of bones with plain scalar channels, without kinematics"
 DERIVED = "the channels of the AMC differ from those of its ASF"
 
@@ -69,14 +73,17 @@ def _read_frames(
     counts = {bone.decode(encoding): count for bone, count in frames.counts.items()}
     if len(counts) < len(frames.counts):
         raise SourceError("two bones of one name")
-    radians = re.search(rb"(?im)^\s*:RADIANS\b", data[:begin]) is not None
-    unit = "rad" if radians else "deg"
+    unit = _unit(data[:begin])
     if skeleton is None:
         fitted, columns = flat(counts, unit)
     else:
         fitted, columns = fit(skeleton, counts, unit)
     frames.columns = {bone: columns[bone.decode(encoding)] for bone in frames.counts}
     return fitted, read_rows(data, begin, fitted.n_channels, frames)
+
+
+def _unit(header: bytes) -> str:
+    return "rad" if re.search(rb"(?im)^\s*:RADIANS\b", header) else "deg"
 
 
 class _UnknownBone(Exception):
@@ -127,6 +134,110 @@ class _Frames:
 
     def _error(self, at: int, message: str) -> SourceError:
         return SourceError(f"line {line_of(self.data, at)}: {message}")
+
+
+def is_amc(data: bytes) -> bool:
+    """Whether there is a line with a frame number."""
+    return _FIRST_FRAME.search(data) is not None
+
+
+def arrive(lines: Iterator[bytes], skeleton: Skeleton | None = None) -> Arriving:
+    """An AMC file whose lines come one by one; waits for its first frame.
+
+    The first frame is complete when all bones of ``skeleton`` with channels have come, or the next
+    frame begins; a later one when all bones of the first have come. Raises SourceError without a
+    skeleton, and for bones that do not fit it or come late.
+    """
+    if skeleton is None:
+        raise SourceError("an AMC that comes line by line needs its skeleton")
+    source = Lines(lines)
+    header, number = _header(source)
+    if number is None:
+        raise SourceError("no line with a frame number; not an AMC file, or without frames")
+    frames = _ArrivingFrames(source, header, skeleton)
+    rows = frames.rows(number)
+    first = list(islice(rows, 1))
+    note = {} if frames.skeleton is skeleton else {"skeleton-note": DERIVED}
+    return Arriving(frames.skeleton, chain(first, rows), metadata=note, first_number=number)
+
+
+def _header(source: Lines) -> tuple[bytes, int | None]:
+    """The lines before the first frame, and its number, None where there is none."""
+    header = bytearray()
+    for line in source:
+        if _FIRST_FRAME.fullmatch(line.rstrip(b"\n")):
+            return bytes(header), _frame_number(source, line.strip())
+        header += line
+    return bytes(header), None
+
+
+def _frame_number(source: Lines, text: bytes) -> int:
+    if len(text) > MOST_DIGITS:
+        raise source.error(f"{text[:40]!r} is too large for a frame number")
+    return int(text)
+
+
+class _ArrivingFrames:
+    """The frames of an AMC as their lines come; ``skeleton`` fits the bones of the first."""
+
+    def __init__(self, source: Lines, header: bytes, skeleton: Skeleton) -> None:
+        self.source, self.skeleton = source, skeleton
+        self._unit = _unit(header)
+        self._columns: Mapping[str, int] = {}
+        self._counts: dict[str, int] = {}  # of the values of each bone
+
+    def rows(self, number: int) -> Iterator[Frame]:
+        """All frames, the first of which has this number."""
+        bones: dict[str, list[bytes]] = {}
+        done = False
+        for line in self.source:
+            words = _WORDS.findall(line)
+            if not words or words[0].startswith(b"#"):
+                continue
+            if len(words) == 1 and _NUMBER.fullmatch(words[0]):
+                if not done:
+                    yield number, self._row(bones)
+                number, bones, done = _frame_number(self.source, words[0]), {}, False
+                continue
+            self._add(bones, words, done)
+            if self._is_whole(bones):
+                yield number, self._row(bones)
+                done = True
+        if not done:
+            yield number, self._row(bones)
+
+    def _add(self, bones: dict[str, list[bytes]], words: list[bytes], done: bool) -> None:
+        name = words[0].decode("utf-8", "backslashreplace")
+        if name in bones:
+            raise self.source.error(f"bone {name[:40]!r} twice in a frame")
+        count = self._counts.get(name)
+        if done or (self._counts and count is None):
+            raise self.source.error(f"bone {name[:40]!r}, which the first frame does not have")
+        if count is not None and count != len(words) - 1:
+            raise self.source.error(
+                f"{len(words) - 1} values for bone {name[:40]!r}, which has {count} elsewhere"
+            )
+        bones[name] = words[1:]
+
+    def _is_whole(self, bones: Mapping[str, list[bytes]]) -> bool:
+        if self._counts:
+            return len(bones) == len(self._counts)
+        joints = {joint.name for joint in self.skeleton.joints if joint.channels}
+        return joints <= set(match_names(self.skeleton, dict.fromkeys(bones, 0)).values())
+
+    def _row(self, bones: Mapping[str, list[bytes]]) -> NDArray[np.float64]:
+        """The values of a frame, (n_channels,), NaN where a bone did not come."""
+        if not self._counts:
+            self._counts = {name: len(texts) for name, texts in bones.items()}
+            self.skeleton, self._columns = fit(self.skeleton, self._counts, self._unit)
+        row = np.full(self.skeleton.n_channels, np.nan)
+        values = self.source.numbers([text for texts in bones.values() for text in texts])
+        at = 0
+        for name, texts in bones.items():
+            column = self._columns[name]
+            row[column : column + len(texts)] = values[at : at + len(texts)]
+            at += len(texts)
+        return row
 
 
 def _word_lines(data: bytes, at: int) -> Iterator[list[re.Match[bytes]]]:

@@ -7,13 +7,15 @@ the order of the hierarchy; how many there are counts, not what ``Frames:`` says
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError, SourceError
+from mcz.formats.arriving import Arriving, Frame, Lines
 from mcz.formats.hierarchy import read_hierarchy, write_hierarchy
 from mcz.formats.layout import Layout, Pattern, runs_of
 from mcz.formats.rates import frame_rate, frame_time
@@ -25,6 +27,8 @@ from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton, Source
 
 _FRAMES = re.compile(rb"\s*Frames\s*:\s*([^\s]+)", re.IGNORECASE)
 _FRAME_TIME = re.compile(rb"\s*Frame\s+Time\s*:\s*([^\s]+)", re.IGNORECASE)
+MOST_SPREAD = 64  # bytes of "Frame Time:" on a line before that of its number
+_MOTION = re.compile(rb"\bMOTION\b", re.IGNORECASE)
 _BLANKS = re.compile(rb"[\x00-\x20]*")
 _TOKENS = re.compile(rb"#[^\n]*|[^\x00-\x20]+")
 
@@ -52,6 +56,51 @@ def read(data: bytes, name: str = "motion") -> Motion:
         _notes(encoding, n_strays, data[slice(*count)], rows.n_rows),
         source_of("bvh", data, header, rows, data[slice(*count)]),
     )
+
+
+def arrive(lines: Iterator[bytes], skeleton: Skeleton | None = None) -> Arriving:
+    """A BVH file whose lines come one by one; waits for its first frame.
+
+    A frame is complete with the line of its last number. What position channels do to the offset is
+    decided by the first frame alone; see ``with_positions``.
+    """
+    source = Lines(lines)
+    header = bytearray()
+    for line in source:
+        header += line
+        last = max(0, len(header) - len(line) - MOST_SPREAD)
+        if _FRAME_TIME.search(header, last) and _MOTION.search(header):
+            break
+    data = bytes(header)
+    encoding = text_encoding(data)
+    joints, at, n_strays = read_hierarchy(data, encoding)
+    n_columns = sum(len(joint.channels) for joint in joints)
+    if not n_columns:
+        raise SourceError("no joint has channels")
+    count, time, body = _motion_section(data, at, n_columns)
+    frames = _arriving(chain([data[body:]], source), source, n_columns)
+    first = list(islice(frames, 1))
+    values = np.array([row for _, row in first]).reshape(-1, n_columns)
+    rate, exact = frame_rate(data[slice(*time)].decode("latin-1"))
+    declared = data[slice(*count)]
+    notes = _notes(encoding, n_strays, declared, int(declared) if declared.isdigit() else -1)
+    bones = Skeleton(with_positions(joints, values), unit_cm=None)
+    return Arriving(bones, chain(first, frames), rate, exact, notes)
+
+
+def _arriving(lines: Iterable[bytes], source: Lines, n_columns: int) -> Iterator[Frame]:
+    """The frames that the numbers of ``lines`` make."""
+    words: list[bytes] = []
+    for line in lines:
+        for match in _TOKENS.finditer(line):
+            if match[0][:1] == b"#":
+                continue
+            words.append(match[0])
+            if len(words) == n_columns:
+                yield None, source.numbers(words)
+                words = []
+    if words:
+        raise source.error(f"the last frame has {len(words)} of {n_columns} values")
 
 
 def _notes(encoding: str, n_strays: int, count: bytes, n_rows: int) -> dict[str, str]:

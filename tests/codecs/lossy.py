@@ -13,7 +13,7 @@ import numpy as np
 
 import mcz
 from mcz.codecs import by_name
-from mcz.codecs.base import Encoded, Layout, Request, Segment, Span
+from mcz.codecs.base import Encoded, Layout, Request, Segment, Span, model_finder
 from mcz.files.memory import MemorySource
 from mcz.files.sizes import clip_sizes
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
@@ -59,6 +59,20 @@ def gapped(n_frames: int = 100) -> Motion:
     return Motion(Skeleton(joints, unit_cm=0.1), (Signal(values, mask=mask),), name="markers")
 
 
+def markers(n_frames: int, n_markers: int = 4, seed: int = 0, unit_cm: float = 0.1) -> Motion:
+    """Markers that walk about together, each with a walk of its own."""
+    random = np.random.default_rng(seed)
+    shared = np.cumsum(random.normal(0, 3, (n_frames, 1, 3)), axis=0)
+    own = np.cumsum(random.normal(0, 0.5, (n_frames, n_markers, 3)), axis=0)
+    places = shared + own + random.normal(0, 200, (n_markers, 3))
+    joints = tuple(
+        Joint(f"M{i}", channels=tuple(map(Channel, POSITION_KINDS))) for i in range(n_markers)
+    )
+    signal = Signal(places.reshape(n_frames, 3 * n_markers))
+    skeleton = Skeleton(joints, unit_cm=unit_cm)
+    return Motion(skeleton, (signal,), frame_rate=Fraction(120), name="markers")
+
+
 def saved(codec: str, motion: Motion, **params: object) -> bytes:
     out = io.BytesIO()
     mcz.write(motion, out, codec=codec, **params)
@@ -91,7 +105,12 @@ class Direct:
         coded: Encoded = self.codec.encode(source, self.codec.options(params))
         self.header = coded.header
         self.segments: list[Segment] = list(coded.segments)
-        self.layout: Layout = replace(source.layout, n_resolutions=coded.n_resolutions)
+        self.models = coded.models, coded.known
+        self.layout: Layout = replace(
+            source.layout,
+            n_resolutions=coded.n_resolutions,
+            find_model=model_finder((*coded.models, *coded.known)),
+        )
         self.spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in self.segments]
 
     @property

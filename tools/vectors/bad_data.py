@@ -9,14 +9,23 @@ from dataclasses import replace
 from typing import Any
 
 from mcz.container import payloads
-from mcz.container.packets import END, SEGMENT, Packet, build_packet
-from mcz.container.segments import FRAME_NOTES, MASKS, SegmentHeader, StreamCounts, parse_table
+from mcz.container.directory import PACKETS
+from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet
+from mcz.container.segments import (
+    FRAME_NOTES,
+    FRESH,
+    MASKS,
+    SegmentHeader,
+    StreamCounts,
+    parse_table,
+)
 from mcz.numbers import Grid, GridKind
 from mcz.schema import read_varint, varint
 from tools.vectors.bad_clips import indexed
 from tools.vectors.craft import Broken, Crafter, Vector, file_of, finished
 from tools.vectors.edits import Edit, Made, flip, framed, headed, plus, put, raw_stream, table
 from tools.vectors.motions import column, dance
+from tools.vectors.uncommon import live_file
 
 N_GROUPS = 2  # of a dance
 
@@ -142,6 +151,33 @@ def _packets(shelf: Broken) -> None:
     for name, purpose, edits in cases:
         data = file_of(dance(), packets=True, index=False, **edits)
         shelf.add(name, "Open DATA and packets", purpose, data)
+    spec = "Open DATA and packets"
+    data = live_file(dance(3), index=False, frames=0)
+    shelf.add("frame-first", spec, "A packet of kind 2 is the first of its DATA.", data)
+    data = file_of(dance(2), packets=True, index=False, segment_frames=1, packet=_SecondAsFrame())
+    shelf.add("frame-of-two-groups", spec, "Kind 2, of a signal with two groups.", data)
+    data = live_file(dance(3), table=_stale)
+    shelf.add("frame-index", f"{spec}; INDX", "INDX says that a frame is not fresh.", data)
+
+
+class _SecondAsFrame:
+    """Makes the second packet one of kind 2."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self, packet: bytes) -> bytes:
+        self.count += 1
+        body = packet[_head_size(packet) + 2 : -2]
+        return build_packet(Packet(FRAME, 1, body)) if self.count == 2 else packet
+
+
+def _stale(fields: Any) -> Any:
+    """Say in INDX of the last segment that it needs the one before."""
+    row = fields.clips[0]
+    assert row.segments[-1] == PACKETS[FRAME] | FRESH
+    row.segments = row.segments[:-1] + bytes((PACKETS[FRAME],))
+    return fields
 
 
 def _head_size(packet: bytes) -> int:

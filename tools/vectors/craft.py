@@ -20,7 +20,7 @@ from mcz.container import payloads
 from mcz.container.chunks import Chunk, build_chunk, build_foot
 from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow, build_index
 from mcz.container.limits import BASE, Profile
-from mcz.container.packets import END, SEGMENT, Packet, build_packet
+from mcz.container.packets import CHECK_SIZE, END, FRAME, SEGMENT, Packet, build_packet
 from mcz.container.segments import SegmentHeader, build_segment
 from mcz.container.writer import Writer, payload_id
 from mcz.files.encoding import canonical, write_clip
@@ -58,14 +58,21 @@ class Crafter(Writer):
     A chunk type names an edit of its payload, TYPE_frame one of its whole bytes. "table" changes
     the fields of INDEX, "FOOT" edits its 32 bytes, "row" the ClipRow behind INDX, "segments" the
     list of (header, streams) of a clip. ``packets``: segments go into an open DATA; "packet" and
-    "end_packet" edit their bytes.
+    "end_packet" edit their bytes. ``frames``: those of signal 0 from this number on that have one
+    stream alone are packets of kind 2.
     """
 
     def __init__(
-        self, *, packets: bool = False, profile: Profile = BASE, **edits: Callable[..., Any]
+        self,
+        *,
+        packets: bool = False,
+        frames: int | None = None,
+        profile: Profile = BASE,
+        **edits: Callable[..., Any],
     ) -> None:
         self.edits = edits
         self.packets = packets
+        self.frames = frames
         self._made: Made = []
         self._sink_bytes = io.BytesIO()
         super().__init__(self._sink_bytes, profile=profile)
@@ -127,12 +134,30 @@ class Crafter(Writer):
         if self.packets:
             self.open_data()
         for header, streams in made:
+            if self._is_frame(header, streams):
+                self._frame(header, streams[0])
+                continue
             payload = self.edited("DATA", build_segment(header, streams))
             self._segment(header, payload)
         row = self._clip
         super().end_clip(n_frames, source_sha256, value_sha256)
         assert row is not None
         self.directory.clips[row.name] = self.edited("row", row)
+
+    def _is_frame(self, header: SegmentHeader, streams: Sequence[bytes]) -> bool:
+        number = self._next_packet
+        short = self.frames is not None and number is not None and number >= self.frames
+        return short and len(streams) == 1 and header.signal == 0
+
+    def _frame(self, header: SegmentHeader, stream: bytes) -> None:
+        clip: ClipRow | None = self._clip
+        assert clip is not None
+        assert self._next_packet is not None
+        packet = build_packet(Packet(FRAME, self._next_packet, stream, bool(header.flags & 1)))
+        at = self.offset + len(packet) - CHECK_SIZE - len(stream)
+        clip.segments.append(SegmentRow(at, len(stream), header, FRAME))
+        self._write(self.edited("packet", packet))
+        self._next_packet += 1
 
     def _segment(self, header: SegmentHeader, payload: bytes) -> None:
         clip: ClipRow | None = self._clip
@@ -143,7 +168,8 @@ class Crafter(Writer):
         else:
             packet = Packet(SEGMENT, self._next_packet, payload, bool(header.flags & 1))
             data = build_packet(packet)
-            row = SegmentRow(self.offset + len(data) - 2 - len(payload), len(payload), header, True)
+            at = self.offset + len(data) - CHECK_SIZE - len(payload)
+            row = SegmentRow(at, len(payload), header, SEGMENT)
             self._write(self.edited("packet", data))
             self._next_packet += 1
         clip.segments.append(row)
@@ -175,13 +201,14 @@ def file_of(
     *motions: Motion,
     index: bool = True,
     packets: bool = False,
+    frames: int | None = None,
     grouping: str = "joint",
     segment_frames: int = 0,
     codec: Codec = raw.CODEC,
     **edits: Any,
 ) -> bytes:
     """A file of these clips, edited; a segment has all frames unless ``segment_frames`` says it."""
-    crafter = Crafter(packets=packets, **edits)
+    crafter = Crafter(packets=packets, frames=frames, **edits)
     for motion in motions:
         crafter.clip(motion, grouping=grouping, codec=codec, segment_frames=segment_frames)
     return finished(crafter, index=index)

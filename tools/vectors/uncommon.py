@@ -7,10 +7,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from mcz.codecs import raw
 from mcz.container import payloads
 from mcz.container.chunks import ANCILLARY
-from mcz.container.packets import CODEC, END, Packet, build_packet
+from mcz.motion import Channel, Motion, Signal
+from mcz.numbers import Grid, GridKind
 from mcz.schema import build, inflate, parse
 from tools.vectors.craft import OK, UNSUPPORTED, Crafter, Vector, Whole, file_of, finished
 from tools.vectors.edits import Made, at, both, headed, plus, put
@@ -141,9 +144,47 @@ def _open_data(shelf: Whole) -> None:
     ):
         data = file_of(long, packets=True, segment_frames=3, index=index)
         shelf.hold(name, "Open DATA and packets", purpose, data, long)
+    _frames(shelf)
     opened = both(put(payloads.CLIP, "flags", b"\1"), put(payloads.CLIP, "n_frames", b"\0"))
     purpose = "A clip that does not know its frames in advance: CEND tells."
     shelf.hold("open-clip", "CLIP; CEND", purpose, file_of(long, CLIP=opened), long)
+
+
+def live_file(motion: Motion, **edits: Any) -> bytes:
+    """The clip as a live one: packets of one frame, of kind 2 where that can be."""
+    given = {"packets": True, "frames": 1, "segment_frames": 1, "grouping": "all"}
+    return file_of(motion, **given | edits)
+
+
+def _frames(shelf: Whole) -> None:
+    long = dance(8)
+    mask = np.ones(long.signals[0].values.shape, np.bool_)
+    mask[4, 1:] = False
+    masked = replace(long, signals=(replace(long.signals[0], mask=mask),))
+    cases = (
+        ("frame-packets", "Packets of kind 2 behind one of kind 1.", long, True),
+        ("frame-packets-no-index", "Packets of kind 2 are found without INDX too.", long, False),
+        (
+            "frame-packets-mask",
+            "A frame with a mask, of kind 1, among those of kind 2.",
+            masked,
+            True,
+        ),
+    )
+    for name, purpose, motion, index in cases:
+        data = live_file(motion, index=index)
+        shelf.hold(name, "Open DATA and packets; INDX", purpose, data, motion)
+    samples = np.arange(8).reshape(8, 1) * 3 - 9
+    channels = (Channel("", "emg", "V"),)
+    analog = Signal(
+        samples, (Grid(GridKind.INTEGER),), "analog", samples_per_frame=2, channels=channels
+    )
+    both_signals = replace(dance(), signals=(*dance().signals, analog))
+    data = live_file(
+        both_signals, segments=lambda made: sorted(made, key=lambda part: part[0].first)
+    )
+    purpose = "Packets of kind 2 among those of another signal."
+    shelf.hold("frame-packets-signals", "Open DATA and packets; INDX", purpose, data, both_signals)
 
 
 def _segments(shelf: Whole) -> None:
@@ -164,13 +205,6 @@ def _needs_more(shelf: Whole) -> None:
     crafters[1].clip(dance(), codec=replace(raw.CODEC, version=9))
     crafters[2].plain_chunk(b"ROOM", b"what the room looked like")
     crafters[2].clip(dance())
-    packets = file_of(
-        dance(),
-        packets=True,
-        index=False,
-        packet=plus(build_packet(Packet(CODEC, 1, b"impulse"))),
-        end_packet=lambda packet: build_packet(Packet(END, 2, b"")),
-    )
     cases = (
         ("unknown-codec", "Codecs", "A codec id beyond the registry.", finished(crafters[0])),
         ("newer-codec", "Codecs", "A later version of a known codec.", finished(crafters[1])),
@@ -179,7 +213,6 @@ def _needs_more(shelf: Whole) -> None:
         ("older-minor", "HEAD", "Minor version 1 of 0.", file_of(dance(), HEAD=at(3, b"\1"))),
         ("newer-major", "HEAD", "Another major version.", file_of(dance(), HEAD=at(2, b"\1\0"))),
         ("unknown-profile", "HEAD", "A later profile.", file_of(dance(), HEAD=at(4, b"\7"))),
-        ("codec-packet", "Open DATA and packets", "A packet of kind 2, a codec's own.", packets),
     )
     for name, spec, purpose, data in cases:
         shelf.add(name, spec, purpose, data, exit=(UNSUPPORTED,))

@@ -12,12 +12,13 @@ from mcz.errors import OptionError
 from mcz.files.conversion.acclaim import to_amc
 from mcz.files.conversion.hierarchy import to_bvh
 from mcz.files.conversion.markers import to_c3d
+from mcz.files.conversion.solved import Fit, from_positions
 from mcz.files.sources import plain_source, with_facts
 from mcz.formats import FORMATS
 from mcz.kinematics import point_set
 from mcz.motion import Motion
 
-__all__ = ["TARGETS", "convert", "converted_files"]
+__all__ = ["TARGETS", "Fit", "convert", "converted_files", "from_positions"]
 
 TARGETS = {"bvh": to_bvh, "amc": to_amc, "c3d": to_c3d}
 

@@ -1,0 +1,80 @@
+"""``mcz encode -``: a motion on standard input, frame by frame where its codec can do that."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, BinaryIO
+
+import click
+
+from mcz.cli.common import Exit, Failure, about, binary_output, plural, printable, say
+
+NAME = "standard input"
+
+
+def standard_input() -> BinaryIO:
+    """Standard input as bytes; raises Failure where it is closed."""
+    if sys.stdin is None:
+        raise Failure(f"{NAME} is closed")
+    return sys.stdin.buffer
+
+
+@contextmanager
+def stored(format_name: str | None) -> Iterator[str]:
+    """The path of a file, for as long as the block runs, that holds all of standard input."""
+    from mcz.files.arriving import format_name_of
+
+    data = standard_input().read()
+    with about(NAME):
+        name = format_name or format_name_of(data)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "stdin" / f"stdin.{name}"  # with nothing beside it
+        path.parent.mkdir()
+        path.write_bytes(data)
+        yield str(path)
+
+
+def encode_lines(
+    target: str | None, force: bool, format_name: str | None, skeleton: str | None, **options: Any
+) -> None:
+    """Encode standard input frame by frame to ``target``, - or None being standard output."""
+    from mcz.files.arriving import encode_live
+
+    for name in ("verbatim", "archive"):
+        if options.pop(name):
+            raise Failure(f"--{name} has no meaning for what is coded frame by frame", Exit.USAGE)
+    stream = standard_input()
+    name = format_name or ("bvh" if skeleton is None else "amc")
+    others = () if target in (None, "-") else (str(target),)
+    with about(NAME, *others), _live_output(target, force) as sink:
+        report = encode_live(iter(stream.readline, b""), sink, name, skeleton=skeleton, **options)
+    for remark in report.remarks:
+        say(f"{NAME}: {remark}")
+    if target not in (None, "-"):
+        size = Path(str(target)).stat().st_size
+        held = f"{plural(report.n_frames, 'frame')} of {plural(report.n_channels, 'channel')}"
+        click.echo(printable(f"{target}: {held}, live; {size:,} bytes"))
+
+
+@contextmanager
+def _live_output(target: str | None, force: bool) -> Iterator[BinaryIO]:
+    """Where frames go at once, so that what was written before a crash stays."""
+    if target in (None, "-"):
+        yield binary_output()
+        return
+    path = Path(str(target))
+    try:
+        stream = path.open("wb" if force or _is_special(path) else "xb", buffering=0)
+    except FileExistsError:
+        raise Failure(f"{path}: exists; --force overwrites it", Exit.USAGE) from None
+    with stream:
+        yield stream
+
+
+def _is_special(path: Path) -> bool:
+    """Whether ``path`` is a device or a pipe, which is there to be written to."""
+    return path.exists() and not (path.is_file() or path.is_dir())

@@ -1,0 +1,141 @@
+"""``mcz train``: bases for the learned transforms, from clips."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mcz.cli.common import (
+    Exit,
+    about,
+    existing,
+    plural,
+    print_json,
+    printable,
+    table,
+    write_output,
+)
+from mcz.cli.options import UNITS, force_option, json_option
+from mcz.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from mcz.motion import Motion
+
+AXES = "xyz"
+
+
+@click.command(short_help="Learn the bases of a transform from clips.")
+@click.argument("clips", metavar="CLIPS...", nargs=-1, required=True, type=click.Path())
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="The file of bases, for --param basis=OUT of mcz encode.",
+)
+@click.option(
+    "--P",
+    "sparsity",
+    metavar="N",
+    type=click.IntRange(1),
+    default=8,
+    help="Coefficients that may stay of each frame while learning. Default: 8.",
+)
+@click.option(
+    "--iterations",
+    metavar="N",
+    type=click.IntRange(0, 100_000),
+    default=300,
+    help="At most so many, fewer where they gain nothing. Default: 300.",
+)
+@click.option(
+    "--growth",
+    metavar="N",
+    type=click.IntRange(0, 10_000),
+    default=40,
+    help="Iterations with each smaller P before them; 0 is the published algorithm. Default: 40.",
+)
+@click.option("--start", type=click.Choice(("dct", "haar")), default="dct", help="Default: dct.")
+@click.option(
+    "--of",
+    "kind",
+    type=click.Choice(("frames", "steps", "windows")),
+    default="steps",
+    help="What is to become sparse: steps between frames, frames themselves as published, or DCT "
+    "coefficients of windows. Default: steps.",
+)
+@click.option(
+    "--mirror/--no-mirror", default=False, help="Mirror images too, left points for right ones."
+)
+@click.option(
+    "--headings",
+    metavar="N",
+    type=click.IntRange(1, 360),
+    default=1,
+    help="Turned copies about the up axis, 180 / N degrees apart. Default: 1, none.",
+)
+@click.option(
+    "--every", metavar="N", type=click.IntRange(1), default=1, help="Every N-th frame alone."
+)
+@click.option("--unit", type=click.Choice(UNITS), help="Length unit of files that say none.")
+@force_option
+@json_option
+def command(
+    clips: tuple[str, ...],
+    output: Path,
+    unit: str | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> Exit:
+    """Learn one orthogonal basis a coordinate from the positions of CLIPS (.amc, .bvh, .c3d, .mcz).
+
+    All clips must have the same points. A basis is learned by turns: the largest coefficients of
+    each frame stay, then comes the basis nearest to what has stayed. OUT holds the bases in
+    integers, as SPEC.md, "Bases", has them.
+    """
+    from mcz.training import Recipe, train
+
+    for path in clips:
+        existing(path)
+    with about(clips[0], *clips), Progress() as progress:
+        trained = train(_motions(clips, unit, progress), Recipe(**options), progress)
+    write_output(output, trained.data, force)
+    document = {"output": str(output), **trained.document()}
+    if as_json:
+        print_json(document)
+    else:
+        for line in _lines(document):
+            click.echo(printable(line))
+    return Exit.FINE
+
+
+def _motions(paths: tuple[str, ...], unit: str | None, progress: Progress) -> Iterator[Motion]:
+    import mcz
+
+    for number, path in enumerate(paths):
+        progress(number, len(paths), f"reading {path}")
+        with about(path):
+            motion = mcz.read(path, unit=unit)
+        yield replace(motion, name=path)  # errors name the file
+
+
+def _lines(document: dict[str, Any]) -> Iterator[str]:
+    yield (
+        f"{document['output']}: {plural(document['n_points'], 'point')}, "
+        f"{document['bytes']:,} bytes, from {plural(document['n_vectors'], 'vector')} of "
+        f"{plural(document['n_frames'], 'frame')} in {plural(document['n_clips'], 'clip')}"
+    )
+    if document["n_left_out"]:
+        yield f"  left out: {plural(document['n_left_out'], 'frame')} with missing points"
+    head = ("coordinate", "iterations", f"at the start, {document['unit']}", "at the end")
+    rows = [
+        (axis, str(found["iterations"]), f"{found['start']:.5g}", f"{found['end']:.5g}")
+        for axis, found in zip(AXES, document["coordinates"], strict=True)
+    ]
+    yield from (f"  {line}" for line in table([head, *rows], "lrrr").split("\n"))

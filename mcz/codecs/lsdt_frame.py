@@ -1,0 +1,366 @@
+"""Codec 7, ``lsdt-frame``: what each frame adds to the one before, in a learned basis.
+
+SPEC.md, "Codec 7: lsdt-frame", is normative; the names below are its field names.
+Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Low-latency compression of mocap data using
+learned spatial decorrelation transform, 2016, section 3.1.
+
+Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
+states). No delay: a frame is coded before the next is known.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from construct import Struct
+from numpy.typing import NDArray
+
+from mcz.angles import Unwrapper
+from mcz.codecs._frames import FrameReader, fill_gaps
+from mcz.codecs._lossy import (
+    SEGMENT_FRAMES_PARAMETER,
+    TARGET_BYTES,
+    chosen_of,
+    preset_parameter,
+    segment_frames_of,
+    skeleton_of,
+)
+from mcz.codecs._prefix_streams import (
+    CODE,
+    NO_CODES,
+    build_vectors,
+    codes_from,
+    fields_of,
+    parse_vectors,
+)
+from mcz.codecs._space import COURSES, MEAN, SPACE, check, space_of, uses_of
+from mcz.codecs._space_choice import (
+    BASIS,
+    CODER,
+    DOMAIN,
+    STEP,
+    THRESHOLD,
+    THRESHOLD_PARAMETER,
+    VIRTUAL_MARKERS,
+    changes,
+    choose_space,
+    default_step,
+    live_choice,
+    sample_of,
+)
+from mcz.codecs.base import (
+    Codec,
+    Dial,
+    Encoded,
+    Fetch,
+    Layout,
+    Request,
+    Segment,
+    SignalSource,
+    Span,
+    model_finder,
+)
+from mcz.coding.start import start_state
+from mcz.coding.streams import code, uncode
+from mcz.errors import FormatError, MotionError, OptionError
+from mcz.schema import build, parse
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NAME = "lsdt-frame"
+START_TABLE = Path(__file__).with_name("frame_start.json")
+BLOCK_FRAMES = 512  # coded at a time
+SEGMENT_FRAMES = 1200
+
+FRAME_HEADER = Struct(
+    "space" / SPACE * "how a frame becomes coefficients",
+    "code" / CODE * "how coefficients become bits",
+)
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {"threshold": THRESHOLD, "coder": "adaptive"},
+    "hou2016": {"threshold": 0.5, "coder": "prefix"},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, or is too large.
+    """
+    chosen = chosen_of(PRESETS, params)
+    sample = sample_of(NAME, source)
+    step = params["step"] or default_step(sample)
+    choice = choose_space(NAME, sample, step, params["basis"], changes)
+    layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
+    fields = {"space": choice.fields, "code": NO_CODES}
+    published = params["preset"] == "hou2016"
+    length = segment_frames_of(layout, params["segment_frames"], as_published=published)
+    coder = _Coder(build(FRAME_HEADER, fields, f"{NAME} header"), layout, chosen["threshold"])
+    if chosen["coder"] == "prefix" and layout.n_channels:
+        length = length or SEGMENT_FRAMES
+        fields["code"] = fields_of(_vectors(coder, source, length))
+        coder = _Coder(build(FRAME_HEADER, fields, f"{NAME} header"), layout, chosen["threshold"])
+    segments = _segments(source, coder, length)
+    return Encoded(coder.header, segments, models=choice.models, known=choice.known)
+
+
+def _vectors(coder: _Coder, source: SignalSource, length: int) -> Iterator[Ints]:
+    """The coefficients of segments of ``length`` frames, of each matrix (frames, n_vectors)."""
+    reader = FrameReader(NAME, source)
+    n_frames = source.layout.n_frames
+    for start in range(0, n_frames, length):
+        coder.restart()
+        indices = coder.quantize(reader.next(min(start + length, n_frames)))
+        yield from np.split(indices, coder.space.starts[1:-1], axis=1)
+
+
+def _segments(source: SignalSource, coder: _Coder, given: int) -> Iterator[Segment]:
+    """``given`` frames each, or, where that is 0, as many as make a DATA of the usual size."""
+    layout = source.layout
+    if not layout.n_channels:
+        if layout.n_frames:
+            yield Segment(0, layout.n_frames, ())
+        return
+    reader = FrameReader(NAME, source)
+    length = min(given or SEGMENT_FRAMES, layout.most_frames)
+    ahead = np.zeros((0, layout.n_channels))
+    first = 0
+    while first < layout.n_frames:
+        stop = min(first + length, layout.n_frames)
+        if stop > reader.at:
+            ahead = np.concatenate([ahead, reader.next(stop)])
+        coder.restart()
+        stream = coder.build(coder.quantize(ahead[: stop - first]))
+        if not given and len(stream) > TARGET_BYTES and length > 1:
+            length //= 2
+            continue
+        yield Segment(first, stop - first, (stream,))
+        ahead = ahead[stop - first :]
+        first = stop
+
+
+def decode(
+    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+) -> Floats:
+    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
+    check(NAME, layout, spans, fresh=False)
+    n_channels = layout.n_channels if request.groups else 0
+    out = np.zeros((request.stop - request.start, n_channels))
+    coder = _Coder(header, layout)
+    if not n_channels:
+        return out
+    fresh = [i for i, span in enumerate(spans) if span.fresh and span.first <= request.start]
+    for index in range(max(fresh, default=0), len(spans)):
+        span = spans[index]
+        if span.first >= request.stop:
+            break
+        if span.fresh:
+            coder.restart()
+        elif not index or spans[index - 1].stop != span.first:
+            raise FormatError(
+                f"{NAME}: the segment before {span.first}, which it needs, is missing"
+            )
+        stop = min(span.stop, request.stop)
+        block = coder.decode(fetch(index, 0, 0), span.n_frames, stop - span.first)
+        begin = max(span.first, request.start)
+        if begin < stop:
+            out[begin - request.start : stop - request.start] = block[begin - span.first :]
+    return out
+
+
+def _header(header: bytes) -> Any:
+    """The fields of FRAME_HEADER; raises FormatError."""
+    fields = parse(FRAME_HEADER, header, f"{NAME} header")
+    if fields.space.flags & (MEAN | COURSES):
+        raise FormatError(f"{NAME}: flags {fields.space.flags:#x}, it has no mean or courses")
+    return fields
+
+
+def uses(header: bytes) -> tuple[bytes, ...]:
+    """The models that a header names."""
+    return uses_of(_header(header).space)
+
+
+@cache
+def _start_states() -> tuple[Ints, ...]:
+    return tuple(start_state(table) for table in json.loads(START_TABLE.read_text())["sets"])
+
+
+@cache
+def _kernels() -> Any:
+    from mcz.codecs import _frame_kernels
+
+    return _frame_kernels
+
+
+class _Coder:
+    """Encoder or decoder with what it remembers of the frames before.
+
+    Raises FormatError for a bad header.
+    """
+
+    def __init__(self, header: bytes, layout: Layout, threshold: float = THRESHOLD) -> None:
+        fields = _header(header)
+        self.header, self.threshold = header, threshold
+        self.space = space_of(NAME, fields.space, layout)
+        self.codes = codes_from(fields.code, f"{NAME} header")
+        self._analysis = np.zeros((0, 0))
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all frames."""
+        space = self.space
+        self._models = _start_states()[0].copy()
+        self._values = np.zeros(len(space.weights))
+        self._lengths = np.zeros(len(space.starts) - 1, np.int64)
+        self._tracks = np.zeros((space.n_rows, _kernels().TRACK_SIZE), np.int64)
+        self._begins = 1
+
+    def decode(self, stream: bytes, n_frames: int, wanted: int) -> Floats:
+        """The first ``wanted`` frames of a segment; raises FormatError on bad bytes."""
+        indices = np.zeros((wanted, self.space.n_rows), np.int64)
+        self._parse(stream, indices, whole=wanted == n_frames)
+        out = np.empty((wanted, len(self._values)))
+        _kernels().add_frames(out, self._values, indices, *self._transform())
+        return out
+
+    def quantize(self, frames: Floats) -> Ints:
+        """The coefficients of a segment, (frames, n_rows); raises MotionError."""
+        if not self._analysis.size:
+            self._analysis = np.ascontiguousarray(np.concatenate(self.space.analysis()))
+        indices = np.zeros((len(frames), self.space.n_rows), np.int64)
+        fault = _kernels().quantize_frames(
+            indices,
+            np.ascontiguousarray(frames),
+            self._values,
+            *self._transform(),
+            self._analysis,
+            self.threshold,
+        )
+        if fault >= 0:
+            raise MotionError(f"{NAME}: a coefficient exceeds 2^40 quantizer steps")
+        return indices
+
+    def build(self, indices: Ints) -> bytes:
+        """The stream of a segment's coefficients."""
+        if self.codes is not None:
+            return build_vectors(indices, self.space.starts, self.codes)
+        before = self._lengths.copy(), self._tracks.copy()
+
+        def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
+            self._lengths, self._tracks = before[0].copy(), before[1].copy()
+            return self._code(state, data, indices)
+
+        stream = code(self._models.copy(), indices.size + 256, loop, "a coefficient")
+        self._begins = 0
+        return stream
+
+    def _parse(self, stream: bytes, indices: Ints, *, whole: bool) -> None:
+        what = f"{NAME}: a coefficient"
+        if self.codes is not None:
+            parse_vectors(stream, indices, self.space.starts, self.codes, what, whole=whole)
+            return
+        uncode(
+            stream,
+            self._models,
+            lambda state, data: self._code(state, data, indices),
+            what,
+            whole=whole,
+        )
+        self._begins = 0
+
+    def _code(self, state: Ints, data: NDArray[np.uint8], indices: Ints) -> bool:
+        memory = self._lengths, self._tracks, self._begins
+        fault = _kernels().code_frames(state, data, indices, self.space.starts, *memory)
+        self._models[:] = state
+        return bool(fault < 0)
+
+    def _transform(self) -> tuple[Any, ...]:
+        space = self.space
+        return space.vectors, space.starts, space.columns, space.step, space.weights
+
+
+class _LiveEncoder:
+    """One frame a push, each a segment that needs the one before, from time to time a fresh one."""
+
+    def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
+        chosen = chosen_of(PRESETS, options)
+        choice = live_choice(NAME, layout, options["step"], options["basis"])
+        if chosen["coder"] == "prefix":
+            raise OptionError(f"{NAME}: prefix codes need all frames, coder adaptive does not")
+        fields = {"space": choice.fields, "code": NO_CODES}
+        self.header = build(FRAME_HEADER, fields, f"{NAME} header")
+        self.models = choice.models
+        found = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
+        self._coder = _Coder(self.header, found, chosen["threshold"])
+        self._every = options["segment_frames"] or SEGMENT_FRAMES
+        self._at = 0
+        self._unwrapper = Unwrapper(skeleton_of(NAME, layout))
+        self._last = np.full(layout.n_channels, np.nan)
+
+    def push(self, values: Floats, valid: NDArray[np.bool_] | None = None) -> tuple[bytes, bool]:
+        row = np.asarray(values, np.float64)[None]
+        known = np.ones(row.shape, np.bool_) if valid is None else valid[None]
+        if not np.isfinite(row[known]).all():
+            raise MotionError(f"{NAME}: frame {self._at} holds a value that is not finite")
+        row = fill_gaps(self._unwrapper(np.where(known, row, np.nan)), known, self._last)
+        self._last = row[0]
+        fresh = self._at % self._every == 0
+        if fresh:
+            self._coder.restart()
+        self._at += 1
+        return self._coder.build(self._coder.quantize(row)), fresh
+
+
+class _LiveDecoder:
+    """The inverse of ``_LiveEncoder``."""
+
+    def __init__(self, header: bytes, layout: Layout) -> None:
+        self._coder = _Coder(header, layout)
+        self._broken = True  # until something fresh comes
+
+    def push(self, stream: bytes, fresh: bool) -> Floats:
+        if fresh:
+            self._coder.restart()
+        elif self._broken:
+            raise FormatError(f"{NAME}: a frame that needs the one before, which is not known")
+        self._broken = True
+        values: Floats = self._coder.decode(stream, 1, 1)[0]
+        self._broken = False
+        return values
+
+
+CODEC = Codec(
+    id=7,
+    name=NAME,
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=decode,
+    grouping="all",
+    delay=0,
+    places=True,
+    uses=uses,
+    live=_LiveEncoder,
+    follow=_LiveDecoder,
+    dial=Dial("step", 2.0**-60, 2.0**60),
+    parameters=(
+        preset_parameter(PRESETS),
+        STEP,
+        THRESHOLD_PARAMETER,
+        BASIS,
+        CODER,
+        DOMAIN,
+        VIRTUAL_MARKERS,
+        SEGMENT_FRAMES_PARAMETER,
+    ),
+)

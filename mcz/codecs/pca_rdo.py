@@ -1,0 +1,84 @@
+"""Codec 10, ``pca-rdo``: principal components of poses, and of their courses in windows.
+
+SPEC.md, "Codec 10: pca-rdo", is normative; the names below are its field names.
+Source: L. Vasa, G. Brunnett, Rate-distortion optimized compression of motion capture data, 2014, as
+Hou 2016 describes it in sections 2.1 and 5.4.2.
+
+Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
+states). Mean, components and courses are in the file, as a model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from mcz.codecs import _windows
+from mcz.codecs._lossy import SEGMENT_FRAMES_PARAMETER, chosen_of, preset_parameter
+from mcz.codecs._space import APART, COURSES, MEAN, WEIGHTED
+from mcz.codecs._space_choice import (
+    CODER,
+    DOMAIN,
+    STEP,
+    VIRTUAL_MARKERS,
+    default_step,
+    sample_of,
+)
+from mcz.codecs._window_fit import (
+    FREQUENCIES,
+    RANK,
+    THRESHOLD,
+    THRESHOLD_PARAMETER,
+    asked_of,
+    plan_of,
+    window_parameter,
+)
+from mcz.codecs.base import Codec, Dial, Encoded, SignalSource
+
+NAME = "pca-rdo"
+WINDOW = 120
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {"window": WINDOW, "threshold": THRESHOLD, "coder": "adaptive"},
+    "hou2016": {"window": WINDOW, "threshold": 0.5, "coder": "prefix"},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, or is too large.
+    """
+    sample = sample_of(NAME, source)
+    step = params["step"] or default_step(sample)
+    asked = asked_of(params, chosen_of(PRESETS, params), step)
+    plan = plan_of(NAME, source, sample, asked, apart=False, mean=True, courses=True)
+    return _windows.encode(NAME, source, plan)
+
+
+CODEC = Codec(
+    id=10,
+    name=NAME,
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=partial(_windows.decode, NAME, flags=APART | WEIGHTED | MEAN | COURSES),
+    grouping="all",
+    places=True,
+    uses=partial(_windows.uses, NAME),
+    dial=Dial("step", 2.0**-60, 2.0**60),
+    parameters=(
+        preset_parameter(PRESETS),
+        STEP,
+        window_parameter(WINDOW),
+        THRESHOLD_PARAMETER,
+        RANK,
+        FREQUENCIES,
+        CODER,
+        DOMAIN,
+        VIRTUAL_MARKERS,
+        SEGMENT_FRAMES_PARAMETER,
+    ),
+)

@@ -1,0 +1,36 @@
+"""Compiled: bits in bytes, the highest of each byte first. SPEC.md, "Bits", is normative.
+
+One function serves encoder and decoder, as in ``kernels``: a coder is an array of two, the place in
+bits and whether it encodes. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+from mcz.coding.kernels import Bytes, Ints
+from mcz.jit import inner
+
+AT, WRITING = 0, 1
+
+
+@inner
+def plain(coder: Ints, data: Bytes, value: int, n_bits: int) -> int:
+    """Code the low ``n_bits`` of ``value``, the highest first.
+
+    Bits behind the end of ``data`` are counted, and read as 0: the caller compares sizes.
+    """
+    at = coder[AT]
+    coder[AT] = at + n_bits
+    out = 0
+    for shift in range(n_bits - 1, -1, -1):
+        place = at >> 3
+        mask = 128 >> (at & 7)
+        at += 1
+        bit = 0
+        if coder[WRITING]:
+            bit = value >> shift & 1
+            if bit and place < len(data):
+                data[place] |= mask
+        elif place < len(data) and data[place] & mask:
+            bit = 1
+        out = out << 1 | bit
+    return out

@@ -1,0 +1,278 @@
+"""Live clips: frames written as they come, each decodable at once, and read as they arrive.
+
+Part of the joint between motion, codec and container (see ``file.py``). SPEC.md, "Open DATA and
+packets", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from types import MappingProxyType, TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import by_name
+from mcz.codecs.base import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
+from mcz.container import payloads
+from mcz.container.segments import FRESH, MASKS, SegmentHeader
+from mcz.container.writer import Sink, Writer
+from mcz.errors import MotionError, OptionError
+from mcz.files.digest import ValueDigest
+from mcz.files.encoding import asked, open_clip, write_skeleton
+from mcz.files.masks import build_mask
+from mcz.files.memory import MemorySource
+from mcz.files.positions import NOTE, SEPARATOR, marker_skeleton, places_of, wants_positions
+from mcz.files.quality import CHUNK, texts_of
+from mcz.files.sources import name_skeleton
+from mcz.kinematics import point_names, point_set
+from mcz.motion import Motion, Signal, Skeleton
+from mcz.schema import build
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class LiveWriter:
+    """Writes one clip to ``sink`` frame by frame; nothing is sought, so a pipe will do.
+
+    ``skeleton`` is that of the frames that are pushed; a codec of places of points codes those,
+    under a skeleton of markers. ``codec`` names one that works live, ``params`` are its parameters;
+    ``metadata`` are those of the clip, ``first_number`` is the number of its first frame, ``base``
+    the skeleton that its own was derived from where that says so. Each frame's bytes are
+    written in one call, and flushed. Raises OptionError for a codec that cannot, for a bad
+    parameter or one that needs all frames, MotionError for a skeleton without channels.
+
+    As a context manager it closes the clip where the block fails, too: what was written is whole.
+    """
+
+    def __init__(
+        self,
+        sink: Sink,
+        skeleton: Skeleton,
+        codec: str,
+        params: Mapping[str, Any] = MappingProxyType({}),
+        *,
+        frame_rate: Fraction | None = None,
+        frame_rate_exact: bool = True,
+        name: str = "live",
+        metadata: Mapping[str, str] = MappingProxyType({}),
+        first_number: int = 1,
+        base: Skeleton | None = None,
+    ) -> None:
+        self.n_frames = 0
+        self.codec = by_name(codec)
+        self.options = self.codec.options(params)
+        self._outlet = _Outlet(sink)
+        self._writer = Writer(self._outlet)
+        self._is_open = self._has_data = False
+        self._written: tuple[bytes, bool, Mask | None, Floats] | None = None
+        if base is not None:
+            name_skeleton(self._writer, base)
+            if skeleton.base is not None:
+                skeleton = replace(skeleton, base=write_skeleton(self._writer, base))
+        self.skeleton, self._n_channels = skeleton, skeleton.n_channels
+        self._places = wants_positions(self.codec, self.options, skeleton)
+        coded = self._coded_skeleton()
+        signal = Signal(np.zeros((0, coded.n_channels)))
+        if self._places:
+            note = metadata.get("source-note", "")
+            metadata = dict(metadata) | {"source-note": SEPARATOR.join(filter(None, (NOTE, note)))}
+        motion = Motion(coded, (signal,), frame_rate, frame_rate_exact, name, metadata)
+        self._encoder, self._decoder = _coders(self.codec, motion, self.options, self._writer)
+        header, models = self._encoder.header, self._encoder.models
+        encoded = Encoded(header, iter(()), models=models)
+        open_clip(self._writer, motion, self.codec, encoded, first_number)
+        self._is_open = True
+        self._digest = ValueDigest()
+        self._figures = _Figures(coded)
+        self._outlet.send()
+
+    def _coded_skeleton(self) -> Skeleton:
+        if not self._places:
+            return self.skeleton
+        base = write_skeleton(self._writer, self.skeleton)
+        return marker_skeleton(self.skeleton, base, virtual_markers=self._virtual)
+
+    @property
+    def _virtual(self) -> bool:
+        return bool(self.options.get("virtual_markers"))
+
+    def __enter__(self) -> LiveWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if not isinstance(error, OSError):  # the sink itself, it seems
+            self.close()
+
+    def push(self, values: Floats) -> Floats:
+        """Write the next frame, (n_channels,) in source units, NaN where invalid.
+
+        Returns what a reader will have, NaN where invalid. Raises MotionError for values that the
+        codec cannot hold, LimitError for a frame too large for a packet; nothing is written then.
+        """
+        if not self._is_open:
+            raise MotionError("the live clip is closed")
+        row = np.asarray(values, np.float64)
+        if row.shape != (self._n_channels,):
+            raise MotionError(
+                f"frame {self.n_frames}: values of shape {row.shape}, "
+                f"the skeleton has {self._n_channels} channels"
+            )
+        if self._places:
+            row = places_of(self.skeleton, row[None], virtual_markers=self._virtual)[0]
+        known = ~np.isnan(row)
+        valid = None if known.all() else known
+        given = row if valid is None else np.where(valid, row, 0.0)
+        stream, fresh = self._encoder.push(given, valid)
+        self._write(stream, fresh, valid)
+        self._written = stream, fresh, valid, row
+        self._outlet.send()
+        return self._settle()
+
+    def _settle(self) -> Floats:
+        """Count the frame that was written, and take it into the hash and the figures."""
+        assert self._written is not None
+        (stream, fresh, valid, row), self._written = self._written, None
+        decoded = self._decoder.push(stream, fresh)
+        self._digest.update(decoded[None], None if valid is None else valid[None])
+        self._figures.add(row, decoded)
+        self.n_frames += 1
+        return decoded if valid is None else np.where(valid, decoded, np.nan)
+
+    def _write(self, stream: bytes, fresh: bool, valid: Mask | None) -> None:
+        """Write one frame, each fresh one as the first of a DATA of its own."""
+        if fresh and self._has_data:
+            self._writer.close_data()
+            self._has_data = False
+        if self._has_data and valid is None:
+            self._writer.frame(self.n_frames, stream, fresh=fresh)
+        else:
+            if not self._has_data:
+                self._writer.open_data()
+                self._has_data = True
+            flags, streams = fresh * FRESH, [stream]
+            if valid is not None:
+                flags, streams = flags | MASKS, [build_mask(valid[None]), stream]
+            self._writer.segment(SegmentHeader(0, self.n_frames, 1, flags=flags), streams)
+
+    def close(self) -> None:
+        """Write what comes behind the frames: hash, quality record, index."""
+        if not self._is_open:
+            return
+        self._is_open = False
+        if self._written is not None:  # an interrupt came after a frame, before it was counted
+            self._settle()
+        self._writer.end_clip(self.n_frames, b"", [self._digest.digest()])
+        if not self.codec.lossless:
+            settings = {f"param.{name}": value for name, value in self.options.items()}
+            found = {"codec": self.codec.name, **settings, **self._figures.entries()}
+            rows = [{"key": key, "value": value} for key, value in texts_of(found).items()]
+            payload = build(payloads.QUAL, {"entries": rows, "extension": b""}, "quality record")
+            self._writer.ancillary(CHUNK, payload)
+        self._writer.finish()
+        self._outlet.send()
+
+
+def _coders(
+    codec: Codec, motion: Motion, options: Mapping[str, Any], writer: Writer
+) -> tuple[LiveEncoder, LiveDecoder]:
+    if codec.live is None or codec.follow is None:
+        raise OptionError(f"codec {codec.name} does not code frame by frame")
+    if asked(options):
+        raise OptionError(f"{', '.join(asked(options))}: needs all frames, and none is known yet")
+    layout = MemorySource(motion, 0, codec, writer.profile.segment_bytes).layout
+    if len(layout.groups) != 1:
+        raise MotionError(f"codec {codec.name}: {len(layout.groups)} groups, live there is one")
+    encoder = codec.live(layout, options)
+    known = replace(layout, find_model=model_finder(encoder.models))
+    return encoder, codec.follow(encoder.header, known)
+
+
+class _Outlet:
+    """Collects what is written and sends it in one call."""
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+        self._pending: list[bytes] = []
+        self._left = memoryview(b"")  # of what is being sent
+
+    def write(self, data: bytes, /) -> None:
+        self._pending.append(data)
+
+    def send(self) -> None:
+        self._left = memoryview(b"".join((self._left, *self._pending)))
+        self._pending.clear()
+        while self._left:  # a raw stream may take a part alone
+            taken = self._sink.write(self._left)  # type: ignore[arg-type]  # any buffer will do
+            self._left = self._left[len(self._left) if taken is None else taken :]
+        flush = getattr(self._sink, "flush", None)
+        if flush is not None:
+            flush()
+
+
+class _Figures:
+    """The errors of a quality record, frame by frame: of values and, of markers, of places."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+        self._places = bool(skeleton.joints) and point_set(skeleton) == "markers"
+        self._frames = self._values = self._points = 0
+        self._squares = self._sum = 0.0
+        self._most = -1.0
+        self._where: tuple[int, int] | None = None
+
+    def add(self, given: Floats, decoded: Floats) -> None:
+        """Add a frame; NaN in ``given`` does not count."""
+        with np.errstate(all="ignore"):  # what overflows is no figure
+            squares = np.square(decoded - given)
+            self._squares, self._values = _added(self._squares, self._values, squares)
+            if self._places:
+                distances = np.sqrt(squares.reshape(-1, 3).sum(axis=1))
+                self._sum, self._points = _added(self._sum, self._points, distances)
+                distances[np.isnan(distances)] = -1.0
+                point = int(distances.argmax())
+                if distances[point] > self._most:
+                    self._most, self._where = float(distances[point]), (self._frames, point)
+        self._frames += 1
+
+    def entries(self) -> dict[str, Any]:
+        """The figures by their metric ids, None where there is none."""
+        unit = self.skeleton.unit_cm
+        found: dict[str, Any] = {"frames": self._frames, "channels": self.skeleton.n_channels}
+        found["mse_raw"] = self._squares / self._values if self._values else None
+        if self._places and self._where is not None:
+            mean, (frame, point) = self._sum / self._points, self._where
+            found |= {
+                "point_set": point_set(self.skeleton),
+                "points": self.skeleton.n_joints,
+                "unit_cm": unit,
+                "mean_position_error": mean,
+                "mean_position_error_cm": mean * unit if unit is not None else None,
+                "max_position_error": self._most,
+                "max_position_error_cm": self._most * unit if unit is not None else None,
+                "max_position_error_frame": frame,
+                "max_position_error_point": point_names(self.skeleton)[point],
+            }
+        return {key: value for key, value in found.items() if not _is_absurd(value)}
+
+
+def _added(total: float, count: int, more: Floats) -> tuple[float, int]:
+    """Sum and number with those of ``more`` that are not NaN."""
+    found = float(more.sum())
+    if found == found:
+        return total + found, count + more.size
+    valid = ~np.isnan(more)
+    return total + float(more[valid].sum()), count + int(np.count_nonzero(valid))
+
+
+def _is_absurd(value: Any) -> bool:
+    return isinstance(value, float) and not np.isfinite(value)

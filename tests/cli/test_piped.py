@@ -1,0 +1,326 @@
+"""``mcz encode -``: standard input, frame by frame over real pipes, and as a whole."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.container.following import Follower
+from mcz.files.arriving import encode_live
+from mcz.files.following import live_frames
+from mcz.formats import FORMATS, sniffed
+
+ROOT = Path(mcz.__file__).parent.parent
+HEADER = (
+    b"HIERARCHY\nROOT hips\n{\n  OFFSET 1 2 3\n  CHANNELS 3 Xposition Yposition Zposition\n"
+    b"  JOINT arm\n  {\n    OFFSET 0 4 0\n    CHANNELS 1 Zrotation\n    End Site\n    {\n"
+    b"      OFFSET 0 2 0\n    }\n  }\n}\nMOTION\nFrames: 3\nFrame Time: .0083333\n"
+)
+LINES = b"1 2 3 10\n", b"1.5 2 3 20\n", b"2 2.25 3 30\n"
+VALUES = np.array([[1, 2, 3, 10], [1.5, 2, 3, 20], [2, 2.25, 3, 30]])
+ASF = (
+    b":version 1.10\n:name VICON\n:units\n  length 0.45\n  angle deg\n:root\n"
+    b"  order TX TY TZ RX RY RZ\n  axis XYZ\n  position 0 0 0\n  orientation 0 0 0\n"
+    b":bonedata\n  begin\n    id 1\n    name knee\n    direction 0 1 0\n    length 2\n"
+    b"    axis 0 0 20 XYZ\n    dof rx\n  end\n:hierarchy\n  begin\n    root knee\n  end\n"
+)
+AMC = (
+    b"#!OML:ASF\n:FULLY-SPECIFIED\n:DEGREES\n3\n",
+    b"root 1 2 3 4 5 6\n",
+    b"knee 15\n",
+    b"4\n",
+    b"knee 20\n",
+    b"root 1 2 3.5 4 5 -7\n",
+)
+STEP = ("--param", "step=0.01", "--codec", "lsdt-frame")
+
+
+@pytest.fixture
+def asf(tmp_path: Path) -> Path:
+    path = tmp_path / "knee.asf"
+    path.write_bytes(ASF)
+    return path
+
+
+def run(*arguments: str | Path, data: bytes = b"", cwd: Path = ROOT) -> tuple[int, bytes, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "mcz.cli.main", *map(str, arguments)],
+        check=False,
+        input=data,
+        capture_output=True,
+        cwd=cwd,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    return done.returncode, done.stdout, done.stderr.decode()
+
+
+class Piped:
+    """A process of ``mcz encode -`` with both ends of its pipes in hand."""
+
+    def __init__(self, *arguments: str | Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "mcz.cli.main", "encode", "-", *map(str, arguments)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            cwd=ROOT,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.stdin, self.stdout = self.process.stdin, self.process.stdout
+
+    def say(self, data: bytes) -> None:
+        self.stdin.write(data)
+        self.stdin.flush()
+
+    def end(self) -> int:
+        self.stdin.close()
+        return self.process.wait()
+
+
+def test_each_frame_is_out_before_the_next_line_is_read() -> None:
+    piped = Piped(*STEP, "--param", "domain=channels")
+    piped.say(HEADER)
+    found = live_frames(piped.stdout)
+    for number, (line, row) in enumerate(zip(LINES, VALUES, strict=True)):
+        piped.say(line[:3])
+        piped.say(line[3:])  # its line end completes a frame
+        frame, values, valid = next(found)  # waits for ever if it were held back
+        assert frame == number
+        np.testing.assert_allclose(values, row, atol=0.02)
+        assert valid.all()
+    piped.stdin.close()
+    assert list(found) == []
+    assert piped.process.wait() == 0
+    piped.stdout.close()
+
+
+def test_bones_complete_a_frame_of_an_amc(asf: Path) -> None:
+    piped = Piped(*STEP, "--skeleton", asf, "--param", "domain=channels")
+    for line in AMC[:3]:
+        piped.say(line)
+    found = live_frames(piped.stdout)
+    np.testing.assert_allclose(next(found)[1], [1, 2, 3, 4, 5, 6, 15], atol=0.02)
+    for line in AMC[3:]:
+        piped.say(line)
+    np.testing.assert_allclose(next(found)[1], [1, 2, 3.5, 4, 5, -7, 20], atol=0.02)
+    piped.stdin.close()
+    assert list(found) == []
+    piped.stdout.close()
+    assert piped.process.wait() == 0
+
+
+def test_positions_of_a_bvh_from_a_pipe(tmp_path: Path) -> None:
+    out = tmp_path / "out.mcz"
+    data = HEADER + b"".join(LINES)
+    code, said, errors = run("encode", "-", *STEP, "-o", out, "--unit", "cm", data=data)
+    assert (code, errors) == (0, "")
+    assert said.decode().startswith(f"{out}: 3 frames of 4 channels, live; ")
+    assert mcz.verify(out) == []
+    (tmp_path / "a.bvh").write_bytes(data)
+    wanted = mcz.positions(mcz.read(tmp_path / "a.bvh")).reshape(3, -1)
+    with mcz.open(out) as file:
+        clip = file.clips["live"]
+        np.testing.assert_allclose(clip.read(), wanted, atol=0.03)
+        assert [joint.name for joint in clip.skeleton.joints] == ["hips", "arm", "arm end"]
+        assert clip.frame_rate == 120
+        note = "positions by forward kinematics; coded live, frame by frame, from BVH text"
+        assert clip.metadata["source-note"].startswith(note)
+        assert clip.quality is not None
+        assert float(clip.quality["max_position_error_cm"]) < 0.03
+    assert run("encode", "-", *STEP, "-o", out, data=data)[0] == 2
+    assert run("encode", "-", *STEP, "-o", out, "--force", data=data)[0] == 0
+
+
+def test_text_that_breaks_off_leaves_what_was_whole(tmp_path: Path) -> None:
+    out = tmp_path / "out.mcz"
+    data = HEADER + LINES[0] + LINES[1] + b"1 2 x 3\n"
+    code, _, errors = run("encode", "-", *STEP, "-o", out, data=data)
+    assert code == 1
+    assert errors == "mcz: standard input: line 21: b'x' is not a number\n"
+    assert mcz.verify(out) == []
+    with mcz.open(out) as file:
+        assert file.clips["live"].n_frames == 2
+
+
+def test_an_interrupt_ends_a_recording_well(tmp_path: Path) -> None:
+    out = tmp_path / "out.mcz"
+    piped = Piped(*STEP, "-o", out)
+    piped.say(HEADER + b"".join(LINES))
+    while not out.exists() or len(out.read_bytes()) < 300:
+        time.sleep(0.01)
+    piped.process.send_signal(signal.SIGINT)
+    assert piped.process.wait() == 130
+    piped.stdin.close()
+    piped.stdout.close()
+    assert mcz.verify(out) == []
+    with mcz.open(out) as file:
+        assert file.clips["live"].n_frames <= 3
+
+
+def test_codecs_that_are_not_live_read_all(tmp_path: Path, asf: Path) -> None:
+    data = HEADER + b"".join(LINES)
+    out = tmp_path / "out.mcz"
+    assert run("encode", "-", data=data)[0] == 2
+    assert run("encode", "-", "-o", out, data=data)[0] == 0
+    with mcz.open(out) as file:
+        assert file.clips["stdin"].source_bytes() == data
+    amc = b"".join(AMC)
+    code, coded, _ = run("encode", "-", "-o", "-", "--skeleton", asf, data=amc)
+    assert code == 0
+    with mcz.open(coded) as file:
+        assert file.clips["stdin"].source_bytes() == amc
+    assert run("encode", "-", "-o", out, "--force", data=b"what?")[0] == 2
+    assert run("encode", "-", "-o", out, "--force", "--format", "bvh", data=b"what?")[0] == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("--archive",), ("--verbatim",), ("--json",), ("--format", "c3d"), ("--format", "amc")],
+)
+def test_what_has_no_meaning_live(arguments: tuple[str, ...]) -> None:
+    code, said, errors = run("encode", "-", *STEP, *arguments, data=HEADER)
+    assert (code, said) == (2, b"")
+    assert errors.startswith("mcz: ")
+
+
+def test_format_is_for_standard_input(asf: Path) -> None:
+    assert run("encode", asf, "--format", "asf")[0] == 2
+
+
+# The parsers, without a process ---------------------------------------------
+
+
+def lines(data: bytes) -> Iterator[bytes]:
+    return iter(io.BytesIO(data).readline, b"")
+
+
+def arrived(name: str, data: bytes, *skeleton: mcz.Skeleton) -> np.ndarray:
+    arriving = FORMATS[name].arrive(lines(data), *skeleton)
+    rows = [row for _, row in arriving.frames]
+    return np.array(rows).reshape(len(rows), arriving.skeleton.n_channels)
+
+
+def test_bvh_arrives_as_it_is_read() -> None:
+    odd = HEADER.replace(
+        b"Frame Time: .0083333\n", b"Frame Time:\n.01 1 2\n 3 # 4\n 10 1.5\n2 3 20 "
+    )
+    whole = FORMATS["bvh"].read(odd)
+    np.testing.assert_array_equal(arrived("bvh", odd), whole.values)
+    arriving = FORMATS["bvh"].arrive(lines(odd))
+    assert arriving.skeleton == whole.skeleton
+    assert arriving.frame_rate == whole.frame_rate == 100
+
+
+@pytest.mark.parametrize(
+    ("data", "match"),
+    [
+        (b"", "no HIERARCHY"),
+        (HEADER[:60], "channels are named"),
+        (HEADER + b"1 2 3", "3 of 4 values"),
+        (HEADER.replace(b"Frames: 3\n", b""), "no 'Frames:'"),
+        (b"HIERARCHY\nROOT a\n{\n}\nMOTION\nFrames: 1\nFrame Time: 1\n", "no joint has channels"),
+    ],
+)
+def test_bad_bvh(data: bytes, match: str) -> None:
+    with pytest.raises(mcz.SourceError, match=match):
+        arrived("bvh", data)
+
+
+def test_a_bvh_of_no_frames() -> None:
+    assert arrived("bvh", HEADER).shape == (0, 4)
+
+
+@pytest.mark.parametrize(
+    ("data", "match"),
+    [
+        (b":DEGREES\n", "no line with a frame number"),
+        (b"1\nroot 1 2 3 4 5 6\nknee 1\nknee 2\n", "twice"),
+        (b"1\nroot 1 2 3 4 5 6\nknee 1\ntoe 2\n", "first frame does not have"),
+        (b"1\nroot 1 2 3 4 5 6\nknee 1\n2\nknee 1 2\n", "2 values for bone"),
+        (b"1\nroot 1 2 3 4 5 x\nknee 1\n", "not a number"),
+        (b"12345678901234567\n", "too large"),
+    ],
+)
+def test_bad_amc(asf: Path, data: bytes, match: str) -> None:
+    with pytest.raises(mcz.SourceError, match=match):
+        arrived("amc", data, mcz.read_skeleton(asf))
+    with pytest.raises(mcz.SourceError, match="needs its skeleton"):
+        FORMATS["amc"].arrive(lines(data))
+
+
+def test_bones_that_are_missing_are_invalid(asf: Path) -> None:
+    data = b":DEGREES\n1\nroot 1 2 3 4 5 6\nknee 7\n2\nroot 1 2 3 4 5 6\n4\nknee 8\n"
+    whole = FORMATS["amc"].read(data, "x", mcz.read_skeleton(asf))
+    np.testing.assert_array_equal(arrived("amc", data, mcz.read_skeleton(asf)), whole.values)
+    out = io.BytesIO()
+    report = encode_live(
+        lines(data), out, "amc", "lsdt-frame", {"step": 0.01, "domain": "channels"}, skeleton=asf
+    )
+    assert report.remarks == ("frame 4 comes where 3 is due; the clip counts on",)
+    with mcz.open(out.getvalue()) as file:
+        found = file.clips["live"].read()
+        np.testing.assert_array_equal(np.isnan(found), np.isnan(whole.values))
+        assert file.skeleton_bytes(file.clips["live"].skeleton_id) == ASF
+
+
+def test_other_channels_than_the_asf(asf: Path) -> None:
+    data = b":RADIANS\n5\nroot 1 2 3 4 5 6\nknee 7 8 9\n6\nroot 1 2 3 4 5 6\nknee 7 8 9\n"
+    out = io.BytesIO()
+    encode_live(
+        lines(data), out, "amc", "lsdt-frame", {"step": 0.01, "domain": "channels"}, skeleton=asf
+    )
+    with mcz.open(out.getvalue()) as file:
+        clip = file.clips["live"]
+        assert clip.skeleton.n_channels == 9
+        assert clip.skeleton.angle_unit == "rad"
+        assert clip.skeleton.base is not None
+        assert file.skeleton_bytes(clip.skeleton.base) == ASF
+        assert clip.frame_numbers.tolist() == [5, 6]
+
+
+@pytest.mark.real
+def test_real_clips_live(data: Path) -> None:
+    """A clip of each format, its first frames: as the whole file gives them, to the step."""
+    asf, amc = data / "cmu/asf/17.asf", data / "cmu/amc/17_10.amc"
+    bvh = data / "cmu/bvh/17_10.bvh"
+    text = b"".join(amc.read_bytes().splitlines(keepends=True)[: 3 + 30 * 50])
+    motion = FORMATS["amc"].read(text, "17_10", mcz.read_skeleton(asf))
+    out = io.BytesIO()
+    encode_live(lines(text), out, "amc", "lsdt-frame", {"step": 0.05}, skeleton=asf)
+    with mcz.open(out.getvalue()) as file:
+        found = file.clips["live"].read().reshape(motion.n_frames, -1, 3)
+    distances = np.sqrt(((found - mcz.positions(motion)) ** 2).sum(axis=2))
+    assert distances.mean() < 0.05
+    for path in (bvh,) if bvh.exists() else ():
+        np.testing.assert_array_equal(arrived("bvh", path.read_bytes()), mcz.read(path).values)
+
+
+def test_formats_are_known_by_their_looks(asf: Path) -> None:
+    assert sniffed(HEADER) == "bvh"
+    assert sniffed(b"".join(AMC)) == "amc"
+    assert sniffed(ASF) == "asf"
+    assert sniffed(b"\x02\x50" + bytes(510)) == "c3d"
+    assert sniffed(b"P\x50PP") is None
+    assert sniffed(b"") is None
+
+
+def test_nothing_is_kept_that_was_used() -> None:
+    out = io.BytesIO()
+    encode_live(lines(HEADER + b"".join(LINES) * 500), out, "bvh", "lsdt-frame", {"step": 0.01})
+    follower = Follower(io.BytesIO(out.getvalue()))
+    for arrival in follower.arrivals():
+        if arrival.segment is not None:
+            assert follower.clip is not None
+            assert follower.clip.segments == []
+    assert len(follower.found.chunks) <= 1

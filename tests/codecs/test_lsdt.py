@@ -1,0 +1,469 @@
+"""Codecs 7 and 8, ``lsdt-frame`` and ``lsdt-clip``: bounds, segments, bases, live coding."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.angles import unwrap
+from mcz.codecs import _bases, _space_choice, by_name
+from mcz.codecs.base import Layout, Model, Request, Span, id_of
+from mcz.codecs.lsdt_frame import CODEC as FRAME
+from mcz.kinematics import point_names
+from mcz.motion import Motion, Signal
+from tests.codecs.lossy import (
+    Direct,
+    amc,
+    bytes_of,
+    clip_of,
+    decoded,
+    gapped,
+    markers,
+    saved,
+    wandering,
+)
+
+CODECS = ["lsdt-frame", "lsdt-clip"]
+CODERS = st.sampled_from(["adaptive", "prefix"])
+THRESHOLD = 0.6
+ROUNDED = 1.05  # what a basis of 7 binary digits may add to an error, and more
+
+
+# Bounds
+
+
+@given(
+    st.sampled_from(CODECS),
+    st.integers(1, 130),
+    st.integers(1, 6),
+    st.floats(-3, 6),
+    CODERS,
+    st.sampled_from(["cosines", "learned"]),
+    st.one_of(st.none(), st.integers(1, 60)),
+)
+@example("lsdt-frame", 1, 1, 0.0, "prefix", "learned", None)
+@example("lsdt-clip", 2, 1, 0.0, "adaptive", "learned", 1)
+def test_a_coefficient_loses_at_most_the_threshold(
+    codec, n_frames, n_markers, power, coder, basis, segment_frames
+) -> None:
+    """Bases are orthogonal: the rms over a window, or a frame, is bounded as a coefficient is."""
+    motion = markers(n_frames, n_markers)
+    step = 2.0**power
+    params = {"step": step, "coder": coder, "basis": basis, "segment_frames": segment_frames}
+    params |= {"window": 24} if codec == "lsdt-clip" else {}
+    found = decoded(codec, motion, **{k: v for k, v in params.items() if v is not None})
+    squares = (found - motion.values) ** 2
+    parts = (
+        [squares[a : a + 24] for a in range(0, n_frames, min(24, segment_frames or 24))]
+        if codec == "lsdt-clip"
+        else list(squares)
+    )
+    if codec == "lsdt-clip" and segment_frames is not None:
+        parts = [squares]
+    for part in parts:
+        assert np.sqrt(part.mean()) <= THRESHOLD * step * ROUNDED + 1e-9
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_errors_do_not_add_up(codec) -> None:
+    """The last frames are as good as the first."""
+    motion = markers(1500, 5)
+    error = np.abs(decoded(codec, motion, step=1.0) - motion.values)
+    assert error[-100:].mean() < 1.5 * error[:100].mean()
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_a_finer_step_costs_more_and_errs_less(codec) -> None:
+    motion = markers(400, 6)
+    sizes, errors = [], []
+    for step in (0.01, 0.1, 1.0, 10.0):
+        sizes.append(bytes_of(saved(codec, motion, step=step)))
+        errors.append(float(np.abs(decoded(codec, motion, step=step) - motion.values).mean()))
+    assert sizes == sorted(sizes, reverse=True) and errors == sorted(errors)
+    assert sizes[-1] < sizes[0] / 4
+
+
+@pytest.mark.parametrize("codec", CODECS)
+@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+def test_a_still_clip_is_small(codec, coder) -> None:
+    """600 frames of 12 channels: a few bits a frame."""
+    motion = clip_of(np.tile(np.arange(12.0), (600, 1)), ["tx", "ty", "tz"] * 4)
+    data = saved(codec, motion, step=0.01, coder=coder, domain="channels")
+    found = decoded(codec, motion, step=0.01, coder=coder, domain="channels")
+    assert np.abs(found - motion.values).max() < 1
+    assert bytes_of(data) < (1200 if coder == "adaptive" else 3000)
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_channels_are_coded_as_they_are_asked_for(codec) -> None:
+    motion = wandering(300, ["rx", "ry", "rz", "tx", "ty"])
+    found = decoded(codec, motion, domain="channels", step=0.01)
+    meant = unwrap(motion.values, motion.skeleton)
+    assert np.abs(found - meant).max() < 5
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_a_clip_of_channels_becomes_places(codec) -> None:
+    motion = wandering(60, ["tx", "ty", "tz", "rx", "ry", "rz"])
+    with mcz.open(saved(codec, motion, step=0.001)) as file:
+        clip = file.only_clip()
+        found = clip.motion()
+        assert tuple(clip.skeleton.addresses()) == point_names(motion.skeleton)
+    np.testing.assert_allclose(mcz.positions(found), mcz.positions(motion), atol=0.01)
+
+
+# Gaps, odd shapes, values that cannot be coded
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_gaps_stay_and_what_lies_beneath_is_not_coded(codec) -> None:
+    motion = gapped()
+    with mcz.open(saved(codec, motion, step=0.05)) as file:
+        values, mask = file.only_clip().read_masked()
+    np.testing.assert_array_equal(mask, motion.signals[0].mask)
+    assert np.abs(values - motion.signals[0].values)[mask].max() < 1
+    assert np.isfinite(values).all() and np.abs(values).max() < 1e4
+
+
+@pytest.mark.parametrize("codec", CODECS)
+@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+@pytest.mark.parametrize(("n_frames", "n_markers"), [(0, 2), (1, 1), (2, 3), (5, 0), (0, 0)])
+def test_small_clips(codec, coder, n_frames, n_markers) -> None:
+    motion = markers(n_frames, n_markers)
+    found = decoded(codec, motion, step=0.5, coder=coder)
+    assert found.shape == motion.values.shape
+    assert np.abs(found - motion.values).max(initial=0) < 2
+
+
+@pytest.mark.parametrize("codec", CODECS)
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
+def test_values_without_a_code_are_refused(codec, bad) -> None:
+    motion = markers(30, 3)
+    motion.signals[0].values[17, 4] = bad
+    with pytest.raises(mcz.MotionError):
+        saved(codec, motion, step=1e-9)
+
+
+@pytest.mark.parametrize("codec", CODECS)
+@pytest.mark.parametrize(
+    "params",
+    [
+        {"step": 0.0},
+        {"step": -1},
+        {"threshold": 0.4},
+        {"coder": "zip"},
+        {"domain": "angles"},
+        {"virtual_markers": "maybe"},
+        {"basis": 3},
+    ],
+)
+def test_bad_parameters(codec, params) -> None:
+    with pytest.raises(mcz.OptionError):
+        saved(codec, markers(10), **params)
+
+
+def test_a_basis_that_is_not_there_or_does_not_fit(tmp_path: Path) -> None:
+    with pytest.raises(mcz.AccessError):
+        saved("lsdt-clip", markers(10), basis=str(tmp_path / "no.bases"))
+    other = tmp_path / "five.bases"
+    other.write_bytes(_bases.build_bases([np.eye(5)] * 3))
+    with pytest.raises(mcz.OptionError, match="do not fit"):
+        saved("lsdt-clip", markers(10, 4), basis=str(other))
+    other.write_bytes(other.read_bytes()[:20])
+    with pytest.raises(mcz.FormatError):
+        saved("lsdt-clip", markers(10, 5), basis=str(other))
+
+
+# Segments and requests
+
+
+@given(st.sampled_from(CODECS), st.integers(1, 90), CODERS, st.data())
+def test_a_part_is_what_it_is_in_the_whole(codec, segment_frames, coder, data) -> None:
+    motion = markers(100, 3)
+    params = {"step": 0.3, "segment_frames": segment_frames, "coder": coder}
+    coded = Direct(codec, motion, **params | ({"window": 16} if codec == "lsdt-clip" else {}))
+    whole = coded.read()
+    start = data.draw(st.integers(0, 100))
+    stop = data.draw(st.integers(start, 100))
+    np.testing.assert_array_equal(coded.read(start, stop), whole[start:stop])
+
+
+def test_a_window_decodes_without_the_others() -> None:
+    coded = Direct("lsdt-clip", markers(100, 3), step=0.2, window=20)
+    whole, data = coded.read(), coded.stream(0, 0, 0)
+    from mcz.codecs._window_streams import windows_of
+    from mcz.schema import varint
+
+    parts = list(windows_of(data, 5, "test"))
+    for kept in range(5):  # the others are damaged
+        broken = [part if i == kept else b"\xff" * len(part) for i, part in enumerate(parts)]
+        stream = b"".join(varint(len(part)) + part for part in broken)
+        found = coded.read(20 * kept, 20 * kept + 20, changes=coded.with_stream((0, 0, 0), stream))
+        np.testing.assert_array_equal(found, whole[20 * kept : 20 * kept + 20])
+
+
+def test_frames_behind_a_request_may_be_damaged() -> None:
+    coded = Direct("lsdt-frame", markers(300, 3), step=0.2)
+    data = coded.stream(0, 0, 0)
+    change = coded.with_stream((0, 0, 0), data[: len(data) // 2])
+    np.testing.assert_array_equal(coded.read(0, 100, changes=change), coded.read(0, 100))
+    with pytest.raises(mcz.FormatError):
+        coded.read(changes=change)
+
+
+# Bases
+
+
+def test_a_basis_is_in_the_file_and_a_decoder_without_it_refuses() -> None:
+    coded = Direct("lsdt-clip", markers(60, 5), basis="learned")
+    (model,) = coded.models[0]
+    assert by_name("lsdt-clip").uses(coded.header) == (id_of(model),)
+    bare = replace(coded.layout, find_model=lambda _: None)
+    with pytest.raises(mcz.UnsupportedError, match=id_of(model).hex()):
+        coded.read(changes={"layout": bare})
+    with pytest.raises(mcz.UnsupportedError):
+        coded.read(changes={"layout": replace(coded.layout, find_model=None)})
+
+
+def test_a_model_of_another_kind_or_shape_is_refused() -> None:
+    coded = Direct("lsdt-clip", markers(60, 5), basis="learned")
+    for model, words in (
+        (Model(2, b"?"), "kind 2"),
+        (_bases.model_of([np.eye(5)] * 2), "2 bases, 3 are due"),
+        (_bases.model_of([np.eye(4)] * 3), "4 entries for 5 points"),
+        (Model(1, b"\x00"), "0 bases"),
+    ):
+        given_ = replace(coded.layout, find_model=lambda _, m=model: m)
+        with pytest.raises(mcz.FormatError, match=words):
+            coded.read(changes={"layout": given_})
+
+
+def test_clips_of_a_file_share_a_basis(tmp_path: Path) -> None:
+    path = tmp_path / "b.bases"
+    path.write_bytes(_bases.build_bases([np.eye(4)] * 3))
+    motions = [replace(markers(50, 4, seed), name=f"c{seed}") for seed in range(3)]
+    from mcz.codecs import by_name
+    from mcz.container.writer import Writer
+    from mcz.files.tuning import write_tuned
+
+    with open(tmp_path / "all.mcz", "wb") as stream:
+        writer = Writer(stream)
+        for motion in motions:
+            write_tuned(writer, motion, by_name("lsdt-clip"), {"basis": str(path), "step": 0.1})
+        writer.finish()
+    with mcz.open(tmp_path / "all.mcz") as file:
+        kinds = [kind for kind, _ in file.container.directory.shared]
+        assert kinds.count(b"MODL") == 1
+        for motion in motions:
+            assert np.abs(file.clips[motion.name].read() - motion.values).max() < 2
+
+
+@given(st.integers(1, 12), st.integers(1, 12), st.integers(0, 40), st.integers(0, 2**32 - 1))
+def test_bases_survive(n_vectors, more, shift, seed) -> None:
+    vectors = np.random.default_rng(seed).normal(size=(n_vectors, n_vectors + more - 1))
+    vectors = np.clip(vectors, -0.9, 0.9)
+    first, second = _bases.rounded(vectors, shift), _bases.rounded(np.eye(3), 7)
+    found = _bases.parse_bases(_bases.build_bases([first, second]))
+    np.testing.assert_array_equal(found[0].entries, first.entries)
+    np.testing.assert_array_equal(found[0].shifts, first.shifts)
+    np.testing.assert_array_equal(found[1].vectors, np.eye(3))
+    assert np.abs(found[0].vectors - vectors).max() <= 0.5 * 2.0**-shift
+
+
+def test_no_cut_of_a_model_is_the_model() -> None:
+    """What is left of a range coder's bytes may spell other entries: ids tell models apart."""
+    data = _bases.build_bases([np.linalg.qr(np.random.default_rng(0).normal(size=(5, 5)))[0]])
+    (meant,) = _bases.parse_bases(data)
+    for size in range(len(data)):
+        try:
+            (found,) = _bases.parse_bases(data[:size])
+        except mcz.FormatError:
+            continue
+        assert (found.entries != meant.entries).any()
+    with pytest.raises(mcz.FormatError):
+        _bases.parse_bases(data + b"\x00")
+
+
+def test_too_many_points_are_refused() -> None:
+    for head in (b"\x00", b"\x11", b"\x01\x81\x10\x01", b"\x01\x01\x02", b"\x02" + b"\x80\x10" * 2):
+        with pytest.raises(mcz.FormatError):
+            _bases.parse_bases(head + bytes(3000))
+    with pytest.raises(mcz.MotionError):
+        _bases.build_bases([np.zeros((1, 2049))])
+    with pytest.raises(mcz.MotionError, match="exceeds"):
+        _bases.build_bases([np.full((1, 1), 2.0)], shift=40)
+
+
+def test_well_known_bases_are_nearly_orthogonal() -> None:
+    """Rounding to few digits must not let errors grow."""
+    models = _bases.known_models()
+    assert models
+    for model in models.values():
+        for basis in _bases.parse_bases(model.data):
+            assert basis.entries.shape[0] == basis.entries.shape[1]
+            assert np.linalg.cond(basis.vectors) < 1.25
+
+
+def test_what_is_smaller_is_chosen() -> None:
+    """A clip of one frame does not pay for a basis; a long one of few directions does."""
+    few = Direct("lsdt-clip", markers(3, 9), basis="auto")
+    assert few.models == ((), ())
+    random = np.random.default_rng(5)
+    mixed = random.normal(size=(1500, 2)).cumsum(axis=0) @ random.normal(size=(2, 27))
+    motion = markers(1500, 9)
+    motion = replace(motion, signals=(Signal(mixed),))
+    assert Direct("lsdt-clip", motion, basis="auto", step=0.1).models[0]
+
+
+# Live
+
+
+@given(st.integers(1, 40), st.integers(1, 5), st.integers(1, 15))
+def test_frame_by_frame_gives_the_values_of_the_whole(n_frames, n_markers, every) -> None:
+    motion = markers(n_frames, n_markers)
+    params = {"step": 0.3, "basis": "cosines", "segment_frames": every}
+    whole = Direct("lsdt-frame", motion, **params)
+    assert FRAME.live is not None and FRAME.follow is not None
+    encoder = FRAME.live(replace(whole.layout, n_frames=0), FRAME.options(params))
+    decoder = FRAME.follow(encoder.header, whole.layout)
+    pushed = [encoder.push(row) for row in motion.values]
+    assert [fresh for _, fresh in pushed] == [i % every == 0 for i in range(n_frames)]
+    found = np.array([decoder.push(*packet) for packet in pushed])
+    np.testing.assert_array_equal(found, whole.read())
+    spans = [Span(i, 1, fresh=fresh) for i, (_, fresh) in enumerate(pushed)]
+    for start in {0, n_frames // 2, n_frames - 1}:
+        request = Request(start, n_frames, (0,))
+        again = FRAME.decode(
+            encoder.header, whole.layout, spans, request, lambda i, _, __: pushed[i][0]
+        )
+        np.testing.assert_array_equal(again, found[start:])
+
+
+def test_a_live_decoder_waits_for_a_fresh_start() -> None:
+    motion = markers(20, 2)
+    layout = Direct("lsdt-frame", motion, basis="cosines").layout
+    encoder = FRAME.live(layout, FRAME.options({"step": 0.3, "segment_frames": 8}))
+    pushed = [encoder.push(row) for row in motion.values]
+    decoder = FRAME.follow(encoder.header, layout)
+    with pytest.raises(mcz.FormatError, match="not known"):
+        decoder.push(*pushed[3])
+    assert np.abs(decoder.push(*pushed[8]) - motion.values[8]).max() < 1
+    with pytest.raises(mcz.FormatError):
+        decoder.push(b"\xff" * 9, False)
+    with pytest.raises(mcz.FormatError, match="not known"):
+        decoder.push(*pushed[9])
+    assert np.abs(decoder.push(*pushed[16]) - motion.values[16]).max() < 1
+
+
+def test_what_needs_all_frames_is_refused_live() -> None:
+    layout = Layout(0, ((0, 1, 2),), skeleton=markers(1, 1).skeleton)
+    for options, words in (
+        ({}, "step"),
+        ({"step": 1, "basis": "learned"}, "train"),
+        ({"step": 1, "coder": "prefix"}, "prefix"),
+    ):
+        with pytest.raises(mcz.OptionError, match=words):
+            FRAME.live(layout, FRAME.options(options))
+
+
+def test_a_missing_marker_is_held_live() -> None:
+    motion = gapped(60)
+    layout = Direct("lsdt-frame", motion, basis="cosines").layout
+    encoder = FRAME.live(layout, FRAME.options({"step": 0.1}))
+    decoder = FRAME.follow(encoder.header, layout)
+    signal = motion.signals[0]
+    for row, valid in zip(signal.values, signal.mask, strict=True):
+        found = decoder.push(*encoder.push(row, valid))
+        assert np.abs(found - row)[valid].max() < 1
+
+
+def test_a_segment_whose_forerunner_is_lost_is_refused() -> None:
+    motion = markers(30, 2)
+    layout = Direct("lsdt-frame", motion, basis="cosines").layout
+    encoder = FRAME.live(layout, FRAME.options({"step": 0.3}))
+    pushed = [encoder.push(row)[0] for row in motion.values]
+    spans = [Span(i, 1, fresh=i == 0) for i in range(30) if i != 12]
+    streams = [stream for i, stream in enumerate(pushed) if i != 12]
+    with pytest.raises(mcz.FormatError, match="missing"):
+        FRAME.decode(
+            encoder.header, layout, spans, Request(20, 25, (0,)), lambda i, _, __: streams[i]
+        )
+
+
+# Bad bytes
+
+
+@pytest.mark.parametrize("codec", CODECS)
+@pytest.mark.parametrize("span", [Span(0, 20, 1), Span(0, 20, 0, 1)])
+def test_segments_that_bear_upon_others_are_refused(codec, span) -> None:
+    with pytest.raises(mcz.FormatError, match="bears upon"):
+        Direct(codec, markers(20)).read(changes={"spans": [span]})
+
+
+@pytest.mark.parametrize("codec", CODECS)
+@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+def test_every_cut_and_bit_of_a_header_or_stream(codec, coder) -> None:
+    """Values, or one of our errors; what is cut never gives the same values."""
+    coded = Direct(codec, markers(12, 2), step=0.5, coder=coder, basis="cosines")
+    header, stream = coded.header, coded.stream(0, 0, 0)
+    for size in range(len(header)):
+        with pytest.raises(mcz.FormatError):
+            coded.read(changes={"header": header[:size]})
+    meant = coded.read()
+    for size in range(len(stream)):
+        try:
+            found = coded.read(changes=coded.with_stream((0, 0, 0), stream[:size]))
+        except mcz.FormatError:
+            continue
+        assert (found != meant).any()
+    for data, change in (
+        (header, lambda d: {"header": d}),
+        (stream, lambda d: coded.with_stream((0, 0, 0), d)),
+    ):
+        for bit in range(8 * len(data)):
+            damaged = bytearray(data)
+            damaged[bit // 8] ^= 1 << bit % 8
+            try:
+                coded.read(changes=change(bytes(damaged)))
+            except mcz.MczError:
+                continue
+
+
+# Real clips
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("codec", CODECS)
+def test_a_real_clip_at_its_target(data: Path, codec: str) -> None:
+    motion = amc(data, "17_10")
+    held = saved(codec, motion, mean_error_cm=0.3)
+    with mcz.open(held) as file:
+        found = file.only_clip().motion()
+    distance = np.sqrt(((mcz.positions(found) - mcz.positions(motion)) ** 2).sum(axis=2)).mean()
+    assert 0.97 * 0.3 <= distance * motion.skeleton.unit_cm <= 0.3
+    most = {"lsdt-clip": 16_000, "lsdt-frame": 34_000}[codec]
+    assert bytes_of(held) < most
+
+
+@pytest.mark.real
+def test_the_well_known_basis_beats_cosines(data: Path) -> None:
+    motion = amc(data, "49_02")
+    known, plain = (
+        bytes_of(saved("lsdt-clip", motion, mean_error_cm=0.5, basis=basis))
+        for basis in ("known", "cosines")
+    )
+    assert known < 0.85 * plain
+
+
+def test_channels_have_weights_and_places_have_none() -> None:
+    skeleton = wandering(5, ["rx", "tx"]).skeleton
+    assert not _space_choice.is_places(skeleton)
+    assert _space_choice.is_places(markers(1, 3).skeleton)
+    motion: Motion = markers(5, 0)
+    assert not _space_choice.is_places(motion.skeleton)

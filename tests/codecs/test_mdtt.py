@@ -1,0 +1,442 @@
+"""Codec 9, ``mdtt``, and what it shares with codec 10: bounds, ranks, odd clips, hostile bytes."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.angles import unwrap
+from mcz.codecs import CODECS, _bases, mdtt, pca_rdo
+from mcz.codecs._space import APART, COURSES, LEARNED, MEAN, WEIGHTED
+from mcz.codecs._windows import WINDOWS_HEADER
+from mcz.codecs.base import Model, Span, id_of
+from mcz.files.sizes import clip_sizes
+from mcz.kinematics import point_names
+from mcz.motion import Joint, Motion, Signal, Skeleton
+from mcz.schema import build, parse
+from tests.codecs.lossy import (
+    Direct,
+    amc,
+    bytes_of,
+    clip_of,
+    decoded,
+    gapped,
+    markers,
+    saved,
+    wandering,
+)
+
+NAMES = ["mdtt", "pca-rdo"]
+CODERS = st.sampled_from(["adaptive", "prefix"])
+KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx", "length"]), min_size=1, max_size=5)
+ALL = {"rank": 2048, "frequencies": 2048}  # nothing is cut
+BOUND = 0.8  # of a step: the threshold, and what rounding the bases may add
+
+
+def header_of(coded: Direct) -> object:
+    return parse(WINDOWS_HEADER, coded.header, "header")
+
+
+def root_mean_square(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def test_the_table_of_codecs_has_them() -> None:
+    assert [CODECS[9], CODECS[10]] == [mdtt.CODEC, pca_rdo.CODEC]
+    assert all(CODECS[i].places and CODECS[i].domain == "values" for i in (9, 10))
+
+
+# Bounds
+
+
+@given(
+    st.sampled_from(NAMES),
+    st.integers(1, 130),
+    st.integers(1, 6),
+    st.floats(-3, 6),
+    CODERS,
+    st.integers(1, 40),
+)
+@example("pca-rdo", 1, 1, 0.0, "prefix", 1)
+@example("mdtt", 2, 1, 0.0, "adaptive", 1)
+def test_without_cuts_a_coefficient_loses_at_most_the_threshold(
+    codec, n_frames, n_markers, power, coder, window
+) -> None:
+    """Bases are nearly orthogonal: an error of all frames is that of the coefficients."""
+    motion = markers(n_frames, n_markers)
+    step = 2.0**power
+    found = decoded(codec, motion, step=step, coder=coder, window=window, **ALL)
+    assert root_mean_square(found - motion.values) <= BOUND * step + 1e-9
+
+
+@given(st.sampled_from(NAMES), st.integers(1, 150), KINDS, st.floats(-4, 2), st.integers(2, 60))
+def test_channels_without_cuts(codec, n_frames, kinds, power, window) -> None:
+    motion = wandering(n_frames, kinds)
+    step = 2.0**power
+    params = {"domain": "channels", "window": window, "threshold": 0.5}
+    found = decoded(codec, motion, step=step, **params, **ALL)
+    meant = unwrap(motion.values, motion.skeleton)
+    # Weights are relative to the average effect; the least share of it is 1/16.
+    assert root_mean_square(found - meant) <= 40 * step + 1e-9
+
+
+@given(st.sampled_from(NAMES), st.integers(1, 200), st.integers(1, 6), st.floats(-3, 6))
+def test_what_is_cut_costs_no_more_than_it_saves(codec, n_frames, n_markers, power) -> None:
+    """What does not pay is left out: errors grow by no more than bytes shrink."""
+    motion = markers(n_frames, n_markers)
+    step = 2.0**power
+    cut, whole = (Direct(codec, motion, step=step, window=24, **p) for p in ({}, ALL))
+    errors = [float(np.sum((c.read() - motion.values) ** 2)) / step**2 for c in (cut, whole)]
+    sizes = [c.n_bytes + sum(len(m.data) for m in c.models[0]) for c in (cut, whole)]
+    assert errors[0] + 8 * 0.2 * sizes[0] <= 1.2 * (errors[1] + 8 * 0.2 * sizes[1]) + 16
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_a_finer_step_costs_more_and_errs_less(codec) -> None:
+    motion = markers(400, 6)
+    sizes, errors = [], []
+    for step in (0.01, 0.1, 1.0, 10.0):
+        sizes.append(bytes_of(saved(codec, motion, step=step)))
+        errors.append(float(np.abs(decoded(codec, motion, step=step) - motion.values).mean()))
+    assert sizes == sorted(sizes, reverse=True) and errors == sorted(errors)
+    assert sizes[-1] < sizes[0] / 4
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_a_higher_rank_errs_less(codec) -> None:
+    motion = markers(300, 6)
+    for name, settings in (
+        ("rank", (1, 2, 3, 6)),
+        ("frequencies", (1, 4, 16, 60)),
+    ):
+        errors = [
+            root_mean_square(
+                decoded(codec, motion, step=0.02, window=60, **(ALL | {name: n})) - motion.values
+            )
+            for n in settings
+        ]
+        assert errors == sorted(errors, reverse=True) and errors[-1] < errors[0] / 4
+
+
+def test_ranks_are_those_of_the_motion() -> None:
+    """Markers that move along few directions have as many vectors."""
+    random = np.random.default_rng(3)
+    courses = np.cumsum(np.cumsum(random.normal(size=(600, 2)), axis=0), axis=0)
+    values = np.einsum("fk,kpd->fpd", courses, random.normal(size=(2, 20, 3)))
+    motion = markers(600, 20)
+    motion = replace(motion, signals=(Signal(values.reshape(600, 60)),))
+    coded = Direct("mdtt", motion, step=0.01)
+    bases = _bases.parse_bases(coded.models[0][0].data)
+    assert [len(basis.entries) for basis in bases] == [2, 2, 2]
+    assert root_mean_square(coded.read() - values.reshape(600, 60)) < 0.02
+
+
+def test_headers() -> None:
+    fields = header_of(Direct("mdtt", markers(300, 4)))
+    assert (fields.window, fields.space.flags, fields.space.basis) == (240, APART, LEARNED)
+    fields = header_of(Direct("mdtt", wandering(300, ["rx", "tx", "ty"]), domain="channels"))
+    assert fields.space.flags == WEIGHTED and len(fields.space.weights) == 3
+    fields = header_of(Direct("pca-rdo", markers(300, 4)))
+    assert (fields.window, fields.space.flags) == (120, MEAN | COURSES)
+    fields = header_of(Direct("pca-rdo", wandering(300, ["rx"]), domain="channels"))
+    assert fields.space.flags == MEAN | COURSES | WEIGHTED
+    for codec in NAMES:
+        short = header_of(Direct(codec, markers(7, 2)))
+        assert short.window == 7
+        published = header_of(Direct(codec, markers(300, 2), preset="hou2016"))
+        assert published.code.coder == 1
+        few = header_of(Direct(codec, markers(300, 2), rank=1, frequencies=3, window=50))
+        assert (few.window, few.n_frequencies) == (50, 3)
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_fits_are_made_once(codec, monkeypatch: pytest.MonkeyPatch) -> None:
+    motion = markers(200, 4, seed=77)
+    saved(codec, motion, step=0.3)
+    monkeypatch.setattr(np.linalg, "eigh", None)
+    saved(codec, motion, step=0.1)
+
+
+# Clips
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_a_clip_of_channels_becomes_places(codec) -> None:
+    motion = wandering(60, ["tx", "ty", "tz", "rx", "ry", "rz"])
+    with mcz.open(saved(codec, motion, step=0.001, virtual_markers=True)) as file:
+        clip = file.only_clip()
+        n_points = len(point_names(motion.skeleton))
+        assert len(clip.skeleton.joints) == n_points + 3 * len(motion.skeleton.joints)
+        found = mcz.positions(clip.motion())[:, :n_points]
+    np.testing.assert_allclose(found, mcz.positions(motion), atol=0.01)
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_gaps_stay_and_what_lies_beneath_is_not_coded(codec) -> None:
+    motion = gapped()
+    with mcz.open(saved(codec, motion, step=0.05)) as file:
+        values, mask = file.only_clip().read_masked()
+    np.testing.assert_array_equal(mask, motion.signals[0].mask)
+    assert np.abs(values - motion.signals[0].values)[mask].max() < 1
+    assert np.isfinite(values).all() and np.abs(values).max() < 1e4
+
+
+@pytest.mark.parametrize("codec", NAMES)
+@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+@pytest.mark.parametrize(
+    ("n_frames", "n_markers"), [(0, 2), (1, 1), (2, 3), (5, 0), (0, 0), (121, 2), (241, 1)]
+)
+def test_small_clips(codec, coder, n_frames, n_markers) -> None:
+    motion = markers(n_frames, n_markers)
+    found = decoded(codec, motion, step=0.5, coder=coder)
+    assert found.shape == motion.values.shape
+    assert np.abs(found - motion.values).max(initial=0) < 4
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_no_channels_at_all(codec) -> None:
+    motion = Motion(Skeleton((Joint("rock"),)), (Signal(np.zeros((40, 0))),), name="still")
+    for domain in ("channels", "positions"):
+        assert decoded(codec, motion, domain=domain).shape[0] == 40
+    assert decoded(codec, wandering(0, ["tx", "rx"])).shape[0] == 0
+    none = Motion(Skeleton(()), (Signal(np.zeros((0, 0))),), name="nothing")
+    assert decoded(codec, none).shape == (0, 0)
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_still_clips_are_small(codec) -> None:
+    zeros = Direct(codec, replace(markers(500, 5), signals=(Signal(np.zeros((500, 15))),)))
+    assert zeros.n_bytes <= 10 and not zeros.read().any()
+    values = np.tile(np.arange(12.0), (600, 1))
+    motion = replace(markers(600, 4), signals=(Signal(values),))
+    data = saved(codec, motion, step=0.01)
+    found = decoded(codec, motion, step=0.01)
+    assert np.abs(found - values).max() < 0.05 and bytes_of(data) < 600
+    if codec == "pca-rdo":  # all is in the mean
+        assert Direct(codec, motion, step=0.01).n_bytes <= 10
+
+
+@pytest.mark.parametrize("codec", NAMES)
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_values_that_are_not_finite_are_refused(codec, bad) -> None:
+    motion = markers(30, 3)
+    motion.signals[0].values[17, 4] = bad
+    with pytest.raises(mcz.MotionError, match=f"{codec}: frames 0:30 hold a value that is not"):
+        saved(codec, motion, step=1e-9)
+
+
+@pytest.mark.parametrize("codec", NAMES)
+@pytest.mark.parametrize("huge", [1e12, 1e20, 1e300, -1.7e308])
+def test_huge_values_are_refused(codec, huge) -> None:
+    motion = markers(30, 3)
+    motion.signals[0].values[17, 4] = huge
+    with pytest.raises(mcz.MotionError, match=r"exceeds 2\^40"):
+        saved(codec, motion, step=1e-3)
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_many_channels(codec) -> None:
+    motion = markers(64, 300)
+    found = decoded(codec, motion, step=0.5)
+    assert root_mean_square(found - motion.values) < 0.8
+    with pytest.raises(mcz.MotionError, match="at most 2048"):
+        saved(codec, markers(2, 2100))
+    assert decoded(codec, wandering(20, ["ty", "rz"] * 100), domain="channels").shape == (20, 200)
+
+
+def test_one_matrix_has_2048_channels() -> None:
+    motion = markers(2, 700)
+    assert root_mean_square(decoded("mdtt", motion, step=0.5) - motion.values) < 1
+    with pytest.raises(mcz.MotionError, match="pca-rdo: 2100 channels, at most 2048"):
+        saved("pca-rdo", motion, step=0.5)
+
+
+@pytest.mark.parametrize("codec", NAMES)
+@pytest.mark.parametrize(
+    "params",
+    [
+        {"step": 0.0},
+        {"step": -1},
+        {"threshold": 0.4},
+        {"coder": "zip"},
+        {"domain": "angles"},
+        {"virtual_markers": "maybe"},
+        {"rank": 0},
+        {"rank": "all"},
+        {"frequencies": 2049},
+        {"window": 0},
+        {"window": 2049},
+        {"segment_frames": 0},
+        {"preset": "vasa2014"},
+        {"basis": "learned"},
+    ],
+)
+def test_bad_parameters(codec, params) -> None:
+    with pytest.raises(mcz.OptionError, match=next(iter(params))):
+        saved(codec, markers(10), **params)
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_targets_are_met(codec) -> None:
+    motion = markers(300, 5)
+    with mcz.open(saved(codec, motion, mean_error_cm=0.05)) as file:
+        found = mcz.positions(file.only_clip().motion())
+    distance = np.sqrt(((found - mcz.positions(motion)) ** 2).sum(axis=2)).mean() * 0.1
+    assert 0.9 * 0.05 <= distance <= 0.05
+    data = saved(codec, motion, target_bytes=3000)
+    with mcz.open(data) as file:
+        reached = float(file.only_clip().quality["target_reached"])
+    assert 2400 < reached <= 3000 and bytes_of(data) < reached  # its model is counted
+
+
+# Segments and requests
+
+
+@given(st.sampled_from(NAMES), st.integers(1, 90), CODERS, st.data())
+def test_a_part_is_what_it_is_in_the_whole(codec, segment_frames, coder, data) -> None:
+    params = {"step": 0.3, "segment_frames": segment_frames, "coder": coder, "window": 16}
+    coded = Direct(codec, markers(100, 3), **params)
+    whole = coded.read()
+    start = data.draw(st.integers(0, 100))
+    stop = data.draw(st.integers(start, 100))
+    np.testing.assert_array_equal(coded.read(start, stop), whole[start:stop])
+
+
+@pytest.mark.parametrize("codec", NAMES)
+@pytest.mark.parametrize("frames", [(0, 60), (90, 170), (150, 210), (205, None)])
+def test_frames_that_are_extracted_have_the_same_values(codec, frames) -> None:
+    data = saved(codec, markers(210, 3), window=32, segment_frames=32)
+    out = io.BytesIO()
+    mcz.extract(data, out, frames=frames)
+    with mcz.open(data) as whole, mcz.open(out.getvalue()) as part:
+        meant = whole.only_clip().read((frames[0], frames[1] or 210))
+        assert part.only_clip().read().tobytes() == meant.tobytes()
+        assert part.only_clip().read((2, 4)).tobytes() == meant[2:4].tobytes()
+
+
+# Models
+
+
+@pytest.mark.parametrize("codec", NAMES)
+def test_a_decoder_without_the_model_refuses(codec) -> None:
+    coded = Direct(codec, markers(60, 5))
+    (model,) = coded.models[0]
+    assert coded.codec.uses(coded.header) == (id_of(model),)
+    for find_model in (None, lambda _: None):
+        with pytest.raises(mcz.UnsupportedError, match=id_of(model).hex()):
+            coded.read(changes={"layout": replace(coded.layout, find_model=find_model)})
+
+
+@pytest.mark.parametrize(
+    ("codec", "bases", "words"),
+    [
+        ("mdtt", [(2, 5), (2, 5)], "2 bases, 3 are due"),
+        ("mdtt", [(2, 5), (2, 5), (2, 4)], "4 entries for 5 points"),
+        ("pca-rdo", [(2, 15), (3, 20)], "2 bases, 3 are due"),
+        ("pca-rdo", [(2, 15), (3, 20), (1, 14)], r"mean of \(1, 14\) for 15 channels"),
+        ("pca-rdo", [(2, 15), (3, 20), (2, 15)], r"mean of \(2, 15\) for 15 channels"),
+        ("pca-rdo", [(2, 15), (2, 20), (1, 15)], "2 courses of 20 cosines for 3 coefficients"),
+        ("pca-rdo", [(2, 15), (3, 21), (1, 15)], "3 courses of 21 cosines .* 20 frames"),
+    ],
+)
+def test_models_of_another_shape_are_refused(codec, bases, words) -> None:
+    coded = Direct(codec, markers(60, 5), window=20, frequencies=3)
+    model = _bases.model_of([np.eye(*shape) for shape in bases])
+    given_ = replace(coded.layout, find_model=lambda _: model)
+    with pytest.raises(mcz.FormatError, match=words):
+        coded.read(changes={"layout": given_})
+
+
+def test_a_model_of_another_kind_is_refused() -> None:
+    coded = Direct("mdtt", markers(60, 5))
+    given_ = replace(coded.layout, find_model=lambda _: Model(2, b"?"))
+    with pytest.raises(mcz.FormatError, match="kind 2"):
+        coded.read(changes={"layout": given_})
+
+
+# Bad bytes
+
+
+@pytest.mark.parametrize("codec", NAMES)
+@pytest.mark.parametrize(
+    "span", [Span(0, 20, 1), Span(0, 20, 0, 1), Span(0, 20, 0, 0, fresh=False)]
+)
+def test_segments_that_bear_upon_others_are_refused(codec, span) -> None:
+    with pytest.raises(mcz.FormatError, match="bears upon"):
+        Direct(codec, markers(20)).read(changes={"spans": [span]})
+
+
+@pytest.mark.parametrize("codec", NAMES)
+@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+def test_every_cut_and_bit_of_header_stream_and_model(codec, coder) -> None:
+    """Values, or one of our errors; what is cut never gives the same values."""
+    coded = Direct(codec, markers(12, 2), step=0.5, coder=coder)
+    header, stream, (model,) = coded.header, coded.stream(0, 0, 0), coded.models[0]
+    for size in range(len(header)):
+        with pytest.raises(mcz.FormatError):
+            coded.read(changes={"header": header[:size]})
+    meant = coded.read()
+    for size in range(len(stream)):
+        try:
+            found = coded.read(changes=coded.with_stream((0, 0, 0), stream[:size]))
+        except mcz.FormatError:
+            continue
+        assert (found != meant).any()
+
+    def with_model(data: bytes) -> dict[str, object]:
+        changed = Model(model.kind, data)
+        return {"layout": replace(coded.layout, find_model=lambda _: changed)}
+
+    for data, change in (
+        (header, lambda d: {"header": d}),
+        (stream, lambda d: coded.with_stream((0, 0, 0), d)),
+        (model.data, with_model),
+    ):
+        for bit in range(8 * len(data)):
+            damaged = bytearray(data)
+            damaged[bit // 8] ^= 1 << bit % 8
+            try:
+                coded.read(changes=change(bytes(damaged)))
+            except mcz.MczError:
+                continue
+
+
+def test_channels_that_are_no_coordinates_are_refused() -> None:
+    """Flag APART where channels are not three each."""
+    coded = Direct("mdtt", clip_of(np.ones((9, 4))), domain="channels")
+    header = bytearray(coded.header)
+    header[2] |= APART
+    with pytest.raises(mcz.FormatError, match="4 channels are not three coordinates"):
+        coded.read(changes={"header": bytes(header)})
+
+
+@pytest.mark.parametrize("codec", ["mdtt", "lsdt-clip"])
+@pytest.mark.parametrize("flag", [MEAN, COURSES])
+def test_a_mean_and_courses_are_those_of_codec_10(codec, flag) -> None:
+    coded = Direct(codec, markers(60, 5))
+    fields = header_of(coded)
+    fields.space.flags |= flag
+    fields.space.model = fields.space.model or bytes(16)
+    with pytest.raises(mcz.FormatError, match="it has no mean or courses"):
+        coded.read(changes={"header": build(WINDOWS_HEADER, fields, "header")})
+
+
+# Real clips
+
+
+@pytest.mark.real
+@pytest.mark.parametrize(("name", "most"), [("17_10", 21_600), ("49_02", 11_400)])
+def test_bytes_of_real_clips(data: Path, name: str, most: int) -> None:
+    """Models counted; lsdt-clip, whose bases are well known, has to write none."""
+    with mcz.open(saved("mdtt", amc(data, name), mean_error_cm=0.2)) as file:
+        sizes = clip_sizes(file.container, file.only_clip())
+        reached = float(file.only_clip().quality["mean_position_error_cm"])
+    assert 0.19 <= reached <= 0.2
+    assert sizes.models > 1000 and sizes.payload + sizes.overhead + sizes.models < most

@@ -1,0 +1,122 @@
+"""A codec for tests alone that works frame by frame: steps from the frame before.
+
+A stream holds, for each of its frames, the zigzag varint of each channel's difference to the frame
+before in steps; one of zeros alone is empty. Every so many frames one starts fresh.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mcz.codecs.base import Codec, Encoded, Parameter, Segment, integer, number
+from mcz.errors import FormatError
+from mcz.schema import read_varint, varint
+
+ID = 252
+HEADER = b"stairs"
+
+
+def _packed(steps):
+    if not steps.any():
+        return b""
+    return b"".join(varint(2 * n if n >= 0 else -2 * n - 1) for n in steps.ravel().tolist())
+
+
+def _unpacked(stream, n_frames, n_channels):
+    if not stream:
+        return np.zeros((n_frames, n_channels), np.int64)
+    at, found = 0, []
+    for _ in range(n_frames * n_channels):
+        value, at = read_varint(stream, at)
+        found.append(value // 2 if value % 2 == 0 else -(value + 1) // 2)
+    if at != len(stream) or not any(found):
+        raise FormatError(f"stairs: {len(stream)} bytes of steps")
+    return np.array(found, np.int64).reshape(n_frames, n_channels)
+
+
+class Encoder:
+    models = ()
+    header = HEADER
+
+    def __init__(self, layout, options):
+        self.every, self.step = options["every"], options["step"]
+        self.last = np.zeros(layout.n_channels, np.int64)
+        self.at = 0
+
+    def push(self, values, valid=None):
+        indices = np.rint(values / self.step).astype(np.int64)
+        if valid is not None:
+            indices = np.where(valid, indices, self.last)
+        fresh = self.at % self.every == 0
+        steps = indices if fresh else indices - self.last
+        self.last = indices
+        self.at += 1
+        return _packed(steps), fresh
+
+
+class Decoder:
+    def __init__(self, header, layout):
+        if header != HEADER:
+            raise FormatError(f"stairs: header {header!r}")
+        self.last = None
+        self.n_channels = layout.n_channels
+
+    def push(self, stream, fresh):
+        steps = _unpacked(stream, 1, self.n_channels)[0]
+        if fresh:
+            self.last = np.zeros(self.n_channels, np.int64)
+        if self.last is None:
+            raise FormatError("stairs: nothing fresh came")
+        self.last = self.last + steps
+        if (np.abs(self.last) > 2**50).any():
+            raise FormatError("stairs: too high")
+        return self.last / 8
+
+
+def encode(source, params):
+    def segments():
+        encoder = Encoder(source.layout, params)
+        for frame in range(source.layout.n_frames):
+            stream, fresh = encoder.push(source.values(frame, frame + 1)[0])
+            yield Segment(frame, 1, (stream,), fresh=fresh)
+
+    return Encoded(HEADER, segments())
+
+
+def decode(header, layout, spans, request, fetch):
+    decoder = Decoder(header, layout)
+    out = np.zeros((request.stop - request.start, layout.n_channels if request.groups else 0))
+    if not request.groups:
+        return out
+    first = max(i for i, s in enumerate(spans) if s.fresh and s.first <= request.start)
+    for index in range(first, len(spans)):
+        span = spans[index]
+        if span.first >= request.stop:
+            break
+        if span.n_frames != 1:
+            raise FormatError("stairs: one frame a segment")
+        values = decoder.push(fetch(index, 0, 0), span.fresh)
+        if span.first >= request.start:
+            out[span.first - request.start] = values
+    return out
+
+
+CODEC = Codec(
+    id=ID,
+    name="stairs",
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=decode,
+    grouping="all",
+    delay=0,
+    places=True,
+    live=Encoder,
+    follow=Decoder,
+    parameters=(
+        Parameter("every", 10, "frames from one fresh one to the next", integer("every", 1, 10**9)),
+        Parameter("step", 0.125, "a step", number("step", 0.125, 0.125)),
+        Parameter("domain", "channels", "channels or positions", str),
+    ),
+)

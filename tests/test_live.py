@@ -1,0 +1,544 @@
+"""Live clips: written frame by frame, read as they arrive, damaged, cut off, and long."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+import tracemalloc
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz import codecs
+from mcz.container import payloads
+from mcz.container.chunks import FOOT, OPEN_LENGTH, build_chunk, build_foot, build_header
+from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet
+from mcz.container.scan import scan
+from mcz.container.segments import FRESH, SegmentHeader
+from mcz.container.writer import Writer
+from mcz.files.encoding import write_clip
+from mcz.files.following import live_frames
+from mcz.files.live import LiveWriter
+from mcz.files.report import info, layout
+from mcz.files.sizes import packet_framing
+from mcz.schema import build, parse
+from tests import live_codec
+from tests.motions import skeleton, smooth
+from tests.repair import flipped, use
+from tests.test_container import parts_of
+
+ROOT = Path(mcz.__file__).parent.parent
+
+
+@pytest.fixture(autouse=True)
+def stairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(codecs.CODECS, live_codec.ID, live_codec.CODEC)
+
+
+def frames(n: int = 23, seed: int = 1) -> np.ndarray:
+    """Multiples of an eighth, some frames equal to the one before, some values invalid."""
+    random = np.random.default_rng(seed)
+    steps = random.integers(-40, 40, (n, 10)) * (random.random((n, 1)) < 0.8)
+    values = steps.cumsum(axis=0) / 8
+    if n > 7:
+        values[7, 3:5] = np.nan
+    return values
+
+
+def live(values: np.ndarray, **params: object) -> bytes:
+    out = io.BytesIO()
+    with LiveWriter(out, skeleton(), "stairs", params, frame_rate=Fraction(120)) as writer:
+        for row in values:
+            writer.push(row)
+    return out.getvalue()
+
+
+def test_reads_like_any_clip() -> None:
+    values = frames()
+    data = live(values)
+    assert mcz.verify(data) == []
+    with mcz.open(data) as file:
+        clip = file.clips["live"]
+        np.testing.assert_array_equal(clip.read(), values)
+        np.testing.assert_array_equal(clip.read((9, 14)), values[9:14])
+        np.testing.assert_array_equal(clip.read((8, 9), ["spine"]), values[8:9, 6:9])
+        assert clip.read(joints=[]).shape == (23, 0)
+        assert clip.frame_rate == 120
+        kinds = [row.packet for row in clip.signals[0].rows]
+        assert [i for i, kind in enumerate(kinds) if kind == SEGMENT] == [0, 7, 10, 20]
+        assert sum(size for _, size, _ in layout(file)) == len(data)
+    use(data)
+    use(data, salvage=True)
+
+
+@given(st.integers(0, 30), st.integers(1, 12), st.integers(0, 2**32))
+def test_any_number_of_frames(n: int, every: int, seed: int) -> None:
+    codecs.CODECS[live_codec.ID] = live_codec.CODEC
+    values = frames(n, seed)
+    data = live(values, every=every)
+    found = list(live_frames(io.BytesIO(data)))
+    assert [number for number, _, _ in found] == list(range(n))
+    np.testing.assert_array_equal(np.array([row for _, row, _ in found]).reshape(n, 10), values)
+    np.testing.assert_array_equal(
+        np.array([mask for _, _, mask in found], bool).reshape(n, 10), ~np.isnan(values)
+    )
+    with mcz.open(data) as file:
+        np.testing.assert_array_equal(file.clips["live"].read(), values)
+
+
+class Trickle(io.RawIOBase):
+    """A stream that gives a byte at a time and knows how many were taken."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data, self.at = data, 0
+
+    def readable(self) -> bool:
+        return True
+
+    def read(self, size: int = -1) -> bytes:
+        self.at += 1
+        return self.data[self.at - 1 : self.at]
+
+
+def test_each_frame_comes_with_its_last_byte() -> None:
+    values = frames()
+    data = live(values)
+    with mcz.open(data) as file:
+        ends = [row.stop + 2 for row in file.clips["live"].signals[0].rows]
+    stream = Trickle(data)
+    assert [stream.at for _ in live_frames(stream)] == ends
+
+
+def test_one_write_a_frame() -> None:
+    class Sink:
+        def __init__(self) -> None:
+            self.writes: list[bytes] = []
+            self.flushes = 0
+
+        def write(self, data: memoryview) -> int:
+            self.writes.append(bytes(data[:100]))  # takes a part alone
+            return len(self.writes[-1])
+
+        def flush(self) -> None:
+            self.flushes += 1
+
+    sink = Sink()
+    with LiveWriter(sink, skeleton(), "stairs") as writer:
+        for count, row in enumerate(frames()):
+            writer.push(row)
+            found = live_frames(io.BytesIO(b"".join(sink.writes)))
+            for _ in range(count + 1):
+                next(found)
+            assert sink.flushes == count + 2
+    assert mcz.verify(b"".join(sink.writes)) == []
+
+
+def test_quality_of_markers() -> None:
+    channels = tuple(map(mcz.Channel, ("tx", "ty", "tz")))
+    bones = mcz.Skeleton(tuple(mcz.Joint(n, channels=channels) for n in "ab"), unit_cm=10.0)
+    values = np.array([[0.0, 0, 0, 8, 8, 8], [0.05, 0, 0, 8, 8, np.nan], [0, 0, 0.0625, 1, 1, 1]])
+    out = io.BytesIO()
+    with LiveWriter(out, bones, "stairs") as writer:
+        decoded = np.array([writer.push(row) for row in values])
+    with mcz.open(out.getvalue()) as file:
+        clip = file.clips["live"]
+        np.testing.assert_array_equal(clip.read(), decoded)
+        quality = clip.quality
+        motion = clip.motion()
+    signal = mcz.Signal(np.nan_to_num(values), mask=~np.isnan(values))
+    wanted = mcz.compare(mcz.Motion(bones, (signal,)), motion).entries()
+    assert quality is not None
+    for key in ("mean_position_error_cm", "max_position_error", "max_position_error_point"):
+        assert quality[key] == str(wanted[key])
+    assert int(quality["max_position_error_frame"]) == wanted["max_position_error_frame"] == 2
+    assert float(quality["mse_raw"]) == pytest.approx(wanted["mse_raw"])
+
+
+def test_places_of_points_are_coded() -> None:
+    out = io.BytesIO()
+    rows = smooth(5).values
+    with LiveWriter(out, skeleton(), "stairs", {"domain": "positions"}) as writer:
+        for row in rows:
+            writer.push(row)
+        with pytest.raises(mcz.MotionError, match="10 channels"):
+            writer.push(rows[0, :9])
+    with mcz.open(out.getvalue()) as file:
+        clip = file.clips["live"]
+        wanted = mcz.positions(smooth(5)).reshape(5, -1)
+        np.testing.assert_allclose(clip.read(), wanted, atol=1 / 16)
+        assert clip.skeleton.base is not None
+        assert file.skeleton(clip.skeleton.base) == skeleton()
+
+
+def test_what_cannot_be_live() -> None:
+    out = io.BytesIO()
+    with pytest.raises(mcz.OptionError, match="frame by frame"):
+        LiveWriter(out, skeleton(), "raw")
+    with pytest.raises(mcz.OptionError, match="no parameter"):
+        LiveWriter(out, skeleton(), "stairs", {"steps": 1})
+    with pytest.raises(mcz.MotionError, match="0 groups"):
+        LiveWriter(out, mcz.Skeleton((mcz.Joint("a"),)), "stairs")
+    writer = LiveWriter(out, skeleton(), "stairs")
+    writer.close()
+    writer.close()
+    with pytest.raises(mcz.MotionError, match="closed"):
+        writer.push(np.zeros(10))
+
+
+def test_clips_that_are_not_live_are_followed_too() -> None:
+    out = io.BytesIO()
+    writer = Writer(out)
+    motion = smooth(12)
+    write_clip(writer, motion, codecs.by_name("raw"), {"segment_frames": 5})
+    write_clip(writer, smooth(6, name="b"), live_codec.CODEC, {"every": 4})
+    writer.finish()
+    writer.attachment("a", b"more")
+    write_clip(writer, smooth(3, name="c"), codecs.by_name("lossless"), {})
+    writer.finish()
+    found = list(live_frames(io.BytesIO(out.getvalue())))
+    assert [n for n, _, _ in found] == [*range(12), *range(6), *range(3)]
+    with mcz.open(out.getvalue()) as file:
+        parts = found[:12], found[12:18], found[18:]
+        for clip, part in zip(file.clips.values(), parts, strict=True):
+            np.testing.assert_array_equal(np.array([row for _, row, _ in part]), clip.read())
+
+
+def test_a_cut_clip_is_followed(tmp_path: Path) -> None:
+    values = frames()
+    (tmp_path / "a.mcz").write_bytes(live(values))
+    mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(13, 21))
+    data = (tmp_path / "b.mcz").read_bytes()
+    found = list(live_frames(io.BytesIO(data)))
+    assert [n for n, _, _ in found] == list(range(8))
+    np.testing.assert_array_equal(np.array([row for _, row, _ in found]), values[13:21])
+    with mcz.open(data) as file:
+        clip = file.clips["live"]
+        np.testing.assert_array_equal(clip.read(), values[13:21])
+        assert not any(row.packet for row in clip.signals[0].rows)  # rewriting closes it
+        assert clip.signals[0].skip == 3
+    assert mcz.verify(data) == []
+
+
+def test_appending_to_a_live_clip_cut_off_behind_its_end(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    data = live(frames())
+    foot = scan(source_of(data)).feet[0]
+    path.write_bytes(data[: foot - 3])
+    bvh = tmp_path / "one.bvh"
+    bvh.write_text(
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 1\n"
+        "Frame Time: 1\n2\n"
+    )
+    mcz.append([bvh], path, salvage=True)
+    assert mcz.verify(path) == []
+    with mcz.open(path) as file:
+        assert list(file.clips) == ["live", "one"]
+
+
+def source_of(data: bytes):
+    from mcz.container.source import ByteSource
+
+    return ByteSource(io.BytesIO(data))
+
+
+def test_sizes_count_the_framing() -> None:
+    data = live(frames())
+    with mcz.open(data) as file:
+        row = file.container.directory.clips["live"]
+        clip = info(file)["clips"][0]
+        assert row.cend is not None
+        bodies = sum(segment.size for segment in row.segments)
+        between = row.cend.offset - (row.clip.offset + row.clip.size)
+        assert packet_framing(row.segments) == between - bodies
+        assert clip["packet_bytes"] == between - bodies
+        assert clip["packets"] == 23
+        assert clip["payload_bytes"] + clip["overhead_bytes"] + clip["hash_bytes"] == (
+            row.cend.offset + row.cend.size - row.clip.offset
+        )
+
+
+# Damage ----------------------------------------------------------------------
+
+
+def test_every_prefix_is_truncated() -> None:
+    values = frames()
+    data = live(values)
+    with mcz.open(data) as file:
+        ends = [row.stop + 2 for row in file.clips["live"].signals[0].rows]
+        start = file.container.directory.clips["live"].clip
+    for size in range(len(data)):
+        with pytest.raises(mcz.TruncatedError):
+            mcz.open(data[:size])
+        whole = sum(end <= size for end in ends)
+        got = 0
+        with pytest.raises(mcz.TruncatedError):
+            for _ in live_frames(io.BytesIO(data[:size])):
+                got += 1
+        assert got == whole
+        if size >= start.offset + start.size:
+            with mcz.open(data[:size], salvage=True) as file:
+                np.testing.assert_array_equal(file.clips["live"].read(), values[:whole])
+
+
+def test_flipped_bits_are_found() -> None:
+    data = live(frames(13))
+    with mcz.open(data) as file:
+        row = file.container.directory.clips["live"]
+        assert row.cend is not None
+        places = range(row.clip.offset + row.clip.size, row.cend.offset)
+    for byte in places:
+        bad = flipped(data, byte, byte % 8)
+        assert mcz.verify(bad) != [], byte
+        with pytest.raises(mcz.MczError):
+            list(live_frames(io.BytesIO(bad)))
+        use(bad, salvage=True)
+
+
+def packets_of(data: bytes) -> list[list[Packet]]:
+    """The packets of each open DATA."""
+    with mcz.open(data) as file:
+        rows = file.clips["live"].signals[0].rows
+    found: list[list[Packet]] = []
+    for row in rows:
+        if row.packet == SEGMENT and row.header.flags & FRESH:
+            found.append([])
+        body = data[row.offset : row.offset + row.size]
+        found[-1].append(Packet(row.packet, len(found[-1]), body, bool(row.header.flags & FRESH)))
+    return found
+
+
+def assembled(data: bytes, chunks: list[list[Packet]]) -> bytes:
+    """The file with other packets, without an index."""
+    parts = [part for part in parts_of(data) if part[0].type != b"QUAL"]
+    head = b"".join(build_chunk(c.type, p, c.flags) for c, p in parts[:-1])
+    body = b""
+    for packets in chunks:
+        body += build_header(b"DATA", 0, OPEN_LENGTH) + b"".join(map(build_packet, packets))
+        body += build_packet(Packet(END, len(packets), b""))
+    cend = build_chunk(b"CEND", parts[-1][1])
+    return data[:8] + head + body + cend + build_foot(0, 0)
+
+
+def test_assembled_is_the_same() -> None:
+    data = live(frames())
+    with mcz.open(assembled(data, packets_of(data))) as file:
+        np.testing.assert_array_equal(file.clips["live"].read(), frames())
+
+
+def test_bodies_flipped_and_cut_behind_repaired_checks() -> None:
+    data = live(frames(13))
+    chunks = packets_of(data)
+    for which, packets in enumerate(chunks):
+        for number, packet in enumerate(packets):
+            bodies = [flipped(packet.body, i // 8, i % 8) for i in range(8 * len(packet.body))]
+            bodies += [packet.body[:size] for size in range(len(packet.body))]
+            for body in bodies[:: max(1, len(bodies) // 40)]:
+                changed = [list(part) for part in chunks]
+                changed[which][number] = Packet(packet.kind, number, body, packet.fresh)
+                bad = assembled(data, changed)
+                for how in (False, True):
+                    try:
+                        use(bad, salvage=how)
+                    except mcz.MczError as error:
+                        assert str(error)
+                with pytest.raises(mcz.MczError):
+                    list(live_frames(io.BytesIO(bad)))
+
+
+@pytest.mark.parametrize("salvage", [False, True])
+def test_a_frame_whose_number_nobody_told(salvage: bool) -> None:
+    data = live(frames())
+    first, second, third = packets_of(data)
+    orphan = [Packet(FRAME, n, p.body, p.fresh) for n, p in enumerate(second[1:])]
+    bad = assembled(data, [first, orphan, third])
+    if not salvage:
+        with pytest.raises(mcz.FormatError, match="tells its frame"):
+            mcz.open(bad)
+        with pytest.raises(mcz.FormatError, match="tells its frame"):
+            list(live_frames(io.BytesIO(bad)))
+        return
+    with mcz.open(bad, salvage=True) as file:
+        found = file.clips["live"].read()
+        np.testing.assert_array_equal(found[:10], frames()[:10])
+        assert np.isnan(found[10:20]).all()
+        np.testing.assert_array_equal(found[20:], frames()[20:])
+
+
+def test_the_first_packet_starts_fresh() -> None:
+    data = live(frames(5), every=100)
+    (packets,) = packets_of(data)
+    body = bytearray(packets[0].body)
+    with mcz.open(data) as file:
+        header = file.clips["live"].signals[0].rows[0].header
+    assert body[:6] == bytes((0, 0, 1, 0, 0, 1))
+    assert header == SegmentHeader(0, 0, 1)
+    from mcz.container.segments import build_segment
+
+    stale = build_segment(SegmentHeader(0, 0, 1, flags=0), [packets[0].body[-10:]])
+    bad = assembled(data, [[Packet(SEGMENT, 0, stale, fresh=False), *packets[1:]]])
+    with mcz.open(bad) as file, pytest.raises(mcz.FormatError, match="first segment needs"):
+        file.clips["live"].read()
+    with pytest.raises(mcz.FormatError, match="first segment needs"):
+        list(live_frames(io.BytesIO(bad)))
+
+
+def test_two_groups_have_no_such_packets() -> None:
+    data = live(frames(5))
+    parts = parts_of(data)
+    (which,) = [i for i, (chunk, _) in enumerate(parts) if chunk.type == b"CLIP"]
+    fields = parse(payloads.CLIP, parts[which][1], "CLIP")
+    fields.signals[0].groups = {"kind": payloads.GROUP_CHANNEL, "sizes": None}
+    clip = build(payloads.CLIP, fields, "CLIP")
+    bad = assembled(data, packets_of(data)).replace(
+        build_chunk(b"CLIP", parts[which][1]), build_chunk(b"CLIP", clip)
+    )
+    with mcz.open(bad) as file, pytest.raises(mcz.FormatError, match="10 groups"):
+        file.clips["live"].read()
+    assert mcz.verify(bad) != []
+
+
+def test_a_lost_frame_costs_those_up_to_the_next_fresh_one() -> None:
+    values = frames()
+    data = bytearray(live(values))
+    with mcz.open(bytes(data)) as file:
+        row = file.clips["live"].signals[0].rows[12]
+    data[row.offset] ^= 1
+    with mcz.open(bytes(data), salvage=True) as file:
+        clip = file.clips["live"]
+        found = clip.read()
+        assert len(found) == 23
+        np.testing.assert_array_equal(found[:12], values[:12])
+        assert np.isnan(found[12:20]).all()
+        np.testing.assert_array_equal(found[20:], values[20:])
+    got = []
+    with pytest.raises(mcz.ChecksumError):
+        got.extend(live_frames(io.BytesIO(bytes(data))))
+    assert got == [] or len(got) == 12
+
+
+def test_a_lost_end_packet_costs_no_frame() -> None:
+    data = live(frames())
+    end = build_packet(Packet(END, 3, b""))
+    assert data.count(end) == 1
+    with mcz.open(data.replace(end, b""), salvage=True) as file:
+        clip = file.clips["live"]
+        np.testing.assert_array_equal(clip.read(), frames())
+        assert clip.quality is not None
+        assert not any("CEND" in text for text in clip.damage)
+
+
+def test_an_undecodable_frame_is_salvaged_around() -> None:
+    data = live(frames())
+    chunks = packets_of(data)
+    bad = chunks[1][3]
+    chunks[1][3] = Packet(bad.kind, bad.sequence, b"\xff", bad.fresh)
+    with mcz.open(assembled(data, chunks), salvage=True) as file:
+        found = file.clips["live"].read()
+        lost = np.isnan(found).all(axis=1)
+        np.testing.assert_array_equal(np.flatnonzero(lost), np.arange(13, 20))
+        np.testing.assert_array_equal(found[~lost], frames()[~lost])
+        assert len(file.damage) == 2
+
+
+def test_the_index_must_say_what_the_packet_says() -> None:
+    from mcz.container.directory import ClipRow, build_index
+
+    data = live(frames(5))
+    with mcz.open(data) as file:
+        directory = file.container.directory
+        clip: ClipRow = directory.clips["live"]
+        start = file.container.index.index_offset
+    from dataclasses import replace
+
+    row = clip.segments[2]
+    header = SegmentHeader(0, 2, 1, flags=FRESH)
+    for changed in (replace(row, header=header), replace(row, packet=SEGMENT)):
+        clip.segments[2] = changed
+        chunk = build_index(directory)
+        bad = data[:start] + chunk + build_foot(start, len(chunk))
+        assert len(bad) > FOOT.size
+        with mcz.open(bad) as file, pytest.raises(mcz.FormatError):
+            file.clips["live"].read()
+        assert mcz.verify(bad) != []
+
+
+# Long and cut off --------------------------------------------------------------
+
+
+def test_a_hundred_thousand_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is decoded twice, or kept for each frame beside its row in the index."""
+    n = 100_000
+    values = np.random.default_rng(3).integers(-9, 9, (n, 10)).cumsum(axis=0) / 8
+    data = live(values, every=240)
+    pushes = 0
+    plain = live_codec.Decoder.push
+
+    def counted(self, stream, fresh):
+        nonlocal pushes
+        pushes += 1
+        return plain(self, stream, fresh)
+
+    monkeypatch.setattr(live_codec.Decoder, "push", counted)
+    with mcz.open(data) as file:
+        np.testing.assert_array_equal(file.clips["live"].read(), values)
+        assert pushes == n
+        assert file.container.source.n_bytes < 4 * len(data)
+    assert mcz.verify(data) == []
+    pushes = 0
+    cut = data[: len(data) - 40]  # amid INDX
+    with mcz.open(cut, salvage=True) as file:
+        np.testing.assert_array_equal(file.clips["live"].read(), values)
+        assert pushes == n
+    part = live(values[:20_000], every=240)
+    tracemalloc.start()
+    for number, row, _ in live_frames(io.BytesIO(part)):
+        assert row[0] == values[number, 0]
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2**20
+
+
+WRITES = """
+import sys, time
+import numpy as np
+from mcz import codecs
+from mcz.files.live import LiveWriter
+from tests import live_codec
+from tests.motions import skeleton
+codecs.CODECS[live_codec.ID] = live_codec.CODEC
+with open(sys.argv[1], "wb", buffering=0) as sink:
+    writer = LiveWriter(sink, skeleton(), "stairs")
+    for n in range(100000):
+        writer.push(np.full(10, n / 8))
+        if n == 200:
+            print("ready", flush=True)
+"""
+
+
+def test_killed_amid_a_recording(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    process = subprocess.Popen(
+        [sys.executable, "-c", WRITES, str(path)],
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"ready\n"
+    process.kill()
+    process.wait()
+    process.stdout.close()
+    with pytest.raises(mcz.TruncatedError):
+        mcz.open(path)
+    with mcz.open(path, salvage=True) as file:
+        clip = file.clips["live"]
+        assert clip.n_frames > 200
+        wanted = np.repeat(np.arange(clip.n_frames)[:, None] / 8, 10, axis=1)
+        np.testing.assert_array_equal(clip.read(), wanted)

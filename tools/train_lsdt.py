@@ -1,0 +1,76 @@
+"""Train the bases that ship with the package: those of the 31 points of the CMU ASF skeleton.
+
+    python tools/train_lsdt.py OUT.bin CLIP.amc...
+    python tools/train_lsdt.py --virtual-markers OUT.bin CLIP.amc...
+
+The recipe is ``mcz.training.SHIPPED``, tried from several starts, of which the best basis of each
+coordinate is kept; ``mcz train`` takes any other. With three virtual markers a joint beside the
+points it is ``VIRTUAL``: mirrored axes are no axes, and one start of so many points is near enough.
+The clips were those of ``mcz.bench.hou2016_training.TRAINING_CLIPS``, in that order. BLAS differs
+between machines in the last digits, which may turn an entry: what is normative is the file, by its
+hash.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from functools import reduce
+from pathlib import Path
+
+import numpy as np
+
+import mcz
+from mcz.codecs._bases import build_bases, rounded
+from mcz.training import SHIPPED, Recipe, Trained, training_set
+
+TRIES = (("dct", 20), ("haar", 20), ("dct", 40), ("haar", 40), ("dct", 80))
+VIRTUAL = Recipe(sparsity=16, iterations=150, growth=6, headings=4, every=4)
+SHOWN = (0, 1, 10, 50, 100, 200, 300)
+
+
+def lines(trained: Trained) -> list[str]:
+    """The convergence of each coordinate, in cm rms a point and coordinate."""
+    found = []
+    for axis, learned in zip("xyz", trained.learned, strict=True):
+        left = trained.left_out(learned)
+        marks = [learned.n_growth + mark for mark in SHOWN]
+        shown = left[np.minimum([0, *marks], len(left) - 1)]
+        figures = " ".join(f"{value:.4f}" for value in shown)
+        found.append(f"{axis}: {learned.n_iterations} iterations, rms left out: {figures} cm")
+    return found
+
+
+def main(out: str, *clips: str) -> None:
+    if out == "--virtual-markers":
+        with_virtual_markers(*clips)
+        return
+    found = training_set(map(mcz.read, clips))
+    tries = []
+    for start, growth in TRIES:
+        tries.append(replace(SHIPPED, start=start, growth=growth).learn(found))
+        print(f"from {start}, growth {growth}", *lines(tries[-1]), sep="\n  ", file=sys.stderr)
+    trained = reduce(Trained.better, tries)
+    Path(out).write_bytes(trained.data)
+    print(f"{out}: {len(trained.data)} bytes from {trained.n_vectors} vectors", file=sys.stderr)
+    for line in lines(trained):
+        print(line, file=sys.stderr)
+
+
+def with_virtual_markers(out: str, *clips: str) -> None:
+    motions = (mcz.in_positions(mcz.read(clip), virtual_markers=True) for clip in clips)
+    trained = VIRTUAL.learn(training_set(motions))
+    bases = [rounded(found.basis, digits(len(found.basis))) for found in trained.learned]
+    Path(out).write_bytes(build_bases(bases))
+    for line in lines(trained):
+        print(line, file=sys.stderr)
+
+
+def digits(n_vectors: int) -> np.ndarray:
+    """The binary digits of each vector, 12 to 5: more take bytes and save none."""
+    fall = 9 * np.arange(n_vectors) / max(1, n_vectors - 1)
+    return np.clip(np.rint(12 - fall), 5, None).astype(np.int64)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
