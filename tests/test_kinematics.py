@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import (
+    FramePlaces,
     chain,
     depths,
     point_names,
@@ -297,3 +298,32 @@ def test_nothing_to_place() -> None:
     assert positions_of(WALKS["bvh"].skeleton, np.zeros((0, 96))).shape == (0, 38, 3)
     assert reach(Skeleton(())) == reach(WALKS["markers"].skeleton) == 0.0
     assert mcz.positions is positions
+
+
+@given(skeletons(), st.booleans(), st.integers(0, 2**32))
+def test_a_frame_alone_is_as_among_many(skeleton: Skeleton, plain: bool, seed: int) -> None:
+    if plain:  # what is compiled
+        skeleton = replace(skeleton, joints=tuple(map(_turning_and_moving, skeleton.joints)))
+    values = values_for(skeleton, seed=seed)
+    meant = positions_of(skeleton, values)
+    place = FramePlaces(skeleton)
+    agree(np.array([place(row) for row in values]), meant, reach(skeleton))
+    skeleton = replace(skeleton, unit_cm=2.0)
+    place = FramePlaces(skeleton, virtual_markers=True)
+    meant = np.concatenate([meant, virtual_markers_of(skeleton, values)], axis=1)
+    agree(np.array([place(row) for row in values]), meant, 3 + reach(skeleton))
+
+
+def _turning_and_moving(joint: Joint) -> Joint:
+    kept = {c.kind: c for c in joint.channels if c.kind[:1] in ("t", "r")}
+    return replace(joint, channels=tuple(kept.values()))
+
+
+def test_a_frame_alone_knows_what_is_missing() -> None:
+    skeleton = Skeleton((Joint("a", channels=MARKER), Joint("b", channels=MARKER)), unit_cm=1.0)
+    found = FramePlaces(skeleton)(np.array([1.0, np.nan, 3.0, 4.0, 5.0, 6.0]))
+    np.testing.assert_array_equal(found, [[np.nan] * 3, [4, 5, 6]])
+    with pytest.raises(MotionError):
+        FramePlaces(Skeleton((Joint("a", channels=(Channel("rx"),)),), angle_unit=""))
+    with pytest.raises(OptionError):
+        FramePlaces(replace(skeleton, unit_cm=None), virtual_markers=True)

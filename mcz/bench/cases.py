@@ -15,7 +15,11 @@ from mcz.codecs.base import Codec
 from mcz.errors import MczError, OptionError
 from mcz.motion import Motion
 
-PUBLISHED = ("khan2014", "khan2016")  # presets that follow a paper, looked for in every codec
+PUBLISHED = (
+    "khan2014",
+    "khan2016",
+    "hou2016",
+)  # presets that follow a paper, looked for in every codec
 SUFFIXES = (".amc", ".bvh", ".c3d")
 
 
@@ -68,7 +72,7 @@ class Variant:
 
     @property
     def published(self) -> bool:
-        return ("preset", "khan2014") in self.params or ("preset", "khan2016") in self.params
+        return dict(self.params).get("preset") in PUBLISHED
 
     def options(self, more: Mapping[str, Any] | None = None) -> dict[str, Any]:
         return dict(self.params) | dict(more or {})

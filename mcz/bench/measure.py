@@ -13,11 +13,12 @@ from typing import Any
 import mcz
 from mcz.bench.cases import Case, Loaded, Variant, load
 from mcz.codecs import by_name
-from mcz.codecs.base import Request, Span
+from mcz.codecs.base import Codec, Request, Span, model_finder
 from mcz.container.limits import BASE
 from mcz.container.writer import Writer
 from mcz.files.encoding import write_clip
 from mcz.files.memory import MemorySource
+from mcz.files.positions import as_codec_wants
 from mcz.files.report import clip_ratios
 from mcz.files.sizes import clip_sizes
 from mcz.files.sources import read_source
@@ -40,18 +41,25 @@ def write_file(motion: Motion, codec: str, params: Mapping[str, Any]) -> bytes:
     """An MCZ file of one clip, without its quality record, which is no part of the codec."""
     out = io.BytesIO()
     writer = Writer(out)
-    write_clip(writer, motion, by_name(codec), params, quality=False)
+    chosen = by_name(codec)
+    wanted = as_codec_wants(writer, motion, chosen, chosen.options(params))
+    write_clip(writer, wanted, chosen, params, quality=False)
     writer.finish()
     return out.getvalue()
 
 
+def as_coded(motion: Motion, codec: Codec, options: Mapping[str, Any]) -> Motion:
+    """What a codec is given of ``motion``: itself, or the places of its points."""
+    return as_codec_wants(Writer(io.BytesIO()), motion, codec, options)
+
+
 def coded_bytes(case: Case, variant: Variant, params: Mapping[str, Any]) -> int:
-    """Payload and overhead, SPEC.md's "Sizes and ratios"."""
+    """Payload and overhead, SPEC.md's "Sizes and ratios", and the models that the file has."""
     motion = what_is_coded(load(case).motion, variant.codec)
     data = write_file(motion, variant.codec, variant.options(params))
     with mcz.open(data, max_decoded=2**53) as file:
         sizes = clip_sizes(file.container, file.only_clip())
-    return sizes.payload + sizes.overhead
+    return sizes.payload + sizes.overhead + sizes.models
 
 
 def point(
@@ -65,17 +73,28 @@ def point(
         clip = file.only_clip()
         sizes, ratios = clip_sizes(file.container, clip), clip_ratios(file, clip)
         found = mcz.compare(motion, clip.motion(), virtual_markers=markers)
-    del ratios["cr_file"]
+    coded = sizes.payload + sizes.overhead + sizes.models
+    if not by_name(variant.codec).lossless:
+        ratios = _ratios(motion, len(load(case).data), coded)
+    ratios.pop("cr_file", None)
     if len(motion.signals) < len(whole.signals):
         ratios["cr_source"] = None  # its bytes are of signals, too, that are not coded here
     entries = {k: v for k, v in found.entries().items() if k not in DROPPED}
     return {
         "params": dict(params),
-        "coded_bytes": sizes.payload + sizes.overhead,
+        "coded_bytes": coded,
         "payload_bytes": sizes.payload,
         **ratios,
         **{k: v for k, v in entries.items() if not k.startswith("signal.")},
     }
+
+
+def _ratios(motion: Motion, source_bytes: int, coded: int) -> dict[str, float | None]:
+    """Ratios with the numerators of the clip itself, whatever domain its codec has."""
+    per_joint = 40 * motion.n_frames * motion.skeleton.n_joints
+    numerators = (source_bytes, 4 * motion.signals[0].values.size, per_joint)
+    names = ("cr_source", "cr_float32", "cr_40B")
+    return {name: n / coded if n else None for name, n in zip(names, numerators, strict=True)}
 
 
 def cpu_seconds(work: Callable[[], Any]) -> float:
@@ -109,28 +128,13 @@ def speeds(case: Case, variant: Variant, params: Mapping[str, Any]) -> Record:
     """
     loaded = load(case)
     motion = what_is_coded(loaded.motion, variant.codec)
-    codec = by_name(variant.codec)
-    options = codec.options(variant.options(params))
-    encoded, segments = _encode(motion, variant.codec, options)
-
-    def decode() -> Any:
-        layout = MemorySource(motion, 0, codec, BASE.segment_bytes).layout
-        layout = replace(layout, n_resolutions=encoded.n_resolutions)
-        spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
-        n = len(layout.groups)
-        request = Request(0, layout.n_frames, tuple(range(n)))
-        return codec.decode(
-            encoded.header, layout, spans, request, lambda s, r, g: segments[s].streams[r * n + g]
-        )
-
-    def encode() -> Any:
-        return _encode(motion, variant.codec, options)
+    given = variant.options(params)
+    encode, decode = work_of(motion, variant.codec, given)
 
     def read() -> Any:
         with mcz.open(data, max_decoded=2**53) as file:
             return file.only_clip().read()
 
-    given = variant.options(params)
     data = write_file(motion, variant.codec, given)
     seconds = {
         "parse": cpu_seconds(lambda: _parse(case, loaded)),
@@ -149,10 +153,32 @@ def speeds(case: Case, variant: Variant, params: Mapping[str, Any]) -> Record:
     return {"params": dict(params), **fps, **ratios, **memory}
 
 
-def _encode(motion: Motion, name: str, options: Mapping[str, Any]) -> tuple[Any, list[Any]]:
+def work_of(
+    motion: Motion, name: str, params: Mapping[str, Any]
+) -> tuple[Callable[[], Any], Callable[[], Any]]:
+    """Encoding and decoding by the codec alone, of values in the domain that it wants."""
     codec = by_name(name)
-    encoded = codec.encode(MemorySource(motion, 0, codec, BASE.segment_bytes), options)
-    return encoded, list(encoded.segments)
+    options = codec.options(params)
+    wanted = as_coded(motion, codec, options)
+
+    def encode() -> tuple[Any, list[Any]]:
+        encoded = codec.encode(MemorySource(wanted, 0, codec, BASE.segment_bytes), options)
+        return encoded, list(encoded.segments)
+
+    encoded, segments = encode()
+    find_model = model_finder((*encoded.models, *encoded.known))
+
+    def decode() -> Any:
+        layout = MemorySource(wanted, 0, codec, BASE.segment_bytes).layout
+        layout = replace(layout, n_resolutions=encoded.n_resolutions, find_model=find_model)
+        spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
+        n = len(layout.groups)
+        request = Request(0, layout.n_frames, tuple(range(n)))
+        return codec.decode(
+            encoded.header, layout, spans, request, lambda s, r, g: segments[s].streams[r * n + g]
+        )
+
+    return encode, decode
 
 
 def _parse(case: Case, loaded: Loaded) -> Motion:

@@ -103,10 +103,10 @@ def _panel(
         if labels:
             _label_points(axes, curve, key, published)
     axes.set_xscale("log")
-    _plain_ticks(axes.xaxis)
+    plain_ticks(axes.xaxis)
     if logarithmic:
         axes.set_yscale("log")
-        _plain_ticks(axes.yaxis)
+        plain_ticks(axes.yaxis)
     axes.set_xlabel("coded bytes, payload and overhead")
     axes.set_ylabel(text)
     axes.grid(True, which="both", color="0.9", linewidth=0.6)
@@ -118,10 +118,10 @@ def _panel(
     )
     above.set_xlabel("CR: source bytes / coded bytes (cr_source)", fontsize=8)
     above.tick_params(which="both", labelsize=8)
-    _plain_ticks(above.xaxis)
+    plain_ticks(above.xaxis)
 
 
-def _plain_ticks(axis: Any) -> None:
+def plain_ticks(axis: Any) -> None:
     """Marks at 1, 2 and 5, or of a long range at 1, of a logarithmic axis as plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 

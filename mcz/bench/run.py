@@ -8,22 +8,28 @@ from types import ModuleType
 from typing import Any
 
 import mcz
-from mcz.bench import khan2014, khan2016, peers, sweep
+from mcz.bench import hou2016, khan2014, khan2016, peers, sweep
 from mcz.bench.cases import Case, Variant, find_cases, named, variants_of
+from mcz.bench.panels import Panels
 from mcz.bench.sweep import ClipResult
 from mcz.bench.tables import Table
-from mcz.bench.tasks import Runner
+from mcz.bench.tasks import Runner, Task
 from mcz.errors import OptionError
 
-PAPERS: dict[str, ModuleType] = {"khan2014": khan2014, "khan2016": khan2016}
+PAPERS: dict[str, ModuleType] = {
+    "khan2014": khan2014,
+    "khan2016": khan2016,
+    "hou2016": hou2016,
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a run found: clips that were swept, tables to print, and what is to be said."""
+    """What a run found: clips that were swept, tables, plots, and what is to be said."""
 
     clips: list[ClipResult] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
+    panels: list[Panels] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def document(self) -> dict[str, Any]:
@@ -91,11 +97,26 @@ def _paper(
         outcome.notes.append(f"{paper}: clips that are not here: {', '.join(absent)}")
     if left := module.missing():
         outcome.notes.append(f"{paper}: codecs that this version does not have: {', '.join(left)}")
-    results = runner.run(module.tasks(cases))
-    outcome.tables.extend(module.tables(cases, results))
+    results: Mapping[Task, Any]
+    if module is hou2016:
+        found = hou2016.measure(runner, cases, _beside(paths, unit))
+        results = found.results
+        outcome.tables.extend(hou2016.tables(found))
+        outcome.panels.extend(hou2016.panels(found))
+    else:
+        results = runner.run(module.tasks(cases))
+        outcome.tables.extend(module.tables(cases, results))
     for task, result in results.items():
         if isinstance(result, dict) and "error" in result:
             outcome.notes.append(f"{task.label}: {result['error']}")
+
+
+def _beside(paths: Sequence[str], unit: str | None) -> dict[str, Case]:
+    """The clips at hand that bases are learned from, those of the tables not left out."""
+    names = sorted({case.name for case in find_cases(paths, unit)})
+    wanted = hou2016.others(names)
+    found = [case for case in find_cases(paths, unit, wanted) if case.name in wanted]
+    return {case.name: case for case in reversed(found)}  # of one name the first
 
 
 def _sweep(

@@ -176,8 +176,8 @@ def _about(clip: ClipResult) -> str:
 
 NUMERATORS = (
     "CR: cr_source (bytes of the source file), cr_float32 (4 bytes a value), cr_40B (40 bytes a "
-    "joint and frame), each / payload and overhead, cr_source of a lossless codec / all that "
-    "restores the file"
+    "joint and frame), each / payload, overhead and models in the file, cr_source of a lossless "
+    "codec / all that restores the file"
 )
 
 

@@ -31,6 +31,16 @@ class Table:
             "rows": [list(row) for row in self.rows],
         }
 
+    def kept(self) -> dict[str, Any]:
+        """Everything, for the cache."""
+        return self.document() | {"columns": [list(pair) for pair in self.columns]}
+
+    @classmethod
+    def of(cls, kept: dict[str, Any]) -> Table:
+        """The inverse of ``kept``."""
+        columns = tuple((head, spec) for head, spec in kept["columns"])
+        return cls(kept["title"], kept["caption"], columns, kept["rows"])
+
     def cells(self) -> list[list[str]]:
         """Headings, then rows, as text."""
         formats = [spec for _, spec in self.columns]

@@ -7,19 +7,25 @@ key. Speeds and memory are measured one task at a time, with nothing else of our
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any
 
-from mcz.bench import deflated, ladder, measure, peers
+from mcz.bench import curves, deflated, ladder, measure, peers, spatial, ways_back
 from mcz.bench.cache import Cache
 from mcz.bench.cases import Case, Variant, load, why
 from mcz.codecs import by_name
 from mcz.errors import MczError
 
 Progress = Callable[[int, int, str], None]
+THREADS = (
+    *("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"),
+    "VECLIB_MAXIMUM_THREADS",
+)
 NONE = Variant("")  # of tasks that are about no codec
 
 
@@ -66,6 +72,31 @@ def _peers(task: Task) -> Any:
     return peers.measure(load(task.case))
 
 
+def _curve(task: Task) -> Any:
+    return curves.curve(task.case, task.variant, *task.arguments)
+
+
+def _bases(task: Task) -> Any:
+    return curves.bases(*task.arguments)
+
+
+def _convergence(task: Task) -> Any:
+    return spatial.measured_convergence(*task.arguments)
+
+
+def _spatial(task: Task) -> Any:
+    return spatial.measured_distortions(*task.arguments)
+
+
+def _speeds_beside(task: Task) -> Any:
+    given = [(Variant(codec, params), setting) for codec, params, setting in task.arguments]
+    return curves.speeds_beside(task.case, given)
+
+
+def _way_back(task: Task) -> Any:
+    return ways_back.way_back(task.case, *task.arguments)
+
+
 KINDS = {
     "sweep": _sweep,  # n_points
     "point": _point,  # pairs of parameter and value
@@ -74,8 +105,14 @@ KINDS = {
     "resolutions": _resolutions,  # joint, pairs of parameter and value
     "speeds": _speeds,  # pairs of parameter and value
     "peers": _peers,  # names of the installed ones
+    "curve": _curve,  # bases as text, if any
+    "bases": _bases,  # clips, pairs of a recipe
+    "convergence": _convergence,  # clips, iterations, every so many frames
+    "spatial": _spatial,  # clips, pairs of name and bases as text
+    "speeds_beside": _speeds_beside,  # triples of codec, its parameters, setting
+    "way_back": _way_back,  # step in cm, whether with virtual markers
 }
-ALONE = ("speeds", "peers")
+ALONE = ("speeds", "peers", "speeds_beside")
 
 
 def perform(task: Task) -> Any:
@@ -98,6 +135,24 @@ def key_of(task: Task) -> str:
             task.arguments,
         ]
     )
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes that start meanwhile multiply matrices in one thread.
+
+    CPU time is that of all threads, and those of BLAS wait for each other by running.
+    """
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 class Runner:
@@ -136,8 +191,11 @@ class Runner:
                 self.progress(len(results), total, task.label)
                 self._keep(task, perform(task), results)
             return
-        # New processes, not copies of this one: their memory is their own.
-        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        # New processes, not copies of this one: their memory is their own, and their threads.
+        with ExitStack() as stack:
+            if tasks[0].kind in ALONE:
+                stack.enter_context(_one_thread())
+            pool = stack.enter_context(ProcessPoolExecutor(jobs, mp_context=get_context("spawn")))
             self._collect(pool, tasks, jobs, results, total)
 
     def _collect(

@@ -19,7 +19,7 @@ from mcz.cli.progress import Progress
 if TYPE_CHECKING:
     from mcz.bench.run import Outcome
 
-TABLES = ("khan2014", "khan2016", "all")
+TABLES = ("khan2014", "khan2016", "hou2016", "all")
 
 
 @click.command(short_help="Compare codecs: size, error, speed, memory.")
@@ -68,8 +68,9 @@ def command(
 
     Prints sizes by three numerators, errors of channels and positions, what codecs reach at equal
     error and at equal size, Bjontegaard deltas, speed as a ratio to parsing the text, and memory.
-    With --tables only the clips of that paper are taken. Results are kept in the user's cache
-    folder, by what they depend on; speeds are measured one at a time.
+    With --tables only the clips of that paper are taken, of hou2016 also those that bases are
+    learned from. Results are kept in the user's cache folder, by what they depend on; speeds are
+    measured one at a time.
     """
     from mcz.bench.cache import Cache, default_folder
     from mcz.bench.run import PAPERS, bench
@@ -127,14 +128,14 @@ def _lines(outcome: Outcome) -> Iterator[str]:
 
 def _write(outcome: Outcome, folder: Path) -> list[str]:
     """Write the files of a report; return their paths."""
-    from mcz.bench import plots
+    from mcz.bench import panels, plots
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
         drawn: list[Path] = []
         if plots.can_draw():
-            drawn = list(plots.draw(outcome.clips, folder))
-        elif outcome.clips:
+            drawn = [*plots.draw(outcome.clips, folder), *panels.draw(outcome.panels, folder)]
+        elif outcome.clips or outcome.panels:
             outcome.notes.append(plots.MISSING)
         text = "\n".join(outcome.markdown([path.name for path in drawn]))
         report, results = folder / "report.md", folder / "results.json"

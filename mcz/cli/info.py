@@ -26,7 +26,7 @@ from mcz.cli.verify import is_unsound
 
 DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
 FEW = 4  # clips that are shown in full; more are shown as a table
-PARTS = ("payload", "overhead", "source_chunk", "hash", "quality")
+PARTS = ("payload", "overhead", "model", "source_chunk", "hash", "quality")
 RATIOS = (
     ("cr_source", "source file"),
     ("cr_float32", "float32 a channel"),
@@ -169,6 +169,9 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
     )
     yield f"  skeleton   {clip['skeleton'][:8]}"
     yield from (_codec(clip["codec"], signal) for signal in clip["codecs"])
+    for model in clip["models"]:
+        known = f"{model['name']}, well known" if model["name"] else "in the file"
+        yield f"  model      {model['id'][:8]} ({known})"
     yield from _source(clip)
     for key, value in clip["metadata"].items():
         yield f"  {key}  {value[:80]}"
@@ -183,6 +186,7 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
             _percent(clip[f"{part}_bytes"], total),
         ]
         for part in PARTS
+        if part != "model" or clip["models"]
     ]
     yield from (
         "  " + line for line in table([["part", "bytes", "share"], *rows], "lrr").split("\n")

@@ -147,6 +147,11 @@ def _known_by_id() -> dict[bytes, Model]:
     return {id_of(model): model for model in known_models().values()}
 
 
+def name_of(id_: bytes) -> str | None:
+    """What a well-known model is called, None for any other."""
+    return next((name for name, model in known_models().items() if id_of(model) == id_), None)
+
+
 def find_bases(codec: str, layout: Layout, id_: bytes) -> tuple[Basis, ...]:
     """The bases of the model with this id, which is well known or in the file.
 

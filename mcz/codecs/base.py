@@ -390,7 +390,7 @@ TARGETS = (
     Parameter(
         "target_bytes",
         None,
-        "at most so many bytes of payload and overhead",
+        "at most so many bytes of payload, overhead and models",
         integer("target_bytes", 1, 2**53 - 1),
     ),
     Parameter(

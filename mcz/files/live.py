@@ -25,10 +25,10 @@ from mcz.files.digest import ValueDigest
 from mcz.files.encoding import asked, open_clip, write_skeleton
 from mcz.files.masks import build_mask
 from mcz.files.memory import MemorySource
-from mcz.files.positions import NOTE, SEPARATOR, marker_skeleton, places_of, wants_positions
+from mcz.files.positions import NOTE, SEPARATOR, marker_skeleton, wants_positions
 from mcz.files.quality import CHUNK, texts_of
 from mcz.files.sources import name_skeleton
-from mcz.kinematics import point_names, point_set
+from mcz.kinematics import FramePlaces, point_names, point_set
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.schema import build
 
@@ -95,6 +95,7 @@ class LiveWriter:
         if not self._places:
             return self.skeleton
         base = write_skeleton(self._writer, self.skeleton)
+        self._placed = FramePlaces(self.skeleton, virtual_markers=self._virtual)
         return marker_skeleton(self.skeleton, base, virtual_markers=self._virtual)
 
     @property
@@ -128,7 +129,7 @@ class LiveWriter:
                 f"the skeleton has {self._n_channels} channels"
             )
         if self._places:
-            row = places_of(self.skeleton, row[None], virtual_markers=self._virtual)[0]
+            row = self._placed(row).reshape(-1)
         known = ~np.isnan(row)
         valid = None if known.all() else known
         given = row if valid is None else np.where(valid, row, 0.0)

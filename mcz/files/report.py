@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from mcz.codecs._bases import name_of
 from mcz.container import payloads
 from mcz.container.chunks import CRC, FOOT, HEADER, SIGNATURE, Chunk
 from mcz.container.directory import ClipRow
@@ -18,7 +19,7 @@ from mcz.container.segments import GROUP_NOTES, StreamTable
 from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
 from mcz.files.clip import Clip
 from mcz.files.file import File, open
-from mcz.files.sizes import Sizes, clip_sizes
+from mcz.files.sizes import Sizes, clip_sizes, models_used
 from mcz.motion import Skeleton
 from mcz.schema import parse
 
@@ -36,6 +37,7 @@ def info(file: File) -> dict[str, Any]:
     """The document that ``mcz info --json`` prints; its keys are stable."""
     container = file.container
     clips = [_clip_info(file, clip) for clip in file.clips.values()]
+    shared = container.directory.shared
     sources = [c["source_bytes"] for c in clips if c["source_bytes"]]
     return {
         "format_version": file.header["format_version"],
@@ -44,6 +46,7 @@ def info(file: File) -> dict[str, Any]:
         "file_bytes": file.size,
         "index_bytes": container.index.index_length if container.index else 0,
         "skeletons": [_skeleton_info(container, id_, s) for id_, s in file.skeletons],
+        "models": [_model_info(container, id_) for kind, id_ in shared if kind == b"MODL"],
         "clips": clips,
         "attachments": [{"name": a.name, "bytes": a.size} for a in file.attachments.values()],
         "aliases": sorted(file.aliases),
@@ -86,6 +89,12 @@ def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> dict
     }
 
 
+def _model_info(container: Container, id_: bytes) -> dict[str, Any]:
+    fields = container.shared(b"MODL", id_, payloads.MODL)
+    size = container.directory.shared[b"MODL", id_].size
+    return {"id": id_.hex(), "kind": fields.kind, "chunk_bytes": size}
+
+
 def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
     rate = clip.frame_rate
     sizes = clip_sizes(file.container, clip)
@@ -119,6 +128,12 @@ def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
         "source_chunk_bytes": sizes.source,
         "hash_bytes": sizes.hashes,
         "quality_bytes": sizes.quality,
+        "model_bytes": sizes.models,
+        "models": [
+            {"id": id_.hex(), "name": name_of(id_)}
+            for signal in clip.signals
+            for id_ in models_used(signal)
+        ],
         **_source_info(clip),
         **exceptions_info(file.container, clip),
         "quality": clip.quality,
@@ -153,7 +168,7 @@ def clip_ratios(file: File, clip: Clip) -> dict[str, float | None]:
 
 def _ratios(file: File, clip: Clip, sizes: Sizes) -> dict[str, float | None]:
     """The compression ratios of SPEC.md's registry; None where the numerator is unknown."""
-    coded = sizes.payload + sizes.overhead
+    coded = sizes.payload + sizes.overhead + sizes.models
     try:
         lossless = all(signal.codec.lossless for signal in clip.signals)
     except UnsupportedError:

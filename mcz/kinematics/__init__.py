@@ -19,10 +19,12 @@ from mcz.kinematics.points import (
     virtual_markers_of,
 )
 from mcz.kinematics.sensitivity import sensitivities
+from mcz.kinematics.single import FramePlaces
 from mcz.kinematics.targets import unsolved_channels
 
 __all__ = [
     "MARKER_DISTANCE_CM",
+    "FramePlaces",
     "depths",
     "point_names",
     "point_set",
