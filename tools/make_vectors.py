@@ -29,6 +29,9 @@ from tools.vectors import (  # noqa: E402 - needs the path
     bad_index,
     bad_khan,
     bad_lossless,
+    bad_lsdt,
+    bad_lsdt_models,
+    bad_lsdt_streams,
     bad_mrdwt,
     bad_notes,
     bad_numbers,
@@ -44,6 +47,9 @@ from tools.vectors import (  # noqa: E402 - needs the path
     valid_khan,
     valid_lossless,
     valid_lossless_clips,
+    valid_lsdt,
+    valid_lsdt_clips,
+    valid_lsdt_windows,
     valid_mrdwt,
     valid_mrdwt_clips,
     valid_notes,
@@ -65,6 +71,9 @@ MODULES = (
     valid_mrdwt_clips,
     valid_qbc,
     valid_khan,
+    valid_lsdt,
+    valid_lsdt_clips,
+    valid_lsdt_windows,
     valid_cut,
     sources,
     sources_c3d,
@@ -82,10 +91,13 @@ MODULES = (
     bad_mrdwt,
     bad_qbc,
     bad_khan,
+    bad_lsdt,
+    bad_lsdt_models,
+    bad_lsdt_streams,
     bad_sources,
     bad_c3d,
 )
-FORMAT_VERSION = "0.2"
+FORMAT_VERSION = "0.3"
 
 
 def vectors() -> list[Vector]:

@@ -312,12 +312,12 @@ class _LiveEncoder:
         if not np.isfinite(row[known]).all():
             raise MotionError(f"{NAME}: frame {self._at} holds a value that is not finite")
         row = fill_gaps(self._unwrapper(np.where(known, row, np.nan)), known, self._last)
-        self._last = row[0]
         fresh = self._at % self._every == 0
         if fresh:
             self._coder.restart()
-        self._at += 1
-        return self._coder.build(self._coder.quantize(row)), fresh
+        stream = self._coder.build(self._coder.quantize(row))
+        self._last, self._at = row[0], self._at + 1  # a frame that is refused does not count
+        return stream, fresh
 
 
 class _LiveDecoder:

@@ -81,7 +81,7 @@ def _other_id(fields: Any) -> None:
 
 
 def _other_head(fields: Any) -> None:
-    fields.head = at(1, b"\3")(fields.head)
+    fields.head = at(1, b"\7")(fields.head)
 
 
 def _ghost(fields: Any) -> None:

@@ -1,0 +1,196 @@
+"""Streams of codecs 7 to 10 that no coder would write, and what a lax reader makes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import _window_streams, lsdt_frame
+from mcz.codecs._windows import WINDOWS_HEADER, _space_of, temporal_of
+from mcz.coding import kernels
+from mcz.coding.huffman import class_of, codes_of
+from mcz.coding.residuals import bits, code_residual, side_of
+from mcz.container import payloads
+from mcz.jit import kernel
+from mcz.motion import Motion
+from mcz.schema import parse, varint
+from tools.vectors.edits import Edit, put, stream
+from tools.vectors.spatial import (
+    CLIP,
+    FRAME,
+    HEADINGS,
+    Ints,
+    Lengths,
+    Plan,
+    file_with,
+    header,
+    still,
+    tables,
+)
+
+UNEXAMINED = 2**16  # bytes, more than any crafted stream has
+
+
+def sized(*windows: bytes) -> bytes:
+    """The stream of windows of these bytes."""
+    return b"".join(varint(len(window)) + window for window in windows)
+
+
+def adaptive(codec: str, loop: Callable[[Ints, NDArray[np.uint8]], bool], *, faulty: bool) -> bytes:
+    """The bits that ``loop`` writes; ``faulty``: the last integer has no code."""
+    own: Any = lsdt_frame if codec == FRAME else _window_streams
+    data, state = np.zeros(UNEXAMINED, np.uint8), own._start_states()[0].copy()
+    kernels.start(state, data, 1)
+    assert loop(state, data) != faulty
+    return data[: kernels.finish(state, data)].tobytes()
+
+
+def faulty_bits(plan: Plan, table: Ints) -> bytes:
+    """A table whose last coefficient may not be, in adaptive bits: a window's or a segment's."""
+    starts = plan.starts
+
+    def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
+        if plan.codec == FRAME:
+            frames = lsdt_frame._kernels()
+            memory = np.zeros(len(starts) - 1, np.int64)
+            tracks = np.zeros((int(starts[-1]), frames.TRACK_SIZE), np.int64)
+            found = frames.code_frames(state, data, table.copy(), starts, memory, tracks, 1)
+        else:
+            windows = _window_streams._kernels()
+            lengths = np.zeros(len(table), np.int64)
+            found = windows.code_window(state, data, table.copy(), starts, lengths)
+        return bool(found < 0)
+
+    return adaptive(plan.codec, loop, faulty=True)
+
+
+@kernel
+def _code_longer_row(state: Ints, data: Any, row: Ints, n: int) -> bool:
+    """Code the only row of a window of ``n`` frequencies, all of ``row`` as its length."""
+    length = len(row)
+    code_residual(state, data, length, 0, (16 * n, 16 * n), 3, (0, 0, 0), (0, 0))
+    last = before = side_1 = side_2 = 0
+    for k in range(length):
+        if k == 0:
+            code_residual(state, data, row[0], 0, (0, 0), 0, (0, 0, 0), (2568, 17))
+            continue
+        near = min(bits(length - k), 7)
+        scales = 8 * last + 4 * before, 0
+        code_residual(state, data, row[k], 0, scales, near, (side_1, side_2, 0), (5136, 34))
+        before, last = last, abs(row[k])
+        side_2, side_1 = side_1, side_of(row[k])
+    return True
+
+
+@kernel
+def _code_longer_frame(state: Ints, data: Any, row: Ints) -> bool:
+    """Code the only frame, a fresh one of one matrix, all of ``row`` as its length."""
+    code_residual(state, data, len(row), 0, (0, 0), 0, (0, 0, 0), (0, 0))
+    above = 0
+    for r in range(len(row)):
+        sides = side_of(above), 0, 0
+        code_residual(state, data, row[r], 0, (16 * abs(above), 0), 0, sides, (2568, 17))
+        above = row[r]
+    return True
+
+
+def longer_row(row: Ints, n: int) -> bytes:
+    """The bits of the only row of a window, whose length counts zeros behind the last other."""
+
+    def loop(state: Ints, data: Any) -> bool:
+        return bool(_code_longer_row(state, data, row, n))
+
+    return adaptive(CLIP, loop, faulty=False)
+
+
+def longer_frame(row: Ints) -> bytes:
+    """The bits of the only frame, of one matrix, likewise."""
+
+    def loop(state: Ints, data: Any) -> bool:
+        return bool(_code_longer_frame(state, data, row))
+
+    return adaptive(FRAME, loop, faulty=False)
+
+
+class Bits:
+    """Bits as they are written, of integers by the codes of these lengths."""
+
+    def __init__(self, lengths: Lengths = ((), ())) -> None:
+        self.text = ""
+        self.lengths = lengths
+
+    def plain(self, value: int, n: int) -> Bits:
+        self.text += f"{value:0{n}b}" if n else ""
+        return self
+
+    def integer(self, value: int, which: int) -> Bits:
+        """``which``: 0 a gap, 1 a value."""
+        lengths = list(self.lengths[which])
+        symbol, n = class_of(value)
+        self.plain(int(codes_of(lengths, "code")[symbol]), lengths[symbol])
+        return self.plain(value % 2**n, n)
+
+    def sparse(self, n: int, *pairs: tuple[int, int], count: int | None = None) -> Bits:
+        """A list of ``n`` entries: gaps and coefficients; ``count`` is said in place of theirs."""
+        self.plain(len(pairs) if count is None else count, n.bit_length())
+        for gap, value in pairs:
+            self.integer(gap, 0).integer(abs(value) - 1, 1).plain(value < 0, 1)
+        return self
+
+    def data(self, padding: str = "0") -> bytes:
+        text = self.text + padding * (-len(self.text) % 8)
+        return bytes(int(text[i : i + 8], 2) for i in range(0, len(text), 8))
+
+
+def values_from(plan: Plan) -> NDArray[np.float64]:
+    """The values of all frames, never coded: for coefficients that may not be."""
+    values = np.zeros((plan.n_frames, plan.n_channels))
+    found = [table for segment in tables(plan) for table in segment]
+    if plan.codec == FRAME:
+        coder = lsdt_frame._Coder(header(plan), plan.layout)
+        for first, table in zip(plan.firsts, found, strict=True):
+            out = values[first : first + len(table)]
+            lsdt_frame._kernels().add_frames(out, coder._values, table, *coder._transform())
+        return values
+    fields = parse(WINDOWS_HEADER, header(plan), plan.codec)
+    space = _space_of(plan.codec, fields, plan.layout)
+    sizes, at = [n for _, own in plan.windows() for n in own], 0
+    for n, table in zip(sizes, found, strict=True):
+        _window_streams._kernels().synthesize(
+            values[at : at + n],
+            table,
+            np.full(len(table), table.shape[1]),
+            temporal_of(space, fields, n),
+            space.vectors,
+            space.starts,
+            space.columns,
+            space.step,
+            space.weights,
+            space.mean,
+        )
+        at += n
+    return values
+
+
+def spec_of(name: str, *more: str) -> str:
+    """Headings of SPEC.md: those of the codec, and more."""
+    return "; ".join((HEADINGS[name], *(() if name == FRAME else ("Windows",)), *more))
+
+
+def silent(plan: Plan, motion: Motion | None = None, **edits: Any) -> bytes:
+    """A file of zeros."""
+    return file_with(replace(plan, fill=still), motion, **edits)
+
+
+def says(data: bytes) -> Edit:
+    """Put another header into CLIP."""
+    return put(payloads.CLIP, "signals.0.header", varint(len(data)) + data)
+
+
+def stream_with(plan: Plan, data: bytes) -> Any:
+    """The only segment has these bits, of frames or of a window."""
+    return stream(0, lambda _: data if plan.codec == FRAME else sized(data))
