@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs._bases import build_bases
+from mcz.codecs._frames import fill_gaps
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import point_names, positions
 from mcz.motion import Motion
@@ -35,14 +36,15 @@ class TrainingSet:
     """Clips of one set of points, each float64 (n_frames, J, 3), without missing points.
 
     ``up`` is "x", "y" or "z"; ``unit`` is "cm", or "" where the clips do not say theirs.
-    ``n_left_out`` counts the frames in which a point was missing.
+    ``n_filled`` counts the frames in which a point was missing; it lies on a straight line there,
+    as the codecs fill gaps.
     """
 
     names: tuple[str, ...]
     clips: tuple[Floats, ...]
     up: str
     unit: str
-    n_left_out: int = 0
+    n_filled: int = 0
 
     @property
     def n_frames(self) -> int:
@@ -53,23 +55,23 @@ def training_set(motions: Iterable[Motion]) -> TrainingSet:
     """The positions of ``motions``.
 
     Raises MotionError where their points, their up axes or what is known of their units differ,
-    where a motion has no positions, and where no frame is left.
+    where a motion has no positions, and where no place is known.
     """
     first: tuple[str, TrainingSet] | None = None
     clips: list[Floats] = []
-    n_left_out = 0
+    n_filled = 0
     for motion in motions:
         found = _of_one(motion)
         if first is None:
             first = motion.name, found
         _check_alike(first, (motion.name, found))
         clips.extend(found.clips)
-        n_left_out += found.n_left_out
+        n_filled += found.n_filled
     if first is None:
         raise MotionError("training needs at least one clip")
-    if not any(map(len, clips)):
-        raise MotionError("training needs at least one frame in which no point is missing")
-    return replace(first[1], clips=tuple(clips), n_left_out=n_left_out)
+    if not any(clip.any() for clip in clips):
+        raise MotionError("training needs at least one frame with points")
+    return replace(first[1], clips=tuple(clips), n_filled=n_filled)
 
 
 def _of_one(motion: Motion) -> TrainingSet:
@@ -77,12 +79,13 @@ def _of_one(motion: Motion) -> TrainingSet:
     places = positions(motion)
     if not places.shape[1]:
         raise MotionError(f"motion {motion.name!r} has no points to train on")
-    whole = np.isfinite(places).all(axis=(1, 2))
-    kept = places[whole] * (skeleton.unit_cm or 1.0)
+    rows = places.reshape(len(places), 3 * places.shape[1])
+    known = np.isfinite(rows)
+    filled = fill_gaps(rows, known, np.full(rows.shape[1], np.nan))
+    clip = filled.reshape(places.shape) * (skeleton.unit_cm or 1.0)
+    n_filled = int((~known.all(axis=1)).sum())
     unit = "cm" if skeleton.unit_cm else ""
-    return TrainingSet(
-        point_names(skeleton), (kept,), skeleton.up_axis or "y", unit, int((~whole).sum())
-    )
+    return TrainingSet(point_names(skeleton), (clip,), skeleton.up_axis or "y", unit, n_filled)
 
 
 def _check_alike(first: tuple[str, TrainingSet], other: tuple[str, TrainingSet]) -> None:
@@ -283,7 +286,7 @@ class Trained:
             "n_points": len(self.source.names),
             "n_clips": len(self.source.clips),
             "n_frames": self.source.n_frames,
-            "n_left_out": self.source.n_left_out,
+            "n_filled": self.source.n_filled,
             "n_vectors": self.n_vectors,
             "unit": self.source.unit or "length units",
             "coordinates": [

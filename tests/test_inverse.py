@@ -282,3 +282,11 @@ def test_real_clips_come_back(data: Path, name: str) -> None:
     found = way_back(motion, virtual_markers=True)
     assert found["position_mean_cm"] < 1e-4
     assert found["angle_rms_deg"] < 0.01
+
+
+def test_places_beyond_all_bounds_are_refused() -> None:
+    base = WALKS["bvh"].skeleton
+    motion = mcz.in_positions(WALKS["bvh"])
+    motion.signals[0].values[1, 4] = -1e301
+    with pytest.raises(MotionError, match=r"frame 1, .* is at -1e\+301, too far off"):
+        mcz.from_positions(motion, base)

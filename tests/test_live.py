@@ -28,6 +28,7 @@ from mcz.files.following import live_frames
 from mcz.files.live import LiveWriter
 from mcz.files.report import info, layout
 from mcz.files.sizes import packet_framing
+from mcz.motion import POSITION_KINDS, Channel, Joint, Skeleton
 from mcz.schema import build, parse
 from tests import live_codec
 from tests.motions import skeleton, smooth
@@ -542,3 +543,23 @@ def test_killed_amid_a_recording(tmp_path: Path) -> None:
         assert clip.n_frames > 200
         wanted = np.repeat(np.arange(clip.n_frames)[:, None] / 8, 10, axis=1)
         np.testing.assert_array_equal(clip.read(), wanted)
+
+
+@pytest.mark.parametrize("at", [0, 1, 2, 3])
+def test_a_frame_that_is_refused_leaves_no_trace(at: int) -> None:
+    """The next one is coded as if it had not been, fresh where that one was to be."""
+    joints = tuple(Joint(f"p{i}", channels=tuple(map(Channel, POSITION_KINDS))) for i in range(2))
+    out = io.BytesIO()
+    params = {"step": 0.1, "segment_frames": 2}
+    with mcz.LiveWriter(out, Skeleton(joints, unit_cm=1.0), "lsdt-frame", params) as live:
+        for frame in range(6):
+            if frame == at:
+                with pytest.raises(mcz.MotionError):
+                    live.push(np.full(6, 1e300))
+            gap = np.where(np.arange(6) < 3, 10.0 * frame + 5, np.nan)
+            live.push(gap if frame == at else np.full(6, 10.0 * frame + 5))
+    data = out.getvalue()
+    with mcz.open(data) as file:
+        values = file.clips["live"].read()
+    np.testing.assert_allclose(values[:, 0], 10.0 * np.arange(6) + 5, atol=0.1)
+    assert mcz.verify(data) == []

@@ -190,9 +190,8 @@ def _check_moves(clip: Clip) -> None:
     from mcz.kinematics import point_set
 
     if clip.skeleton.base and point_set(clip.skeleton) == "markers":
-        raise Failure(
-            f"clip {clip.name!r} holds positions; --solve-ik fits its skeleton to them", Exit.USAGE
-        )
+        held = f"{clip.container.source.name}: clip {clip.name!r} holds positions"
+        raise Failure(f"{held}; --solve-ik fits its skeleton to them", Exit.USAGE)
 
 
 def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
@@ -202,7 +201,8 @@ def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
     base = clip.base_skeleton
     if base is None:
         raise Failure(
-            f"clip {clip.name!r} names no skeleton that --solve-ik could fit to its positions",
+            f"{clip.container.source.name}: clip {clip.name!r} names no skeleton that --solve-ik "
+            "could fit to its positions",
             Exit.USAGE,
         )
     return from_positions(motion, base)

@@ -67,12 +67,17 @@ def _live_output(target: str | None, force: bool) -> Iterator[BinaryIO]:
         yield binary_output()
         return
     path = Path(str(target))
+    is_special = _is_special(path)
     try:
-        stream = path.open("wb" if force or _is_special(path) else "xb", buffering=0)
+        stream = path.open("wb" if force or is_special else "xb", buffering=0)
     except FileExistsError:
         raise Failure(f"{path}: exists; --force overwrites it", Exit.USAGE) from None
-    with stream:
-        yield stream
+    try:
+        with stream:
+            yield stream
+    finally:
+        if not is_special and not path.stat().st_size:  # refused before anything was written
+            path.unlink()
 
 
 def _is_special(path: Path) -> bool:

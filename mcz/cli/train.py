@@ -131,8 +131,8 @@ def _lines(document: dict[str, Any]) -> Iterator[str]:
         f"{document['bytes']:,} bytes, from {plural(document['n_vectors'], 'vector')} of "
         f"{plural(document['n_frames'], 'frame')} in {plural(document['n_clips'], 'clip')}"
     )
-    if document["n_left_out"]:
-        yield f"  left out: {plural(document['n_left_out'], 'frame')} with missing points"
+    if document["n_filled"]:
+        yield f"  points were missing, and filled, in {plural(document['n_filled'], 'frame')}"
     head = ("coordinate", "iterations", f"at the start, {document['unit']}", "at the end")
     rows = [
         (axis, str(found["iterations"]), f"{found['start']:.5g}", f"{found['end']:.5g}")

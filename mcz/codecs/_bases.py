@@ -5,7 +5,7 @@ SPEC.md, "Bases", is normative; the names below are its field names.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -26,6 +26,7 @@ BASES = 1  # the kind of model
 MAX_BASES = 16
 MAX_POINTS = 2048  # entries of a vector
 MAX_ENTRIES = 2**22  # of all bases of a model
+MAX_KEPT = 2**17  # entries of a model that is kept for the next clip
 MAX_SHIFT = 40
 MAX_ENTRY = 2**40
 FINE = 15  # binary digits of an entry, where nobody asks for less
@@ -85,13 +86,20 @@ def build_bases(bases: Sequence[Basis | Floats], shift: int = FINE) -> bytes:
     )
 
 
-def parse_bases(data: bytes, where: str = "model") -> tuple[Basis, ...]:
-    """The bases of a model of kind 1; raises FormatError on bad bytes."""
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What a model says of a basis before its entries."""
+
+    shifts: Ints
+    n_points: int
+
+
+def parse_heads(data: bytes, where: str = "model") -> tuple[tuple[Head, ...], int]:
+    """What a model of kind 1 says of its bases, and where their entries begin."""
     n_bases, at = read_varint(data, 0)
     if not 1 <= n_bases <= MAX_BASES:
         raise FormatError(f"{where}: {n_bases} bases, not 1 to {MAX_BASES}")
-    tables: list[Ints] = []
-    shifts: list[Ints] = []
+    heads: list[Head] = []
     size = 0
     for _ in range(n_bases):
         n_points, at = read_varint(data, at)
@@ -103,8 +111,15 @@ def parse_bases(data: bytes, where: str = "model") -> tuple[Basis, ...]:
         at += n_vectors
         if len(digits) < n_vectors or digits.max() > MAX_SHIFT:
             raise FormatError(f"{where}: the shifts of a basis end, or one exceeds {MAX_SHIFT}")
-        shifts.append(digits)
-        tables.append(np.zeros((n_vectors, n_points), np.int64))
+        heads.append(Head(digits, n_points))
+    return tuple(heads), at
+
+
+def parse_bases(data: bytes, where: str = "model") -> tuple[Basis, ...]:
+    """The bases of a model of kind 1; raises FormatError on bad bytes."""
+    heads, at = parse_heads(data, where)
+    shifts = [head.shifts for head in heads]
+    tables = [np.zeros((len(head.shifts), head.n_points), np.int64) for head in heads]
     uncode(
         data[at:],
         basis_state(),
@@ -152,24 +167,31 @@ def name_of(id_: bytes) -> str | None:
     return next((name for name, model in known_models().items() if id_of(model) == id_), None)
 
 
-def find_bases(codec: str, layout: Layout, id_: bytes) -> tuple[Basis, ...]:
+def find_bases(
+    codec: str, layout: Layout, id_: bytes, check: Callable[[Sequence[Head]], None]
+) -> tuple[Basis, ...]:
     """The bases of the model with this id, which is well known or in the file.
 
-    Raises UnsupportedError where it is neither, FormatError where it is no model of bases.
+    ``check`` refuses heads that are not due, before their entries take memory. Raises
+    UnsupportedError where there is no such model, FormatError where it is none of bases.
     """
-    known = _known_by_id().get(id_)
-    if known is not None:
-        return _parsed(known.data, known.kind)
-    found = None if layout.find_model is None else layout.find_model(id_)
+    found = _known_by_id().get(id_)
+    if found is None and layout.find_model is not None:
+        found = layout.find_model(id_)
     if found is None:
         raise UnsupportedError(f"{codec}: model {id_.hex()} is not in the file nor well known")
-    return _parsed(found.data, found.kind)
+    where = f"{codec}: model {id_.hex()}"
+    if found.kind != BASES:
+        raise FormatError(f"{where} is one of kind {found.kind} where bases are due")
+    heads, _ = parse_heads(found.data, where)
+    check(heads)
+    if sum(len(head.shifts) * head.n_points for head in heads) > MAX_KEPT:
+        return parse_bases(found.data, where)
+    return _parsed(found.data)
 
 
 @lru_cache(maxsize=8)
-def _parsed(data: bytes, kind: int) -> tuple[Basis, ...]:
-    if kind != BASES:
-        raise FormatError(f"a model of kind {kind} where bases are due")
+def _parsed(data: bytes) -> tuple[Basis, ...]:
     bases = parse_bases(data)
     for basis in bases:
         basis.entries.setflags(write=False)
@@ -179,5 +201,8 @@ def _parsed(data: bytes, kind: int) -> tuple[Basis, ...]:
 def read_bases(path: Path) -> Model:
     """The model in a file that ``mcz train`` has written; raises FormatError."""
     data = path.read_bytes()
-    parse_bases(data, str(path))
+    try:
+        parse_bases(data)
+    except FormatError as error:
+        raise FormatError(f"{path}: no bases: {error}") from None
     return Model(BASES, data)

@@ -5,14 +5,16 @@ SPEC.md, "Space", is normative; the names below are its field names.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from construct import Bytes, ExprValidator, Float64l, If, Int8ul, OneOf, Struct
 from numpy.typing import NDArray
 
-from mcz.codecs._bases import MAX_POINTS, Basis, find_bases
+from mcz.codecs._bases import MAX_POINTS, Basis, Head, find_bases
 from mcz.codecs._wavelet_quantizer import ratio_of
 from mcz.codecs.base import ID_SIZE, Layout, Span
 from mcz.errors import FormatError
@@ -92,20 +94,14 @@ def space_of(name: str, fields: Any, layout: Layout) -> Space:
     n_matrices, n_points = columns.shape
     if n_points > MAX_POINTS:
         raise FormatError(f"{name}: {n_points} points in a matrix, at most {MAX_POINTS}")
-    bases = [] if fields.model is None else list(find_bases(name, layout, bytes(fields.model)))
     n_spatial = n_matrices if fields.basis == LEARNED else 0
-    n_due = n_spatial + sum(bool(fields.flags & flag) for flag in (COURSES, MEAN))
-    if len(bases) != n_due:
-        raise FormatError(f"{name}: a model of {len(bases)} bases, {n_due} are due")
-    spatial = bases[:n_spatial]
-    rest = bases[n_spatial:]
+    rest: list[Basis] = []
+    if fields.model is not None:
+        check = partial(_check_heads, name, fields.flags, [n_points] * n_spatial, n_channels)
+        rest = list(find_bases(name, layout, bytes(fields.model), check))
+    spatial, rest = rest[:n_spatial], rest[n_spatial:]
     courses = rest.pop(0).vectors if fields.flags & COURSES else None
-    mean = _mean(name, rest.pop(0), n_channels) if fields.flags & MEAN else np.zeros(n_channels)
-    for basis in spatial:
-        if basis.entries.shape[1] != n_points:
-            raise FormatError(
-                f"{name}: vectors of {basis.entries.shape[1]} entries for {n_points} points"
-            )
+    mean = rest.pop(0).vectors[0] if fields.flags & MEAN else np.zeros(n_channels)
     vectors = [basis.vectors for basis in spatial] or [dct_matrix(n_points)] * n_matrices
     return Space(
         float(fields.step),
@@ -123,11 +119,19 @@ def uses_of(fields: Any) -> tuple[bytes, ...]:
     return () if fields.model is None else (bytes(fields.model),)
 
 
-def _mean(name: str, basis: Basis, n_channels: int) -> Floats:
-    if basis.entries.shape != (1, n_channels):
-        raise FormatError(f"{name}: a mean of {basis.entries.shape} for {n_channels} channels")
-    mean: Floats = basis.vectors[0]
-    return mean
+def _check_heads(
+    name: str, flags: int, n_points: Sequence[int], n_channels: int, heads: Sequence[Head]
+) -> None:
+    """Refuse a model unless it has a basis of each of ``n_points``, then courses and a mean."""
+    n_due = len(n_points) + sum(bool(flags & flag) for flag in (COURSES, MEAN))
+    if len(heads) != n_due:
+        raise FormatError(f"{name}: a model of {len(heads)} bases, {n_due} are due")
+    for head, due in zip(heads, n_points, strict=False):
+        if head.n_points != due:
+            raise FormatError(f"{name}: vectors of {head.n_points} entries for {due} points")
+    if flags & MEAN and (len(heads[-1].shifts), heads[-1].n_points) != (1, n_channels):
+        shape = len(heads[-1].shifts), heads[-1].n_points
+        raise FormatError(f"{name}: a mean of {shape} for {n_channels} channels")
 
 
 def _weights(name: str, fields: Any, n_channels: int) -> Floats:

@@ -21,6 +21,7 @@ LENGTHS = 0, 0  # residuals of a stream
 FIRSTS = residuals.N_CONTEXTS, residuals.N_MIXERS
 OTHERS = 2 * residuals.N_CONTEXTS, 2 * residuals.N_MIXERS
 N_SETS = 3
+BLOCK_FRAMES = 256  # at a time, so that sums stay near the processor
 
 
 @kernel
@@ -129,25 +130,35 @@ def synthesize(
     of each matrix and the end, ``columns`` (n_matrices, n_points) the channel of each entry,
     ``weights`` and ``mean`` (n_channels,).
     """
-    n_points, n_frames = vectors.shape[1], len(out)
-    course, sums = np.empty(n_frames), np.empty((n_points, n_frames))
-    for m in range(len(starts) - 1):
-        sums[:] = 0.0
-        for r in range(starts[m], starts[m + 1]):
-            if lengths[r] == 0:
-                continue
-            course[:] = 0.0
-            for k in range(lengths[r]):
-                if rows[r, k] != 0:
-                    index = float(rows[r, k])
-                    for f in range(n_frames):
-                        course[f] = course[f] + index * temporal[k, f]
-            for j in range(n_points):
-                entry = vectors[r, j]
+    for begin in range(0, len(out), BLOCK_FRAMES):
+        end = min(begin + BLOCK_FRAMES, len(out))
+        part = temporal[:, begin:end]
+        for m in range(len(starts) - 1):
+            here = slice(starts[m], starts[m + 1])
+            sums = _sums(rows[here], lengths[here], part, vectors[here])
+            for j in range(len(sums)):
+                c = columns[m, j]
+                weight, start = weights[c], mean[c]
+                for f in range(end - begin):
+                    out[begin + f, c] = start + (sums[j, f] * step) * weight
+
+
+@inner
+def _sums(rows: Ints, lengths: Ints, temporal: Floats, vectors: Floats) -> Floats:
+    """The points of one matrix, (n_points, frames), before step, weight and mean."""
+    n_points, n_frames = vectors.shape[1], temporal.shape[1]
+    course, sums = np.empty(n_frames), np.zeros((n_points, n_frames))
+    for r in range(len(rows)):
+        if lengths[r] == 0:
+            continue
+        course[:] = 0.0
+        for k in range(lengths[r]):
+            if rows[r, k] != 0:
+                index = float(rows[r, k])
                 for f in range(n_frames):
-                    sums[j, f] = sums[j, f] + entry * course[f]
+                    course[f] = course[f] + index * temporal[k, f]
         for j in range(n_points):
-            c = columns[m, j]
-            weight, start = weights[c], mean[c]
+            entry = vectors[r, j]
             for f in range(n_frames):
-                out[f, c] = start + (sums[j, f] * step) * weight
+                sums[j, f] = sums[j, f] + entry * course[f]
+    return sums

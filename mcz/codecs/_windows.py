@@ -235,6 +235,8 @@ def _segment(
         start = span.first + number * fields.window
         stop = min(start + fields.window, span.stop)
         a, b = max(start, request.start), min(stop, request.stop)
+        if start >= request.stop:
+            break
         if a >= b:
             continue
         temporal = temporal_of(space, fields, stop - start)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs import by_id
 from mcz.container import payloads
 from mcz.container.chunks import SIGNATURE, build_foot
 from mcz.container.directory import ClipRow
@@ -24,6 +26,7 @@ from mcz.container.reader import Container
 from mcz.container.segments import FRESH, MASKS, frame_table, parse_table
 from mcz.container.skeletons import parse_skeleton
 from mcz.container.source import ByteSource
+from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, OptionError, TruncatedError, UnsupportedError
 from mcz.files.clip import Clip
 from mcz.files.digest import ValueDigest
@@ -33,7 +36,8 @@ from mcz.schema import parse
 
 Floats = NDArray[np.float64]
 Frame = tuple[int, NDArray[Any], NDArray[np.bool_]]
-SHARED = (b"HEAD", b"SKEL", b"MODL", b"SRCE")  # what clips refer to
+SHARED = (b"SKEL", b"MODL", b"SRCE")  # what clips refer to
+Shared = dict[tuple[bytes, bytes], bytes]  # kind and id -> chunk
 
 
 def live_frames(stream: Any) -> Iterator[Frame]:
@@ -48,24 +52,40 @@ def live_frames(stream: Any) -> Iterator[Frame]:
     if not hasattr(stream, "read"):
         raise OptionError(f"cannot read from {stream!r}: not a binary stream")
     follower = Follower(stream)
-    shared = [SIGNATURE]
+    head = b""
+    shared: Shared = {}
     clip: _Followed | _Held | None = None
     for arrival in follower.arrivals():
         kind = arrival.chunk.type if arrival.chunk is not None else b"FOOT"
-        if kind in SHARED:
-            shared.append(arrival.data)
+        if kind == b"HEAD":
+            head = SIGNATURE + arrival.data
+        elif kind in SHARED:
+            shared.setdefault((kind, payload_id(arrival.payload)), arrival.data)
         elif kind == b"CLIP":
             assert follower.clip is not None
-            clip = _begin(b"".join(shared), follower.clip, arrival)
+            fields = parse(payloads.CLIP, arrival.payload, follower.clip.clip.label)
+            needed = [shared[key] for key in _needs(fields) if key in shared]
+            clip = _begin(b"".join([head, *needed]), follower.clip, fields, arrival)
         elif clip is not None:
             yield from clip.take(kind, arrival)
             clip = None if kind == b"CEND" else clip
 
 
-def _begin(shared: bytes, row: ClipRow, arrival: Arrival) -> _Followed | _Held:
+def _needs(fields: Any) -> Iterator[tuple[bytes, bytes]]:
+    """Kind and id of the chunks that a clip cannot be read without."""
+    yield b"SKEL", bytes(fields.skeleton)
+    for source in fields.source:
+        yield b"SRCE", bytes(source.template)
+    for signal in fields.signals:
+        with suppress(FormatError):  # it is said when the signal is read
+            uses = by_id(signal.codec, signal.codec_version).uses
+            for id_ in () if uses is None else uses(bytes(signal.header)):
+                yield b"MODL", id_
+
+
+def _begin(shared: bytes, row: ClipRow, fields: Any, arrival: Arrival) -> _Followed | _Held:
     """What reads the frames of the clip that begins."""
     container = Container(ByteSource(io.BytesIO(shared + build_foot(0, 0))))
-    fields = parse(payloads.CLIP, arrival.payload, row.clip.label)
     where = f"SKEL {row.skeleton.hex()}"
     bones = container.shared(b"SKEL", row.skeleton, payloads.SKEL)
     skeleton = parse_skeleton(bones, container.profile, where)

@@ -133,7 +133,8 @@ def _error(target: Target, comparison: Any) -> float:
     name = target.name.replace("_error_cm", "_position_error_cm")
     value = getattr(comparison, name)
     if value is None:
-        raise OptionError(f"{target.name} has no meaning: {'; '.join(comparison.notes)}")
+        why = "; ".join(comparison.notes) or "no place is known in any frame"
+        raise OptionError(f"{target.name} has no meaning: {why}")
     return float(value)
 
 

@@ -324,3 +324,13 @@ def test_nothing_is_kept_that_was_used() -> None:
             assert follower.clip is not None
             assert follower.clip.segments == []
     assert len(follower.found.chunks) <= 1
+
+
+def test_what_is_refused_at_once_leaves_no_file(tmp_path: Path) -> None:
+    """Virtual markers need a length unit, and BVH says none."""
+    target = tmp_path / "walk.mcz"
+    marked = ("--param", "virtual_markers=true")
+    data = HEADER + b"".join(LINES)
+    code, _, errors = run("encode", "-", *STEP, *marked, "-o", target, data=data)
+    assert code == 2 and "length unit is unknown" in errors
+    assert not target.exists()

@@ -21,6 +21,8 @@ from mcz.kinematics import (
 )
 from mcz.motion import Motion, Signal, Skeleton
 
+FARTHEST = 2.0**100  # length units
+
 
 @dataclass(frozen=True, slots=True)
 class Fit:
@@ -62,6 +64,21 @@ class Fit:
         return None if distance is None or self.unit_cm is None else distance * self.unit_cm
 
 
+def _check_sizes(motion: Motion) -> None:
+    """Raises MotionError for a place so far off that its square is beyond binary64."""
+    values = np.asarray(motion.values, np.float64)
+    with np.errstate(invalid="ignore"):
+        far = np.argwhere(np.abs(values) > FARTHEST)
+    if len(far):
+        row, column = far[0].tolist()
+        frame = row // motion.signals[0].samples_per_frame
+        name = motion.skeleton.addresses()[column // 3]
+        raise MotionError(
+            f"motion {motion.name!r}: frame {frame}, {name} is at {values[row, column]:g}, too far "
+            "off for inverse kinematics"
+        )
+
+
 def from_positions(motion: Motion, base: Skeleton) -> tuple[Motion, Fit]:
     """Markers as a motion of the skeleton ``base``, whose points they are, and how well they fit.
 
@@ -77,6 +94,7 @@ def from_positions(motion: Motion, base: Skeleton) -> tuple[Motion, Fit]:
         raise MotionError(
             f"motion {motion.name!r} has joints that are no markers, so it has no positions to fit"
         )
+    _check_sizes(motion)
     if point_set(base) == "markers":
         raise MotionError(
             f"motion {motion.name!r}: the skeleton to fit, {base.name!r}, has markers alone"
