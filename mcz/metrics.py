@@ -108,18 +108,20 @@ def compare(original: Motion, decoded: Motion, *, virtual_markers: bool = True) 
     placed = _same_points(original, decoded, notes)
     marked = placed and unit is not None and virtual_markers
     marked = marked and _same_axes(original.skeleton, decoded.skeleton, notes)
+    n_points = len(point_names(original.skeleton)) if placed else 0
     with np.errstate(all="ignore"):  # what overflows is no figure
         for start, left, right in _blocks(original, decoded):
             if same:
                 channels.add(left, right)
             if marked:
                 ours, ours_marked = points_and_markers_of(original.skeleton, left)
-                theirs, theirs_marked = points_and_markers_of(decoded.skeleton, right)
+                theirs, theirs_marked = _places(original.skeleton, decoded.skeleton, right)
                 points.add(start, ours, _scaled(theirs, scale))
                 markers.add(start, ours_marked, _scaled(theirs_marked, scale))
             elif placed:
                 ours = positions_of(original.skeleton, left)
-                points.add(start, ours, _scaled(positions_of(decoded.skeleton, right), scale))
+                theirs = positions_of(decoded.skeleton, right)[:, :n_points]
+                points.add(start, ours, _scaled(theirs, scale))
         further = _further_signals(original, decoded, notes)
     return Comparison(
         frames=a.n_frames,
@@ -296,11 +298,12 @@ def _same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
         except MczError as error:
             notes.append(f"no positions of {motion.name!r}: {error}")
             return False
-    if counts[0] != counts[1] or not counts[0]:
+    alike = counts[0] == counts[1] or _has_markers_of(original.skeleton, decoded.skeleton)
+    if not (alike and counts[0]):
         sets = f"{point_set(original.skeleton)}, {point_set(decoded.skeleton)}"
         notes.append(f"{counts[0]} and {counts[1]} points ({sets}): no errors of positions")
         return False
-    pairs = zip(point_names(original.skeleton), point_names(decoded.skeleton), strict=True)
+    pairs = zip(point_names(original.skeleton), point_names(decoded.skeleton), strict=False)
     apart = [pair for pair in pairs if pair[0] != pair[1]]
     if apart:
         first = " and ".join(map(repr, apart[0]))
@@ -314,10 +317,26 @@ def _same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
 def _same_axes(a: Skeleton, b: Skeleton, notes: list[str]) -> bool:
     """Whether both have joints that turn, or both markers, whose axes are those of the world."""
     sets = point_set(a), point_set(b)
-    if "markers" in sets and sets[0] != sets[1]:
+    if "markers" in sets and sets[0] != sets[1] and not _has_markers_of(a, b):
         notes.append(f"points of {sets[0]} and {sets[1]}: no errors of virtual markers")
         return False
     return True
+
+
+def _has_markers_of(a: Skeleton, b: Skeleton) -> bool:
+    """Whether ``b`` holds the places of the points of ``a``, then those of its virtual markers."""
+    if point_set(b) != "markers" or point_set(a) == "markers":
+        return False
+    return b.n_joints == len(point_names(a)) + 3 * a.n_joints
+
+
+def _places(a: Skeleton, b: Skeleton, values: Values) -> tuple[Values, Values]:
+    """Points and virtual markers of ``b``, which may hold both as markers, those of ``a``."""
+    if _has_markers_of(a, b):
+        both = positions_of(b, values)
+        n_points = len(point_names(a))
+        return both[:, :n_points], both[:, n_points:]
+    return points_and_markers_of(b, values)
 
 
 def _rows(signal: Signal, start: int, stop: int) -> Values:

@@ -446,3 +446,24 @@ def test_rounding_as_khan_does(data: Path) -> None:
         < np.sqrt(3) * found.rms_coordinate_error
         < found.max_position_error
     )
+
+
+@pytest.mark.parametrize("virtual_markers", [False, True])
+def test_positions_against_what_they_were_made_of(virtual_markers: bool) -> None:
+    """Points with points and virtual markers with virtual markers, by places that are known."""
+    from mcz.kinematics import points_and_markers_of
+    from mcz.sample import acclaim_walk
+
+    walk = acclaim_walk()
+    places = mcz.in_positions(walk, virtual_markers=virtual_markers)
+    noise = np.random.default_rng(3).normal(0, 0.1, places.values.shape)
+    found = mcz.compare(walk, places.with_values(places.values + noise))
+    distances = np.sqrt((noise.reshape(len(noise), -1, 3) ** 2).sum(axis=2))
+    n_points = points_and_markers_of(walk.skeleton, walk.values[:1])[0].shape[1]
+    assert found.points == n_points
+    assert found.mean_position_error == pytest.approx(distances[:, :n_points].mean())
+    if virtual_markers:
+        meant = distances[:, n_points:].mean() * walk.skeleton.unit_cm
+        assert found.virtual_marker_mean_cm == pytest.approx(meant)
+    else:
+        assert found.virtual_marker_mean_cm is None

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 import mcz
 from mcz.bench import hou2016_training as study
 from mcz.bench.cases import Case
+from mcz.bench.curves import bases, references
+from mcz.bench.spatial import measured_convergence, measured_distortions
+from mcz.bench.tables import Table
 from mcz.cli.common import run
 from mcz.cli.main import cli
 from mcz.codecs._bases import parse_bases
@@ -388,14 +391,19 @@ def test_distortion_of_kept_coefficients() -> None:
 
 def test_study_tables(samples: Path) -> None:
     case = Case(str(samples / "walk.amc"))
-    fig_3, fig_5, fig_4 = study.tables([case], {"walk": case}, iterations=3)
-    assert len(fig_3.rows) == 2 * 2 * 3
-    assert [row[1] for row in fig_5.rows[:4]] == ["LSDT", "LSDT, as shipped", "DCT", "Haar"]
-    assert [row[1] for row in fig_4.rows[:4]] == ["P = 2", "P = 5", "P = 8", "P = 11"]
-    learned, cosine = fig_5.rows[0], fig_5.rows[2]
-    assert all(a < b for a, b in zip(learned[2:], cosine[2:], strict=True))  # type: ignore[operator]
-    for table in (fig_3, fig_5, fig_4):
-        assert table.cells() and table.document()
+    clips = references([case])
+    fig_3 = measured_convergence(clips, 3, 1)["table"]
+    assert len(fig_3["rows"]) == 2 * 2 * 3
+    given = ("iterations", 3), ("kind", "frames")
+    named = [(f"P = {P}", bases(clips, (*given, ("sparsity", P)))["data"]) for P in (2, 8)]
+    found = measured_distortions(clips, [("LSDT", named[1][1]), *named])
+    fig_5, fig_4 = found["fig_5"]["rows"], found["by_sparsity"]["rows"]
+    assert [row[1] for row in fig_5[:4]] == ["LSDT", "LSDT, as shipped", "DCT", "Haar"]
+    assert [row[1] for row in fig_4[:2]] == ["P = 2", "P = 8"]
+    learned, cosine = fig_5[0], fig_5[2]
+    assert all(a < b for a, b in zip(learned[2:], cosine[2:], strict=True))
+    for kept in (fig_3, *found.values()):
+        assert Table.of(kept).cells()
 
 
 @pytest.mark.real

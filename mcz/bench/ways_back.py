@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 
 import mcz
 from mcz.bench.cases import Case, load
-from mcz.bench.inverse import angle_errors
 from mcz.bench.measure import Record, what_is_coded, write_file
 from mcz.errors import MotionError
 from mcz.files.conversion import from_positions
 from mcz.files.positions import in_positions
 from mcz.files.sizes import clip_sizes
 from mcz.kinematics.chain import chain_of
-from mcz.motion import Motion
+from mcz.motion import ROTATION_KINDS, Motion, Skeleton
+
+Floats = NDArray[np.float64]
 
 CODEC = "lsdt-clip"
 
@@ -41,13 +42,13 @@ def way_back(case: Case, step_cm: float | None, virtual_markers: bool) -> Record
         coded["coded_bytes"] = sizes.payload + sizes.overhead + sizes.models
     solved, _ = from_positions(seen, motion.skeleton)
     found = mcz.compare(motion, solved)
-    _, nearest = angle_errors(motion.skeleton, motion.values, solved.values)
+    angles = angle_errors(motion.skeleton, motion.values, solved.values)
     return coded | {
         "seen_cm": _seen_error(places, seen) * unit,
         "cm": found.mean_position_error_cm,
         "max_cm": found.max_position_error_cm,
         "markers_cm": found.virtual_marker_mean_cm,
-        "channel_deg": float(np.abs(nearest).mean()),
+        "channel_deg": float(np.abs(angles).mean()),
         "turn_deg": _turn_error(motion, solved),
     }
 
@@ -71,8 +72,34 @@ def _turn_error(motion: Motion, solved: Motion) -> float:
     return float(np.degrees(sums / max(1, count)))
 
 
-def _angles(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _angles(a: Floats, b: Floats) -> Floats:
     """Of the rotation from ``a`` to ``b``, (3, 3, F): by its chord, which small ones need."""
     chord = np.sqrt(((a - b) ** 2).sum(axis=(0, 1)))
-    angles: NDArray[np.float64] = 2 * np.arcsin(np.minimum(1.0, chord / np.sqrt(8.0)))
+    angles: Floats = 2 * np.arcsin(np.minimum(1.0, chord / np.sqrt(8.0)))
     return angles
+
+
+def angle_errors(skeleton: Skeleton, before: Floats, after: Floats) -> Floats:
+    """Errors of the rotation channels in degrees, (n_frames, n_rotations), modulo whole turns.
+
+    Where three channels of a joint turn about different axes, of the other three angles that make
+    the same turn wherever those are nearer.
+    """
+    turn = 360.0 if skeleton.angle_unit == "deg" else 2 * np.pi
+    errors = [np.zeros((len(before), 0))]
+    for index, joint in enumerate(skeleton.joints):
+        pairs = zip(joint.channels, skeleton.columns(index), strict=True)
+        found = [(channel.kind, c) for channel, c in pairs if channel.kind in ROTATION_KINDS]
+        columns = [column for _, column in found]
+        error = _modulo(after[:, columns] - before[:, columns], turn)
+        if len(found) == 3 and len({kind for kind, _ in found}) == 3:
+            other = after[:, columns] * [1, -1, 1] + turn / 2
+            other_error = _modulo(other - before[:, columns], turn)
+            nearer = (other_error**2).sum(axis=1) < (error**2).sum(axis=1)
+            error = np.where(nearer[:, None], other_error, error)
+        errors.append(error)
+    return np.concatenate(errors, axis=1) * (360.0 / turn)
+
+
+def _modulo(difference: Floats, turn: float) -> Floats:
+    return difference - turn * np.rint(difference / turn)

@@ -59,8 +59,9 @@ def command(
 ) -> Exit:
     """Encode SRC (.bvh, .amc, .c3d or .asf) into OUT.mcz; an ASF alone makes one of a skeleton.
 
-    With SRC - standard input is read. A codec without delay then writes each frame of a BVH or AMC
-    before it reads the next, to standard output unless -o says otherwise.
+    With SRC - standard input is read. A codec that works frame by frame (lsdt-frame) then writes
+    each frame of a BVH or AMC before it reads the next, to standard output unless -o says
+    otherwise.
     """
     if source == "-":
         return _encode_piped(output, skeleton, force, as_json, format_name, **options)

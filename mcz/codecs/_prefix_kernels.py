@@ -6,7 +6,7 @@ serves encoder and decoder. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.coding.bitio import plain
+from mcz.coding.bitio import WRITING, plain
 from mcz.coding.huffman import DIRECT, MAX_LENGTH
 from mcz.coding.kernels import Bytes, Ints
 from mcz.coding.residuals import bits
@@ -75,7 +75,7 @@ def _code_integer(coder: Ints, data: Bytes, value: int, table: Ints) -> int:
 
 @inner
 def _code_symbol(coder: Ints, data: Bytes, symbol: int, table: Ints) -> int:
-    if coder[1]:
+    if coder[WRITING]:
         plain(coder, data, table[CODES, symbol], table[LENGTHS, symbol])
         return symbol
     code = 0

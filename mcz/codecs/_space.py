@@ -142,7 +142,7 @@ def _weights(name: str, fields: Any, n_channels: int) -> Floats:
     return np.array([ratio_of(code) for code in fields.weights])
 
 
-def check(name: str, layout: Layout, spans: list[Span] | Any, *, fresh: bool) -> None:
+def check(name: str, layout: Layout, spans: Sequence[Span], *, fresh: bool) -> None:
     """Raise FormatError for a layout or segments that a codec of this family has not.
 
     ``fresh``: all segments start so.

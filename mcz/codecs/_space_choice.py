@@ -174,9 +174,8 @@ def choose_space(name: str, sample: Sample, step: float, which: str, in_time: In
         raise OptionError(f"{name}: there are no well-known bases of {n_points} points")
     if len(candidates) == 1:
         return candidates[0][0]
-    return min(candidates, key=lambda c: _expected_bytes(sample, in_time, c[1], step, c[0].models))[
-        0
-    ]
+    sizes = [_expected_bytes(sample, in_time, v, step, c.models) for c, v in candidates]
+    return candidates[sizes.index(min(sizes))][0]
 
 
 def live_choice(name: str, layout: Layout, step: float | None, which: str) -> Choice:

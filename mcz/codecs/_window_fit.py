@@ -43,7 +43,7 @@ THRESHOLD = 0.7  # of a step: what is smaller becomes 0
 PER_ONE, PER_OCTAVE = 2.0, 1.5  # about the bits of a coefficient that is not zero
 ENTRY, ENTRY_OCTAVE = 0.5, 1.2  # about those of an entry of a basis
 LESS_DIGITS = 1.0  # of a vector's entries than log2 of all its coefficients' size in steps
-MEAN_STEPS = 8  # a mean is rounded to so many parts of a step
+MEAN_STEPS = 8  # a mean is right to so many parts of a step
 LONGEST = 1024  # frames: courses of longer windows are too many
 ROOM = MAX_ENTRIES - 2**15  # for vectors and courses, beside a mean
 

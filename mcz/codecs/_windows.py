@@ -102,7 +102,7 @@ class _Quantizer:
         layout = replace(layout, find_model=model_finder((*plan.models, *plan.known)))
         self.name, self.source, self.threshold = name, source, plan.threshold
         self.fields = parse(WINDOWS_HEADER, header, f"{name} header")
-        self.space = _space_of(name, self.fields, layout)
+        self.space = space_of_windows(name, self.fields, layout)
         self.analysis = self.space.analysis()
         self.from_courses: Floats | None = None
         if self.space.courses is not None:
@@ -181,7 +181,7 @@ def decode(
     check(name, layout, spans, fresh=True)
     n_channels = layout.n_channels if request.groups else 0
     out = np.zeros((request.stop - request.start, n_channels))
-    space = _space_of(name, fields, layout)
+    space = space_of_windows(name, fields, layout)
     codes = codes_from(fields.code, f"{name} header")
     if not n_channels:
         return out
@@ -196,7 +196,7 @@ def uses(name: str, header: bytes) -> tuple[bytes, ...]:
     return uses_of(parse(WINDOWS_HEADER, header, f"{name} header").space)
 
 
-def _space_of(name: str, fields: Any, layout: Layout) -> Space:
+def space_of_windows(name: str, fields: Any, layout: Layout) -> Space:
     """The Space of a header, its courses those of a whole window."""
     from mcz.codecs._window_kernels import synthesize_courses
 

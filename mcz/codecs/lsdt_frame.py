@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -105,7 +106,7 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     length = segment_frames_of(layout, params["segment_frames"], as_published=published)
     coder = _Coder(build(FRAME_HEADER, fields, f"{NAME} header"), layout, chosen["threshold"])
     if chosen["coder"] == "prefix" and layout.n_channels:
-        length = length or SEGMENT_FRAMES
+        length = min(length or SEGMENT_FRAMES, layout.most_frames)  # each begins with large ones
         fields["code"] = fields_of(_vectors(coder, source, length))
         coder = _Coder(build(FRAME_HEADER, fields, f"{NAME} header"), layout, chosen["threshold"])
     segments = _segments(source, coder, length)
@@ -311,12 +312,14 @@ class _LiveEncoder:
         known = np.ones(row.shape, np.bool_) if valid is None else valid[None]
         if not np.isfinite(row[known]).all():
             raise MotionError(f"{NAME}: frame {self._at} holds a value that is not finite")
-        row = fill_gaps(self._unwrapper(np.where(known, row, np.nan)), known, self._last)
+        unwrapper = copy(self._unwrapper)
+        row = fill_gaps(unwrapper(np.where(known, row, np.nan)), known, self._last)
         fresh = self._at % self._every == 0
         if fresh:
             self._coder.restart()
         stream = self._coder.build(self._coder.quantize(row))
-        self._last, self._at = row[0], self._at + 1  # a frame that is refused does not count
+        # A frame that was refused did not come this far, and leaves no trace.
+        self._unwrapper, self._last, self._at = unwrapper, row[0], self._at + 1
         return stream, fresh
 
 

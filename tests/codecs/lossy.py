@@ -99,9 +99,11 @@ def amc(data: Path, name: str) -> Motion:
 class Direct:
     """A clip coded and decoded by the codec alone."""
 
-    def __init__(self, codec: str, motion: Motion, **params: object) -> None:
+    def __init__(
+        self, codec: str, motion: Motion, *, segment_bytes: int = 2**26, **params: object
+    ) -> None:
         self.codec = by_name(codec)
-        source = MemorySource(motion, 0, self.codec, 2**26)
+        source = MemorySource(motion, 0, self.codec, segment_bytes)
         coded: Encoded = self.codec.encode(source, self.codec.options(params))
         self.header = coded.header
         self.segments: list[Segment] = list(coded.segments)

@@ -208,6 +208,16 @@ def test_a_window_decodes_without_the_others() -> None:
         np.testing.assert_array_equal(found, whole[20 * kept : 20 * kept + 20])
 
 
+@pytest.mark.parametrize("params", [{"preset": "hou2016"}, {"segment_frames": 50}], ids=str)
+def test_prefix_codes_are_those_of_segments_as_the_limit_leaves_them(params) -> None:
+    motion = markers(120, 2)
+    limit = 37 * 8 * 6  # bytes of 37 frames
+    params = {"step": 0.1, "basis": "cosines", "coder": "prefix", **params}
+    coded = Direct("lsdt-frame", motion, segment_bytes=limit, **params)
+    assert [span.n_frames for span in coded.spans] == [37, 37, 37, 9]
+    assert np.abs(coded.read() - motion.values).max() < 0.3
+
+
 def test_frames_behind_a_request_may_be_damaged() -> None:
     coded = Direct("lsdt-frame", markers(300, 3), step=0.2)
     data = coded.stream(0, 0, 0)
@@ -359,6 +369,19 @@ def test_a_live_decoder_waits_for_a_fresh_start() -> None:
     with pytest.raises(mcz.FormatError, match="not known"):
         decoder.push(*pushed[9])
     assert np.abs(decoder.push(*pushed[16]) - motion.values[16]).max() < 1
+
+
+def test_turns_of_a_frame_that_is_refused_live_are_forgotten() -> None:
+    motion = clip_of(np.zeros((1, 2)), ["rx", "tx"])
+    layout = Direct("lsdt-frame", motion, domain="channels").layout
+    options = FRAME.options({"step": 0.1, "domain": "channels"})
+    encoder, other = FRAME.live(layout, options), FRAME.live(layout, options)
+    frames = [np.array([10.0, 0.0]), np.array([175.0, 0.0])]
+    pushed = [encoder.push(frames[0]), other.push(frames[0])]
+    with pytest.raises(mcz.MotionError):
+        encoder.push(np.array([350.0, 1e300]))
+    pushed += [encoder.push(frames[1]), other.push(frames[1])]
+    assert pushed[::2] == pushed[1::2]
 
 
 def test_what_needs_all_frames_is_refused_live() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import _window_streams, lsdt_frame
-from mcz.codecs._windows import WINDOWS_HEADER, _space_of, temporal_of
+from mcz.codecs._windows import WINDOWS_HEADER, space_of_windows, temporal_of
 from mcz.coding import kernels
 from mcz.coding.huffman import class_of, codes_of
 from mcz.coding.residuals import bits, code_residual, side_of
@@ -157,7 +157,7 @@ def values_from(plan: Plan) -> NDArray[np.float64]:
             lsdt_frame._kernels().add_frames(out, coder._values, table, *coder._transform())
         return values
     fields = parse(WINDOWS_HEADER, header(plan), plan.codec)
-    space = _space_of(plan.codec, fields, plan.layout)
+    space = space_of_windows(plan.codec, fields, plan.layout)
     sizes, at = [n for _, own in plan.windows() for n in own], 0
     for n, table in zip(sizes, found, strict=True):
         _window_streams._kernels().synthesize(
