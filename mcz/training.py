@@ -280,7 +280,7 @@ class Trained:
         return rms
 
     def document(self) -> dict[str, Any]:
-        """For JSON and people."""
+        """For JSON and people; ``left_out`` is rms, at the start and after each iteration."""
         return {
             "bytes": len(self.data),
             "n_points": len(self.source.names),
@@ -294,6 +294,7 @@ class Trained:
                     "iterations": found.n_iterations,
                     "start": float(self.left_out(found)[0]),
                     "end": float(self.left_out(found)[-1]),
+                    "left_out": self.left_out(found).tolist(),
                 }
                 for found in self.learned
             ],

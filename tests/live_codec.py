@@ -110,7 +110,6 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     grouping="all",
-    delay=0,
     places=True,
     live=Encoder,
     follow=Decoder,

@@ -247,8 +247,7 @@ class Codec:
 
     ``decode`` returns int64 ordinals or binary64 values, as ``domain`` says, of shape
     (rows, channels of the requested groups in the order requested).
-    ``segmented``: memory is bounded by a segment. ``delay``: frames a live encoder holds back,
-    None where it cannot work live.
+    ``segmented``: memory is bounded by a segment.
 
     A clip may be cut without the codec's help, SPEC.md, "Cutting without re-encoding": whole
     segments at its ends, groups, and the streams of the finest resolutions are left out, and what
@@ -278,7 +277,6 @@ class Codec:
     decode: Decode
     grouping: Grouping = "joint"
     segmented: bool = True
-    delay: int | None = None
     parameters: tuple[Parameter, ...] = field(default=())
     dial: Dial | None = None
     cut: Cut | None = None

@@ -342,7 +342,6 @@ CODEC = Codec(
     decode=decode,
     regroup=regroup,
     recode=recode,
-    delay=0,
     parameters=(
         Parameter(
             "segment_frames",

@@ -350,7 +350,6 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     grouping="all",
-    delay=0,
     places=True,
     uses=uses,
     live=_LiveEncoder,

@@ -143,7 +143,6 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     recode=recode,
-    delay=0,
     parameters=(
         Parameter(
             "segment_frames",
