@@ -127,7 +127,9 @@ class _Quantizer:
             found = np.floor(sizes + 0.5)
             found[sizes < self.threshold] = 0
         if not (found <= MAX_INDEX).all():  # NaN too
-            raise MotionError(f"{self.name}: a coefficient exceeds 2^40 quantizer steps")
+            raise MotionError(
+                f"{self.name}: a coefficient exceeds 2^40 quantizer steps of {space.step:g}"
+            )
         signed: Floats = np.where(rows < 0, -found, found)
         return signed.astype(np.int64)
 

@@ -247,7 +247,10 @@ class _Coder:
             self.threshold,
         )
         if fault >= 0:
-            raise MotionError(f"{NAME}: a coefficient exceeds 2^40 quantizer steps")
+            raise MotionError(
+                f"{NAME}: a coefficient of frame {fault} of a segment exceeds 2^40 quantizer steps "
+                f"of {self.space.step:g}"
+            )
         return indices
 
     def build(self, indices: Ints) -> bytes:

@@ -84,6 +84,9 @@ def encode_live(
             writer.push(values)
             due += 1
             report.n_frames += 1
+    if arriving.declared not in (None, report.n_frames):
+        remark = f"{arriving.declared} frames are declared, {report.n_frames} came"
+        report.remarks = (*report.remarks, remark)
     return report
 
 

@@ -25,8 +25,9 @@ Frame = tuple[int | None, Floats]  # its number, None where the text has none, a
 class Arriving:
     """The header of a motion, read up to its first frame, and all of its frames in order.
 
-    Values are NaN where the text has none. ``frames`` raises SourceError, with the number of the
-    line, at text that is none of the format.
+    Values are NaN where the text has none. ``declared`` is how many frames the header says there
+    are, None where it says nothing that is a number. ``frames`` raises SourceError, with the number
+    of the line, at text that is none of the format.
     """
 
     skeleton: Skeleton
@@ -35,6 +36,7 @@ class Arriving:
     frame_rate_exact: bool = True
     metadata: Mapping[str, str] = field(default_factory=dict)
     first_number: int = 1
+    declared: int | None = None
 
 
 class Lines:

@@ -83,9 +83,10 @@ def arrive(lines: Iterator[bytes], skeleton: Skeleton | None = None) -> Arriving
     values = np.array([row for _, row in first]).reshape(-1, n_columns)
     rate, exact = frame_rate(data[slice(*time)].decode("latin-1"))
     declared = data[slice(*count)]
-    notes = _notes(encoding, n_strays, declared, int(declared) if declared.isdigit() else -1)
+    number = int(declared[:40]) if declared.isdigit() else None
+    notes = _notes(encoding, n_strays, declared, -1 if number is None else number)
     bones = Skeleton(with_positions(joints, values), unit_cm=None)
-    return Arriving(bones, chain(first, frames), rate, exact, notes)
+    return Arriving(bones, chain(first, frames), rate, exact, notes, declared=number)
 
 
 def _arriving(lines: Iterable[bytes], source: Lines, n_columns: int) -> Iterator[Frame]:

@@ -334,3 +334,12 @@ def test_what_is_refused_at_once_leaves_no_file(tmp_path: Path) -> None:
     code, _, errors = run("encode", "-", *STEP, *marked, "-o", target, data=data)
     assert code == 2 and "length unit is unknown" in errors
     assert not target.exists()
+
+
+def test_frames_that_did_not_come_are_remarked(tmp_path: Path) -> None:
+    target = tmp_path / "walk.mcz"
+    code, _, errors = run("encode", "-", *STEP, "-o", target, data=HEADER + LINES[0])
+    assert code == 0 and "3 frames are declared, 1 came" in errors
+    whole = HEADER + b"".join(LINES)
+    code, _, errors = run("encode", "-", *STEP, "-o", target, "--force", data=whole)
+    assert (code, errors) == (0, "")
