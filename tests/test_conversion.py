@@ -71,6 +71,16 @@ def test_an_order_away_from_gimbal_lock() -> None:
     assert np.abs(euler_angles(steep, order)[:, 1]).max() < np.deg2rad(60)
 
 
+def test_the_end_of_a_bone_stays_where_a_child_leaves_it() -> None:
+    """A child that begins at the tail and then moves does not stand for it."""
+    bone = Joint("bone", tails=((1.0, 0.0, 0.0),))
+    child = Joint("child", 0, (1.0, 0.0, 0.0), channels=(Channel("tx"),), adds_to_offset=False)
+    skeleton = Skeleton((bone, child), unit_cm=1.0, intrinsic=False)
+    motion = Motion(skeleton, (Signal(np.array([[5.0], [7.0]])),), Fraction(120))
+    before, after = positions(motion), positions(mcz.convert(motion, "bvh"))
+    assert farthest(before, after) < 1e-12
+
+
 @given(skeletons(), st.integers(0, 2**32))
 def test_any_skeleton_to_bvh(skeleton: Skeleton, seed: int) -> None:
     """Scales, lengths, quaternions, axes and radians included."""

@@ -23,7 +23,8 @@ from mcz.container.segments import FRESH
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
 from mcz.errors import FormatError
-from mcz.files.encoding import canonical, write_clip
+from mcz.files.digest import canonical
+from mcz.files.encoding import write_clip
 from mcz.files.report import validate
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 
 import mcz
-from mcz.files.encoding import canonical
+from mcz.files.digest import canonical
 from mcz.files.frames import frame_number_metadata, parse_frame_numbers
 from mcz.files.report import info
 from mcz.motion import Signal

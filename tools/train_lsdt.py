@@ -21,11 +21,12 @@ from pathlib import Path
 import numpy as np
 
 import mcz
-from mcz.codecs._bases import build_bases, rounded
+from mcz.codecs._bases import build_bases, falling_digits, rounded
 from mcz.training import SHIPPED, Recipe, Trained, training_set
 
 TRIES = (("dct", 20), ("haar", 20), ("dct", 40), ("haar", 40), ("dct", 80))
 VIRTUAL = Recipe(sparsity=16, iterations=150, growth=6, headings=4, every=4)
+VIRTUAL_DIGITS = 12, 5  # binary, from the first vector to the last: more save no bytes
 SHOWN = (0, 1, 10, 50, 100, 200, 300)
 
 
@@ -60,16 +61,11 @@ def main(out: str, *clips: str) -> None:
 def with_virtual_markers(out: str, *clips: str) -> None:
     motions = (mcz.in_positions(mcz.read(clip), virtual_markers=True) for clip in clips)
     trained = VIRTUAL.learn(training_set(motions))
-    bases = [rounded(found.basis, digits(len(found.basis))) for found in trained.learned]
+    digits = falling_digits(len(trained.source.names), *VIRTUAL_DIGITS)
+    bases = [rounded(found.basis, digits) for found in trained.learned]
     Path(out).write_bytes(build_bases(bases))
     for line in lines(trained):
         print(line, file=sys.stderr)
-
-
-def digits(n_vectors: int) -> np.ndarray:
-    """The binary digits of each vector, 12 to 5: more take bytes and save none."""
-    fall = 9 * np.arange(n_vectors) / max(1, n_vectors - 1)
-    return np.clip(np.rint(12 - fall), 5, None).astype(np.int64)
 
 
 if __name__ == "__main__":

@@ -205,6 +205,12 @@ def binary_output() -> BinaryIO:
     return sys.stdout.buffer
 
 
+def check_new(path: Path, force: bool) -> None:
+    """Raise Failure for a file that is there already, before work on it begins."""
+    if path.exists() and not force:
+        raise Failure(f"{path}: exists; --force overwrites it", Exit.USAGE)
+
+
 def write_output(path: Path, data: bytes, force: bool) -> None:
     """Write ``data`` under its name in one step, never over an existing file without ``force``."""
     from mcz.files.targets import replacing

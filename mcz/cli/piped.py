@@ -4,14 +4,24 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from io import FileIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, binary_output, plural, printable, say
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    binary_output,
+    check_new,
+    plural,
+    printable,
+    say,
+)
 
 NAME = "standard input"
 
@@ -61,23 +71,36 @@ def encode_lines(
 
 
 @contextmanager
-def _live_output(target: str | None, force: bool) -> Iterator[BinaryIO]:
+def _live_output(target: str | None, force: bool) -> Iterator[BinaryIO | _Late]:
     """Where frames go at once, so that what was written before a crash stays."""
     if target in (None, "-"):
         yield binary_output()
         return
     path = Path(str(target))
-    is_special = _is_special(path)
-    try:
-        stream = path.open("wb" if force or is_special else "xb", buffering=0)
-    except FileExistsError:
-        raise Failure(f"{path}: exists; --force overwrites it", Exit.USAGE) from None
-    try:
-        with stream:
-            yield stream
-    finally:
-        if not is_special and not path.stat().st_size:  # refused before anything was written
-            path.unlink()
+    if not _is_special(path):
+        check_new(path, force)
+    with _Late(path) as sink:
+        yield sink
+
+
+class _Late:
+    """A file that is opened for its first bytes: what is refused before leaves an old one alone."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._stack = ExitStack()
+        self._stream: FileIO | None = None
+
+    def __enter__(self) -> _Late:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def write(self, data: bytes, /) -> int | None:
+        if self._stream is None:
+            self._stream = self._stack.enter_context(FileIO(self._path, "wb"))
+        return self._stream.write(data)
 
 
 def _is_special(path: Path) -> bool:

@@ -12,6 +12,7 @@ import click
 from mcz.cli.common import (
     Exit,
     about,
+    check_new,
     existing,
     plural,
     print_json,
@@ -101,6 +102,7 @@ def command(
     """
     from mcz.training import Recipe, train
 
+    check_new(output, force)
     for path in clips:
         existing(path)
     with about(clips[0], *clips), Progress() as progress:

@@ -60,6 +60,12 @@ def rounded(vectors: Floats, shift: int | Sequence[int] | Ints = FINE) -> Basis:
     return Basis(shifts, np.rint(np.ldexp(vectors, shifts[:, None])).astype(np.int64))
 
 
+def falling_digits(n_vectors: int, most: int, least: int) -> Ints:
+    """Binary digits of each vector, fewer for later ones, which have next to no coefficients."""
+    fall = (most - least + 2) * np.arange(n_vectors) / max(1, n_vectors - 1)
+    return np.clip(np.rint(most - fall), least, None).astype(np.int64)
+
+
 def build_bases(bases: Sequence[Basis | Floats], shift: int = FINE) -> bytes:
     """The data of a model of ``bases``; vectors that are no integers yet get ``shift`` digits.
 

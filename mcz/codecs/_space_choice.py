@@ -20,6 +20,7 @@ from mcz.angles import Unwrapper
 from mcz.codecs._bases import (
     MAX_POINTS,
     Basis,
+    falling_digits,
     known_models,
     model_of,
     parse_bases,
@@ -257,14 +258,9 @@ def _learned(_digest: bytes, held: _Held, apart: bool) -> Model:
             growth=0,
             start=np.ascontiguousarray(np.linalg.eigh(points.T @ points)[1].T),
         )
-        bases.append(rounded(found.basis, _digits(len(found.basis))))
+        digits = falling_digits(len(found.basis), MOST_DIGITS, LEAST_DIGITS)
+        bases.append(rounded(found.basis, digits))
     return model_of(bases)
-
-
-def _digits(n_vectors: int) -> NDArray[np.int64]:
-    """The binary digits of each vector: the later ones have next to no coefficients."""
-    fall = (MOST_DIGITS - LEAST_DIGITS + 2) * np.arange(n_vectors) / max(1, n_vectors - 1)
-    return np.clip(np.rint(MOST_DIGITS - fall), LEAST_DIGITS, None).astype(np.int64)
 
 
 def _expected_bytes(

@@ -26,8 +26,9 @@ from mcz.codecs._bases import (
     rounded,
 )
 from mcz.codecs._frames import FrameReader
+from mcz.codecs._lossy import SEGMENT_FRAMES_PARAMETER, Presets, preset_parameter
 from mcz.codecs._space import APART, COSINES, COURSES, LEARNED, MEAN, WEIGHTED, columns_of
-from mcz.codecs._space_choice import Sample
+from mcz.codecs._space_choice import CODER, DOMAIN, STEP, VIRTUAL_MARKERS, Sample
 from mcz.codecs._wavelet_quantizer import ratio_of
 from mcz.codecs._windows import MAX_WINDOW, Plan
 from mcz.codecs.base import Model, Parameter, SignalSource, id_of, integer, number
@@ -306,30 +307,37 @@ def _cost(basis: Basis) -> Floats:
     return cost
 
 
-def window_parameter(default: int) -> Parameter:
-    return Parameter(
-        "window",
-        None,
-        f"frames a window; default {default}",
-        integer("window", 1, MAX_WINDOW),
+def parameters_of(presets: Presets, window: int) -> tuple[Parameter, ...]:
+    """Those of a codec with these presets, whose windows have ``window`` frames by default."""
+    return (
+        preset_parameter(presets),
+        STEP,
+        Parameter(
+            "window",
+            None,
+            f"frames a window; default {window}",
+            integer("window", 1, MAX_WINDOW),
+        ),
+        Parameter(
+            "threshold",
+            None,
+            f"coefficients below so many steps become 0; default {THRESHOLD}",
+            number("threshold", 0.5, 2.0**20),
+        ),
+        Parameter(
+            "rank",
+            None,
+            "vectors of each basis in space; default: as many as pay",
+            integer("rank", 1, MAX_POINTS),
+        ),
+        Parameter(
+            "frequencies",
+            None,
+            "coefficients of each row in time; default: as many as pay",
+            integer("frequencies", 1, MAX_WINDOW),
+        ),
+        CODER,
+        DOMAIN,
+        VIRTUAL_MARKERS,
+        SEGMENT_FRAMES_PARAMETER,
     )
-
-
-THRESHOLD_PARAMETER = Parameter(
-    "threshold",
-    None,
-    f"coefficients below so many steps become 0; default {THRESHOLD}",
-    number("threshold", 0.5, 2.0**20),
-)
-RANK = Parameter(
-    "rank",
-    None,
-    "vectors of each basis in space; default: as many as pay",
-    integer("rank", 1, MAX_POINTS),
-)
-FREQUENCIES = Parameter(
-    "frequencies",
-    None,
-    "coefficients of each row in time; default: as many as pay",
-    integer("frequencies", 1, MAX_WINDOW),
-)

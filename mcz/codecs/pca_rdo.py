@@ -15,25 +15,10 @@ from functools import partial
 from typing import Any
 
 from mcz.codecs import _windows
-from mcz.codecs._lossy import SEGMENT_FRAMES_PARAMETER, chosen_of, preset_parameter
+from mcz.codecs._lossy import chosen_of
 from mcz.codecs._space import APART, COURSES, MEAN, WEIGHTED
-from mcz.codecs._space_choice import (
-    CODER,
-    DOMAIN,
-    STEP,
-    VIRTUAL_MARKERS,
-    default_step,
-    sample_of,
-)
-from mcz.codecs._window_fit import (
-    FREQUENCIES,
-    RANK,
-    THRESHOLD,
-    THRESHOLD_PARAMETER,
-    asked_of,
-    plan_of,
-    window_parameter,
-)
+from mcz.codecs._space_choice import default_step, sample_of
+from mcz.codecs._window_fit import THRESHOLD, asked_of, parameters_of, plan_of
 from mcz.codecs.base import Codec, Dial, Encoded, SignalSource
 
 NAME = "pca-rdo"
@@ -69,16 +54,5 @@ CODEC = Codec(
     places=True,
     uses=partial(_windows.uses, NAME),
     dial=Dial("step", 2.0**-60, 2.0**60),
-    parameters=(
-        preset_parameter(PRESETS),
-        STEP,
-        window_parameter(WINDOW),
-        THRESHOLD_PARAMETER,
-        RANK,
-        FREQUENCIES,
-        CODER,
-        DOMAIN,
-        VIRTUAL_MARKERS,
-        SEGMENT_FRAMES_PARAMETER,
-    ),
+    parameters=parameters_of(PRESETS, WINDOW),
 )

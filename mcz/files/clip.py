@@ -25,7 +25,7 @@ from mcz.container.skeletons import parse_skeleton
 from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
 from mcz.files.clip_source import SourceInfo, of_no_file, read_source, skeleton_source
 from mcz.files.decimation import decimated, decimated_rows
-from mcz.files.encoding import value_hash
+from mcz.files.digest import value_hash
 from mcz.files.frames import parse_frame_numbers
 from mcz.files.signal_info import SignalInfo, read_signal
 from mcz.files.signals import SignalReader

@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.files.encoding import canonical
-
+ROWS = 4096  # at a time, so that hashing needs little memory
 PIECE = 2**20  # bytes of a mask that are made at a time
+
+
+def canonical(values: NDArray[Any]) -> bytes:
+    """The bytes that hashes and conformance compare: little-endian, row after row, one NaN."""
+    if values.dtype == np.int64:
+        return values.astype("<i8").tobytes()
+    return np.where(np.isnan(values), math.nan, values).astype("<f8").tobytes()
+
+
+def value_hash(values: NDArray[Any], mask: NDArray[np.bool_] | None) -> bytes:
+    """SHA-256 of the canonical array and, where any value is invalid, of the mask."""
+    digest = ValueDigest()
+    for start in range(0, len(values), ROWS):
+        rows = slice(start, start + ROWS)
+        digest.update(values[rows], None if mask is None else mask[rows])
+    return digest.digest()
 
 
 class ValueDigest:

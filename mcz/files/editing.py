@@ -25,7 +25,8 @@ from mcz.files.appending import lock
 from mcz.files.clip import Clip
 from mcz.files.clip_source import of_no_file
 from mcz.files.cutting import ClipCut, add_note, cut_segment, plan_cut
-from mcz.files.encoding import Progress, value_hash
+from mcz.files.digest import value_hash
+from mcz.files.encoding import Progress
 from mcz.files.extraction import Copier
 from mcz.files.file import File, open
 from mcz.files.quality import CHUNK, texts_of

@@ -6,7 +6,6 @@ Part of the joint between motion, codec and container (see ``file.py``).
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -24,6 +23,7 @@ from mcz.container.skeletons import build_skeleton, channel_fields
 from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
+from mcz.files.digest import value_hash
 from mcz.files.frames import KEY, frame_number_metadata
 from mcz.files.memory import MemorySource, place
 from mcz.files.quality import CHUNK, quality_payload
@@ -32,7 +32,6 @@ from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.schema import MAX_COUNT, build
 
 Progress = Callable[[int, int, str], None]
-HASHED_ROWS = 4096  # at a time, so that hashing needs little memory
 
 
 def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
@@ -268,23 +267,6 @@ def _write_segment(
     streams += segment.streams
     header = SegmentHeader(index, start, segment.n_frames, segment.lead, segment.tail, flags)
     writer.segment(header, streams)
-
-
-def canonical(values: NDArray[Any]) -> bytes:
-    """The bytes that hashes and conformance compare: little-endian, row after row, one NaN."""
-    if values.dtype == np.int64:
-        return values.astype("<i8").tobytes()
-    return np.where(np.isnan(values), math.nan, values).astype("<f8").tobytes()
-
-
-def value_hash(values: NDArray[Any], mask: NDArray[np.bool_] | None) -> bytes:
-    """SHA-256 of the canonical array and, where any value is invalid, of the mask."""
-    digest = hashlib.sha256()
-    for start in range(0, len(values), HASHED_ROWS):
-        digest.update(canonical(values[start : start + HASHED_ROWS]))
-    if mask is not None and not mask.all():
-        digest.update(mask.astype("u1").tobytes())
-    return digest.digest()
 
 
 def _decoded(coded: _Coded, segments: Sequence[Segment]) -> NDArray[np.float64]:

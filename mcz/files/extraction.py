@@ -39,8 +39,8 @@ from mcz.files.cutting import (
     cut_skeleton,
     plan_cut,
 )
-from mcz.files.digest import ValueDigest
-from mcz.files.encoding import Progress, value_hash
+from mcz.files.digest import ValueDigest, value_hash
+from mcz.files.encoding import Progress
 from mcz.files.file import File, open
 from mcz.files.signals import SignalReader
 from mcz.files.targets import replacing

@@ -343,3 +343,16 @@ def test_frames_that_did_not_come_are_remarked(tmp_path: Path) -> None:
     whole = HEADER + b"".join(LINES)
     code, _, errors = run("encode", "-", *STEP, "-o", target, "--force", data=whole)
     assert (code, errors) == (0, "")
+
+
+def test_what_is_refused_leaves_an_old_file_alone(tmp_path: Path) -> None:
+    target = tmp_path / "walk.mcz"
+    target.write_bytes(b"dear")
+    data = HEADER + b"".join(LINES)
+    marked = ("--param", "virtual_markers=true", "--force")
+    assert run("encode", "-", *STEP, *marked, "-o", target, data=data)[0] == 2
+    assert target.read_bytes() == b"dear"
+    assert run("encode", "-", *STEP, "-o", target, data=data)[0] == 2
+    assert target.read_bytes() == b"dear"
+    assert run("encode", "-", *STEP, "--force", "-o", target, data=data)[0] == 0
+    assert mcz.verify(target) == []

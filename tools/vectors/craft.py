@@ -23,7 +23,8 @@ from mcz.container.limits import BASE, Profile
 from mcz.container.packets import CHECK_SIZE, END, FRAME, SEGMENT, Packet, build_packet
 from mcz.container.segments import SegmentHeader, build_segment
 from mcz.container.writer import Writer, payload_id
-from mcz.files.encoding import canonical, write_clip
+from mcz.files.digest import canonical
+from mcz.files.encoding import write_clip
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import build, deflate, inflate, parse, varint
 from tools.vectors.edits import Edit, Made, put

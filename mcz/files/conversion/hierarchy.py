@@ -149,8 +149,12 @@ def _stretches(joint: Joint) -> bool:
 
 
 def _loose_tails(skeleton: Skeleton, index: int) -> tuple[Vector, ...]:
-    """The tails of a joint at which no child begins."""
-    children = {joint.offset for joint in skeleton.joints if joint.parent == index}
+    """The tails of a joint at which no child begins and stays."""
+    children = {
+        joint.offset
+        for joint in skeleton.joints
+        if joint.parent == index and not any(c.kind in POSITION_KINDS for c in joint.channels)
+    }
     return tuple(tail for tail in skeleton.joints[index].tails if tail not in children)
 
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from mcz.kinematics import point_names, point_set, positions
-from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.files.positions import in_positions
+from mcz.motion import Motion
 
 MM_CM = 0.1
 MM_PER_CM = 10.0
@@ -18,27 +16,15 @@ def to_c3d(motion: Motion) -> Motion:
 
     A motion of markers is returned as it is. A point whose place is not known is invalid.
     """
-    skeleton = motion.skeleton
-    if point_set(skeleton) == "markers":
-        return motion
-    points = positions(motion)
-    unit_cm = skeleton.unit_cm
-    if unit_cm is not None:
-        points *= unit_cm * MM_PER_CM
-    values = points.reshape(len(points), points.shape[1] * points.shape[2])
-    valid = ~np.isnan(values)
-    channels = tuple(Channel(kind) for kind in POSITION_KINDS)
-    converted = Skeleton(
-        tuple(Joint(name, channels=channels) for name in point_names(skeleton)),
-        skeleton.name,
-        None if unit_cm is None else MM_CM,
-        "",
-        skeleton.up_axis,
+    made = in_positions(motion)
+    unit_cm = motion.skeleton.unit_cm
+    if made is motion or unit_cm is None:
+        return replace(made, metadata=motion.metadata)
+    values = made.signals[0].values * (unit_cm * MM_PER_CM)
+    signal = replace(made.signals[0], values=values)
+    return replace(
+        made,
+        skeleton=replace(made.skeleton, unit_cm=MM_CM),
+        signals=(signal, *made.signals[1:]),
+        metadata=motion.metadata,
     )
-    signal = Signal(
-        np.where(valid, values, 0.0),
-        name=motion.signals[0].name,
-        samples_per_frame=motion.signals[0].samples_per_frame,
-        mask=None if valid.all() else valid,
-    )
-    return replace(motion, skeleton=converted, signals=(signal, *motion.signals[1:]))
