@@ -12,7 +12,8 @@
         ├── TruncatedError   they end too early
         ├── ChecksumError    a stored checksum does not match them
         ├── UnsupportedError they need a codec, version or chunk that this reader lacks
-        └── LimitError       they ask for more than the reader is willing to give
+        ├── LimitError       they ask for more than the reader is willing to give
+        └── LostFrameError   they need a frame that did not come
 
 A message says where (file, chunk, offset, line) and shows the value that was found.
 """
@@ -75,3 +76,7 @@ class UnsupportedError(FormatError):
 
 class LimitError(FormatError):
     """The file asks for more channels, memory or output than the profile or caller allows."""
+
+
+class LostFrameError(FormatError):
+    """A live frame that needs one that did not come, or came damaged."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.codecs.base import Codec, Encoded, Parameter, Segment, integer, number
-from mcz.errors import FormatError
+from mcz.errors import FormatError, LostFrameError, OptionError
 from mcz.schema import read_varint, varint
 
 ID = 252
@@ -53,6 +53,9 @@ class Encoder:
         self.at += 1
         return _packed(steps), fresh
 
+    def change(self, options):
+        raise OptionError("stairs: nothing changes")
+
 
 class Decoder:
     def __init__(self, header, layout):
@@ -66,11 +69,14 @@ class Decoder:
         if fresh:
             self.last = np.zeros(self.n_channels, np.int64)
         if self.last is None:
-            raise FormatError("stairs: nothing fresh came")
+            raise LostFrameError("stairs: nothing fresh came")
         self.last = self.last + steps
         if (np.abs(self.last) > 2**50).any():
             raise FormatError("stairs: too high")
         return self.last / 8
+
+    def skip(self, n_frames):
+        self.last = None if n_frames else self.last
 
 
 def encode(source, params):

@@ -14,6 +14,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs._live import LiveDecoder as LiveDecoder
+from mcz.codecs._live import LiveEncoder as LiveEncoder
 from mcz.errors import FormatError, OptionError
 from mcz.motion import Skeleton
 from mcz.numbers import Grid
@@ -202,32 +204,6 @@ Recode = Callable[
     [bytes, SignalSource, tuple[int, ...], Sequence[Span], Mapping[str, Any], Fetch],
     Iterator[tuple[bytes, ...]],
 ]
-
-
-class LiveEncoder(Protocol):
-    """Codes frames as they come, each into the one stream of a segment of one frame.
-
-    ``header`` and ``models`` are known before the first frame. ``n_resolutions`` is 1, and there is
-    one group.
-    """
-
-    header: bytes
-    models: tuple[Model, ...]
-
-    def push(
-        self, values: NDArray[np.float64], valid: NDArray[np.bool_] | None = None
-    ) -> tuple[bytes, bool]:
-        """The stream of the next frame, (n_channels,), and whether its segment starts fresh."""
-        ...
-
-
-class LiveDecoder(Protocol):
-    """The inverse: raises FormatError on bad bytes, and is of no use any more then until a fresh
-    segment comes."""
-
-    def push(self, stream: bytes, fresh: bool) -> NDArray[np.float64]:
-        """The values of the next frame, (n_channels,)."""
-        ...
 
 
 Live = Callable[[Layout, Mapping[str, Any]], LiveEncoder]  # a layout of 0 frames, options

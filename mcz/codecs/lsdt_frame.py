@@ -69,7 +69,7 @@ from mcz.codecs.base import (
 )
 from mcz.coding.start import start_state
 from mcz.coding.streams import code, uncode
-from mcz.errors import FormatError, MotionError, OptionError
+from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
 from mcz.schema import build, parse
 
 Floats = NDArray[np.float64]
@@ -325,6 +325,9 @@ class _LiveEncoder:
         self._unwrapper, self._last, self._at = unwrapper, row[0], self._at + 1
         return stream, fresh
 
+    def change(self, options: Mapping[str, Any]) -> None:
+        raise OptionError(f"{NAME}: {', '.join(options)} cannot change while frames come")
+
 
 class _LiveDecoder:
     """The inverse of ``_LiveEncoder``."""
@@ -337,11 +340,14 @@ class _LiveDecoder:
         if fresh:
             self._coder.restart()
         elif self._broken:
-            raise FormatError(f"{NAME}: a frame that needs the one before, which is not known")
+            raise LostFrameError(f"{NAME}: a frame needs the one before, which did not come")
         self._broken = True
         values: Floats = self._coder.decode(stream, 1, 1)[0]
         self._broken = False
         return values
+
+    def skip(self, n_frames: int) -> None:
+        self._broken = self._broken or n_frames > 0
 
 
 CODEC = Codec(
