@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         ExistsError,
         FormatError,
         LimitError,
+        LostFrameError,
         MczError,
         MotionError,
         OptionError,
@@ -25,24 +26,29 @@ if TYPE_CHECKING:
     )
     from mcz.files.archive import Outcome, Report, append, pack, unpack
     from mcz.files.clip import Clip
+    from mcz.files.concealing import LiveFrame
     from mcz.files.conversion import Fit, convert, from_positions
     from mcz.files.editing import Replacement, replace
     from mcz.files.extraction import ExtractedClip, Extraction, extract
     from mcz.files.file import Attachment, File, encode, open, read, write
+    from mcz.files.filtering import post_filter
     from mcz.files.following import live_frames
     from mcz.files.live import LiveWriter
     from mcz.files.positions import in_positions
     from mcz.files.report import Problem, verify
     from mcz.files.sources import read_skeleton
+    from mcz.files.streams import LiveReader, stream_decode, stream_encode
+    from mcz.files.tolerant import StreamSummary
     from mcz.kinematics import positions
     from mcz.metrics import Comparison, compare
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 _HOMES = {
     "mcz.files.archive": ("Outcome", "Report", "append", "pack", "unpack"),
     "mcz.files.clip": ("Clip",),
+    "mcz.files.concealing": ("LiveFrame",),
     "mcz.files.conversion": ("Fit", "convert", "from_positions"),
     "mcz.files.editing": ("Replacement", "replace"),
     "mcz.errors": (
@@ -51,6 +57,7 @@ _HOMES = {
         "ExistsError",
         "FormatError",
         "LimitError",
+        "LostFrameError",
         "MczError",
         "MotionError",
         "OptionError",
@@ -60,6 +67,7 @@ _HOMES = {
     ),
     "mcz.files.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.files.file": ("Attachment", "File", "encode", "open", "read", "write"),
+    "mcz.files.filtering": ("post_filter",),
     "mcz.files.positions": ("in_positions",),
     "mcz.files.following": ("live_frames",),
     "mcz.files.live": ("LiveWriter",),
@@ -68,6 +76,8 @@ _HOMES = {
     "mcz.metrics": ("Comparison", "compare"),
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
     "mcz.files.sources": ("read_skeleton",),
+    "mcz.files.streams": ("LiveReader", "stream_decode", "stream_encode"),
+    "mcz.files.tolerant": ("StreamSummary",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -87,7 +97,10 @@ __all__ = [
     "FormatError",
     "Joint",
     "LimitError",
+    "LiveFrame",
+    "LiveReader",
     "LiveWriter",
+    "LostFrameError",
     "MczError",
     "Motion",
     "MotionError",
@@ -100,6 +113,7 @@ __all__ = [
     "Skeleton",
     "Source",
     "SourceError",
+    "StreamSummary",
     "TruncatedError",
     "UnsupportedError",
     "append",
@@ -113,9 +127,12 @@ __all__ = [
     "open",
     "pack",
     "positions",
+    "post_filter",
     "read",
     "read_skeleton",
     "replace",
+    "stream_decode",
+    "stream_encode",
     "unpack",
     "verify",
     "write",

@@ -47,8 +47,8 @@ def _watch(compiled: Any) -> None:
 @cache
 def _shared_stamp() -> tuple[tuple[str, int, int], ...]:
     """Name, time and size of every file of loops that others are compiled with."""
-    folder = Path(__file__).with_name("coding")
-    files = sorted(folder.glob("*.py"))
+    package = Path(__file__).parent
+    files = sorted([*package.glob("coding/*.py"), *package.glob("codecs/_*_kernels.py")])
     return tuple((file.name, file.stat().st_mtime_ns, file.stat().st_size) for file in files)
 
 

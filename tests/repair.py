@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import mcz
 from mcz.container import payloads
 from mcz.container.chunks import FOOT, HEADER, SIGNATURE, Chunk, build_chunk, build_foot
+from mcz.container.packets import END, FRAME, NUMBERED, Packet, build_packet, read_packets
 from mcz.container.scan import scan
 from mcz.container.segments import StreamCounts, parse_table
 from mcz.container.source import open_source
@@ -74,6 +77,31 @@ def with_index_content(data: bytes, change: object) -> bytes:
     fields = {"size": len(content), "data": deflate(content)}
     chunk = build_chunk(b"INDX", build(payloads.INDX, fields, "INDX"))
     return data[:start] + chunk + build_foot(start, len(chunk))
+
+
+def with_packets(data: bytes, change: Callable[[Packet], Packet]) -> bytes:
+    """The file, without an index, with every packet passed through ``change``."""
+    out, at = b"", 0
+    for chunk in scan(open_source(data)).chunks:
+        if chunk.length is None:
+            stream = io.BytesIO(data)
+            stream.seek(chunk.payload_offset)
+            packets = [change(packet) for packet in read_packets(stream.read, 2**20)]
+            end = Packet(END, len(packets), b"")
+            out += data[at : chunk.payload_offset] + b"".join(map(build_packet, [*packets, end]))
+            at = stream.tell()
+    return out + data[at : FOOT.unpack(data[-FOOT.size :])[2]] + build_foot(0, 0)
+
+
+def as_kind_2(data: bytes) -> bytes:
+    """The file as format 0.3 has it: packets of frames do not check the frame's number."""
+
+    def change(packet: Packet) -> Packet:
+        if packet.kind != NUMBERED:
+            return packet
+        return replace(packet, kind=FRAME, check=None)
+
+    return with_packets(data, change)
 
 
 def use(data: bytes, *, salvage: bool = False) -> None:

@@ -35,7 +35,7 @@ ALLOWED = {
     "container": MODEL,
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},
-    "files": MODEL | {"kinematics", "metrics", "codecs", "container", "formats"},
+    "files": MODEL | {"kinematics", "metrics", "transforms", "codecs", "container", "formats"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL | {"kinematics", "metrics", "files", "sample", "training"},
     # On top of all: it measures every part by itself.

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import struct
+import zlib
 
 import numpy as np
 import pytest
@@ -11,7 +13,17 @@ import mcz
 from mcz.codecs import by_name
 from mcz.container import chunks, payloads
 from mcz.container.chunks import ANCILLARY, FOOT, SAFE_TO_COPY, build_chunk, build_foot
-from mcz.container.packets import END, FRAME, Packet, build_packet, read_packets
+from mcz.container.packets import (
+    END,
+    FRAME,
+    NUMBERED,
+    Packet,
+    body_check,
+    build_packet,
+    check_number,
+    numbered_frame,
+    read_packets,
+)
 from mcz.container.payloads import FORMAT_MINOR
 from mcz.container.reader import Container
 from mcz.container.scan import scan
@@ -193,6 +205,29 @@ def test_packets_round_trip_and_order() -> None:
         list(read_packets(io.BytesIO(swapped).read, 100))
     with pytest.raises(LimitError):
         list(read_packets(io.BytesIO(data).read, 2))
+
+
+def test_numbered_packets_round_trip() -> None:
+    """As kind 2, byte for byte, but for the first byte and the two checks."""
+    for sequence, number, body in ((0, 0, b""), (1, 2**53, b"one"), (300, 7, bytes(200))):
+        packet = numbered_frame(sequence, number, body, fresh=sequence == 1)
+        data = build_packet(packet)
+        plain = build_packet(Packet(FRAME, sequence, body, sequence == 1))
+        assert len(data) == len(plain)
+        check = zlib.crc32(body + struct.pack("<Q", number)) & 0xFFFF
+        assert data[-2:] == struct.pack("<H", check) == body_check(body, number)
+        before = [Packet(FRAME, n, b"") for n in range(sequence)]
+        whole = b"".join(map(build_packet, [*before, packet, Packet(END, sequence + 1, b"")]))
+        (found,) = list(read_packets(io.BytesIO(whole).read, 300))[sequence:]
+        assert found == packet
+        assert found.kind == NUMBERED
+        check_number(found, number)
+        for other in (number + 1, number + 10, number + 2**32):
+            with pytest.raises(ChecksumError, match=f"{sequence} is not that of frame {other}"):
+                check_number(found, other)
+        with pytest.raises(ChecksumError):
+            check_number(Packet(NUMBERED, sequence, body, True, body_check(body)), number)
+    check_number(Packet(FRAME, 0, b"any"), 5)  # it says nothing of a number
 
 
 def test_open_data_reads_like_closed() -> None:

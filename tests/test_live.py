@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import tracemalloc
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -19,7 +20,15 @@ import mcz
 from mcz import codecs
 from mcz.container import payloads
 from mcz.container.chunks import FOOT, OPEN_LENGTH, build_chunk, build_foot, build_header
-from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet
+from mcz.container.packets import (
+    END,
+    FRAME,
+    NUMBERED,
+    SEGMENT,
+    Packet,
+    build_packet,
+    numbered_frame,
+)
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH, SegmentHeader
 from mcz.container.writer import Writer
@@ -32,7 +41,7 @@ from mcz.motion import POSITION_KINDS, Channel, Joint, Skeleton
 from mcz.schema import build, parse
 from tests import live_codec
 from tests.motions import skeleton, smooth
-from tests.repair import flipped, use
+from tests.repair import as_kind_2, flipped, use, with_packets
 from tests.test_container import parts_of
 
 ROOT = Path(mcz.__file__).parent.parent
@@ -74,6 +83,7 @@ def test_reads_like_any_clip() -> None:
         assert clip.frame_rate == 120
         kinds = [row.packet for row in clip.signals[0].rows]
         assert [i for i, kind in enumerate(kinds) if kind == SEGMENT] == [0, 7, 10, 20]
+        assert {*kinds} == {SEGMENT, NUMBERED}
         assert sum(size for _, size, _ in layout(file)) == len(data)
     use(data)
     use(data, salvage=True)
@@ -257,11 +267,15 @@ def test_sizes_count_the_framing() -> None:
         assert row.cend is not None
         bodies = sum(segment.size for segment in row.segments)
         between = row.cend.offset - (row.clip.offset + row.clip.size)
-        assert packet_framing(row.segments) == between - bodies
-        assert clip["packet_bytes"] == between - bodies
+        repeats = sum(
+            20 + len(payload) for chunk, payload in parts_of(data) if chunk.type == b"REPT"
+        )
+        assert clip["between_bytes"] == repeats > 0
+        assert packet_framing(row.segments) == between - repeats - bodies
+        assert clip["packet_bytes"] == between - repeats - bodies
         assert clip["packets"] == 23
         assert clip["payload_bytes"] + clip["overhead_bytes"] + clip["hash_bytes"] == (
-            row.cend.offset + row.cend.size - row.clip.offset
+            row.cend.offset + row.cend.size - row.clip.offset - repeats
         )
 
 
@@ -311,8 +325,16 @@ def packets_of(data: bytes) -> list[list[Packet]]:
         if row.packet == SEGMENT and row.header.flags & FRESH:
             found.append([])
         body = data[row.offset : row.offset + row.size]
-        found[-1].append(Packet(row.packet, len(found[-1]), body, bool(row.header.flags & FRESH)))
+        packet = Packet(row.packet, len(found[-1]), body, bool(row.header.flags & FRESH))
+        found[-1].append(with_body(packet, row.header.first, body))
     return found
+
+
+def with_body(packet: Packet, number: int, body: bytes) -> Packet:
+    """The packet of frame ``number`` with another body, and the check of that."""
+    if packet.kind == NUMBERED:
+        return numbered_frame(packet.sequence, number, body, fresh=packet.fresh)
+    return replace(packet, body=body)
 
 
 def assembled(data: bytes, chunks: list[list[Packet]]) -> bytes:
@@ -342,7 +364,7 @@ def test_bodies_flipped_and_cut_behind_repaired_checks() -> None:
             bodies += [packet.body[:size] for size in range(len(packet.body))]
             for body in bodies[:: max(1, len(bodies) // 40)]:
                 changed = [list(part) for part in chunks]
-                changed[which][number] = Packet(packet.kind, number, body, packet.fresh)
+                changed[which][number] = with_body(packet, 10 * which + number, body)
                 bad = assembled(data, changed)
                 for how in (False, True):
                     try:
@@ -353,11 +375,15 @@ def test_bodies_flipped_and_cut_behind_repaired_checks() -> None:
                     list(live_frames(io.BytesIO(bad)))
 
 
+@pytest.mark.parametrize("kind", [FRAME, NUMBERED])
 @pytest.mark.parametrize("salvage", [False, True])
-def test_a_frame_whose_number_nobody_told(salvage: bool) -> None:
+def test_a_frame_whose_number_nobody_told(salvage: bool, kind: int) -> None:
     data = live(frames())
     first, second, third = packets_of(data)
-    orphan = [Packet(FRAME, n, p.body, p.fresh) for n, p in enumerate(second[1:])]
+    orphan = [
+        with_body(Packet(kind, n, p.body, p.fresh), 10 + n, p.body)
+        for n, p in enumerate(second[1:])
+    ]
     bad = assembled(data, [first, orphan, third])
     if not salvage:
         with pytest.raises(mcz.FormatError, match="tells its frame"):
@@ -439,13 +465,82 @@ def test_an_undecodable_frame_is_salvaged_around() -> None:
     data = live(frames())
     chunks = packets_of(data)
     bad = chunks[1][3]
-    chunks[1][3] = Packet(bad.kind, bad.sequence, b"\xff", bad.fresh)
+    chunks[1][3] = with_body(bad, 13, b"\xff")
     with mcz.open(assembled(data, chunks), salvage=True) as file:
         found = file.clips["live"].read()
         lost = np.isnan(found).all(axis=1)
         np.testing.assert_array_equal(np.flatnonzero(lost), np.arange(13, 20))
         np.testing.assert_array_equal(found[~lost], frames()[~lost])
         assert len(file.damage) == 2
+
+
+def test_packets_of_kind_2_are_still_read(tmp_path: Path) -> None:
+    """As format 0.3 has them, with or without losses; what is rewritten has none of them."""
+    data = live(frames())
+    old = as_kind_2(data)
+    with mcz.open(old) as file, mcz.open(data) as other:
+        clip = file.clips["live"]
+        assert {row.packet for row in clip.signals[0].rows} == {SEGMENT, FRAME}
+        np.testing.assert_array_equal(clip.read(), frames())
+        assert info(file)["clips"][0]["packets"] == 23
+        sizes = [info(one)["clips"][0]["packet_bytes"] for one in (file, other)]
+        assert sizes[0] == sizes[1]
+    assert mcz.verify(old) == []
+    assert len(list(live_frames(io.BytesIO(old)))) == 23
+    assert {f.state for f in mcz.stream_decode(io.BytesIO(old), lost="hold")} == {"decoded"}
+    (path := tmp_path / "old.mcz").write_bytes(old)
+    (again := tmp_path / "again.mcz").write_bytes(data)
+    for start in (path, again):
+        mcz.extract(start, tmp_path / "cut.mcz", frames=(5, 18))
+        with mcz.open(tmp_path / "cut.mcz") as file:
+            np.testing.assert_array_equal(file.clips["live"].read(), frames()[5:18])
+        (tmp_path / "cut.mcz").unlink()
+
+
+def test_a_numbered_frame_is_in_its_place() -> None:
+    """A strict reader refuses the check of any other frame, and that of the body alone."""
+    data = live(frames())
+    wrong = [numbered_frame(4, number, b"", fresh=False).check for number in (0, 4, 13, 15, 2**53)]
+    for check in (None, *wrong):
+        count = 0
+
+        def change(packet: Packet) -> Packet:
+            nonlocal count
+            count += 1
+            if count != 15:  # frame 14
+                return packet
+            assert packet.kind == NUMBERED
+            return replace(packet, body=b"", check=check)  # noqa: B023 - used at once
+
+        bad = with_packets(data, change)
+        for read in (mcz.open, lambda data: list(live_frames(io.BytesIO(data)))):
+            with pytest.raises(mcz.ChecksumError, match="packet 4 is not that of frame 14"):
+                read(bad)
+        with mcz.open(bad, salvage=True) as file:
+            found = file.clips["live"].read()
+        assert np.isnan(found[14:20]).all()
+        np.testing.assert_array_equal(found[:14], frames()[:14])
+        np.testing.assert_array_equal(found[20:], frames()[20:])
+        got = list(mcz.stream_decode(io.BytesIO(bad), lost="missing"))
+        assert "".join(frame.state[0] for frame in got) == 14 * "d" + 6 * "m" + 3 * "d"
+
+
+def test_by_the_index_a_numbered_frame_is_in_its_place() -> None:
+    """Frames 14 and 15 change places; INDX, which says where they lie, is right."""
+    data = live(frames())
+    with mcz.open(data) as file:
+        rows = file.clips["live"].signals[0].rows
+        one, other = rows[14], rows[15]
+    assert one.size == other.size > 0
+    bad = bytearray(data)
+    bad[one.offset : one.stop + 2] = data[other.offset : other.stop + 2]
+    bad[other.offset : other.stop + 2] = data[one.offset : one.stop + 2]
+    with (
+        mcz.open(bytes(bad)) as file,
+        pytest.raises(mcz.ChecksumError, match="not that of frame 14"),
+    ):
+        file.clips["live"].read()
+    assert mcz.verify(bytes(bad)) != []
 
 
 def test_the_index_must_say_what_the_packet_says() -> None:
@@ -456,11 +551,10 @@ def test_the_index_must_say_what_the_packet_says() -> None:
         directory = file.container.directory
         clip: ClipRow = directory.clips["live"]
         start = file.container.index.index_offset
-    from dataclasses import replace
-
     row = clip.segments[2]
     header = SegmentHeader(0, 2, 1, flags=FRESH)
-    for changed in (replace(row, header=header), replace(row, packet=SEGMENT)):
+    others = [replace(row, packet=kind) for kind in (0, SEGMENT, FRAME)]
+    for changed in (replace(row, header=header), *others):
         clip.segments[2] = changed
         chunk = build_index(directory)
         bad = data[:start] + chunk + build_foot(start, len(chunk))

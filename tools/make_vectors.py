@@ -35,6 +35,9 @@ from tools.vectors import (  # noqa: E402 - needs the path
     bad_mrdwt,
     bad_notes,
     bad_numbers,
+    bad_online,
+    bad_online_streams,
+    bad_online_units,
     bad_qbc,
     bad_shared,
     bad_sources,
@@ -44,6 +47,7 @@ from tools.vectors import (  # noqa: E402 - needs the path
     uncommon,
     valid_container,
     valid_cut,
+    valid_filtered,
     valid_khan,
     valid_lossless,
     valid_lossless_clips,
@@ -54,6 +58,8 @@ from tools.vectors import (  # noqa: E402 - needs the path
     valid_mrdwt_clips,
     valid_notes,
     valid_numbers,
+    valid_online,
+    valid_online_clips,
     valid_qbc,
     valid_raw,
 )
@@ -74,7 +80,10 @@ MODULES = (
     valid_lsdt,
     valid_lsdt_clips,
     valid_lsdt_windows,
+    valid_online,
+    valid_online_clips,
     valid_cut,
+    valid_filtered,
     sources,
     sources_c3d,
     sources_text,
@@ -94,10 +103,13 @@ MODULES = (
     bad_lsdt,
     bad_lsdt_models,
     bad_lsdt_streams,
+    bad_online,
+    bad_online_units,
+    bad_online_streams,
     bad_sources,
     bad_c3d,
 )
-FORMAT_VERSION = "0.3"
+FORMAT_VERSION = "0.4"
 
 
 def vectors() -> list[Vector]:

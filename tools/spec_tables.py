@@ -38,6 +38,7 @@ MODULES = (
     "mcz.codecs._prefix_streams",
     "mcz.codecs._windows",
     "mcz.codecs.lsdt_frame",
+    "mcz.codecs._online_coder",
     "mcz.formats.layout",
     "mcz.formats.notes",
     "mcz.formats.c3d_layout",

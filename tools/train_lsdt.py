@@ -1,10 +1,12 @@
 """Train the bases that ship with the package: those of the 31 points of the CMU ASF skeleton.
 
     python tools/train_lsdt.py OUT.bin CLIP.amc...
+    python tools/train_lsdt.py --bvh OUT.bin CLIP.amc...
     python tools/train_lsdt.py --virtual-markers OUT.bin CLIP.amc...
 
 The recipe is ``mcz.training.SHIPPED``, tried from several starts, of which the best basis of each
-coordinate is kept; ``mcz train`` takes any other. With three virtual markers a joint beside the
+coordinate is kept; ``mcz train`` takes any other. With --bvh the clips are converted first, and the
+points are the 38 of CMU's BVH files. With three virtual markers a joint beside the
 points it is ``VIRTUAL``: mirrored axes are no axes, and one start of so many points is near enough.
 The clips were those of ``mcz.bench.hou2016_training.TRAINING_CLIPS``, in that order. BLAS differs
 between machines in the last digits, which may turn an entry: what is normative is the file, by its
@@ -15,6 +17,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from fractions import Fraction
 from functools import reduce
 from pathlib import Path
 
@@ -42,11 +45,15 @@ def lines(trained: Trained) -> list[str]:
     return found
 
 
-def main(out: str, *clips: str) -> None:
+def main(out: str, *given: str) -> None:
+    clips = list(given)
     if out == "--virtual-markers":
         with_virtual_markers(*clips)
         return
-    found = training_set(map(mcz.read, clips))
+    as_bvh = out == "--bvh"
+    if as_bvh:
+        out, *clips = clips
+    found = training_set(_converted(clip) if as_bvh else mcz.read(clip) for clip in clips)
     tries = []
     for start, growth in TRIES:
         tries.append(replace(SHIPPED, start=start, growth=growth).learn(found))
@@ -56,6 +63,11 @@ def main(out: str, *clips: str) -> None:
     print(f"{out}: {len(trained.data)} bytes from {trained.n_vectors} vectors", file=sys.stderr)
     for line in lines(trained):
         print(line, file=sys.stderr)
+
+
+def _converted(clip: str) -> mcz.Motion:
+    motion = mcz.read(clip)
+    return mcz.convert(replace(motion, frame_rate=motion.frame_rate or Fraction(120)), "bvh")
 
 
 def with_virtual_markers(out: str, *clips: str) -> None:

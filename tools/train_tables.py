@@ -1,6 +1,6 @@
 """Train the start tables of lossy codecs: the states in which their coders begin.
 
-    python tools/train_tables.py wavelet|qbc|pca|window|frame OUT.json FILE...
+    python tools/train_tables.py wavelet|qbc|pca|window|frame|online OUT.json FILE...
 
 The files are coded twice, with every setting below, by coders that are never reset; see
 ``tools/start_tables.py``.
@@ -22,6 +22,7 @@ import numpy as np
 import mcz
 from mcz.codecs import (
     _frame_kernels,
+    _online_coder,
     _pca_kernels,
     _pca_streams,
     _qbc_kernels,
@@ -32,6 +33,7 @@ from mcz.codecs import (
     lsdt_clip,
     lsdt_frame,
     mrdwt,
+    online,
     pca,
     qbc,
 )
@@ -133,6 +135,24 @@ PLANS = {
             {"step": 0.05},
             {"step": 1.0},
             {"step": 0.2},
+        ),
+    ),
+    "online": Plan(
+        _online_coder,
+        online.CODEC,
+        (3 * residuals.N_MIXERS,) * 2 + (0,) * 2,
+        20,  # of the few bits of a group
+        (
+            {"step": 0.2},
+            {"preset": "mod", "step": 1.0},
+            {"step": 1.0, "intra_period": 2},
+            {"preset": "mod", "step": 0.3, "intra_period": 2, "ltr_step": 0.5},
+            {"step": 0.4, "ltr_step": 1},
+            {"preset": "mod", "step": 2.0, "intra_period": 3},
+            {"step": 2.0, "intra_period": 1},
+            {"preset": "mod", "step": 0.6, "ltr_step": 0.4},
+            {"step": 0.6, "ltr_step": 0.3},
+            {"preset": "mod", "step": 1.4},
         ),
     ),
 }

@@ -311,13 +311,13 @@ def to_params(
         key, equals, text = value.partition("=")
         if not equals or not key:
             raise click.BadParameter(f"{value!r} is not KEY=VALUE")
-        pairs[key] = _literal(text)
+        pairs[key] = literal(text)
     return pairs
 
 
-def _literal(text: str) -> Any:
+def literal(text: str) -> Any:
     """
-    >>> _literal("3"), _literal("4.4"), _literal("true"), _literal("bior4.4")
+    >>> literal("3"), literal("4.4"), literal("true"), literal("bior4.4")
     (3, 4.4, True, 'bior4.4')
     """
     for kind in (int, float):

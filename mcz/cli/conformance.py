@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from mcz.files.clip import Clip
     from mcz.files.file import File
 
-OPTIONS = ("--clip", "--frames", "--joints", "--resolution")
+OPTIONS = ("--clip", "--frames", "--joints", "--resolution", "--post-filter")
 MAX_LINE = 2**20
 Part = tuple[dict[str, Any], bytes]  # a row of the listing, and its bytes
 
@@ -52,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--frames", type=_range)
     parser.add_argument("--joints", type=_integers)
     parser.add_argument("--resolution", type=int, default=0)
+    parser.add_argument("--post-filter", action="store_true")
     return parser
 
 
@@ -103,10 +104,20 @@ def _clip_arrays(clip: Clip, given: argparse.Namespace) -> Iterator[Part]:
         if given.joints is not None and signal.channels is not None:
             continue
         resolution = signal.coarser(given.resolution) if signal.index else given.resolution
-        values, mask = clip.read_masked(given.frames, given.joints, resolution, signal=signal.index)
+        values, mask = _values(clip, given, resolution, signal.index)
         yield _part(clip.name, signal.name, "values", values)
         if mask is not None and not mask.all():
             yield _part(clip.name, signal.name, "mask", mask)
+
+
+def _values(
+    clip: Clip, given: argparse.Namespace, resolution: int, signal: int
+) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+    if given.post_filter and not signal:
+        from mcz.files.filtering import filtered_part
+
+        return filtered_part(clip, given.frames, given.joints, resolution)
+    return clip.read_masked(given.frames, given.joints, resolution, signal=signal)
 
 
 def _part(clip: str, signal: str, array: str, values: NDArray[Any]) -> Part:

@@ -7,7 +7,6 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
-import numpy as np
 
 from mcz.cli.common import (
     Exit,
@@ -22,10 +21,11 @@ from mcz.cli.common import (
     to_rate,
     write_output,
 )
+from mcz.cli.fits import facts_of, told
 from mcz.cli.options import decoded_option, force_option, json_option
+from mcz.cli.parts import Filtered, Part, Preview
 
 if TYPE_CHECKING:
-    from mcz.cli.export import Table
     from mcz.files.clip import Clip
     from mcz.files.conversion import Fit
     from mcz.files.file import File
@@ -35,12 +35,25 @@ Output = tuple[str, str, bytes]  # kind, file name, content
 CONVERSIONS = ("bvh", "amc", "c3d")
 
 
-class _Part(NamedTuple):
-    """What of a clip is wanted: the arguments of ``Clip.motion``."""
+class _Wanted(NamedTuple):
+    """What of a file is wanted, and as what: the options of these names."""
 
-    frames: tuple[int, int] | None
+    name: str | None
+    frames: tuple[int, int | None] | None
+    joints: str | None
     resolution: int
     decimate: bool
+    preview: bool
+    filtered: bool
+    target: str | None
+    rate: Fraction | None
+    solve: bool
+    with_skeleton: bool
+
+    @property
+    def is_converted(self) -> bool:
+        """Whether the target is a format of motions."""
+        return self.target in CONVERSIONS
 
 
 @click.command(short_help="The original file again, or its numbers.")
@@ -73,6 +86,12 @@ class _Part(NamedTuple):
     help="Only frames that can be read without decoding the rest (with --to).",
 )
 @click.option(
+    "--post-filter",
+    "filtered",
+    is_flag=True,
+    help="Filter the noise of a coarse codec out of the places of markers.",
+)
+@click.option(
     "--to",
     "target",
     type=click.Choice(["csv", "npz", *CONVERSIONS]),
@@ -82,7 +101,7 @@ class _Part(NamedTuple):
     "--rate",
     metavar="R",
     callback=to_rate,
-    help="Frames a second (with --to bvh or c3d), where the clip does not know them.",
+    help="Frames a second, where the clip does not know them (--to bvh or c3d, --post-filter).",
 )
 @click.option(
     "--solve-ik",
@@ -98,91 +117,99 @@ class _Part(NamedTuple):
 def command(
     file: str,
     output: str | None,
-    name: str | None,
-    frames: tuple[int, int | None] | None,
-    joints: str | None,
-    resolution: int,
-    decimate: bool,
-    preview: bool,
-    target: str | None,
-    rate: Fraction | None,
-    solve: bool,
-    with_skeleton: bool,
     salvage: bool,
     max_decoded: int | None,
     force: bool,
     as_json: bool,
+    **options: Any,
 ) -> Exit:
     """Write the original file of a clip, byte for byte, or its numbers, or another format.
 
     A file without clips gives its skeleton's ASF or its attachment.
     """
-    if target in (None, *CONVERSIONS) and joints is not None:
-        raise Failure("--joints needs --to csv or --to npz", Exit.USAGE)
-    if preview and (target is None or frames is not None or resolution or salvage):
-        raise Failure(
-            "--preview needs --to, and goes with none of --frames --resolution --salvage",
-            Exit.USAGE,
-        )
-    if decimate and not resolution:
-        raise Failure("--decimate needs --resolution", Exit.USAGE)
-    if rate is not None and target not in CONVERSIONS:
-        raise Failure(f"--rate needs --to {' or '.join(CONVERSIONS)}", Exit.USAGE)
-    if solve and target not in ("amc", "bvh"):
-        raise Failure("--solve-ik needs --to amc or --to bvh", Exit.USAGE)
-    if output == "-" and (as_json or with_skeleton):
+    wanted = _Wanted(**options)
+    _check_options(wanted, salvage)
+    if output == "-" and (as_json or wanted.with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
     fit: Fit | None = None
     with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
         if held.clips:
-            clip = held.only_clip(name)
-            part = _Part(_cut(clip, frames), resolution, decimate)
-            if target is None:
-                outputs = [_source(clip, part)]
-            elif target in CONVERSIONS:
-                motion = _motion(clip, part, preview)
-                if solve:
-                    motion, fit = _solved(clip, motion)
-                elif target in ("amc", "bvh"):
-                    _check_moves(clip)
-                outputs = _converted(motion, target, rate, with_skeleton)
-            else:
-                outputs = [_export(clip, target, part, joints, preview)]
-            if with_skeleton and target != "amc":
-                outputs.append(_skeleton(held, clip.skeleton_id))
-        elif target is not None or frames is not None:
-            raise Failure(f"{file}: it has no clips, so --to and --frames do not apply", Exit.USAGE)
+            outputs, fit = _of_clip(held, wanted)
+        elif wanted.target is not None or wanted.frames is not None or wanted.filtered:
+            raise Failure(
+                f"{file}: it has no clips, so --to, --frames and --post-filter do not apply",
+                Exit.USAGE,
+            )
         else:
-            outputs = [_other(held, name)]
+            outputs = [_other(held, wanted.name)]
         damage = list(held.damage)
-    facts = {"damage": damage} if fit is None else {"damage": damage, "fit": _facts(fit)}
+    facts = {"damage": damage} if fit is None else {"damage": damage, "fit": facts_of(fit)}
     _deliver(file, output, outputs, force, as_json, facts)
     if fit is not None:
-        say(f"{file}: {_told(fit)}")
+        say(f"{file}: {told(fit)}")
     for line in damage:
         say(f"{file}: salvage: {line}")
     return Exit.SALVAGED if damage else Exit.FINE
 
 
-def _cut(clip: Clip, frames: tuple[int, int | None] | None) -> tuple[int, int] | None:
-    if frames is None:
-        return None
-    start, stop = frames
-    return start, clip.n_frames if stop is None else stop
+def _check_options(wanted: _Wanted, salvage: bool) -> None:
+    """Raise Failure for options that do not go together."""
+    if not wanted.target or wanted.is_converted:
+        _refuse(wanted.joints is not None, "--joints needs --to csv or --to npz")
+    lone = wanted.frames is not None or wanted.resolution or salvage or wanted.filtered
+    _refuse(
+        wanted.preview and (wanted.target is None or bool(lone)),
+        "--preview needs --to, and goes with none of --frames --resolution --salvage --post-filter",
+    )
+    _refuse(wanted.decimate and not wanted.resolution, "--decimate needs --resolution")
+    _refuse(
+        wanted.rate is not None and not (wanted.is_converted or wanted.filtered),
+        f"--rate needs --to {' or '.join(CONVERSIONS)}, or --post-filter",
+    )
+    _refuse(
+        wanted.solve and wanted.target not in ("amc", "bvh"),
+        "--solve-ik needs --to amc or --to bvh",
+    )
 
 
-def _source(clip: Clip, part: _Part) -> Output:
-    data = clip.source_bytes(part.frames, part.resolution, decimate=part.decimate)
+def _refuse(wrong: bool, reason: str) -> None:
+    if wrong:
+        raise Failure(reason, Exit.USAGE)
+
+
+def _of_clip(held: File, wanted: _Wanted) -> tuple[list[Output], Fit | None]:
+    """The outputs of the clip that is wanted, and how well a skeleton fits where one is fitted."""
+    clip, target, fit = held.only_clip(wanted.name), wanted.target, None
+    part = _part(clip, wanted)
+    if target is None:
+        outputs = [_source(clip, part)]
+    elif wanted.is_converted:
+        motion = part.motion()
+        if wanted.solve:
+            motion, fit = _solved(clip, motion)
+        elif target in ("amc", "bvh"):
+            _check_moves(clip)
+        rate = None if wanted.filtered else wanted.rate
+        outputs = _converted(motion, target, rate, wanted.with_skeleton)
+    else:
+        outputs = [_export(clip, target, part, wanted.joints)]
+    if wanted.with_skeleton and target != "amc":
+        outputs.append(_skeleton(held, clip.skeleton_id))
+    return outputs, fit
+
+
+def _part(clip: Clip, wanted: _Wanted) -> Part:
+    frames = wanted.frames
+    if frames is not None:
+        start, stop = frames
+        frames = start, clip.n_frames if stop is None else stop
+    what = Filtered if wanted.filtered else Preview if wanted.preview else Part
+    return what(clip, frames, wanted.resolution, wanted.decimate, wanted.rate)
+
+
+def _source(clip: Clip, part: Part) -> Output:
     path = clip.source.path if clip.source else ""
-    return "source", PurePosixPath(path).name or f"{_stem(clip)}.out", data
-
-
-def _motion(clip: Clip, part: _Part, preview: bool) -> Motion:
-    if preview:
-        from mcz.files.preview import preview_motion
-
-        return preview_motion(clip)
-    return clip.motion(part.frames, part.resolution, decimate=part.decimate)
+    return "source", PurePosixPath(path).name or f"{_stem(clip)}.out", part.source_bytes()
 
 
 def _check_moves(clip: Clip) -> None:
@@ -208,40 +235,6 @@ def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
     return from_positions(motion, base)
 
 
-def _facts(fit: Fit) -> dict[str, Any]:
-    """What ``--json`` says of a fit."""
-    keys = ("mean_error", "max_error", "marker_mean_error", "marker_max_error")
-    distances = {name: getattr(fit, name) for key in keys for name in (key, f"{key}_cm")}
-    return {
-        "n_points": fit.n_points,
-        "n_markers": fit.n_markers,
-        **distances,
-        "frame": fit.frame,
-        "point": fit.point,
-        "unsolved": list(fit.unsolved),
-    }
-
-
-def _told(fit: Fit) -> str:
-    """A fit in words."""
-    scale, unit = (1.0, "units") if fit.unit_cm is None else (fit.unit_cm, "cm")
-    if fit.mean_error is None or fit.max_error is None:
-        told = "inverse kinematics: no position is known"
-    else:
-        told = (
-            f"inverse kinematics: {fit.n_points} points {fit.mean_error * scale:.3g} {unit} off on "
-            f"average, at most {fit.max_error * scale:.3g} {unit} (frame {fit.frame}, {fit.point})"
-        )
-    if fit.marker_mean_error is not None and fit.marker_max_error is not None:
-        told += (
-            f"; {fit.n_markers} virtual markers {fit.marker_mean_error * scale:.3g}, at most "
-            f"{fit.marker_max_error * scale:.3g} {unit}"
-        )
-    if fit.unsolved:
-        told += f"; left at 0: {', '.join(fit.unsolved)}"
-    return told
-
-
 def _converted(
     motion: Motion, target: str, rate: Fraction | None, with_skeleton: bool
 ) -> list[Output]:
@@ -253,7 +246,7 @@ def _converted(
     return [(kinds.get(s, s), f"{_stem(motion)}.{s}", data) for s, data in files.items()]
 
 
-def _export(clip: Clip, target: str, part: _Part, joints: str | None, preview: bool) -> Output:
+def _export(clip: Clip, target: str, part: Part, joints: str | None) -> Output:
     from mcz.cli.export import EXPORTS, channel_names
 
     chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]
@@ -261,47 +254,7 @@ def _export(clip: Clip, target: str, part: _Part, joints: str | None, preview: b
     if chosen is not None:
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
-    if preview:
-        table = _preview_table(clip, chosen, names)
-    else:
-        table = _table(clip, part, chosen, names)
-    return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
-
-
-def _table(clip: Clip, part: _Part, joints: list[str] | None, names: list[str]) -> Table:
-    from mcz.cli.export import Table
-    from mcz.files.decimation import decimated_rows
-
-    values, mask = clip.read_masked(part.frames, joints, part.resolution)
-    mask = np.ones(values.shape, np.bool_) if mask is None else mask
-    start, stop = part.frames or (0, clip.n_frames)
-    numbers, rate = clip.frame_numbers[start:stop], clip.frame_rate
-    if part.decimate:
-        step, per_frame = 2**part.resolution, clip.signals[0].layout.samples_per_frame
-        values, mask = (decimated_rows(rows, per_frame, step) for rows in (values, mask))
-        numbers, rate = numbers[::step], rate and rate / step
-    return Table(
-        names,
-        np.asarray(values, dtype=np.float64),
-        mask,
-        np.repeat(numbers, len(values) // max(1, len(numbers))),  # a number for every row
-        rate,
-    )
-
-
-def _preview_table(clip: Clip, joints: list[str] | None, names: list[str]) -> Table:
-    from mcz.cli.export import Table
-    from mcz.files.preview import preview
-
-    found = preview(clip, joints)
-    numbers, rate = clip.frame_numbers[found.frames], clip.frame_rate
-    return Table(
-        names,
-        np.asarray(found.values, dtype=np.float64),
-        np.ones(found.values.shape, np.bool_) if found.mask is None else found.mask,
-        np.repeat(numbers, len(found.values) // max(1, len(numbers))),
-        rate / found.step if rate is not None and found.is_regular else None,
-    )
+    return target, f"{_stem(clip)}.{target}", EXPORTS[target](part.table(chosen, names))
 
 
 def _stem(clip: Clip | Motion) -> str:

@@ -194,6 +194,8 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
     if clip["packets"]:
         framing = f"{clip['packet_bytes']:,} bytes of the overhead"
         yield f"  {plural(clip['packets'], 'packet')}, their framing {framing}"
+    if clip["between_bytes"]:
+        yield f"  {clip['between_bytes']:,} bytes of ancillary chunks (REPT) amid the frames"
     for key, against in RATIOS:
         if clip[key] is not None:
             yield f"  {clip[key]:7.2f} : 1 against {against}"

@@ -22,6 +22,7 @@ COMMANDS = (
     "extract",
     "replace",
     "diff",
+    "stream",
     "bench",
     "train",
 )

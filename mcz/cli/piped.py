@@ -60,7 +60,7 @@ def encode_lines(
     stream = standard_input()
     name = format_name or ("bvh" if skeleton is None else "amc")
     others = () if target in (None, "-") else (str(target),)
-    with about(NAME, *others), _live_output(target, force) as sink:
+    with about(NAME, *others), live_output(target, force) as sink:
         report = encode_live(iter(stream.readline, b""), sink, name, skeleton=skeleton, **options)
     for remark in report.remarks:
         say(f"{NAME}: {remark}")
@@ -71,7 +71,7 @@ def encode_lines(
 
 
 @contextmanager
-def _live_output(target: str | None, force: bool) -> Iterator[BinaryIO | _Late]:
+def live_output(target: str | None, force: bool) -> Iterator[BinaryIO | _Late]:
     """Where frames go at once, so that what was written before a crash stays."""
     if target in (None, "-"):
         yield binary_output()

@@ -10,6 +10,7 @@ from mcz.codecs import (
     lsdt_frame,
     mdtt,
     mrdwt,
+    online,
     pca,
     pca_rdo,
     qbc,
@@ -32,6 +33,7 @@ CODECS: dict[int, Codec] = {
         lsdt_clip.CODEC,
         mdtt.CODEC,
         pca_rdo.CODEC,
+        online.CODEC,
     )
 }
 DEFAULT = lossless.CODEC.name  # the best lossless one there is

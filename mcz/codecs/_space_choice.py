@@ -45,6 +45,7 @@ BLOCKS, BLOCK_FRAMES = 16, 240  # what an encoder looks at to choose
 SPARSITY, ITERATIONS = 12, 30  # of bases of the clip itself, from its principal components on
 MOST_DIGITS, LEAST_DIGITS = 7, 3  # binary, of the first and the last vectors of such bases
 LARGEST = 2.0**80
+LEAST, MOST = 2.0**-60, 2.0**60  # steps
 WHICH = ("auto", "known", "cosines", "learned")
 
 
@@ -137,7 +138,7 @@ def default_step(sample: Sample) -> float:
         return DEFAULT_DEGREES
     parts = [part for part in sample.matrices(sample.frames) if part.size]
     spread = math.sqrt(sum(float(np.mean(part.var(axis=1))) for part in parts))
-    return spread * DEFAULT_SHARE if 0 < spread < math.inf else 1.0
+    return min(max(spread * DEFAULT_SHARE, LEAST), MOST) if 0 < spread < math.inf else 1.0
 
 
 def choose_space(name: str, sample: Sample, step: float, which: str, in_time: InTime) -> Choice:
@@ -186,14 +187,23 @@ def live_choice(name: str, layout: Layout, step: float | None, which: str) -> Ch
     """
     if step is None:
         raise OptionError(f"{name}: the step has to be given, for no frame is known yet")
+    sample, which = live_sample(name, layout, which)
+    return choose_space(name, sample, step, which, changes)
+
+
+def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
+    """A sample of no motion, and which bases can be had without; raises OptionError for learned."""
     if which == "learned":
         raise OptionError(f"{name}: basis learned needs all frames; mcz train makes one beforehand")
     sample = _sample(skeleton_of(name, layout), [np.zeros((1, layout.n_channels))], 0)
-    if which == "auto":
-        n_points = [part.shape[1] for part in sample.matrices(sample.frames)]
-        fits = any(_fits(model, n_points) for model in known_models().values())
-        which = "known" if fits else "cosines"
-    return choose_space(name, sample, step, which, changes)
+    return sample, at_hand(sample) if which == "auto" else which
+
+
+def at_hand(sample: Sample) -> str:
+    """The bases that need no look at the motion: well-known ones where some fit, or cosines."""
+    n_points = [part.shape[1] for part in sample.matrices(sample.frames)]
+    fits = any(_fits(model, n_points) for model in known_models().values())
+    return "known" if fits else "cosines"
 
 
 def _with(fields: dict[str, Any], model: Model | None = None, known: Model | None = None) -> Choice:
@@ -291,7 +301,7 @@ STEP = Parameter(
     None,
     "quantizer step, in length units of places, in degrees of average effect of channels; "
     "default: 1/100 of the points' spread, 0.2 degrees",
-    number("step", 2.0**-60, 2.0**60),
+    number("step", LEAST, MOST),
 )
 THRESHOLD_PARAMETER = Parameter(
     "threshold",

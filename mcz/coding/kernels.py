@@ -27,6 +27,7 @@ WEIGHTS = RATES + 256
 MODELS = WEIGHTS + 3 * 64
 TOP = 0xFFFFFFFF
 MAX_WEIGHT = 1 << 24
+LEAST_ONE = 32  # of 65536: the least probability of a bit that one context codes
 
 
 @kernel
@@ -132,6 +133,15 @@ def mixed(state: Ints, data: Bytes, bit: int, mixer: int, a: int, b: int, c: int
     _learn(state, a, target)
     _learn(state, b, target)
     _learn(state, c, target)
+    return bit
+
+
+@inner
+def adaptive(state: Ints, data: Bytes, bit: int, context: int) -> int:
+    """Code a bit by the opinion of one context, then let it learn."""
+    at = MODELS + 2 * context
+    bit = code(state, data, bit, min(max(state[at], LEAST_ONE), 65536 - LEAST_ONE))
+    _learn(state, at, 65535 if bit else 0)
     return bit
 
 

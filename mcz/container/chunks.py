@@ -27,6 +27,10 @@ ANCILLARY = 1  # a reader that does not know the type skips the chunk
 SAFE_TO_COPY = 2  # a rewriter that does not know the type keeps the chunk
 KNOWN_FLAGS = ANCILLARY | SAFE_TO_COPY
 
+REPEAT = b"REPT"  # flags: ANCILLARY alone
+FLAGS_OF = {b"QUAL": ANCILLARY | SAFE_TO_COPY, REPEAT: ANCILLARY}
+REPEATED = (b"HEAD", b"SKEL", b"MODL", b"CLIP")  # the chunks that a REPT holds again
+
 _CANDIDATE = re.compile(rb"(?=[A-Za-z]{4}[\x00-\x03]\x00)")  # looks like the start of a header
 
 
@@ -125,6 +129,8 @@ def read_payload(source: ByteSource, chunk: Chunk, limit: int) -> bytes:
 def check_chunk(data: bytes, chunk: Chunk) -> bytes:
     """The payload in ``data``, the bytes of the whole ``chunk``, after its crc was checked."""
     found = parse_header(data, chunk.offset)
+    if chunk.length is None or len(data) != chunk.size:
+        raise FormatError(f"chunk {chunk.label} is not whole")
     if (found.type, found.length) != (chunk.type, chunk.length):
         raise FormatError(f"chunk {chunk.label} is not what the index says")
     (stored,) = CRC.unpack(data[-CRC.size :])
@@ -134,6 +140,22 @@ def check_chunk(data: bytes, chunk: Chunk) -> bytes:
             f"crc of chunk {chunk.label} is {computed:#010x}, stored is {stored:#010x}"
         )
     return data[HEADER.size : -CRC.size]
+
+
+def chunks_in(payload: bytes, offset: int) -> list[Chunk]:
+    """The chunks in the ``payload`` of a REPT, which begins at ``offset``; raises FormatError."""
+    chunks, at = [], 0
+    while at < len(payload):
+        chunk = parse_header(payload[at : at + HEADER.size], offset + at)
+        check_chunk(payload[at : at + chunk.size], chunk)
+        chunks.append(chunk)
+        at += chunk.size
+    kinds = [chunk.type for chunk in chunks]
+    middle = set(kinds[1:-1]) <= {b"SKEL", b"MODL"}
+    if kinds[:1] != [b"HEAD"] or kinds[-1:] != [b"CLIP"] or not middle:
+        found = " ".join(kind.decode() for kind in kinds)
+        raise FormatError(f"{REPEAT.decode()} before {offset} holds {found or 'nothing'}")
+    return chunks
 
 
 def build_foot(index_offset: int, index_length: int) -> bytes:

@@ -11,14 +11,14 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.chunks import HEADER, Chunk, build_chunk
-from mcz.container.limits import check
-from mcz.container.packets import FRAME, SEGMENT
+from mcz.container.limits import PROFILES, Profile, check
+from mcz.container.packets import FRAME, NUMBERED, SEGMENT, SHORT
 from mcz.container.segments import FRESH, SegmentHeader
-from mcz.errors import FormatError
+from mcz.errors import FormatError, UnsupportedError
 from mcz.schema import MAX_COUNT, build, deflate, inflate, parse, read_varint, varint
 
 # Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
-PACKETS = {SEGMENT: 128, FRAME: 64}
+PACKETS = {SEGMENT: 128, FRAME: 64, NUMBERED: 32}
 
 # Each segment in the "segments" field of an indexed clip: (name, type, meaning).
 INDEXED_SEGMENT_FIELDS = (
@@ -28,7 +28,11 @@ INDEXED_SEGMENT_FIELDS = (
     ("n_frames", "varint", "frames"),
     ("lead", "varint", "as in DATA"),
     ("tail", "varint", "as in DATA"),
-    ("flags", "varint", "as in DATA; 128 more where it is a packet of kind 1, 64 where of kind 2"),
+    (
+        "flags",
+        "varint",
+        "as in DATA; more where it is a packet: 128 of kind 1, 64 of kind 2, 32 of 3",
+    ),
 )
 
 
@@ -37,7 +41,7 @@ class SegmentRow:
     """One segment: where its payload lies, and what it covers.
 
     ``packet`` is the kind of its packet, 0 where it is a closed DATA. The payload of a packet of
-    kind 2 is a stream without a table.
+    kind 2 or 3 is a stream without a table.
     """
 
     offset: int
@@ -120,6 +124,32 @@ class Directory:
     aliases: dict[str, tuple[int, bytes]] = field(default_factory=dict)
     clips: dict[str, ClipRow] = field(default_factory=dict)
     end: int = 0
+
+
+def parse_head(payload: bytes) -> Profile:
+    """The profile of the file; raises UnsupportedError where it needs a newer reader."""
+    head = parse(payloads.HEAD, payload, "HEAD")
+    ours = payloads.FORMAT_MAJOR, payloads.FORMAT_MINOR
+    needed = head.needs_major, head.needs_minor
+    if not payloads.LEAST_NEEDED <= needed <= ours:
+        raise UnsupportedError(
+            f"HEAD: the file needs format {needed[0]}.{needed[1]}, "
+            f"this reader knows {ours[0]}.{ours[1]}"
+        )
+    if head.profile not in PROFILES:
+        raise UnsupportedError(f"HEAD: profile {head.profile} is unknown")
+    return PROFILES[head.profile]
+
+
+@dataclass(slots=True)
+class Found:
+    """The result of a scan."""
+
+    directory: Directory = field(default_factory=Directory)
+    chunks: list[Chunk] = field(default_factory=list)
+    feet: list[int] = field(default_factory=list)  # offsets of the FOOTs
+    damage: list[str] = field(default_factory=list)
+    ends: dict[int, int] = field(default_factory=dict)  # of open DATA chunks, by their offsets
 
 
 def build_index(directory: Directory) -> bytes:
@@ -246,8 +276,8 @@ def _parse_segments(data: bytes, end: int, n_signals: int, name: str) -> Iterabl
         header = SegmentHeader(
             signal, first[signal], n_frames, lead, tail, flags & ~PACKETS.get(kind, 0)
         )
-        if kind == FRAME and header != SegmentHeader(0, first[0], 1, flags=header.flags & FRESH):
-            raise FormatError(f"INDX: clip {name!r} has {header} as a packet of kind 2")
+        if kind in SHORT and header != SegmentHeader(0, first[0], 1, flags=header.flags & FRESH):
+            raise FormatError(f"INDX: clip {name!r} has {header} as a packet of kind {kind}")
         yield SegmentRow(end + gap, size, header, kind)
         first[signal] += n_frames
         end += gap + size

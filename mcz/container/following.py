@@ -48,6 +48,20 @@ class PipeSource(ByteSource):
             data = self._stream.read(wanted)
         return data
 
+    @property
+    def start(self) -> int:
+        """What lies before was let go."""
+        return self._start
+
+    @property
+    def end(self) -> int:
+        """The bytes that have come."""
+        return self._start + len(self._kept)
+
+    def kept(self, at: int) -> bytes:
+        """What has come of the bytes from ``at`` on, which is not before what was let go."""
+        return bytes(self._kept[at - self._start :])
+
     def forget(self, before: int) -> None:
         """Let go of what lies before an offset."""
         del self._kept[: max(0, before - self._start)]

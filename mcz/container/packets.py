@@ -14,27 +14,49 @@ from mcz.container.limits import check
 from mcz.errors import ChecksumError, FormatError
 from mcz.schema import take_varint, varint
 
-END, SEGMENT, FRAME = 0, 1, 2  # kinds, bits 0 to 3 of the first byte
+END, SEGMENT, FRAME, NUMBERED = 0, 1, 2, 3  # kinds, bits 0 to 3 of the first byte
+SHORT = (FRAME, NUMBERED)  # kinds with a segment that is not spelled out: one frame, one stream
 FRESH = 0x80  # the packet needs none before it
 CHECK_SIZE = 2  # bytes of head_check, and of body_check
 MOST_NUMBER = 8  # bytes of a sequence number
 
 PACKET_FIELDS = (
-    ("kind", "u8", "bits 0-3: 0 end, 1 segment, 2 frame; bit 7: starts fresh; others 0"),
+    ("kind", "u8", "bits 0-3: 0 end, 1 segment, 2 frame, 3 numbered frame; bit 7: fresh; others 0"),
     ("sequence", "varint", "number of the packet in its chunk, from 0"),
     ("length", "varint", "bytes of the body"),
     ("head_check", "u16", "low 16 bits of the CRC-32 of the three fields before"),
-    ("body", "bytes", "kind 1: a segment, as in a closed DATA; kind 2: its one stream"),
-    ("body_check", "u16", "low 16 bits of the CRC-32 of the body"),
+    ("body", "bytes", "kind 1: a segment, as in a closed DATA; 2 and 3: its one stream"),
+    ("body_check", "u16", "low 16 bits of a CRC-32: of the body; kind 3: of body and frame number"),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Packet:
+    """A packet; ``check`` is its body_check where the body alone does not tell it: in kind 3."""
+
     kind: int
     sequence: int
     body: bytes
     fresh: bool = True
+    check: bytes | None = None
+
+
+def numbered_frame(sequence: int, number: int, body: bytes, *, fresh: bool) -> Packet:
+    """A packet of kind 3 with the stored frame ``number``."""
+    return Packet(NUMBERED, sequence, body, fresh, body_check(body, number))
+
+
+def body_check(body: bytes, number: int | None = None) -> bytes:
+    """The check of a body; ``number`` is that of the frame in a packet of kind 3."""
+    return _check16(body if number is None else body + struct.pack("<Q", number))
+
+
+def check_number(packet: Packet, number: int) -> None:
+    """Raise ChecksumError for a packet of kind 3 that is not frame ``number``, or is damaged."""
+    if packet.check not in (None, body_check(packet.body, number)):
+        raise ChecksumError(
+            f"body_check of packet {packet.sequence} is not that of frame {number}, which is due"
+        )
 
 
 def _check16(data: bytes) -> bytes:
@@ -47,7 +69,8 @@ def _head(kind: int, fresh: bool, sequence: int, length: int) -> bytes:
 
 def build_packet(packet: Packet) -> bytes:
     head = _head(packet.kind, packet.fresh, packet.sequence, len(packet.body))
-    return head + _check16(head) + packet.body + _check16(packet.body)
+    check = body_check(packet.body) if packet.check is None else packet.check
+    return head + _check16(head) + packet.body + check
 
 
 def head_size(sequence: int, length: int) -> int:
@@ -75,11 +98,12 @@ def read_packets(read: Callable[[int], bytes], limit: int) -> Iterator[Packet]:
     """The packets of an open DATA up to its end packet, which is not yielded.
 
     ``read(n)`` returns exactly n bytes or raises TruncatedError. Raises ChecksumError or
-    FormatError at the first packet that is damaged or out of order.
+    FormatError at the first packet that is damaged or out of order. A packet of kind 3 still has
+    to pass ``check_number``.
     """
     sequence = 0
     while True:
-        packet = _read_packet(read, limit)
+        packet = read_packet(read, limit)
         if packet.sequence != sequence:
             raise FormatError(f"packet {packet.sequence} where {sequence} is due")
         if packet.kind == END:
@@ -90,7 +114,8 @@ def read_packets(read: Callable[[int], bytes], limit: int) -> Iterator[Packet]:
         sequence += 1
 
 
-def _read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
+def read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
+    """One packet, whatever its number; raises as ``read_packets`` does."""
     head = bytearray(read(1))
 
     def seen() -> int:
@@ -101,10 +126,13 @@ def _read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
     if read(2) != _check16(bytes(head)):
         raise ChecksumError(f"head_check of packet {values[0]} is wrong")
     kind = head[0] & 0x0F
-    if kind > FRAME or head[0] & 0x70:
+    if kind > NUMBERED or head[0] & 0x70:
         raise FormatError(f"packet {values[0]}: kind {head[0]:#04x}")
     check(f"packet {values[0]}", values[1], limit)
     body = read(values[1])
-    if read(2) != _check16(body):
+    stored, fresh = read(CHECK_SIZE), bool(head[0] & FRESH)
+    if kind == NUMBERED:
+        return Packet(kind, values[0], body, fresh, stored)
+    if stored != body_check(body):
         raise ChecksumError(f"body_check of packet {values[0]} is wrong")
-    return Packet(kind, values[0], body, bool(head[0] & FRESH))
+    return Packet(kind, values[0], body, fresh)

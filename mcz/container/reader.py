@@ -7,7 +7,6 @@ SPEC.md, "Strict reading" and "Salvage", are normative.
 from __future__ import annotations
 
 import hashlib
-import zlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -30,12 +29,20 @@ from mcz.container.directory import (
     ClipRow,
     Directory,
     SegmentRow,
+    parse_head,
     parse_index,
     signal_rows,
 )
 from mcz.container.limits import Profile, check, check_decoded, index_limit, output_limit
-from mcz.container.packets import CHECK_SIZE, FRAME, head_size, is_head
-from mcz.container.scan import parse_head, scan
+from mcz.container.packets import (
+    CHECK_SIZE,
+    NUMBERED,
+    SHORT,
+    body_check,
+    head_size,
+    is_head,
+)
+from mcz.container.scan import scan
 from mcz.container.segments import (
     FRESH,
     SegmentHeader,
@@ -199,7 +206,7 @@ class Container:
     def table(self, row: SegmentRow, counts: StreamCounts) -> StreamTable:
         """The stream table of a segment, with as little read as will do."""
         self._check_row(row)
-        if row.packet == FRAME:
+        if row.packet in SHORT:
             return frame_table(row.header, counts, row.size)
         size = min(row.size, TABLE_PEEK + counts.total(row.header.flags) * 7 // 4)
         while True:
@@ -247,7 +254,7 @@ class Container:
             payload = self._packet(row)
         else:
             payload = self.payload(row.chunk())
-        if row.packet == FRAME:
+        if row.packet in SHORT:
             return frame_table(row.header, counts, row.size), {0: payload}
         try:
             table = parse_table(payload, counts)
@@ -260,14 +267,16 @@ class Container:
         }
 
     def _packet(self, row: SegmentRow) -> bytes:
-        """The checked body of a packet; of kind 2 its head is what the row says of the segment."""
-        before = min(row.offset, head_size(MAX_COUNT, row.size)) if row.packet == FRAME else 0
+        """The checked body of a packet; without a table its head says what the row says."""
+        before = min(row.offset, head_size(MAX_COUNT, row.size)) if row.packet in SHORT else 0
         data = self.source.read(row.offset - before, before + row.size + CHECK_SIZE)
         body = data[before:-CHECK_SIZE]
-        if zlib.crc32(body) & 0xFFFF != int.from_bytes(data[-CHECK_SIZE:], "little"):
-            raise ChecksumError(f"body_check of the packet at {row.offset} is wrong")
+        number = row.header.first if row.packet == NUMBERED else None
+        if data[-CHECK_SIZE:] != body_check(body, number):
+            said = "wrong" if number is None else f"not that of frame {number}"
+            raise ChecksumError(f"body_check of the packet at {row.offset} is {said}")
         fresh = bool(row.header.flags & FRESH)
-        if row.packet == FRAME and not is_head(data[:before], FRAME, fresh, row.size):
+        if row.packet in SHORT and not is_head(data[:before], row.packet, fresh, row.size):
             raise FormatError(f"the packet at {row.offset} is not what the index says")
         return body
 

@@ -7,18 +7,20 @@ valid chunk and goes on. SPEC.md, "Grammar" and "Salvage", are normative.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from typing import Any
 
 from mcz.container import payloads, strict
 from mcz.container.chunks import (
     ANCILLARY,
+    FLAGS_OF,
     FOOT,
     HEADER,
-    SAFE_TO_COPY,
+    REPEAT,
+    REPEATED,
     SIGNATURE,
     Chunk,
     check_signature,
+    chunks_in,
     is_foot_at,
     parse_foot,
     read_chunk,
@@ -28,12 +30,13 @@ from mcz.container.chunks import (
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
-    Directory,
+    Found,
     SegmentRow,
+    parse_head,
     signal_rows,
 )
-from mcz.container.limits import BASE, PROFILES, Profile, check, index_limit
-from mcz.container.packets import CHECK_SIZE, FRAME, Packet, read_packets
+from mcz.container.limits import BASE, PROFILES, check, index_limit
+from mcz.container.packets import CHECK_SIZE, SHORT, Packet, check_number, read_packets
 from mcz.container.segments import FRESH, SegmentHeader, parse_header
 from mcz.container.source import ByteSource, Forward
 from mcz.container.writer import build_head, payload_id
@@ -42,32 +45,6 @@ from mcz.schema import parse
 
 LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that salvage may read in vain, in all
 PEEK = 64  # enough for the fields of a segment before its table
-
-
-@dataclass(slots=True)
-class Found:
-    """The result of a scan."""
-
-    directory: Directory = field(default_factory=Directory)
-    chunks: list[Chunk] = field(default_factory=list)
-    feet: list[int] = field(default_factory=list)  # offsets of the FOOTs
-    damage: list[str] = field(default_factory=list)
-    ends: dict[int, int] = field(default_factory=dict)  # of open DATA chunks, by their offsets
-
-
-def parse_head(payload: bytes) -> Profile:
-    """The profile of the file; raises UnsupportedError where it needs a newer reader."""
-    head = parse(payloads.HEAD, payload, "HEAD")
-    ours = payloads.FORMAT_MAJOR, payloads.FORMAT_MINOR
-    needed = head.needs_major, head.needs_minor
-    if not payloads.LEAST_NEEDED <= needed <= ours:
-        raise UnsupportedError(
-            f"HEAD: the file needs format {needed[0]}.{needed[1]}, "
-            f"this reader knows {ours[0]}.{ours[1]}"
-        )
-    if head.profile not in PROFILES:
-        raise UnsupportedError(f"HEAD: profile {head.profile} is unknown")
-    return PROFILES[head.profile]
 
 
 def scan(source: ByteSource, *, salvage: bool = False, whole: bool = False) -> Found:
@@ -156,6 +133,8 @@ class Walker:
         self.found.chunks.append(chunk)
 
     def _take(self, chunk: Chunk) -> None:
+        if self.salvage and self._is_repeated(chunk):
+            return
         handlers: dict[bytes, Callable[[Chunk], None]] = {
             b"HEAD": self._head,
             b"SKEL": self._shared,
@@ -173,12 +152,24 @@ class Walker:
             if chunk.flags:
                 raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x} on a critical type")
             handler(chunk)
-        elif chunk.type == b"QUAL" and chunk.flags != ANCILLARY | SAFE_TO_COPY:
-            raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, QUAL has 3")
+        elif chunk.flags != FLAGS_OF.get(chunk.type, chunk.flags):
+            due = FLAGS_OF[chunk.type]
+            raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, it has {due}")
         elif chunk.flags & ANCILLARY:
             self._ancillary(chunk)
         else:
             raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")
+
+    def _is_repeated(self, chunk: Chunk) -> bool:
+        """Whether it lies in a REPT whose own header is damaged: the clip that is open goes on."""
+        if self.clip is None or chunk.type not in REPEATED:
+            return False
+        payload = self._payload(chunk)
+        if chunk.type == b"HEAD":
+            return payload == self.found.directory.head
+        if chunk.type == b"CLIP":
+            return payload == self._payload(self.clip.clip)
+        return (chunk.type, payload_id(payload)) in self.found.directory.shared
 
     def _payload(self, chunk: Chunk) -> bytes:
         return read_payload(self.source, chunk, self.profile.chunk_bytes)
@@ -290,9 +281,10 @@ class Walker:
 
     def _header_of(self, packet: Packet, start: int, told: bool) -> SegmentHeader:
         """What a packet says of its segment; ``told``: one before it said which frame is due."""
-        if packet.kind == FRAME:
+        if packet.kind in SHORT:
             if not told:
                 raise FormatError(f"packet at {start}: none before it in its DATA tells its frame")
+            check_number(packet, self.first[0])
             return SegmentHeader(0, self.first[0], 1, flags=FRESH if packet.fresh else 0)
         header, _ = parse_header(packet.body)
         if packet.fresh != bool(header.flags & FRESH):
@@ -359,6 +351,10 @@ class Walker:
             payload = self._payload(chunk)
             if self.strict and chunk.type == b"QUAL":
                 parse(payloads.QUAL, payload, chunk.label)
+            if self.salvage and chunk.type == REPEAT and self.clip is None:
+                for inner in chunks_in(payload, chunk.payload_offset):
+                    if inner.type != b"HEAD" or not self.found.directory.head:
+                        self._take(inner)
         if self.clip is None and self.found.directory.clips:
             last = next(reversed(self.found.directory.clips))
             self.found.directory.clips[last].ancillary.append(chunk)

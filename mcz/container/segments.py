@@ -176,10 +176,10 @@ def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
 
 
 def frame_table(header: SegmentHeader, counts: StreamCounts, size: int) -> StreamTable:
-    """The table that a packet of kind 2 does not have: its body of ``size`` bytes is one stream."""
+    """The table that a packet of kind 2 or 3 has not: its body of ``size`` bytes is one stream."""
     if (counts.n_groups, counts.n_resolutions) != (1, 1):
         raise FormatError(
-            f"frame {header.first} is a packet of kind 2, of a signal with {counts.n_groups} "
+            f"frame {header.first} is a packet without a table, of a signal with {counts.n_groups} "
             f"groups and {counts.n_resolutions} resolutions"
         )
     return StreamTable(header, counts, 0, (0,), (size,))

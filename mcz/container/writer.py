@@ -30,7 +30,14 @@ from mcz.container.directory import (
     build_index,
 )
 from mcz.container.limits import BASE, MIB, Profile, check
-from mcz.container.packets import CHECK_SIZE, END, FRAME, SEGMENT, Packet, build_packet
+from mcz.container.packets import (
+    CHECK_SIZE,
+    END,
+    SEGMENT,
+    Packet,
+    build_packet,
+    numbered_frame,
+)
 from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.errors import FormatError, MotionError
 from mcz.schema import build, deflate
@@ -185,27 +192,28 @@ class Writer:
             chunk = self.chunk(b"DATA", payload)
             clip.segments.append(SegmentRow(chunk.payload_offset, len(payload), header))
         else:
-            self._packet(clip, SEGMENT, header, payload)
+            fresh = bool(header.flags & FRESH)
+            self._packet(clip, header, Packet(SEGMENT, self._next_packet, payload, fresh))
 
     def frame(self, first: int, stream: bytes, *, fresh: bool) -> None:
-        """Write a segment of one frame of signal 0, which has one stream, as a packet of kind 2.
+        """Write a segment of one frame of signal 0, which has one stream, as a packet of kind 3.
 
         A DATA is open, and in it frame ``first`` - 1 of signal 0 was written.
         """
-        self._packet(
-            self._in_clip("DATA"), FRAME, SegmentHeader(0, first, 1, flags=fresh * FRESH), stream
-        )
-
-    def _packet(self, clip: ClipRow, kind: int, header: SegmentHeader, body: bytes) -> None:
+        clip = self._in_clip("DATA")
         if self._next_packet is None:
             raise FormatError("no DATA is open")
-        check("packet: bytes", len(body), self.profile.packet_bytes)
-        fresh = bool(header.flags & FRESH)
-        packet = build_packet(Packet(kind, self._next_packet, body, fresh))
-        start = self.offset + len(packet) - CHECK_SIZE - len(body)
-        self._write(packet)
-        self._next_packet += 1
-        clip.segments.append(SegmentRow(start, len(body), header, kind))
+        header = SegmentHeader(0, first, 1, flags=fresh * FRESH)
+        self._packet(clip, header, numbered_frame(self._next_packet, first, stream, fresh=fresh))
+
+    def _packet(self, clip: ClipRow, header: SegmentHeader, packet: Packet) -> None:
+        size = len(packet.body)
+        check("packet: bytes", size, self.profile.packet_bytes)
+        data = build_packet(packet)
+        start = self.offset + len(data) - CHECK_SIZE - size
+        self._write(data)
+        self._next_packet = packet.sequence + 1
+        clip.segments.append(SegmentRow(start, size, header, packet.kind))
 
     def open_data(self) -> None:
         """Begin an open DATA: until ``close_data``, each segment is one packet."""

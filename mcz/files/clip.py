@@ -201,7 +201,7 @@ class Clip:
     ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
         """The values with the stored coordinates beneath the mask, and the mask."""
         info = self._info(signal)
-        start, stop = self._range(frames)
+        start, stop = self.checked_range(frames)
         self._check_resolution(info, resolution)
         groups, places = self.places(info, joints)
         reader = SignalReader(self.container, info, groups, resolution, self.name)
@@ -226,7 +226,8 @@ class Clip:
                 f"not {resolution}"
             )
 
-    def _range(self, frames: tuple[int, int] | None) -> tuple[int, int]:
+    def checked_range(self, frames: tuple[int, int] | None) -> tuple[int, int]:
+        """``frames``, or all; raises OptionError where they are not in the clip."""
         start, stop = frames if frames is not None else (0, self.n_frames)
         if not 0 <= start <= stop <= self.n_frames:
             raise OptionError(
@@ -291,7 +292,7 @@ class Clip:
             return self.skeleton
 
     def _motion(self, frames: tuple[int, int] | None, resolution: int, decimate: bool) -> Motion:
-        start, stop = self._range(frames)
+        start, stop = self.checked_range(frames)
         self._check_resolution(self.signals[0], resolution)
         numbers = self.frame_numbers[start:stop]
         motion = Motion(

@@ -1,43 +1,32 @@
-"""Reading a clip while it is being written.
+"""Reading a clip while it is being written, strictly.
 
 Part of the joint between motion, codec and container (see ``file.py``). SPEC.md, "Open DATA and
-packets", is normative.
+packets", is normative. ``tolerant.py`` goes on where frames are lost.
 """
 
 from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from contextlib import suppress
-from dataclasses import replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import by_id
 from mcz.container import payloads
-from mcz.container.chunks import SIGNATURE, build_foot
-from mcz.container.directory import ClipRow
+from mcz.container.chunks import build_foot
 from mcz.container.following import Arrival, Follower
-from mcz.container.packets import FRAME
 from mcz.container.reader import Container
-from mcz.container.segments import FRESH, MASKS, frame_table, parse_table
-from mcz.container.skeletons import parse_skeleton
+from mcz.container.segments import FRESH
 from mcz.container.source import ByteSource
 from mcz.container.writer import payload_id
-from mcz.errors import ChecksumError, FormatError, OptionError, TruncatedError, UnsupportedError
+from mcz.errors import FormatError, OptionError
 from mcz.files.clip import Clip
-from mcz.files.digest import ValueDigest
-from mcz.files.masks import parse_mask
-from mcz.files.signal_info import SignalInfo, read_signal
+from mcz.files.followed import Followed, LiveClip, Shared, begin, opening
 from mcz.schema import parse
 
-Floats = NDArray[np.float64]
 Frame = tuple[int, NDArray[Any], NDArray[np.bool_]]
 SHARED = (b"SKEL", b"MODL", b"SRCE")  # what clips refer to
-Shared = dict[tuple[bytes, bytes], bytes]  # kind and id -> chunk
 
 
 def live_frames(stream: Any) -> Iterator[Frame]:
@@ -47,59 +36,78 @@ def live_frames(stream: Any) -> Iterator[Frame]:
     (n_channels,) of the motion signal, the values NaN where invalid. A clip whose codec does not
     decode frame by frame comes when it has ended. Raises FormatError at the first fault, after all
     frames before it: TruncatedError where the stream ends too early, ChecksumError where the
-    frames of a clip were not those that it was closed with.
+    frames of a clip were not those that it was closed with. ``stream_decode`` goes on instead.
     """
     if not hasattr(stream, "read"):
         raise OptionError(f"cannot read from {stream!r}: not a binary stream")
-    follower = Follower(stream)
-    head = b""
-    shared: Shared = {}
-    clip: _Followed | _Held | None = None
-    for arrival in follower.arrivals():
-        kind = arrival.chunk.type if arrival.chunk is not None else b"FOOT"
-        if kind == b"HEAD":
-            head = SIGNATURE + arrival.data
-        elif kind in SHARED:
-            shared.setdefault((kind, payload_id(arrival.payload)), arrival.data)
-        elif kind == b"CLIP":
-            assert follower.clip is not None
-            fields = parse(payloads.CLIP, arrival.payload, follower.clip.clip.label)
-            needed = [shared[key] for key in _needs(fields) if key in shared]
-            clip = _begin(b"".join([head, *needed]), follower.clip, fields, arrival)
-        elif clip is not None:
-            yield from clip.take(kind, arrival)
+    return StrictFrames(stream).frames()
+
+
+class StrictFrames:
+    """The frames of a stream, and what is known while they come.
+
+    ``clip`` is the one that the last frame is of, ``payload_bytes`` are those of streams so far,
+    ``is_checked`` is True where a value hash was right.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self._follower = Follower(stream)
+        self.clip: LiveClip | None = None
+        self.payload_bytes = 0
+        self.is_checked = False
+
+    @property
+    def size(self) -> int:
+        """The bytes that came."""
+        return self._follower.pipe.end
+
+    def frames(self) -> Iterator[Frame]:
+        """As ``live_frames``."""
+        head = b""
+        shared: Shared = {}
+        clip: Followed | _Held | None = None
+        for arrival in self._follower.arrivals():
+            kind = arrival.chunk.type if arrival.chunk is not None else b"FOOT"
+            if kind == b"HEAD":
+                head = arrival.data
+            elif kind in SHARED:
+                shared.setdefault((kind, payload_id(arrival.payload)), arrival.data)
+            elif kind == b"CLIP":
+                row = self._follower.clip
+                assert row is not None
+                fields = parse(payloads.CLIP, arrival.payload, row.clip.label)
+                before = opening(head, shared, fields)
+                clip = begin(head, shared, row, fields) or _Held(before + arrival.data, row.name)
+            elif isinstance(clip, Followed):
+                yield from self._frame(clip, kind, arrival)
+            elif clip is not None:
+                yield from clip.take(self, kind, arrival)
             clip = None if kind == b"CEND" else clip
 
-
-def _needs(fields: Any) -> Iterator[tuple[bytes, bytes]]:
-    """Kind and id of the chunks that a clip cannot be read without."""
-    yield b"SKEL", bytes(fields.skeleton)
-    for source in fields.source:
-        yield b"SRCE", bytes(source.template)
-    for signal in fields.signals:
-        with suppress(FormatError):  # it is said when the signal is read
-            uses = by_id(signal.codec, signal.codec_version).uses
-            for id_ in () if uses is None else uses(bytes(signal.header)):
-                yield b"MODL", id_
-
-
-def _begin(shared: bytes, row: ClipRow, fields: Any, arrival: Arrival) -> _Followed | _Held:
-    """What reads the frames of the clip that begins."""
-    container = Container(ByteSource(io.BytesIO(shared + build_foot(0, 0))))
-    where = f"SKEL {row.skeleton.hex()}"
-    bones = container.shared(b"SKEL", row.skeleton, payloads.SKEL)
-    skeleton = parse_skeleton(bones, container.profile, where)
-    rate = Fraction(row.rate_numerator, row.rate_denominator) if row.rate_numerator else None
-    motion = fields.signals[0]
-    shown = range(motion.skip, motion.skip + fields.n_frames)
-    motion.skip = motion.spare = 0
-    nothing = replace(row, n_frames=0, segments=[])  # it is not known what will come
-    info = read_signal(container, nothing, fields, 0, skeleton, rate)
-    one = (info.counts.n_groups, info.counts.n_resolutions, info.layout.samples_per_frame)
-    if info.codec.follow is None or one != (1, 1, 1):
-        return _Held(shared + arrival.data, row.name)
-    is_open = bool(fields.flags & payloads.OPEN_CLIP)
-    return _Followed(row.name, info, None if is_open else shown, len(fields.signals))
+    def _frame(self, clip: Followed, kind: bytes, arrival: Arrival) -> Iterator[Frame]:
+        row = arrival.segment
+        if kind == b"CEND":
+            clip.check_hash(parse(payloads.CEND, arrival.payload, "CEND"))
+            self.is_checked = True
+        if row is None or row.header.signal:
+            return
+        stream, mask = clip.parts(row.header, row.packet, arrival.payload)
+        self.payload_bytes += len(stream)
+        frame = row.header.first
+        fresh = bool(row.header.flags & FRESH)
+        if not (frame or fresh):
+            raise FormatError(f"clip {clip.clip.name!r}: the first segment needs one before it")
+        values = clip.decoder.push(stream, fresh)
+        if clip.shown is not None:
+            if frame not in clip.shown:
+                return
+            frame -= clip.shown.start
+        clip.digest(values, mask)
+        self.clip = clip.clip
+        if mask is None:
+            yield frame, values, np.ones(values.shape, np.bool_)
+        else:
+            yield frame, np.where(mask, values, np.nan), mask
 
 
 class _Held:
@@ -108,13 +116,16 @@ class _Held:
     def __init__(self, data: bytes, name: str) -> None:
         self._parts, self._name = [data], name
 
-    def take(self, kind: bytes, arrival: Arrival) -> Iterator[Frame]:
+    def take(self, reader: StrictFrames, kind: bytes, arrival: Arrival) -> Iterator[Frame]:
         self._parts.append(arrival.data)
         if kind != b"CEND":
             return
         container = Container(ByteSource(io.BytesIO(b"".join(self._parts) + build_foot(0, 0))))
         clip = Clip(container, container.directory.clips[self._name])
         values, mask = clip.read_masked()
+        reader.clip = LiveClip(clip.name, clip.skeleton, clip.frame_rate, clip.codec)
+        reader.payload_bytes += sum(row.size for row in clip.signals[0].rows)
+        reader.is_checked = True
         per_frame = clip.signals[0].layout.samples_per_frame
         valid = np.ones(values.shape, np.bool_) if mask is None else mask
         if not valid.all():
@@ -122,71 +133,3 @@ class _Held:
         for frame in range(clip.n_frames):
             rows = frame if per_frame == 1 else slice(frame * per_frame, (frame + 1) * per_frame)
             yield frame, values[rows], valid[rows]
-
-
-class _Followed:
-    """A clip that is decoded frame by frame."""
-
-    def __init__(self, name: str, info: SignalInfo, shown: range | None, n_signals: int) -> None:
-        assert info.codec.follow is not None
-        self.info, self.shown, self.n_signals = info, shown, n_signals
-        self._where = f"clip {name!r}"
-        self._decoder = info.codec.follow(info.header, info.layout)
-        self._digest = ValueDigest()
-
-    def take(self, kind: bytes, arrival: Arrival) -> Iterator[Frame]:
-        row = arrival.segment
-        if kind == b"CEND":
-            self._check_hash(parse(payloads.CEND, arrival.payload, "CEND"))
-        if row is None or row.header.signal:
-            return
-        stream, mask = self._parts(arrival)
-        frame = row.header.first
-        fresh = bool(row.header.flags & FRESH)
-        if not (frame or fresh):
-            raise FormatError(f"{self._where}: the first segment needs one before it")
-        values = self._decoder.push(stream, fresh)
-        if self.shown is not None:
-            if frame not in self.shown:
-                return
-            frame -= self.shown.start
-        self._digest.update(values[None], None if mask is None else mask[None])
-        if mask is None:
-            yield frame, values, np.ones(values.shape, np.bool_)
-        else:
-            yield frame, np.where(mask, values, np.nan), mask
-
-    def _parts(self, arrival: Arrival) -> tuple[bytes, NDArray[np.bool_] | None]:
-        """The codec's stream of a segment of one frame, and its mask."""
-        row, payload = arrival.segment, arrival.payload
-        assert row is not None
-        header, counts = row.header, self.info.counts
-        if row.packet == FRAME:
-            frame_table(header, counts, row.size)
-            return payload, None
-        if header.n_frames != 1 or header.flags & ~(FRESH | MASKS):
-            raise UnsupportedError(
-                f"{self._where}: a segment of {header.n_frames} frames, flags {header.flags}, "
-                "cannot be followed; read the whole file"
-            )
-        try:
-            table = parse_table(payload, counts)
-        except TruncatedError as error:
-            raise FormatError(f"{self._where}, frame {header.first}: {error}") from None
-        if table.payload_size != row.size:
-            raise FormatError(f"{self._where}, frame {header.first}: {row.size} bytes of streams")
-        streams = [
-            payload[at : at + size] for at, size in zip(table.offsets, table.lengths, strict=True)
-        ]
-        place = table.mask(0)
-        mask = None
-        if place is not None and streams[place]:
-            mask = parse_mask(streams[place], 1, self.info.layout.n_channels, self._where)[0]
-        return streams[table.codec(0, 0)], mask
-
-    def _check_hash(self, fields: Any) -> None:
-        hashes = fields.value_sha256
-        if len(hashes) != self.n_signals:
-            raise FormatError(f"{self._where}: {len(hashes)} hashes of {self.n_signals} signals")
-        if self._digest.digest() != hashes[0]:
-            raise ChecksumError(f"{self._where}: its frames are not those it was closed with")

@@ -6,7 +6,7 @@ packets", is normative.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from types import MappingProxyType, TracebackType
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mcz.codecs import by_name
 from mcz.codecs.base import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
 from mcz.container import payloads
+from mcz.container.chunks import ANCILLARY, REPEAT, REPEATED
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.container.writer import Sink, Writer
 from mcz.errors import MotionError, OptionError
@@ -43,8 +44,13 @@ class LiveWriter:
     under a skeleton of markers. ``codec`` names one that works live, ``params`` are its parameters;
     ``metadata`` are those of the clip, ``first_number`` is the number of its first frame, ``base``
     the skeleton that its own was derived from where that says so. Each frame's bytes are
-    written in one call, and flushed. Raises OptionError for a codec that cannot, for a bad
-    parameter or one that needs all frames, MotionError for a skeleton without channels.
+    written in one call, and flushed. Every ``repeat``-th frame that starts fresh, but the first,
+    is preceded by what a reader needs who joins there (0: none is). Raises OptionError for a codec
+    that cannot, for a bad parameter or one that needs all frames, MotionError for a skeleton
+    without channels.
+
+    ``entry`` is where, in the bytes that are being written or were last, a reader can join, who has
+    those of the beginning or finds them repeated there; None where that is nowhere.
 
     As a context manager it closes the clip where the block fails, too: what was written is whole.
     """
@@ -62,8 +68,13 @@ class LiveWriter:
         metadata: Mapping[str, str] = MappingProxyType({}),
         first_number: int = 1,
         base: Skeleton | None = None,
+        repeat: int = 1,
     ) -> None:
+        if repeat < 0:
+            raise OptionError(f"repeat is {repeat}, not 0 or more")
         self.n_frames = 0
+        self.entry: int | None = None
+        self._repeat, self._n_fresh, self._changed = repeat, 0, set[str]()
         self.codec = by_name(codec)
         self.options = self.codec.options(params)
         self._outlet = _Outlet(sink)
@@ -89,6 +100,7 @@ class LiveWriter:
         self._is_open = True
         self._digest = ValueDigest()
         self._figures = _Figures(coded)
+        self._opening = self._outlet.chunks(REPEATED) if repeat else b""
         self._outlet.send()
 
     def _coded_skeleton(self) -> Skeleton:
@@ -139,6 +151,17 @@ class LiveWriter:
         self._outlet.send()
         return self._settle()
 
+    def change(self, **params: Any) -> None:
+        """Let parameters of the codec have other values from the next group of frames on.
+
+        Raises OptionError for one that cannot change, or a bad value; nothing changes then.
+        """
+        if not self._is_open:
+            raise MotionError("the live clip is closed")
+        options = self.codec.options(params)
+        self._encoder.change({name: options[name] for name in params})
+        self._changed |= set(params)
+
     def _settle(self) -> Floats:
         """Count the frame that was written, and take it into the hash and the figures."""
         assert self._written is not None
@@ -151,6 +174,7 @@ class LiveWriter:
 
     def _write(self, stream: bytes, fresh: bool, valid: Mask | None) -> None:
         """Write one frame, each fresh one as the first of a DATA of its own."""
+        self.entry = None
         if fresh and self._has_data:
             self._writer.close_data()
             self._has_data = False
@@ -158,12 +182,20 @@ class LiveWriter:
             self._writer.frame(self.n_frames, stream, fresh=fresh)
         else:
             if not self._has_data:
-                self._writer.open_data()
-                self._has_data = True
+                self._begin_data()
             flags, streams = fresh * FRESH, [stream]
             if valid is not None:
                 flags, streams = flags | MASKS, [build_mask(valid[None]), stream]
             self._writer.segment(SegmentHeader(0, self.n_frames, 1, flags=flags), streams)
+
+    def _begin_data(self) -> None:
+        """Open a DATA, from time to time behind a copy of what is needed to read it."""
+        self.entry = self._outlet.size
+        self._n_fresh += 1
+        if self._repeat and self._n_fresh > 1 and (self._n_fresh - 1) % self._repeat == 0:
+            self._writer.chunk(REPEAT, self._opening, ANCILLARY)
+        self._writer.open_data()
+        self._has_data = True
 
     def close(self) -> None:
         """Write what comes behind the frames: hash, quality record, index."""
@@ -172,9 +204,13 @@ class LiveWriter:
         self._is_open = False
         if self._written is not None:  # an interrupt came after a frame, before it was counted
             self._settle()
+        if self._has_data:
+            self._writer.close_data()
+        self.entry = self._outlet.size
         self._writer.end_clip(self.n_frames, b"", [self._digest.digest()])
         if not self.codec.lossless:
-            settings = {f"param.{name}": value for name, value in self.options.items()}
+            fixed = {k: v for k, v in self.options.items() if k not in self._changed}
+            settings = {f"param.{name}": value for name, value in fixed.items()}
             found = {"codec": self.codec.name, **settings, **self._figures.entries()}
             rows = [{"key": key, "value": value} for key, value in texts_of(found).items()]
             payload = build(payloads.QUAL, {"entries": rows, "extension": b""}, "quality record")
@@ -208,6 +244,15 @@ class _Outlet:
 
     def write(self, data: bytes, /) -> None:
         self._pending.append(data)
+
+    @property
+    def size(self) -> int:
+        """The bytes that were collected and not sent."""
+        return sum(map(len, self._pending))
+
+    def chunks(self, kinds: Sequence[bytes]) -> bytes:
+        """Those of the chunks that were collected that are of these types, in order."""
+        return b"".join(part for part in self._pending if part[:4] in kinds)
 
     def send(self) -> None:
         self._left = memoryview(b"".join((self._left, *self._pending)))

@@ -125,6 +125,7 @@ def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
         "overhead_bytes": sizes.overhead,
         "packets": sum(row.packet > 0 for signal in clip.signals for row in signal.rows),
         "packet_bytes": sizes.packets,
+        "between_bytes": sizes.between,
         "source_chunk_bytes": sizes.source,
         "hash_bytes": sizes.hashes,
         "quality_bytes": sizes.quality,
@@ -281,7 +282,7 @@ def _segment_places(at: int, table: StreamTable) -> Iterator[tuple[int, int, str
             yield at + offset, length, names[index]
 
 
-HEADINGS = ("HEAD", "SKEL", "SRCE", "MODL", "ATTA", "ALIA", "CLIP", "DATA", "CEND", "QUAL", "INDX")
+HEADINGS = tuple("HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL REPT INDX".split())
 
 
 def validate(file: File) -> list[Problem]:

@@ -16,7 +16,7 @@ from mcz.codecs.base import Codec, Layout, Model, Span
 from mcz.container import payloads
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.limits import check
-from mcz.container.packets import FRAME
+from mcz.container.packets import SHORT
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
 from mcz.container.skeletons import parse_channels
@@ -131,7 +131,7 @@ def _check_segments(container: Container, info: SignalInfo, noted: bool, where: 
     per_frame = max(1, info.layout.n_channels) * info.layout.samples_per_frame * 8
     due = 0
     for row in info.rows:
-        if row.packet == FRAME:
+        if row.packet in SHORT:
             frame_table(row.header, info.counts, row.size)  # refuses what cannot be such a packet
         if row.header.flags & FRAME_NOTES and not noted:
             raise FormatError(f"{where}: frame notes, but no source that they belong to")

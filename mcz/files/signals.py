@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mcz.codecs.base import Request, Span
 from mcz.container import payloads
 from mcz.container.limits import check_decoded
-from mcz.container.packets import FRAME
+from mcz.container.packets import SHORT
 from mcz.container.reader import Container
 from mcz.container.segments import FRESH, StreamTable
 from mcz.errors import FormatError
@@ -207,7 +207,7 @@ class SignalReader:
         found: list[tuple[int, int, bytes]] = []
         changes: dict[int, dict[int, Grid]] = {}
         for index in self.info.covering(start, stop):
-            if self.info.rows[index].packet == FRAME:
+            if self.info.rows[index].packet in SHORT:
                 continue  # it has no notes
             header = self.info.rows[index].header
             table, streams = self._streams(index)
@@ -246,7 +246,7 @@ class SignalReader:
         layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
         mask: NDArray[np.bool_] | None = None
         for index in self.info.covering(start, stop):
-            if self.info.rows[index].packet == FRAME:
+            if self.info.rows[index].packet in SHORT:
                 continue  # all of it is valid
             header = self.info.rows[index].header
             table, streams = self._streams(index)

@@ -26,7 +26,8 @@ from mcz.schema import build
 class Sizes:
     """The bytes of one clip by part; ``models`` are those that its codecs need, in the file.
 
-    ``packets`` is the part of ``overhead`` that goes to framing open DATA and their packets.
+    ``packets`` is the part of ``overhead`` that goes to framing open DATA and their packets,
+    ``between`` are the whole ancillary chunks between CLIP and CEND.
     """
 
     payload: int = 0
@@ -36,6 +37,7 @@ class Sizes:
     quality: int = 0
     models: int = 0
     packets: int = 0
+    between: int = 0
 
 
 def clip_sizes(container: Container, clip: Clip) -> Sizes:
@@ -63,7 +65,13 @@ def clip_sizes(container: Container, clip: Clip) -> Sizes:
     overhead = n_chunks * FRAMING + packets + tables + own
     quality = sum(chunk.size for chunk in row.ancillary if chunk.type == b"QUAL")
     models = sum(_model_sizes(container, clip).values())
-    return Sizes(payload - tables, overhead, template + source, hashes, quality, models, packets)
+    between = 0
+    if row.cend is not None and not container.salvage:
+        closed = FRAMING * (n_chunks - 2)
+        coded = sum(segment.size for segment in row.segments) + packets + closed
+        between = row.cend.offset - (row.clip.offset + row.clip.size) - coded
+    own_parts = payload - tables, overhead, template + source, hashes, quality
+    return Sizes(*own_parts, models, packets, between)
 
 
 def models_used(signal: SignalInfo) -> tuple[bytes, ...]:

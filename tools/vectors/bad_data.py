@@ -10,7 +10,15 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.directory import PACKETS
-from mcz.container.packets import END, FRAME, SEGMENT, Packet, build_packet
+from mcz.container.packets import (
+    END,
+    FRAME,
+    NUMBERED,
+    SEGMENT,
+    Packet,
+    build_packet,
+    numbered_frame,
+)
 from mcz.container.segments import (
     FRAME_NOTES,
     FRESH,
@@ -141,7 +149,8 @@ def _packets(shelf: Broken) -> None:
         ("sequence-end", "The end packet repeats a number.", {"end_packet": ended(0)}),
         ("head-damaged", "A flipped bit in the length of a packet.", {"packet": flip(2)}),
         ("body-damaged", "A flipped bit in the body of a packet.", {"packet": flip(-3)}),
-        ("kind", "A packet of kind 3.", {"packet": _packet(kind=3)}),
+        ("kind", "A segment in a packet of kind 3.", {"packet": _packet(kind=3)}),
+        ("kind-4", "A packet of kind 4.", {"packet": _packet(kind=4)}),
         ("kind-bits", "A reserved bit of kind is set.", {"packet": _packet(kind=0x11)}),
         ("fresh", "Packet and segment differ on starting fresh.", {"packet": _packet(fresh=False)}),
         ("end-body", "An end packet with a body.", {"end_packet": ended(1, b"?")}),
@@ -154,30 +163,93 @@ def _packets(shelf: Broken) -> None:
     spec = "Open DATA and packets"
     data = live_file(dance(3), index=False, frames=0)
     shelf.add("frame-first", spec, "A packet of kind 2 is the first of its DATA.", data)
-    data = file_of(dance(2), packets=True, index=False, segment_frames=1, packet=_SecondAsFrame())
-    shelf.add("frame-of-two-groups", spec, "Kind 2, of a signal with two groups.", data)
-    data = live_file(dance(3), table=_stale)
+    for name, made in (
+        ("frame", Packet(FRAME, 1, b"")),
+        ("numbered", numbered_frame(1, 1, b"", fresh=True)),
+    ):
+        second = _Second(lambda body, made=made: _of_body(made, body))
+        data = file_of(dance(2), packets=True, index=False, segment_frames=1, packet=second)
+        purpose = f"Kind {made.kind}, of a signal with two groups."
+        shelf.add(f"{name}-of-two-groups", spec, purpose, data)
+    data = live_file(dance(3), table=_flags(FRAME, PACKETS[FRAME]))
     shelf.add("frame-index", f"{spec}; INDX", "INDX says that a frame is not fresh.", data)
+    _numbers(shelf)
 
 
-class _SecondAsFrame:
-    """Makes the second packet one of kind 2."""
+def _of_body(made: Packet, body: bytes) -> Packet:
+    """The packet of frame 1 with another body."""
+    if made.kind == NUMBERED:
+        return numbered_frame(made.sequence, 1, body, fresh=made.fresh)
+    return replace(made, body=body)
 
-    def __init__(self) -> None:
-        self.count = 0
+
+def _numbers(shelf: Broken) -> None:
+    """Packets of kind 3 that are not the frame that is due, or are not said to be of kind 3."""
+    spec = "Open DATA and packets"
+    purpose = "A packet of kind 3 is the first of its DATA."
+    data = live_file(dance(3), index=False, frames=0, numbered=True)
+    shelf.add("numbered-first", spec, purpose, data)
+    for name, purpose, number in (
+        ("number-next", "The check is that of the frame behind it.", lambda n: n + (n == 2)),
+        ("number-before", "The check is that of the frame before it.", lambda n: n - (n == 2)),
+        ("number-0", "All checks are those of frame 0.", lambda n: 0),
+        ("number-u32", "The number has 2^32 more.", lambda n: n + 2**32 * (n == 2)),
+    ):
+        for index in (True, False):
+            data = live_file(dance(4), numbered=True, number=number, index=index)
+            shelf.add(name if index else f"{name}-no-index", f"{spec}; INDX", purpose, data)
+    purpose = "A packet of kind 3 with the check of its body alone."
+    alone = _Second(lambda body: Packet(NUMBERED, 1, body))
+    shelf.add("number-none", spec, purpose, live_file(dance(3), numbered=True, packet=alone))
+    swapped = _Second(lambda body: Packet(NUMBERED, 1, body, True, _check_ahead(body)))
+    purpose = "A check of the number, 1, and then the body."
+    shelf.add("number-ahead", spec, purpose, live_file(dance(3), numbered=True, packet=swapped))
+    _indexed(shelf, spec)
+
+
+def _indexed(shelf: Broken, spec: str) -> None:
+    """INDX, which says other things of packets of kind 3; chunks of REPT with other flags."""
+    said = (
+        ("numbered-index-fresh", "not fresh", PACKETS[NUMBERED]),
+        ("numbered-index-kind", "of kind 2", PACKETS[FRAME] | FRESH),
+        ("numbered-index-kinds", "of kinds 2 and 3", PACKETS[FRAME] | PACKETS[NUMBERED] | FRESH),
+    )
+    for name, what, flags in said:
+        data = live_file(dance(3), numbered=True, table=_flags(NUMBERED, flags))
+        shelf.add(name, f"{spec}; INDX", f"INDX says that a packet of kind 3 is {what}.", data)
+
+    for name, flags in (("critical", b"\0"), ("safe-to-copy", b"\3")):
+        edits = {"repeat": (0,), "REPT_frame": framed(flags=flags), "index": False}
+        data = live_file(dance(3), numbered=True, **edits)
+        shelf.add(f"REPT-{name}", "Chunks; REPT", f"A REPT with flags {flags[0]}.", data)
+
+
+def _check_ahead(body: bytes) -> bytes:
+    return struct.pack("<H", zlib.crc32(struct.pack("<Q", 1) + body) & 0xFFFF)
+
+
+class _Second:
+    """Makes the second packet anew of its body."""
+
+    def __init__(self, made: Callable[[bytes], Packet]) -> None:
+        self.count, self.made = 0, made
 
     def __call__(self, packet: bytes) -> bytes:
         self.count += 1
         body = packet[_head_size(packet) + 2 : -2]
-        return build_packet(Packet(FRAME, 1, body)) if self.count == 2 else packet
+        return build_packet(self.made(body)) if self.count == 2 else packet
 
 
-def _stale(fields: Any) -> Any:
-    """Say in INDX of the last segment that it needs the one before."""
-    row = fields.clips[0]
-    assert row.segments[-1] == PACKETS[FRAME] | FRESH
-    row.segments = row.segments[:-1] + bytes((PACKETS[FRAME],))
-    return fields
+def _flags(kind: int, flags: int) -> Callable[[Any], Any]:
+    """Give the last segment, a packet of this kind that starts fresh, these flags in INDX."""
+
+    def edit(fields: Any) -> Any:
+        row = fields.clips[0]
+        assert row.segments[-1] == PACKETS[kind] | FRESH
+        row.segments = row.segments[:-1] + varint(flags)
+        return fields
+
+    return edit
 
 
 def _head_size(packet: bytes) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,10 +17,28 @@ import numpy as np
 from mcz.codecs import raw
 from mcz.codecs.base import Codec
 from mcz.container import payloads
-from mcz.container.chunks import Chunk, build_chunk, build_foot
+from mcz.container.chunks import (
+    ANCILLARY,
+    HEADER,
+    REPEAT,
+    REPEATED,
+    SIGNATURE,
+    Chunk,
+    build_chunk,
+    build_foot,
+    parse_header,
+)
 from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow, build_index
 from mcz.container.limits import BASE, Profile
-from mcz.container.packets import CHECK_SIZE, END, FRAME, SEGMENT, Packet, build_packet
+from mcz.container.packets import (
+    CHECK_SIZE,
+    END,
+    FRAME,
+    SEGMENT,
+    Packet,
+    build_packet,
+    numbered_frame,
+)
 from mcz.container.segments import SegmentHeader, build_segment
 from mcz.container.writer import Writer, payload_id
 from mcz.files.digest import canonical
@@ -60,7 +78,9 @@ class Crafter(Writer):
     the fields of INDEX, "FOOT" edits its 32 bytes, "row" the ClipRow behind INDX, "segments" the
     list of (header, streams) of a clip. ``packets``: segments go into an open DATA; "packet" and
     "end_packet" edit their bytes. ``frames``: those of signal 0 from this number on that have one
-    stream alone are packets of kind 2.
+    stream alone are packets of kind 2, ``numbered`` of kind 3; "number" changes what their checks
+    say. ``anew``: a segment that starts fresh begins an open DATA. ``repeat``: a REPT, which "REPT"
+    edits, precedes the open DATA of these numbers, from 0.
     """
 
     def __init__(
@@ -68,10 +88,17 @@ class Crafter(Writer):
         *,
         packets: bool = False,
         frames: int | None = None,
+        numbered: bool = False,
+        anew: bool = False,
+        repeat: Collection[int] = (),
         profile: Profile = BASE,
         **edits: Callable[..., Any],
     ) -> None:
         self.edits = edits
+        self.anew = anew
+        self.numbered = numbered
+        self.repeat = repeat
+        self._n_data = 0
         self.packets = packets
         self.frames = frames
         self._made: Made = []
@@ -132,9 +159,13 @@ class Crafter(Writer):
 
     def end_clip(self, n_frames: int, source_sha256: bytes, value_sha256: Sequence[bytes]) -> None:
         made, self._made = self.edited("segments", self._made), []
+        opening = self._opening() if self.repeat else b""
         if self.packets:
-            self.open_data()
+            self._begin_data(opening)
         for header, streams in made:
+            if self.anew and header.flags & 1 and self._next_packet:
+                self.close_data()
+                self._begin_data(opening)
             if self._is_frame(header, streams):
                 self._frame(header, streams[0])
                 continue
@@ -145,6 +176,21 @@ class Crafter(Writer):
         assert row is not None
         self.directory.clips[row.name] = self.edited("row", row)
 
+    def _opening(self) -> bytes:
+        """What a REPT repeats, of a file of one clip."""
+        data, at, found = self.data, len(SIGNATURE), b""
+        while at < len(data):
+            chunk = parse_header(data[at : at + HEADER.size], at)
+            found += data[at : at + chunk.size] if chunk.type in REPEATED else b""
+            at += chunk.size
+        return found
+
+    def _begin_data(self, opening: bytes) -> None:
+        if self._n_data in self.repeat:
+            self.chunk(REPEAT, opening, ANCILLARY)
+        self._n_data += 1
+        self.open_data()
+
     def _is_frame(self, header: SegmentHeader, streams: Sequence[bytes]) -> bool:
         number = self._next_packet
         short = self.frames is not None and number is not None and number >= self.frames
@@ -154,9 +200,13 @@ class Crafter(Writer):
         clip: ClipRow | None = self._clip
         assert clip is not None
         assert self._next_packet is not None
-        packet = build_packet(Packet(FRAME, self._next_packet, stream, bool(header.flags & 1)))
+        made = Packet(FRAME, self._next_packet, stream, bool(header.flags & 1))
+        if self.numbered:
+            number = self.edited("number", header.first)
+            made = numbered_frame(made.sequence, number, stream, fresh=made.fresh)
+        packet = build_packet(made)
         at = self.offset + len(packet) - CHECK_SIZE - len(stream)
-        clip.segments.append(SegmentRow(at, len(stream), header, FRAME))
+        clip.segments.append(SegmentRow(at, len(stream), header, made.kind))
         self._write(self.edited("packet", packet))
         self._next_packet += 1
 
@@ -203,13 +253,17 @@ def file_of(
     index: bool = True,
     packets: bool = False,
     frames: int | None = None,
+    numbered: bool = False,
+    anew: bool = False,
+    repeat: Collection[int] = (),
     grouping: str = "joint",
     segment_frames: int = 0,
     codec: Codec = raw.CODEC,
     **edits: Any,
 ) -> bytes:
     """A file of these clips, edited; a segment has all frames unless ``segment_frames`` says it."""
-    crafter = Crafter(packets=packets, frames=frames, **edits)
+    live: dict[str, Any] = {"packets": packets, "frames": frames, "numbered": numbered}
+    crafter = Crafter(**live, anew=anew, repeat=repeat, **edits)
     for motion in motions:
         crafter.clip(motion, grouping=grouping, codec=codec, segment_frames=segment_frames)
     return finished(crafter, index=index)

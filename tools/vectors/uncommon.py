@@ -151,7 +151,7 @@ def _open_data(shelf: Whole) -> None:
 
 
 def live_file(motion: Motion, **edits: Any) -> bytes:
-    """The clip as a live one: packets of one frame, of kind 2 where that can be."""
+    """The clip as a live one: packets of one frame, of kind 2 or 3 where that can be."""
     given = {"packets": True, "frames": 1, "segment_frames": 1, "grouping": "all"}
     return file_of(motion, **given | edits)
 
@@ -172,19 +172,26 @@ def _frames(shelf: Whole) -> None:
         ),
     )
     for name, purpose, motion, index in cases:
-        data = live_file(motion, index=index)
-        shelf.hold(name, "Open DATA and packets; INDX", purpose, data, motion)
+        for kind in (2, 3):
+            named = name if kind == 2 else name.replace("frame", "numbered")
+            data = live_file(motion, index=index, numbered=kind == 3)
+            said = purpose.replace("kind 2", f"kind {kind}")
+            shelf.hold(named, "Open DATA and packets; INDX", said, data, motion)
     samples = np.arange(8).reshape(8, 1) * 3 - 9
     channels = (Channel("", "emg", "V"),)
     analog = Signal(
         samples, (Grid(GridKind.INTEGER),), "analog", samples_per_frame=2, channels=channels
     )
     both_signals = replace(dance(), signals=(*dance().signals, analog))
-    data = live_file(
-        both_signals, segments=lambda made: sorted(made, key=lambda part: part[0].first)
-    )
-    purpose = "Packets of kind 2 among those of another signal."
-    shelf.hold("frame-packets-signals", "Open DATA and packets; INDX", purpose, data, both_signals)
+    for name, kind in (("frame", 2), ("numbered", 3)):
+        data = live_file(
+            both_signals,
+            segments=lambda made: sorted(made, key=lambda part: part[0].first),
+            numbered=kind == 3,
+        )
+        purpose = f"Packets of kind {kind} among those of another signal."
+        spec = "Open DATA and packets; INDX"
+        shelf.hold(f"{name}-packets-signals", spec, purpose, data, both_signals)
 
 
 def _segments(shelf: Whole) -> None:

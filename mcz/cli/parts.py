@@ -1,0 +1,110 @@
+"""What ``mcz decode`` takes of a clip: its source file, a motion, or a table of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from mcz.cli.export import Table
+    from mcz.files.clip import Clip
+    from mcz.motion import Motion
+
+Masked = tuple[NDArray[Any], NDArray[np.bool_] | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Some frames of a clip, at a resolution; ``rate`` is its frame rate where it says none."""
+
+    clip: Clip
+    frames: tuple[int, int] | None
+    resolution: int
+    decimate: bool
+    rate: Fraction | None
+
+    def source_bytes(self) -> bytes:
+        """The source file, of these frames."""
+        return self.clip.source_bytes(self.frames, self.resolution, decimate=self.decimate)
+
+    def motion(self) -> Motion:
+        return self.clip.motion(self.frames, self.resolution, decimate=self.decimate)
+
+    def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
+        """The channels of ``joints``, which are called ``names``."""
+        from mcz.cli.export import Table
+        from mcz.files.decimation import decimated_rows
+
+        clip = self.clip
+        values, mask = self._rows(joints)
+        mask = np.ones(values.shape, np.bool_) if mask is None else mask
+        start, stop = self.frames or (0, clip.n_frames)
+        numbers, rate = clip.frame_numbers[start:stop], self.rate or clip.frame_rate
+        if self.decimate:
+            step, per_frame = 2**self.resolution, clip.signals[0].layout.samples_per_frame
+            values, mask = (decimated_rows(rows, per_frame, step) for rows in (values, mask))
+            numbers, rate = numbers[::step], rate and rate / step
+        return Table(names, _floats(values), mask, _repeated(numbers, len(values)), rate)
+
+    def _rows(self, joints: Sequence[int | str] | None) -> Masked:
+        return self.clip.read_masked(self.frames, joints, self.resolution)
+
+
+class Filtered(Part):
+    """The same, with the post filter."""
+
+    def source_bytes(self) -> bytes:
+        from mcz.files.filtering import filtered_source
+
+        return filtered_source(
+            self.clip, self.frames, self.resolution, decimate=self.decimate, rate=self.rate
+        )
+
+    def motion(self) -> Motion:
+        from mcz.files.filtering import filtered_motion
+
+        return filtered_motion(
+            self.clip, self.frames, self.resolution, decimate=self.decimate, rate=self.rate
+        )
+
+    def _rows(self, joints: Sequence[int | str] | None) -> Masked:
+        from mcz.files.filtering import filtered_part
+
+        return filtered_part(self.clip, self.frames, joints, self.resolution, rate=self.rate)
+
+
+class Preview(Part):
+    """The frames of a clip that can be read without decoding the rest."""
+
+    def motion(self) -> Motion:
+        from mcz.files.preview import preview_motion
+
+        return preview_motion(self.clip)
+
+    def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
+        from mcz.cli.export import Table
+        from mcz.files.preview import preview
+
+        found = preview(self.clip, joints)
+        numbers, rate = self.clip.frame_numbers[found.frames], self.clip.frame_rate
+        return Table(
+            names,
+            _floats(found.values),
+            np.ones(found.values.shape, np.bool_) if found.mask is None else found.mask,
+            _repeated(numbers, len(found.values)),
+            rate / found.step if rate is not None and found.is_regular else None,
+        )
+
+
+def _floats(values: NDArray[Any]) -> NDArray[np.float64]:
+    return np.asarray(values, dtype=np.float64)
+
+
+def _repeated(numbers: NDArray[np.int64], n_rows: int) -> NDArray[np.int64]:
+    """A number for every row."""
+    return np.repeat(numbers, n_rows // max(1, len(numbers)))

@@ -1,0 +1,175 @@
+"""A live stream over TCP: to whoever connects, from the beginning or from where one can join."""
+
+from __future__ import annotations
+
+import socket
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from threading import Condition, Thread
+from time import monotonic
+from typing import BinaryIO
+
+from mcz.cli.common import Exit, Failure, say
+
+MOST_WAITING = 4 * 2**20  # bytes that a client may be behind
+LINGER = 10.0  # seconds that clients have for the rest, once all is coded
+LOOPBACK = "127.0.0.1"
+
+
+def address_of(text: str) -> tuple[str, int]:
+    """``HOST:PORT``; the loopback where there is no host. Raises Failure."""
+    host, colon, port = text.rpartition(":")
+    if not colon or not (port.isascii() and port.isdigit()) or int(port) > 65_535:
+        raise Failure(f"{text!r} is not HOST:PORT", Exit.USAGE)
+    return host.strip("[]") or LOOPBACK, int(port)
+
+
+@contextmanager
+def connected(text: str) -> Iterator[BinaryIO]:
+    """What comes from ``HOST:PORT``, as a binary stream."""
+    with (
+        socket.create_connection(address_of(text)) as connection,
+        connection.makefile("rb") as stream,
+    ):
+        yield stream
+
+
+class Listener:
+    """Sends what is written to it to all clients; none of them can hold the writer up.
+
+    The first write is what every client gets first. Later ones are frames: a client that comes
+    after the first of them gets those from the next one on for which ``entry`` is not None, which
+    says how many bytes before it are not needed there. One that is ``MOST_WAITING`` bytes behind is
+    dropped. Raises OSError where the address cannot be had.
+    """
+
+    def __init__(self, text: str) -> None:
+        host, port = address_of(text)
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self._server = socket.create_server((host, port), family=family)
+        self.entry: Callable[[], int | None] = lambda: None
+        self._opening: bytes | None = None
+        self._has_frames = False
+        self._clients: list[_Client] = []
+        self._changed = Condition()
+        self._accepting = Thread(target=self._accept, daemon=True)
+        self._accepting.start()
+
+    @property
+    def address(self) -> str:
+        host, port = self._server.getsockname()[:2]
+        return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+    def wait_for(self, n_clients: int) -> None:
+        """Wait until so many clients have come."""
+        with self._changed:
+            self._changed.wait_for(lambda: len(self._clients) >= n_clients)
+
+    def write(self, data: bytes, /) -> int:
+        """Give ``data`` to all clients; never waits for them."""
+        data = bytes(data)
+        with self._changed:
+            if self._opening is None:
+                self._opening = data
+                self._send(data, None)
+            else:
+                self._has_frames = True
+                self._send(data, self.entry())
+        return len(data)
+
+    def _send(self, data: bytes, entry: int | None) -> None:
+        for client in list(self._clients):
+            if client.has_joined:
+                client.put(data)
+            elif entry is not None:
+                client.has_joined = True
+                client.put(data[entry:])
+            if client.is_gone:
+                self._clients.remove(client)
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                connection, where = self._server.accept()
+            except OSError:  # it was closed
+                return
+            with self._changed:
+                client = _Client(connection, f"{where[0]}:{where[1]}", not self._has_frames)
+                if self._opening is not None:
+                    client.put(self._opening)
+                self._clients.append(client)
+                self._changed.notify_all()
+
+    def close(self) -> None:
+        """Take no more clients, and give those that are there a while for the rest."""
+        with suppress(OSError):  # what waits in accept is not woken by close alone
+            self._server.shutdown(socket.SHUT_RDWR)
+        self._server.close()
+        self._accepting.join(LINGER)
+        until = monotonic() + LINGER
+        for client in self._clients:
+            client.finish(until)
+
+
+class _Client:
+    """One connection, and the thread that feeds it."""
+
+    def __init__(self, connection: socket.socket, name: str, has_joined: bool) -> None:
+        self.has_joined = has_joined
+        self.is_gone = False
+        self._connection, self._name = connection, name
+        self._queue: deque[bytes] = deque()
+        self._waiting = 0  # bytes in the queue
+        self._is_last = False
+        self._changed = Condition()
+        self._thread = Thread(target=self._feed, daemon=True)
+        self._thread.start()
+
+    def put(self, data: bytes) -> None:
+        """Queue ``data``; the client is dropped where that is too much."""
+        with self._changed:
+            if self.is_gone:
+                return
+            self._queue.append(data)
+            self._waiting += len(data)
+            too_slow = self._waiting > MOST_WAITING
+            self._changed.notify()
+        if too_slow:
+            say(f"client {self._name} is more than {MOST_WAITING:,} bytes behind, and is dropped")
+            self._drop()
+
+    def finish(self, until: float) -> None:
+        """Close the connection when the queue is empty, or at ``until``."""
+        with self._changed:
+            self._is_last = True
+            self._changed.notify()
+        self._thread.join(max(0.0, until - monotonic()))
+        if self._thread.is_alive():
+            say(f"client {self._name} did not take the rest, and is dropped")
+        self._drop()
+
+    def _feed(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._queue or self._is_last or self.is_gone)
+                if self.is_gone or not self._queue:
+                    return
+                data = b"".join(self._queue)
+                self._queue.clear()
+            try:
+                self._connection.sendall(data)
+            except OSError:  # it left
+                self._drop()
+                return
+            with self._changed:
+                self._waiting -= len(data)
+
+    def _drop(self) -> None:
+        with self._changed:
+            self.is_gone = True
+            self._queue.clear()
+            self._changed.notify()
+        with suppress(OSError):
+            self._connection.shutdown(socket.SHUT_RDWR)
+        self._connection.close()

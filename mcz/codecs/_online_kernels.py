@@ -1,0 +1,325 @@
+"""Compiled: frames of a group, each predicted, quantized with a step of its own, and coded.
+
+SPEC.md, "Codec 11: online", is normative and has the steps below in the same order. One function
+serves encoder and decoder. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs._online_rate_kernels import (
+    INTRA,
+    LTR,
+    NEVER,
+    STR,
+    begin_group,
+    ltr_step,
+    settle,
+    str_step,
+)
+from mcz.coding import kernels, residuals
+from mcz.coding.frames import (
+    LAST,
+    MAX_INDEX,
+    TRACK_SIZE,
+    add_frame,
+    code_frame,
+    coefficient_of,
+    index_of,
+)
+from mcz.coding.kernels import Bytes, Ints, adaptive, number
+from mcz.coding.residuals import bits
+from mcz.jit import inner, kernel
+
+__all__ = ["N_MEMORY", "TRACK_SIZE", "decode_frames", "encode_frames"]
+
+Floats = NDArray[np.float64]
+
+MIXED, GOLOMB = 0, 1  # coders
+N_STEPS = 512
+FIRST_STEP = 256  # the code of 1
+
+# Contexts behind the residuals', or in front of all else.
+C_PRESENT, C_SAME, C_LONGER, N_FLAGS = 0, 4, 6, 15
+MIXED_FLAGS = 3 * residuals.N_CONTEXTS
+GOLOMB_FLAGS = 0
+C_PREFIX = N_FLAGS
+CLASSES, PLACES = 16, 4
+MOST_ONES = 16  # of a Golomb-Rice prefix; then the rest follows in plain bits
+N_MIXED, N_GOLOMB = MIXED_FLAGS + N_FLAGS, N_FLAGS + 2 * CLASSES * PLACES
+
+LAST_STEP, LTR_STEP, PRESENT, N_MEMORY = range(4)
+
+
+@inner
+def _ratio(code: int) -> float:
+    """What a step code stands for, about 2^((code - 256) / 8)."""
+    return float(8 + (code & 7)) * 2.0 ** ((code >> 3) - 35)
+
+
+@inner
+def _code_step(state: Ints, data: Bytes, step: int, kind: int, memory: Ints, flags: int) -> int:
+    """Code the step of a frame against the one before; N_STEPS where it is none."""
+    if kind == INTRA:
+        return number(state, data, step, 9)
+    before = memory[LTR_STEP] if kind == LTR else memory[LAST_STEP]
+    change = step - before
+    if adaptive(state, data, 1 if change == 0 else 0, flags + C_SAME + (1 if kind else 0)):
+        return int(before)
+    negative = number(state, data, 1 if change < 0 else 0, 1)
+    size, length = abs(change), 1
+    while adaptive(state, data, 1 if bits(size) > length else 0, flags + C_LONGER + length - 1):
+        length += 1
+        if length > 9:
+            return N_STEPS
+    size = 1 << (length - 1) | number(state, data, size, length - 1)
+    found = before - size if negative else before + size
+    return int(found) if 0 <= found < N_STEPS else N_STEPS
+
+
+@inner
+def _code_golomb(
+    state: Ints, data: Bytes, indices: Ints, sizes: Ints, starts: Ints, kind: int
+) -> int:
+    """Code ``indices`` (n_rows,) in place, ``sizes`` those before; 1 where that is impossible."""
+    for m in range(len(starts) - 1):
+        one = two = 0
+        for r in range(starts[m], starts[m + 1]):
+            activity = 2 * one + two + 2 * sizes[r]
+            if r + 1 < starts[m + 1]:
+                activity += sizes[r + 1]
+            size = _code_size(state, data, abs(indices[r]), activity, kind)
+            if size > MAX_INDEX:
+                return 1
+            indices[r] = -size if indices[r] < 0 else size
+            two, one = one, size
+    for r in range(len(indices)):
+        size = abs(indices[r])
+        if size and number(state, data, 1 if indices[r] < 0 else 0, 1):
+            indices[r] = -size
+        sizes[r] = 0 if kind else size
+    return 0
+
+
+@inner
+def _code_size(state: Ints, data: Bytes, size: int, activity: int, kind: int) -> int:
+    """Code an absolute value by a Golomb-Rice code whose prefix is coded bit by bit."""
+    rice = max(0, bits(activity) - 3)
+    klass = activity if rice == 0 else 7 + min(rice, 8)
+    context = C_PREFIX + (CLASSES * (1 if kind else 0) + klass) * PLACES
+    prefix, ones = size >> rice, 0
+    while adaptive(state, data, 1 if prefix > ones else 0, context + min(ones, PLACES - 1)):
+        ones += 1
+        if ones == MOST_ONES:
+            length = number(state, data, bits(prefix - ones + 1), 6)
+            if length == 0 or length > 42:
+                return MAX_INDEX + 1
+            ones += (1 << (length - 1) | number(state, data, prefix - ones + 1, length - 1)) - 1
+            break
+    if ones > MAX_INDEX >> rice:
+        return MAX_INDEX + 1
+    return ones << rice | number(state, data, size, rice)
+
+
+@inner
+def _code_frame(
+    state: Ints,
+    data: Bytes,
+    coder: int,
+    kind: int,
+    indices: Ints,
+    step: int,
+    starts: Ints,
+    memory: Ints,
+    lengths: Ints,
+    tracks: Ints,
+) -> int:
+    """Code ``indices`` (n_rows,) in place; return the code of their step, N_STEPS at a fault."""
+    flags = GOLOMB_FLAGS if coder == GOLOMB else MIXED_FLAGS
+    if kind:
+        lengths[:] = 0
+        tracks[:] = 0
+    present = 0
+    for index in indices:
+        present |= 1 if index != 0 else 0
+    context = kind + 1 if kind else memory[PRESENT]
+    present = adaptive(state, data, present, flags + C_PRESENT + context)
+    memory[PRESENT] = 0 if kind else present
+    if present:
+        step = _code_step(state, data, step, kind, memory, flags)
+        if step == N_STEPS:
+            return N_STEPS
+        if coder == GOLOMB:
+            fault = _code_golomb(state, data, indices, tracks[:, LAST], starts, kind)
+        else:
+            fault = code_frame(state, data, indices, starts, lengths, tracks, 1 if kind else 0)
+        if fault:
+            return N_STEPS
+    elif kind == INTRA:
+        step = FIRST_STEP
+    else:
+        step = memory[LTR_STEP] if kind else memory[LAST_STEP]
+    memory[LAST_STEP] = step
+    if kind:
+        memory[LTR_STEP] = step
+    return step
+
+
+@inner
+def _predict(kind: int, values: Floats, reference: Floats) -> None:
+    """Make ``values`` what a frame is predicted to be."""
+    if kind == INTRA:
+        values[:] = 0.0
+    elif kind == LTR:
+        values[:] = reference
+
+
+@kernel
+def decode_frames(
+    state: Ints,
+    data: Bytes,
+    coder: int,
+    kind: int,
+    out: Floats,
+    values: Floats,
+    reference: Floats,
+    memory: Ints,
+    lengths: Ints,
+    tracks: Ints,
+    vectors: Floats,
+    starts: Ints,
+    columns: Ints,
+    step: float,
+    weights: Floats,
+) -> int:
+    """Write the frames of a unit, (frames, n_channels), to ``out``; return that of a fault, or -1.
+
+    ``kind`` is that of the first, all others are STR. ``values`` and ``reference`` (n_channels,)
+    are the last frame and the last LTR, ``memory`` (N_MEMORY,), ``lengths`` (n_matrices,) and
+    ``tracks`` (n_rows, TRACK_SIZE) what else is remembered; ``vectors`` (n_rows, n_points),
+    ``starts`` the first row of each matrix and the end, ``columns`` (n_matrices, n_points) the
+    channel of each point, ``weights`` (n_channels,).
+    """
+    indices = np.zeros(len(vectors), np.int64)
+    sums = np.empty(vectors.shape[1])
+    for at in range(len(out)):
+        indices[:] = 0
+        code = _code_frame(state, data, coder, kind, indices, 0, starts, memory, lengths, tracks)
+        if code == N_STEPS:
+            return at
+        _predict(kind, values, reference)
+        used = step * _ratio(code)
+        add_frame(values, indices, vectors, starts, columns, used, weights, sums)
+        out[at] = values
+        if kind:
+            reference[:] = values
+        kind = STR
+    return -1
+
+
+@inner
+def _bits_of(state: Ints) -> float:
+    """The bits that an encoder has written so far, with those that are still in the interval."""
+    width = float(state[kernels.HIGH] - state[kernels.LOW]) + 1.0
+    return float(8.0 * state[kernels.POSITION] + 32.0 - np.log2(width))
+
+
+@inner
+def _transform(
+    coefficients: Floats,
+    frame: Floats,
+    values: Floats,
+    columns: Ints,
+    starts: Ints,
+    step: float,
+    weights: Floats,
+    analysis: Floats,
+    points: Floats,
+) -> None:
+    """The coefficients (n_rows,) of what ``frame`` adds to ``values``, in units of ``step``."""
+    for m in range(len(starts) - 1):
+        for j in range(len(points)):
+            c = columns[m, j]
+            points[j] = (frame[c] - values[c]) / weights[c] / step
+        for r in range(starts[m], starts[m + 1]):
+            coefficients[r] = coefficient_of(points, analysis[r])
+
+
+@inner
+def _quantize(indices: Ints, coefficients: Floats, ratio: float, threshold: float) -> float:
+    """Fill ``indices`` (n_rows,); return the mean square of what they stand for, -1 at a fault."""
+    squares = 0.0
+    for r in range(len(indices)):
+        indices[r] = index_of(coefficients[r] / ratio, threshold)
+        if abs(indices[r]) > MAX_INDEX:
+            return -1.0
+        squares += (indices[r] * ratio) ** 2
+    return squares / max(1, len(indices))
+
+
+@kernel
+def encode_frames(
+    state: Ints,
+    data: Bytes,
+    coder: int,
+    kind: int,
+    frames: Floats,
+    values: Floats,
+    reference: Floats,
+    memory: Ints,
+    lengths: Ints,
+    tracks: Ints,
+    vectors: Floats,
+    starts: Ints,
+    columns: Ints,
+    step: float,
+    weights: Floats,
+    analysis: Floats,
+    threshold: float,
+    n_group: int,
+    plan: Floats,
+    laplace: Floats,
+    gauss: Floats,
+) -> int:
+    """Code frames (frames, n_channels) of a group of ``n_group``; otherwise as ``decode_frames``.
+
+    ``analysis`` (n_rows, n_points) makes coefficients of points. Returns the frame of a value that
+    is too large, of which nothing is coded or remembered, or -1.
+    """
+    indices = np.zeros(len(vectors), np.int64)
+    coefficients = np.empty(len(vectors))
+    sums, points = np.empty(vectors.shape[1]), np.empty(vectors.shape[1])
+    predicted = np.empty_like(values)
+    for at in range(len(frames)):
+        predicted[:] = values
+        _predict(kind, predicted, reference)
+        _transform(
+            coefficients, frames[at], predicted, columns, starts, step, weights, analysis, points
+        )
+        if not np.abs(coefficients).max() < 2.0**80:  # NaN too
+            return at
+        if kind:
+            begin_group(plan, n_group)
+            wanted = ltr_step(plan, coefficients, kind == INTRA, n_group, laplace)
+        else:
+            wanted = str_step(plan, len(coefficients), n_group, gauss)
+        code, variance = FIRST_STEP, 0.0
+        if wanted < NEVER:
+            code = int(min(max(np.rint(8.0 * wanted) + FIRST_STEP, 0), N_STEPS - 1))
+            variance = _quantize(indices, coefficients, _ratio(code), threshold)
+            if variance < 0:
+                return at
+        else:
+            indices[:] = 0
+        before = _bits_of(state)
+        code = _code_frame(state, data, coder, kind, indices, code, starts, memory, lengths, tracks)
+        values[:] = predicted
+        used = step * _ratio(code)
+        add_frame(values, indices, vectors, starts, columns, used, weights, sums)
+        if kind:
+            reference[:] = values
+        settle(plan, kind, wanted, _bits_of(state) - before, variance)
+        kind = STR
+    return -1

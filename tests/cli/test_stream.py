@@ -1,0 +1,490 @@
+"""``mcz stream``: over real pipes and sockets, frame by frame."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.cli import common, tcp
+from mcz.cli.main import cli
+from mcz.cli.rows import Rows
+from mcz.files.following import live_frames
+
+ROOT = Path(mcz.__file__).parent.parent
+NAMES = b"a,b\n"
+ROWS = np.arange(60).reshape(10, 6) / 4
+CODERS = {
+    "online": ("--param", "step=0.01", "--param", "gof=2", "--param", "intra_period=2"),
+    "lsdt-frame": ("--codec", "lsdt-frame", "--param", "step=0.01", "--param", "segment_frames=4"),
+}
+CODER = CODERS["lsdt-frame"]
+ENV = os.environ | {"PYTHONPATH": str(ROOT)}
+
+
+def line(row: np.ndarray) -> bytes:
+    return ",".join("" if np.isnan(v) else repr(float(v)) for v in row).encode() + b"\n"
+
+
+CSV = NAMES + b"".join(map(line, ROWS))
+
+
+def run(*arguments: str | Path, data: bytes = b"") -> tuple[int, bytes, str]:
+    """Exit code, standard output and standard error of ``mcz stream``, in this process."""
+    before = sys.stdin, sys.stdout, sys.stderr
+    streams = [io.TextIOWrapper(io.BytesIO(part), "utf-8") for part in (data, b"", b"")]
+    sys.stdin, sys.stdout, sys.stderr = streams
+    try:
+        code = common.run(cli, "mcz", ["stream", *map(str, arguments)])
+        for stream in streams[1:]:
+            stream.flush()
+    finally:
+        sys.stdin, sys.stdout, sys.stderr = before
+    out, errors = (stream.buffer.getvalue() for stream in streams[1:])
+    return code, out, errors.decode()
+
+
+def encoded(*arguments: str | Path, data: bytes = CSV) -> bytes:
+    code, out, errors = run("encode", *CODER, *arguments, data=data)
+    assert (code, errors) == (0, "")
+    return out
+
+
+class Started:
+    """A process of ``mcz stream`` with its pipes in hand."""
+
+    def __init__(self, *arguments: str | Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "mcz.cli.main", "stream", *map(str, arguments)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            cwd=ROOT,
+            env=ENV,
+        )
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        assert self.process.stderr is not None
+        self.stdin, self.stdout = self.process.stdin, self.process.stdout
+        self.stderr = self.process.stderr
+
+    def __enter__(self) -> Started:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for stream in (self.stdin, self.stdout, self.stderr):
+            stream.close()
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+
+    def say(self, data: bytes) -> None:
+        self.stdin.write(data)
+        self.stdin.flush()
+
+    def address(self) -> str:
+        """Where it listens."""
+        return self.stderr.readline().decode().split()[-1]
+
+    def end(self) -> int:
+        self.stdin.close()
+        return self.process.wait()
+
+
+# Pipes -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("coder", CODERS)
+def test_each_frame_is_out_before_the_next_row_is_read(coder: str) -> None:
+    with Started("encode", *CODERS[coder]) as started:
+        started.say(NAMES)
+        found = live_frames(started.stdout)
+        for number, row in enumerate(ROWS):
+            started.say(line(row)[:3])
+            started.say(line(row)[3:])
+            frame, values, _ = next(found)  # waits for ever if it were held back
+            assert frame == number
+            np.testing.assert_allclose(values, row, atol=0.02)
+        started.stdin.close()
+        assert list(found) == []
+        assert started.process.wait() == 0
+
+
+def test_each_row_is_printed_before_the_next_frame_is_read() -> None:
+    parts = list(mcz.stream_encode(ROWS, ["a", "b"], codec="lsdt-frame", params={"step": 0.01}))
+    with Started("decode") as started:
+        started.say(parts[0])
+        started.say(parts[1])
+        assert started.stdout.readline() == b"frame,a.tx,a.ty,a.tz,b.tx,b.ty,b.tz\n"
+        for number, part in enumerate(parts[2:-1]):
+            assert started.stdout.readline().startswith(b"%d," % number)
+            started.say(part)
+        assert started.stdout.readline().startswith(b"9,")
+        started.say(parts[-1])
+        assert started.end() == 0
+        errors = started.stderr.read().decode()
+    assert "10 frames decoded, 0 concealed, 0 missing" in errors
+
+
+def test_both_ends_of_a_pipe() -> None:
+    with Started("encode", *CODER) as first, Started("decode") as second:
+        for number, row in enumerate(ROWS):
+            first.say((NAMES if not number else b"") + line(row))
+            if not number:
+                second.say(first.stdout.read1(10**6))  # what precedes the frames, and maybe more
+            second.say(first.stdout.read1(10**6))
+            if not number:
+                second.stdout.readline()
+            found = second.stdout.readline().split(b",")
+            assert int(found[0]) == number
+            np.testing.assert_allclose(list(map(float, found[1:])), row, atol=0.02)
+
+
+def test_a_binary_stream_there_and_back() -> None:
+    rows = ROWS.copy()
+    rows[3, 1] = np.nan
+    data = NAMES + rows.astype("<f4").tobytes()
+    coded = encoded("--float32", data=data)
+    code, out, _ = run("decode", "--float32", data=coded)
+    assert code == 0
+    names, _, values = out.partition(b"\n")
+    assert names == b"a.tx,a.ty,a.tz,b.tx,b.ty,b.tz"
+    found = np.frombuffer(values, "<f4").reshape(10, 6)
+    np.testing.assert_array_equal(np.isnan(found), np.isnan(rows))
+    np.testing.assert_allclose(found, rows, atol=0.02)
+    again = encoded("--float32", data=out)
+    assert len(list(live_frames(io.BytesIO(again)))) == 10
+    code, _, errors = run("encode", *CODER, "--float32", data=data[:-5])
+    assert code == 1
+    assert "row 9 ends after 19 of 24 bytes" in errors
+
+
+def test_what_is_printed_can_be_read_again(tmp_path: Path) -> None:
+    rows = ROWS.copy()
+    rows[3, 1] = np.nan
+    path = tmp_path / "a.mcz"
+    path.write_bytes(encoded(data=NAMES + b"".join(map(line, rows))))
+    plain = list(live_frames(io.BytesIO(path.read_bytes())))
+    stored = tmp_path / "a.csv"
+    common.run(cli, "mcz", ["decode", str(path), "--to", "csv", "-o", str(stored)])
+    for printed in (
+        run("decode", path)[1],
+        run("decode", "--states", path)[1],
+        stored.read_bytes(),
+    ):
+        found = list(live_frames(io.BytesIO(encoded(data=printed))))
+        assert len(found) == 10
+        for (_, values, valid), (_, wanted, known) in zip(found, plain, strict=True):
+            np.testing.assert_array_equal(valid, known)
+            np.testing.assert_allclose(values, wanted, atol=0.02)
+
+
+def test_rows_of_the_channels_of_a_skeleton(tmp_path: Path) -> None:
+    bvh = tmp_path / "a.bvh"
+    bvh.write_text(
+        "HIERARCHY\nROOT hips\n{\nOFFSET 1 2 3\nCHANNELS 3 Xposition Yposition Zposition\n"
+        "JOINT arm\n{\nOFFSET 0 4 0\nCHANNELS 1 Zrotation\nEnd Site\n{\nOFFSET 0 2 0\n}\n}\n}\n"
+        "MOTION\nFrames: 1\nFrame Time: .01\n1 2 3 4\n"
+    )
+    data = b"1,2,3,10\n1,2,3,20\n"
+    coded = encoded("--skeleton", bvh, "--param", "domain=channels", data=data)
+    found = [values for _, values, _ in live_frames(io.BytesIO(coded))]
+    np.testing.assert_allclose(found, [[1, 2, 3, 10], [1, 2, 3, 20]], atol=0.02)
+    places = encoded("--skeleton", bvh, data=data)
+    assert next(live_frames(io.BytesIO(places)))[1].shape == (9,)
+    (tmp_path / "a.mcz").write_bytes(coded)
+    again = encoded("--skeleton", tmp_path / "a.mcz", data=data)
+    assert next(live_frames(io.BytesIO(again)))[1].shape == (9,)
+    code, _, errors = run("encode", *CODER, "--skeleton", tmp_path / "no.bvh", data=data)
+    assert (code, "no such file" in errors) == (1, True)
+    code, _, errors = run("encode", *CODER, "--skeleton", __file__, data=data)
+    assert (code, "a skeleton is in" in errors) == (2, True)
+
+
+def test_parameters_change_by_a_line(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    changed = NAMES + line(ROWS[0]) + b"# a comment\n# set step=0.5 gof=3\n" + line(ROWS[1]) * 9
+    code, out, errors = run("encode", *CODERS["online"], "-o", path, data=changed)
+    assert (code, errors) == (0, "")
+    assert out.decode().startswith(f"{path}: 10 frames of 6 channels, live; ")
+    assert mcz.verify(path) == []
+    with mcz.open(path) as file:
+        quality = file.clips["live"].quality
+    assert quality is not None
+    assert "param.step" not in quality
+    changed = changed.replace(b" gof=3", b"")
+    code, _, errors = run("encode", *CODER, "-o", path, "--force", data=changed)
+    assert (code, "cannot change" in errors) == (2, True)
+    assert mcz.verify(path) == []  # what came before that line
+    bad = NAMES + b"# set step\n"
+    assert "not '# set name=value" in run("encode", *CODER, data=bad)[2]
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "the first line should be names"),
+        (b"\n1\n", "need"),
+        (b"a\xff,b\n", "not a line of names"),
+        (NAMES + b"1,2\n", "line 2: 2 values of 6"),
+        (NAMES + line(ROWS[0]) + b"1,2,3,4,5,x\n", "line 3"),
+        (b"a.x,a.z,a.y\n", "not x, y and z"),
+    ],
+)
+def test_bad_rows(data: bytes, message: str) -> None:
+    code, _, errors = run("encode", *CODER, data=data)
+    assert code in (1, 2)
+    assert errors.startswith("mcz: standard input: ")
+    assert message in errors
+    assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("encode", "-o", "x.mcz", "--listen", ":0"),
+        ("encode", "--clients", "1"),
+        ("encode", "--listen", "nowhere"),
+        ("encode", "--codec", "raw"),
+        ("encode", "--codec", "what"),
+        ("decode", "--connect", "localhost:1", "x.mcz"),
+        ("decode", "--states", "--float32"),
+        ("decode", "--rate", "120"),
+        ("decode", "--connect", "what"),
+        ("decode", "--lost", "what"),
+        ("what",),
+    ],
+)
+def test_wrong_usage(arguments: tuple[str, ...]) -> None:
+    code, out, errors = run(*arguments, data=CSV)
+    assert (code, out) == (2, b"")
+    assert errors.startswith("mcz: ")
+    assert "Traceback" not in errors
+
+
+def test_files_that_are_there_stay(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    path.write_bytes(b"dear")
+    assert run("encode", *CODER, "-o", path, data=CSV)[0] == 2
+    assert run("encode", "--codec", "raw", "-o", path, "--force", data=CSV)[0] == 2
+    assert path.read_bytes() == b"dear"
+    assert run("encode", *CODER, "-o", path, "--force", data=CSV)[0] == 0
+    assert mcz.verify(path) == []
+    assert run("decode", tmp_path / "no.mcz")[0] == 1
+    code, out, _ = run("decode", path)
+    assert (code, out.count(b"\n")) == (0, 11)
+
+
+def test_an_interrupt_leaves_a_whole_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    with Started("encode", *CODER, "-o", path) as started:
+        started.say(CSV)
+        while not path.exists() or len(path.read_bytes()) < 500:
+            time.sleep(0.01)
+        started.process.send_signal(signal.SIGINT)
+        assert started.process.wait() == 130
+    assert mcz.verify(path) == []
+    with mcz.open(path) as file:
+        assert 1 <= file.clips["live"].n_frames <= 10
+
+
+def test_what_a_crash_leaves(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    with Started("encode", *CODER, "-o", path) as started:
+        started.say(CSV)
+        while not path.exists() or len(path.read_bytes()) < 500:
+            time.sleep(0.01)
+        started.process.kill()
+        started.process.wait()
+    code, out, errors = run("decode", "--lost", "hold", "--states", path)
+    assert code == 4
+    assert "cut off" in errors
+    assert all(row.endswith(b",decoded") for row in out.splitlines()[1:])
+    strict = run("decode", path)
+    assert strict[0] == 1
+    assert strict[1].count(b"\n") == out.count(b"\n")
+    assert f"mcz: {path}: " in strict[2]
+
+
+def test_a_reader_that_has_seen_enough() -> None:
+    with Started("decode") as started:
+        started.stdout.close()
+        started.stdin.write(encoded())
+        started.end()
+        assert started.stderr.read() == b""
+
+
+def test_lost_frames_are_marked(tmp_path: Path) -> None:
+    sent = list(
+        mcz.stream_encode(
+            ROWS, ["a", "b"], codec="lsdt-frame", params={"step": 0.01, "segment_frames": 4}
+        )
+    )
+    data = b"".join([*sent[:3], *sent[4:]])  # frame 2, and so 3, is lost
+    assert run("decode", data=data)[0] == 1
+    code, out, errors = run("decode", "--lost", "linear", "--states", data=data)
+    assert code == 4
+    assert "8 frames decoded, 2 concealed, 0 missing" in errors
+    states = [row.rpartition(b",")[2].decode() for row in out.splitlines()]
+    assert states == ["state", *["decoded"] * 2, *["concealed"] * 2, *["decoded"] * 6]
+    code, out, _ = run("decode", "--lost", "missing", data=data)
+    assert out.splitlines()[3] == b"2,,,,,,"
+    code, out, errors = run("decode", "--join", "--lost", "hold", data=data[20:])
+    assert (code, out.splitlines()[1][:2]) == (0, b"4,")
+    assert "hash not checked" in errors
+
+
+def test_filtered_rows_come_late() -> None:
+    rows = np.repeat(ROWS, 4, axis=0)
+    sent = list(
+        mcz.stream_encode(rows, ["a", "b"], codec="lsdt-frame", params={"step": 0.01}, unit="cm")
+    )
+    with Started("decode", "--post-filter", "--rate", "120") as started:
+        started.say(b"".join(sent[:14]))  # 13 frames
+        started.stdout.readline()
+        assert started.stdout.readline().startswith(b"0,")
+        started.say(sent[14])
+        assert started.stdout.readline().startswith(b"1,")
+        started.say(b"".join(sent[15:]))
+        assert len(started.stdout.read1(10**6)) > 0
+        assert started.end() == 0
+
+
+# TCP ---------------------------------------------------------------------------
+
+
+def frames_from(stream: object) -> Iterator[mcz.LiveFrame]:
+    return iter(mcz.stream_decode(stream, join=True))
+
+
+def test_clients_early_and_late() -> None:
+    with Started("encode", *CODER, "--listen", "127.0.0.1:0", "--clients", "1") as started:
+        started.stdin.write(NAMES)
+        started.stdin.flush()
+        host, port = tcp.address_of(started.address())
+        with socket.create_connection((host, port)) as early:
+            first = frames_from(early.makefile("rb"))
+            for number in range(2):
+                started.say(line(ROWS[number]))
+                assert next(first).number == number
+            with socket.create_connection((host, port)) as late:
+                stream = late.makefile("rb")
+                while not stream.peek():
+                    pass  # what precedes the frames comes at once
+                second = frames_from(stream)
+                for number in range(2, 6):
+                    started.say(line(ROWS[number]))
+                    assert next(first).number == number
+                found = [next(second), next(second)]
+                assert [frame.number for frame in found] == [4, 5]  # a fresh one every 4 frames
+                for number in range(6, 10):
+                    started.say(line(ROWS[number]))
+                started.stdin.close()
+                rest = list(first), list(second)
+        assert [[frame.number for frame in part] for part in rest] == [[6, 7, 8, 9]] * 2
+        for a, b in zip(*rest, strict=True):
+            np.testing.assert_array_equal(a.values, b.values)
+        assert started.process.wait() == 0
+
+
+def test_both_ends_of_a_connection() -> None:
+    with Started("encode", *CODER, "--listen", ":0", "--clients", "1") as sender:
+        sender.say(NAMES)
+        with Started("decode", "--connect", sender.address(), "--states") as receiver:
+            for number, row in enumerate(ROWS):
+                sender.say(line(row))
+                if not number:
+                    receiver.stdout.readline()
+                found = receiver.stdout.readline()
+                assert found.startswith(b"%d," % number)
+                assert found.endswith(b",decoded\n")
+            assert sender.end() == 0
+            assert receiver.process.wait() == 0
+            assert "10 frames decoded" in receiver.stderr.read().decode()
+
+
+def test_an_interrupt_ends_a_connection_well() -> None:
+    with Started("encode", *CODER, "--listen", ":0", "--clients", "1") as started:
+        started.say(NAMES)
+        with socket.create_connection(tcp.address_of(started.address())) as client:
+            stream = client.makefile("rb")
+            started.say(line(ROWS[0]))
+            reader = mcz.stream_decode(stream, join=True)
+            next(reader)
+            started.process.send_signal(signal.SIGINT)
+            assert list(reader) == []
+            assert not reader.summary.is_cut
+        assert started.process.wait() == 130
+
+
+def test_nobody_holds_the_others_up(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    monkeypatch.setattr(tcp, "MOST_WAITING", 200_000)
+    listener = tcp.Listener("127.0.0.1:0")
+    where = tcp.address_of(listener.address)
+    got = bytearray()
+    with socket.create_connection(where), socket.create_connection(where) as quick:
+        listener.wait_for(2)
+        listener.write(b"opening")
+        while len(got) < len(b"opening"):
+            got += quick.recv(100)
+        for _ in range(300):
+            listener.write(bytes(50_000))
+            left = 50_000
+            while left:
+                data = quick.recv(left)
+                assert data
+                left -= len(data)
+        listener.close()
+        assert quick.recv(10) == b""
+    assert "behind, and is dropped" in capsys.readouterr().err
+    with pytest.raises(OSError):
+        socket.create_connection(where)
+
+
+def test_clients_that_leave(monkeypatch: pytest.MonkeyPatch) -> None:
+    listener = tcp.Listener(":0")
+    with socket.create_connection(tcp.address_of(listener.address)):
+        listener.wait_for(1)
+        listener.write(b"opening")
+    for _ in range(50):
+        listener.write(b"frame")
+        time.sleep(0.01)
+    listener.close()
+    assert listener._clients == []
+
+
+def test_nobody_is_there() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    code, out, errors = run("decode", "--connect", f"127.0.0.1:{port}")
+    assert (code, out) == (1, b"")
+    assert f"127.0.0.1:{port}" in errors
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        code, _, errors = run("encode", *CODER, "--listen", f"127.0.0.1:{port}", data=CSV)
+        assert (code, "Traceback" in errors) == (1, False)
+
+
+# Rows, without a process -----------------------------------------------------------
+
+
+def test_columns_that_are_not_values() -> None:
+    def names(text: bytes) -> list[str] | None:
+        return Rows(io.BytesIO(text), binary=False).names
+
+    assert names(b"frame,a.tx,a.ty,a.tz,state\n") == ["a.tx", "a.ty", "a.tz"]
+    assert names(b"frame,state\n") == ["frame", "state"]
+    assert names(b'"a,b",c\r\n') == ["a,b", "c"]
+    rows = Rows(io.BytesIO(b"frame,a.x,a.y,a.z\n7,1,,nan\n\n# what\n8,1,2,3"), binary=False)
+    rows.expect(3)
+    np.testing.assert_array_equal(list(rows), [[1, np.nan, np.nan], [1, 2, 3]])

@@ -1,0 +1,464 @@
+"""``online``: what its groups, rates and live forms must keep to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mcz
+from mcz.codecs import by_name
+from mcz.codecs._online_plan import gaussian, laplacian, rates
+from mcz.codecs._online_units import INTRA, LTR, STR, Unit, build_units, parse_units
+from mcz.codecs.base import Layout, Request, Span
+from mcz.errors import LostFrameError
+from tests.codecs.lossy import Direct, amc, bytes_of, decoded, gapped, markers, saved
+
+ONLINE = by_name("online")
+PRESETS = ("default", "mod", "rc", "rca")
+
+
+def units_of(coded: Direct) -> list[Unit]:
+    return [
+        unit
+        for segment in coded.segments
+        for unit in parse_units("online", segment.streams[0], segment.n_frames)
+    ]
+
+
+def params_of(preset: str, step: float = 0.5, rate: float = 40.0) -> dict[str, object]:
+    """A step, or a rate for those that need one."""
+    chosen = {"bitrate": rate} if preset in ("rc", "rca") else {"step": step}
+    return {"preset": preset, **chosen}
+
+
+# Values
+
+
+@given(
+    st.integers(1, 70),
+    st.integers(1, 5),
+    st.sampled_from(PRESETS),
+    st.sampled_from(["mixed", "golomb"]),
+    st.sampled_from(["apart", "reordered"]),
+    st.integers(1, 33),
+    st.integers(0, 3),
+)
+def test_errors_do_not_add_up(n_frames, n_markers, preset, coder, order, gof, period) -> None:
+    """With a fixed step every frame is as good as the first."""
+    motion = markers(n_frames, n_markers)
+    chosen = {"coder": coder, "order": order, "gof": gof, "intra_period": period}
+    given_ = {"preset": preset, "rate_control": "mod", "step": 0.5} | chosen
+    coded = Direct("online", motion, basis="cosines", **given_)
+    error = coded.read() - motion.values
+    per_matrix = n_markers if order == "apart" else 3 * n_markers
+    # A coefficient errs by a step's 0.6 at most, and the transform keeps lengths.
+    assert np.abs(error).max() <= 0.6 * 0.5 * math.sqrt(per_matrix) + 1e-9
+    kinds = [unit.kind for unit in units_of(coded)]
+    assert len(kinds) == -(-n_frames // gof)
+    assert kinds == [
+        INTRA if i == 0 or (period and i % period == 0) else LTR for i in range(len(kinds))
+    ]
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize(("n_frames", "n_markers"), [(0, 3), (1, 1), (2, 1), (5, 0)])
+def test_small_clips(preset, n_frames, n_markers) -> None:
+    motion = markers(n_frames, n_markers) if n_markers else markers(n_frames, 1)
+    if not n_markers:
+        signal = replace(motion.signals[0], values=np.zeros((n_frames, 0)), grids=())
+        bare = replace(motion.skeleton, joints=(replace(motion.skeleton.joints[0], channels=()),))
+        motion = replace(motion, skeleton=bare, signals=(signal,))
+    found = Direct("online", motion, **params_of(preset)).read()
+    assert found.shape == motion.values.shape
+
+
+def test_gaps_stay_and_what_lies_beneath_is_not_coded() -> None:
+    motion = gapped()
+    coded = Direct("online", motion, step=0.5)
+    mask = motion.signals[0].mask
+    assert np.abs(coded.read() - motion.values)[mask].max() < 2
+    assert sum(len(unit.data) for unit in units_of(coded)) < 2000
+
+
+@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan, 1e300])
+def test_values_without_a_code_are_refused(bad) -> None:
+    motion = markers(10, 2)
+    values = motion.values.copy()
+    values[7, 3] = bad
+    motion = replace(motion, signals=(replace(motion.signals[0], values=values),))
+    with pytest.raises(mcz.MotionError):
+        Direct("online", motion, step=0.5)
+
+
+@pytest.mark.parametrize(
+    ("params", "words"),
+    [
+        ({"step": 1, "bitrate": 3}, "has no bitrate"),
+        ({"preset": "rc"}, "needs a bitrate"),
+        ({"preset": "rc", "bitrate": 3, "step": 1}, "leave out step"),
+        ({"gof": 0}, "gof"),
+        ({"intra_period": -1}, "intra_period"),
+        ({"bitrate": 0}, "bitrate"),
+        ({"order": "reordered", "basis": "known"}, "cosines only"),
+        ({"coder": "prefix"}, "coder"),
+    ],
+)
+def test_bad_parameters(params, words) -> None:
+    if params == {"step": 1, "bitrate": 3}:
+        params, words = {**params, "rate_control": "mod"}, "has no bitrate"
+    with pytest.raises(mcz.OptionError, match=words):
+        Direct("online", markers(10), **params)
+
+
+def test_a_rate_needs_a_frame_rate() -> None:
+    with pytest.raises(mcz.OptionError, match="frame rate"):
+        Direct("online", replace(markers(10), frame_rate=None), bitrate=4)
+
+
+# Parts
+
+
+@given(st.integers(1, 25), st.integers(0, 3), st.sampled_from([1, 30, 1200]), st.data())
+def test_a_part_is_what_it_is_in_the_whole(gof, period, segment_frames, data) -> None:
+    motion = markers(60, 2)
+    params = {"gof": gof, "intra_period": period, "segment_frames": segment_frames}
+    coded = Direct("online", motion, step=0.5, **params)
+    start = data.draw(st.integers(0, 59))
+    stop = data.draw(st.integers(start + 1, 60))
+    np.testing.assert_array_equal(coded.read(start, stop), coded.read()[start:stop])
+
+
+def test_decoding_begins_at_an_intra_coded_unit() -> None:
+    """What lies before it in its segment may be damaged."""
+    motion = markers(100, 2)
+    coded = Direct("online", motion, step=0.5, gof=10, intra_period=2)
+    meant = coded.read()
+    units = units_of(coded)
+    assert len(coded.segments) == 1
+    units[2] = replace(units[2], data=b"\xff" * 50)
+    with_damage = coded.with_stream((0, 0, 0), build_units(units))
+    found = coded.read(40, 100, changes=with_damage)
+    np.testing.assert_array_equal(found, meant[40:])
+    with pytest.raises(mcz.FormatError):
+        coded.read(39, 100, changes=with_damage)
+
+
+def test_groups_longer_than_a_segment_are_split() -> None:
+    motion = markers(50, 2)
+    coded = Direct("online", motion, step=0.5, gof=40, segment_bytes=8 * 6 * 16)
+    assert {segment.n_frames for segment in coded.segments} <= set(range(1, 17))
+    assert STR in {unit.kind for unit in units_of(coded)}
+    whole = Direct("online", motion, step=0.5, gof=40)
+    np.testing.assert_array_equal(coded.read(), whole.read())
+    np.testing.assert_array_equal(coded.read(45, 50), whole.read()[45:])
+
+
+# Rates
+
+
+def test_rates_are_those_of_quantized_variables() -> None:
+    """Against entropies that are summed up."""
+    for step in (0.05, 0.3, 0.5, 1.0, 2.0, 4.0):
+        edges = (np.arange(-4000, 4001) - 0.5) * step
+        tails = 0.5 * np.exp(-math.sqrt(2) * np.abs(edges))
+        below = np.where(edges < 0, tails, 1 - tails)
+        for found, distribution in (
+            (laplacian(step), below),
+            (gaussian(step), np.array([0.5 * math.erfc(-e / math.sqrt(2)) for e in edges])),
+        ):
+            p = np.diff(distribution)
+            p = p[p > 0]
+            assert found == pytest.approx(-(p * np.log2(p)).sum(), abs=1e-6)
+
+
+def test_rates_fall_with_the_step() -> None:
+    for table in rates():
+        assert (np.diff(table) <= 0).all()
+        assert np.isfinite(table).all()
+        assert table[0] > 15
+        assert table[-1] < 1e-6
+
+
+@settings(max_examples=30)
+@given(
+    st.sampled_from(["rc", "rca", "steady"]),
+    st.floats(2.0, 200.0),
+    st.integers(2, 40),
+    st.integers(0, 3),
+    st.floats(0, 30),
+)
+def test_a_rate_is_held(control, rate, gof, period, speed) -> None:
+    """Over the whole, but for what cannot be spent or saved: still frames, and the last group."""
+    random = np.random.default_rng(3)
+    motion = markers(600, 6)
+    walk = np.cumsum(random.normal(0, speed, motion.values.shape), axis=0)
+    motion = replace(motion, signals=(replace(motion.signals[0], values=walk),))
+    coded = Direct(
+        "online", motion, rate_control=control, bitrate=rate, gof=gof, intra_period=period
+    )
+    spent = 8 * sum(len(unit.data) for unit in units_of(coded)) * 120 / 600 / 1000
+    groups = 600 / gof
+    first = 8 * max(len(unit.data) for unit in units_of(coded)) * 120 / 600 / 1000
+    assert spent <= rate * 1.05 + first + 16 * groups * 120 / 600 / 1000
+    assert np.isfinite(coded.read()).all()
+
+
+def test_no_motion_costs_next_to_nothing_at_any_rate() -> None:
+    motion = markers(300, 4)
+    still = np.repeat(motion.values[:1], 300, axis=0)
+    motion = replace(motion, signals=(replace(motion.signals[0], values=still),))
+    for preset in ("rc", "rca", "default"):
+        coded = Direct("online", motion, preset=preset, bitrate=20.0)
+        assert np.abs(coded.read()[-1] - still[0]).max() < 30
+        assert np.isfinite(coded.read()).all()
+
+
+def test_the_dial_finds_a_size_and_an_error() -> None:
+    motion = markers(240, 8, unit_cm=1.0)
+    found = [saved("online", motion, target_bytes=size) for size in (3000, 6000)]
+    assert bytes_of(found[0]) <= 3000 < bytes_of(found[1]) <= 6000
+    near = decoded("online", motion, mean_error_cm=0.5) - motion.values
+    assert 0.3 < np.linalg.norm(near.reshape(240, -1, 3), axis=2).mean() <= 0.5
+
+
+# Live
+
+
+@given(
+    st.integers(1, 60),
+    st.integers(1, 4),
+    st.sampled_from(PRESETS),
+    st.integers(1, 20),
+    st.integers(0, 3),
+)
+def test_frame_by_frame_gives_the_values_of_the_whole(
+    n_frames, n_markers, preset, gof, period
+) -> None:
+    """With a fixed step; a rate counts bits that differ by what ends each frame's data."""
+    motion = markers(n_frames, n_markers)
+    params = {"preset": preset, "rate_control": "mod", "step": 0.3, "basis": "cosines"}
+    params |= {"gof": gof, "intra_period": period}
+    whole = Direct("online", motion, **params)
+    encoder = ONLINE.live(replace(whole.layout, n_frames=0), ONLINE.options(params))
+    decoder = ONLINE.follow(encoder.header, whole.layout)
+    pushed = [encoder.push(row) for row in motion.values]
+    found = np.array([decoder.push(*packet) for packet in pushed])
+    np.testing.assert_array_equal(found, whole.read())
+    spans = [Span(i, 1, fresh=fresh) for i, (_, fresh) in enumerate(pushed)]
+    for start in {0, n_frames // 2, n_frames - 1}:
+        again = ONLINE.decode(
+            encoder.header,
+            whole.layout,
+            spans,
+            Request(start, n_frames, (0,)),
+            lambda i, _, __: pushed[i][0],
+        )
+        np.testing.assert_array_equal(again, found[start:])
+
+
+def live_pair(motion, **params):
+    layout = Direct("online", motion, **params).layout
+    encoder = ONLINE.live(replace(layout, n_frames=0), ONLINE.options(params))
+    return encoder, ONLINE.follow(encoder.header, layout)
+
+
+@given(st.sets(st.integers(0, 79), max_size=12), st.integers(1, 9), st.integers(0, 3))
+def test_what_is_decoded_after_a_loss_is_right(lost, gof, period) -> None:
+    """A lost STR spoils its group, a lost LTR all up to the next intra coded one."""
+    motion = markers(80, 2)
+    encoder, decoder = live_pair(motion, step=0.5, gof=gof, intra_period=period)
+    _, whole = live_pair(motion, step=0.5, gof=gof, intra_period=period)
+    ltr = before = False
+    for at, row in enumerate(motion.values):
+        packet = encoder.push(row)
+        meant = whole.push(*packet)
+        first, intra = at % gof == 0, packet[1]
+        able = intra or (ltr if first else before)
+        if at in lost:
+            decoder.skip(1)
+            able = False
+        elif able:
+            np.testing.assert_array_equal(decoder.push(*packet), meant)
+        else:
+            with pytest.raises(LostFrameError):
+                decoder.push(*packet)
+        before = able
+        ltr = able if first else ltr
+
+
+def test_bad_bytes_count_as_a_lost_frame() -> None:
+    motion = markers(40, 2)
+    encoder, decoder = live_pair(motion, step=0.5, gof=10, intra_period=2)
+    pushed = [encoder.push(row) for row in motion.values]
+    for at, packet in enumerate(pushed):
+        if at in (0, 10):
+            with pytest.raises(mcz.FormatError):
+                decoder.push(packet[0] + b"\x01", packet[1])
+        elif at < 20:
+            with pytest.raises(LostFrameError):
+                decoder.push(*packet)
+        else:
+            assert np.abs(decoder.push(*packet) - motion.values[at]).max() < 1
+
+
+def test_a_predicted_ltr_is_not_decoded_from_the_wrong_one() -> None:
+    """All of a group is lost, its LTR with it: the distance tells."""
+    motion = markers(60, 2)
+    encoder, decoder = live_pair(motion, step=0.5, gof=10, intra_period=0)
+    pushed = [encoder.push(row) for row in motion.values]
+    for packet in pushed[:10]:
+        decoder.push(*packet)
+    decoder.skip(10)
+    with pytest.raises(LostFrameError, match="lost or no LTR"):
+        decoder.push(*pushed[20])
+
+
+def test_parameters_change_at_the_border_of_a_group() -> None:
+    motion = markers(60, 2)
+    encoder, decoder = live_pair(motion, step=0.5, gof=10, intra_period=2)
+    other, _ = live_pair(motion, step=0.5, gof=10, intra_period=2)
+    sizes, kinds = [], []
+    for at, row in enumerate(motion.values):
+        if at == 15:
+            encoder.change({"step": 4.0})
+            encoder.change({"gof": 5, "intra_period": 1})
+        packet = encoder.push(row)
+        assert at >= 20 or packet == other.push(row)
+        (unit,) = parse_units("online", packet[0], 1)
+        sizes.append(len(packet[0]))
+        kinds.append(unit.kind)
+        assert np.abs(decoder.push(*packet) - row).max() < 8
+    assert [at for at, kind in enumerate(kinds) if kind != STR] == [0, 10, *range(20, 60, 5)]
+    assert set(kinds[20::5]) == {INTRA}
+    assert sum(sizes[21:]) / 39 < sum(sizes[1:20]) / 19
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"coder": "golomb"}, {"basis": "cosines"}, {"step": -1}, {"bitrate": 3}, {"gof": "x"}],
+)
+def test_what_cannot_change_is_refused(options) -> None:
+    encoder, _ = live_pair(markers(10, 2), step=0.5)
+    with pytest.raises(mcz.OptionError):
+        encoder.change(options)
+
+
+def test_a_frame_that_is_refused_live_leaves_no_trace() -> None:
+    motion = markers(30, 2)
+    encoder, _ = live_pair(motion, bitrate=20.0, gof=7)
+    other, _ = live_pair(motion, bitrate=20.0, gof=7)
+    for at, row in enumerate(motion.values):
+        if at % 3 == 0:
+            for bad in (np.nan, 1e300):
+                with pytest.raises(mcz.MotionError):
+                    encoder.push(np.where(np.arange(6) == 2, bad, row))
+        assert encoder.push(row) == other.push(row)
+
+
+def test_a_missing_marker_is_held_live() -> None:
+    motion = gapped(60)
+    encoder, decoder = live_pair(motion, step=0.1)
+    signal = motion.signals[0]
+    for row, valid in zip(signal.values, signal.mask, strict=True):
+        found = decoder.push(*encoder.push(row, valid))
+        assert np.abs(found - row)[valid].max() < 1
+
+
+def test_what_needs_all_frames_is_refused_live() -> None:
+    layout = Layout(0, ((0, 1, 2),), skeleton=markers(1, 1).skeleton)
+    for options, words in (
+        ({}, "step or bitrate"),
+        ({"step": 1, "basis": "learned"}, "train"),
+        ({"bitrate": 4}, "frame rate"),
+    ):
+        with pytest.raises(mcz.OptionError, match=words):
+            ONLINE.live(layout, ONLINE.options(options))
+
+
+# Bad bytes
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([STR, LTR, INTRA]), st.integers(1, 300), st.binary(max_size=5)),
+        min_size=1,
+        max_size=6,
+    ),
+    st.integers(0, 2**40),
+)
+def test_units_survive(rows, distance) -> None:
+    units = [Unit(kind, n, data, distance if kind == LTR else 0) for kind, n, data in rows]
+    stream = build_units(units)
+    n_frames = sum(unit.n_frames for unit in units)
+    assert parse_units("online", stream, n_frames) == units
+    with pytest.raises(mcz.FormatError):
+        parse_units("online", stream, n_frames + 1)
+
+
+@pytest.mark.parametrize("span", [Span(0, 20, 1), Span(0, 20, 0, 1)])
+def test_segments_that_bear_upon_others_are_refused(span) -> None:
+    with pytest.raises(mcz.FormatError, match="bears upon"):
+        Direct("online", markers(20), step=0.5).read(changes={"spans": [span]})
+
+
+@pytest.mark.parametrize("coder", ["mixed", "golomb"])
+@pytest.mark.parametrize("order", ["apart", "reordered"])
+def test_every_cut_and_bit_of_a_header_or_stream(coder, order) -> None:
+    """Values, or one of our errors; what is cut never gives the same values."""
+    params = {"coder": coder, "order": order, "gof": 5, "intra_period": 2, "basis": "cosines"}
+    coded = Direct("online", markers(12, 2), step=0.5, **params)
+    header, stream = coded.header, coded.stream(0, 0, 0)
+    for size in range(len(header)):
+        with pytest.raises(mcz.FormatError):
+            coded.read(changes={"header": header[:size]})
+    meant = coded.read()
+    for size in range(len(stream)):
+        try:
+            found = coded.read(changes=coded.with_stream((0, 0, 0), stream[:size]))
+        except mcz.FormatError:
+            continue
+        assert (found != meant).any()
+    for data, change in (
+        (header, lambda d: {"header": d}),
+        (stream, lambda d: coded.with_stream((0, 0, 0), d)),
+    ):
+        for bit in range(8 * len(data)):
+            damaged = bytearray(data)
+            damaged[bit // 8] ^= 1 << bit % 8
+            try:
+                coded.read(changes=change(bytes(damaged)))
+            except mcz.MczError:
+                continue
+
+
+# Real clips
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", ["17_10", "14_08"])
+def test_rates_of_a_real_clip_are_within_a_percent(data: Path, name: str) -> None:
+    motion = mcz.in_positions(replace(amc(data, name), frame_rate=Fraction(120)))
+    for preset in ("rc", "rca", "default"):
+        for rate in (3.0, 7.0):
+            period = {"intra_period": 0} if preset == "default" else {}
+            coded = Direct("online", motion, preset=preset, bitrate=rate, **period)
+            sizes = np.array([len(unit.data) for unit in units_of(coded)])
+            spent = 8 * sizes.sum() * 120 / motion.n_frames / 1000
+            assert spent == pytest.approx(rate, rel=0.01)
+            if preset != "default":  # which holds it over a second, four groups
+                assert sizes[1:-1].std() < 12
+
+
+@pytest.mark.real
+def test_ours_beats_the_published_at_the_same_rate(data: Path) -> None:
+    motion = mcz.in_positions(replace(amc(data, "17_10"), frame_rate=Fraction(120)))
+    ours = Direct("online", motion, bitrate=5.0).read()
+    theirs = Direct("online", motion, preset="rca", bitrate=5.0).read()
+    assert np.square(ours - motion.values).sum() < np.square(theirs - motion.values).sum() / 2

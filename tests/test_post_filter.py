@@ -1,0 +1,332 @@
+"""The post filter: as SPEC.md writes it, at once, row by row, of motions, and its vectors."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import re
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+import mcz
+from conformance import run
+from mcz.cli import conformance
+from mcz.errors import MotionError, OptionError
+from mcz.files.filtering import filtered_motion, filtered_part, live_filter
+from mcz.motion import Channel, Motion, Signal
+from mcz.sample import acclaim_walk, marker_walk
+from mcz.transforms.post_filter import CUTOFFS, DELAY, RING, SCALE, PostFilter, filter_rows
+from mcz.transforms.post_filter import filter_taps as taps_of
+from tools import make_vectors
+from tools.vectors import valid_filtered
+from tools.vectors.valid_filtered import plain_rows, plain_taps
+
+ROOT = Path(__file__).parents[1]
+SECTION = (ROOT / "SPEC.md").read_text("utf-8").split("\n## Post filter\n")[1].split("\n## ")[0]
+ANNEX = ROOT / "conformance/annex/post_filter.json"
+
+SETTINGS = st.tuples(
+    st.sampled_from([120.0, 30.0, 30000 / 1001, 240.0, 7.0, 1e-3, 1e9]),
+    st.sampled_from([0.1, 1.0, 2.54, 1e-6, 1e6]),
+)
+NUMBERS = st.one_of(
+    st.floats(-1e3, 1e3),
+    st.integers(-50, 50).map(float),
+    st.floats(allow_nan=False),
+    st.just(np.nan),
+)
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> np.ndarray:
+    """Rows of places: any numbers, or steps of a coarse quantizer with runs of unknown ones."""
+    shape = draw(st.integers(0, 70)), draw(st.integers(0, 4))
+    if draw(st.booleans()):
+        return draw(arrays(np.float64, shape, elements=NUMBERS))
+    noise = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    step = draw(st.sampled_from([0.01, 1.0, 30.0]))
+    rows = np.rint(np.cumsum(noise.normal(size=shape), axis=0) / step) * step
+    for _ in range(draw(st.integers(0, 3)) if rows.size else 0):
+        start, column = draw(st.integers(0, shape[0] - 1)), draw(st.integers(0, shape[1] - 1))
+        rows[start : start + draw(st.integers(1, 20)), column] = np.nan
+    return rows
+
+
+def same(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether the bits are the same, but for those of a NaN."""
+    one, other = np.asarray(one), np.asarray(other)
+    bits = np.where(np.isnan(one), 0, one.view(np.int64))
+    return bool(
+        one.shape == other.shape
+        and np.array_equal(np.isnan(one), np.isnan(other))
+        and np.array_equal(bits, np.where(np.isnan(other), 0, other.view(np.int64)))
+    )
+
+
+def streamed(stream: PostFilter, rows: np.ndarray) -> np.ndarray:
+    out = [stream.push(row) for row in rows]
+    assert [row is None for row in out] == [n < DELAY for n in range(len(rows))]
+    return np.concatenate([*(row[None] for row in out if row is not None), stream.finish()])
+
+
+@given(tables(), SETTINGS)
+def test_the_text_says_what_is_computed(rows: np.ndarray, settings: tuple[float, float]) -> None:
+    assert same(filter_rows(rows, *settings), plain_rows(rows, *settings))
+
+
+@given(tables(), tables(), SETTINGS)
+@example(np.full((5, 2), 3.0), np.zeros((0, 2)), (120.0, 1.0))
+def test_row_by_row_is_the_same(
+    rows: np.ndarray, more: np.ndarray, settings: tuple[float, float]
+) -> None:
+    stream = PostFilter(rows.shape[1], *settings)
+    assert same(streamed(stream, rows), filter_rows(rows, *settings))
+    more = np.resize(more, (len(more), rows.shape[1])) if more.size else rows[:3]
+    assert same(streamed(stream, more), filter_rows(more, *settings))  # it is as new
+
+
+def test_long_streams() -> None:
+    noise = np.random.default_rng(5)
+    rows = np.rint(np.cumsum(noise.normal(size=(3 * RING + 77, 3)), axis=0))
+    rows[noise.random(rows.shape) < 0.01] = np.nan
+    meant = filter_rows(rows, 120.0, 0.1)
+    assert same(streamed(PostFilter(3, 120.0, 0.1), rows), meant)
+
+
+@given(
+    st.floats(-(2.0**40), 2.0**40, exclude_min=True, exclude_max=True),
+    st.integers(0, 60),
+    SETTINGS,
+)
+def test_what_stands_still_stays(place: float, n_rows: int, settings: tuple[float, float]) -> None:
+    rows = np.full((n_rows, 2), place)
+    assert np.array_equal(filter_rows(rows, *settings), rows)
+
+
+@given(tables(), st.integers(1, 30), SETTINGS)
+def test_runs_are_filtered_by_themselves(
+    rows: np.ndarray, gap: int, settings: tuple[float, float]
+) -> None:
+    missing = np.full((gap, rows.shape[1]), np.nan)
+    alone = filter_rows(rows, *settings)
+    both = filter_rows(np.concatenate((missing, rows, missing, rows)), *settings)
+    assert same(both, np.concatenate((missing, alone, missing, alone)))
+
+
+@given(tables(), SETTINGS)
+def test_what_is_unknown_stays(rows: np.ndarray, settings: tuple[float, float]) -> None:
+    known = np.abs(rows) < 2.0**40
+    out = filter_rows(rows, *settings)
+    assert np.isfinite(out[known]).all()
+    assert same(np.where(known, 0.0, out), np.where(known, 0.0, rows))
+
+
+def test_noise_falls_and_slow_motion_stays() -> None:
+    seconds = np.arange(1200) / 120
+    slow = 300 * np.sin(seconds)[:, None] * np.ones(3)
+    coarse = np.rint(slow / 10 + np.random.default_rng(1).normal(size=slow.shape)) * 10
+    filtered = filter_rows(coarse, 120.0, 0.1)
+    middle = slice(20, -20)
+    error, before = (np.square(x - slow)[middle].mean() for x in (filtered, coarse))
+    assert error < before / 5
+
+
+def test_each_filter_is_used() -> None:
+    """Errors of prediction up to the first threshold, up to the second, and above it."""
+    for jump, cutoff in ((1.0, 0), (50.0, 1), (500.0, 2)):  # mm
+        rows = np.zeros((30, 1))
+        rows[1] = jump
+        side = taps_of(120.0)[cutoff] / SCALE
+        first = taps_of(120.0)[0, 1] / SCALE * jump  # row 0 goes through the first filter
+        assert filter_rows(rows, 120.0, 0.1)[0, 0] == first
+        meant = plain_rows(rows, 120.0, 0.1)[1, 0]
+        assert meant == pytest.approx(jump * (1 - 2 * side[1:].sum()), rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
+def test_bad_settings(rate: float) -> None:
+    with pytest.raises(OptionError, match="rows a second"):
+        taps_of(rate)
+    with pytest.raises(OptionError, match="length unit"):
+        filter_rows(np.zeros((3, 3)), 120.0, rate)
+    with pytest.raises(MotionError, match="row of shape"):
+        PostFilter(3, 120.0, 1.0).push(np.zeros(4))
+
+
+def test_the_annex_and_the_text_have_the_taps() -> None:
+    annex = json.loads(ANNEX.read_text("utf-8"))
+    assert len(annex) == int(re.search(r"for (\d+) frame rates", SECTION)[1])
+    for text, filters in annex.items():
+        rate = Fraction(text)
+        taps = taps_of(rate.numerator / rate.denominator).tolist()
+        assert filters == {f"{c:g}": row for c, row in zip(CUTOFFS, taps, strict=True)}
+        assert all(row[0] + 2 * sum(row[1:]) == SCALE for row in taps)
+        plain = [plain_taps(cutoff, rate.numerator / rate.denominator) for cutoff in CUTOFFS]
+        assert [[tap / SCALE for tap in row] for row in taps] == plain
+    assert hashlib.sha256(ANNEX.read_bytes()).hexdigest() in SECTION
+    printed = [
+        int(n) for n in re.findall(r"\b\d+\b", re.sub(r"\d Hz", "", SECTION.split("```")[3]))
+    ]
+    assert printed == taps_of(120.0).ravel().tolist()
+
+
+def test_taps_are_those_of_the_window_method() -> None:
+    k = np.arange(-DELAY, DELAY + 1)
+    for row, cutoff in zip(taps_of(120.0), CUTOFFS, strict=True):
+        f = cutoff / 120
+        meant = 2 * f * np.sinc(2 * f * k) * (0.54 + 0.46 * np.cos(2 * np.pi * k / 25))
+        found = np.concatenate((row[:0:-1], row)) / SCALE
+        np.testing.assert_allclose(found, meant / meant.sum(), rtol=0, atol=20 / SCALE)
+
+
+# Motions
+
+
+def walk(**changes) -> Motion:
+    """Markers with some gaps, roughly quantized."""
+    motion = marker_walk()
+    first = motion.signals[0]
+    assert first.mask is not None
+    mask = first.mask.copy()
+    mask[10:14, :3] = False
+    signal = Signal(np.rint(first.values / 30) * 30, mask=mask)
+    return replace(motion, signals=(signal, *motion.signals[1:]), source=None, **changes)
+
+
+def test_motions() -> None:
+    motion = walk()
+    made = mcz.post_filter(motion)
+    signal, first = made.signals[0], motion.signals[0]
+    meant = plain_rows(first.masked(), 120.0, motion.skeleton.unit_cm)
+    assert motion.frame_rate == 120
+    assert same(signal.masked(), meant)
+    assert np.array_equal(signal.values[10:14, :3], first.values[10:14, :3])  # beneath the mask
+    assert signal.mask is first.mask
+    assert made.signals[1:] == motion.signals[1:]
+    assert made.metadata["source-note"].endswith("post-filtered")
+    assert made.source is None
+    assert not np.array_equal(signal.values, first.values)
+    again = mcz.post_filter(made)
+    assert again.metadata["source-note"].count("post-filtered") == 2
+
+
+def test_two_rows_a_frame() -> None:
+    motion = walk()
+    first = motion.signals[0].cut(0, 40)
+    short = replace(motion, signals=(replace(first, samples_per_frame=2),), frame_numbers=None)
+    meant = plain_rows(first.masked(), 240.0, motion.skeleton.unit_cm)
+    assert same(mcz.post_filter(short).signals[0].masked(), meant)
+
+
+def test_integers_become_numbers() -> None:
+    motion = walk()
+    values = np.rint(motion.signals[0].values).astype(np.int64)
+    made = mcz.post_filter(replace(motion, signals=(Signal(values),), frame_numbers=None))
+    assert same(made.values, plain_rows(values.astype(float), 120.0, motion.skeleton.unit_cm))
+
+
+def test_what_cannot_be_filtered() -> None:
+    motion = walk()
+    with pytest.raises(MotionError, match="mcz.in_positions"):
+        mcz.post_filter(acclaim_walk())
+    own = tuple(Channel("", str(c)) for c in range(motion.signals[0].n_channels))
+    named = replace(motion.signals[0], channels=own)
+    with pytest.raises(MotionError, match="markers alone"):
+        mcz.post_filter(replace(motion, signals=(named, *motion.signals[1:])))
+    with pytest.raises(OptionError, match="frame rate is unknown.*give the rate"):
+        mcz.post_filter(replace(motion, frame_rate=None))
+    with pytest.raises(OptionError, match="length unit is unknown.*give the unit"):
+        mcz.post_filter(replace(motion, skeleton=replace(motion.skeleton, unit_cm=None)))
+    given = mcz.post_filter(replace(motion, frame_rate=None), rate=120)
+    assert same(given.values, mcz.post_filter(motion).values)
+    assert given.frame_rate == 120
+
+
+def test_the_live_filter_of_a_clip() -> None:
+    motion = walk()
+    stream = live_filter(motion.skeleton, motion.frame_rate)
+    rows = motion.signals[0].masked()
+    assert same(streamed(stream, rows), mcz.post_filter(motion).signals[0].masked())
+    with pytest.raises(OptionError, match="motion 'live': its frame rate"):
+        live_filter(motion.skeleton, None)
+    with pytest.raises(MotionError):
+        live_filter(acclaim_walk().skeleton, Fraction(120))
+
+
+def written(motion: Motion, **params) -> io.BytesIO:
+    stream = io.BytesIO()
+    mcz.write(motion, stream, **params)
+    return stream
+
+
+def test_parts_are_cut_out_of_the_whole() -> None:
+    motion = walk()
+    whole = mcz.post_filter(motion)
+    rows = whole.signals[0].values
+    with mcz.open(written(motion).getvalue()) as file:
+        clip = next(iter(file.clips.values()))
+        values, mask = filtered_part(clip, (9, 30), [2, 0])
+        columns = [6, 7, 8, 0, 1, 2]
+        assert same(values, rows[9:30, columns])
+        assert np.array_equal(mask, motion.signals[0].mask[9:30, columns])
+        made = filtered_motion(clip, (9, 30))
+        assert same(made.signals[0].values, rows[9:30])
+        assert made.metadata == whole.metadata
+        with pytest.raises(OptionError, match="has frames 0 to"):
+            filtered_part(clip, (9, 10**6))
+        with pytest.raises(MotionError, match="no joint"):
+            filtered_part(clip, None, ["nobody"])
+
+
+def test_resolutions_are_filtered_before_they_are_thinned() -> None:
+    motion = walk()
+    values = motion.signals[0].values[:, 3:12]
+    bones = replace(motion.skeleton, joints=motion.skeleton.joints[1:4])
+    plain = replace(motion, skeleton=bones, signals=(Signal(values),), frame_numbers=None)
+    with mcz.open(written(plain, codec="mrdwt", T_g=1.0).getvalue()) as file:
+        clip = next(iter(file.clips.values()))
+        meant = mcz.post_filter(replace(clip.motion(resolution=2), source=None))
+        made = filtered_motion(clip, (4, 40), 2, decimate=True)
+        assert same(made.values, meant.values[4:40:4])
+        assert made.frame_rate == 30
+
+
+# Vectors
+
+
+@pytest.mark.parametrize("vector", valid_filtered.vectors(), ids=lambda vector: vector.name)
+def test_vectors(vector) -> None:
+    row = make_vectors.row(vector)
+    asked = list(run.requests(row, conformance.OPTIONS))
+    assert any("--post-filter" in request.arguments for request in asked)
+    for request in asked:
+        given = conformance._parser().parse_args(list(request.arguments))
+        answer = b"".join(conformance.respond(vector.data, given))
+        assert run.judge(request, 0, answer) is None, request.arguments
+    assert len(list(run.requests(row, []))) == 1
+
+
+# Real clips
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", ["17_10", "14_08", "01_01"])
+def test_real_clips_coded_coarsely(data: Path, name: str) -> None:
+    """Places that are off by four centimeters come nearer."""
+    clip = mcz.read(data / f"cmu/amc/{name}.amc")
+    motion = replace(mcz.in_positions(clip), frame_rate=Fraction(120))
+    with mcz.open(written(motion, codec="lsdt-frame", step=2.0).getvalue()) as file:
+        coarse = next(iter(file.clips.values())).motion()
+    before, after = (
+        np.linalg.norm((m.values - motion.values).reshape(-1, 3), axis=1).mean()
+        for m in (coarse, mcz.post_filter(coarse))
+    )
+    assert after < 0.9 * before

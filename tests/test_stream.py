@@ -1,0 +1,954 @@
+"""Live streams with losses: what came is decoded, what did not is said."""
+
+from __future__ import annotations
+
+import io
+import tracemalloc
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mcz
+from mcz import codecs
+from mcz.container import payloads
+from mcz.container.chunks import (
+    ANCILLARY,
+    OPEN_LENGTH,
+    REPEAT,
+    SIGNATURE,
+    build_chunk,
+    build_foot,
+    build_header,
+    chunks_in,
+)
+from mcz.container.packets import (
+    END,
+    FRAME,
+    NUMBERED,
+    SEGMENT,
+    Packet,
+    build_packet,
+    head_size,
+    numbered_frame,
+)
+from mcz.container.scan import scan
+from mcz.container.segments import FRESH, SegmentHeader, build_segment
+from mcz.container.source import open_source
+from mcz.files.concealing import LiveFrame
+from mcz.files.report import info, layout
+from mcz.files.tolerant import MOST_MADE_UP
+from mcz.schema import build, parse
+from tests import live_codec
+from tests.repair import as_kind_2, flipped, flips, parts_of, use
+
+NAMES = ("a", "b", "c")
+CODECS = {
+    "stairs": {"every": 10},
+    "lsdt-frame": {"step": 0.02, "segment_frames": 10},
+    "online": {"step": 0.02, "gof": 5, "intra_period": 2},
+}
+CODEC = pytest.mark.parametrize("codec", CODECS)
+
+
+@pytest.fixture(autouse=True)
+def stairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(codecs.CODECS, live_codec.ID, live_codec.CODEC)
+
+
+def rows(n: int = 60, seed: int = 1) -> np.ndarray:
+    """Multiples of an eighth; one value is missing."""
+    values = np.random.default_rng(seed).integers(-9, 9, (n, 9)).cumsum(axis=0) / 8 + 20
+    if n > 15:
+        values[15, 3] = np.nan
+    return values
+
+
+def pieces(codec: str = "stairs", n: int = 60, **more: object) -> list[bytes]:
+    """What precedes the frames, then the bytes of each, then what follows them."""
+    codecs.CODECS[live_codec.ID] = live_codec.CODEC
+    rate = Fraction(120)
+    given = {"params": CODECS[codec], "frame_rate": rate, "unit": "cm"} | more
+    return list(mcz.stream_encode(rows(n), NAMES, codec=codec, **given))
+
+
+def read(data: bytes, **how: object) -> tuple[list[LiveFrame], mcz.StreamSummary]:
+    reader = mcz.stream_decode(io.BytesIO(data), **how)
+    return list(reader), reader.summary
+
+
+def states(found: list[LiveFrame]) -> str:
+    """A letter a frame: d, c or m."""
+    return "".join(frame.state[0] for frame in found)
+
+
+def check_decoded(found: list[LiveFrame], whole: list[LiveFrame]) -> None:
+    """Every frame said to be decoded is that of the lossless run, bit for bit."""
+    for frame in found:
+        if frame.state == "decoded":
+            np.testing.assert_array_equal(frame.values, whole[frame.number].values)
+            np.testing.assert_array_equal(frame.valid, whole[frame.number].valid)
+        assert np.isnan(frame.values[~frame.valid]).all()
+        assert not np.isnan(frame.values[frame.valid]).any()
+        if frame.state == "missing":
+            assert not frame.valid.any()
+
+
+def packet_spans(data: bytes) -> list[tuple[int, int]]:
+    """Where each packet with a frame begins and ends."""
+    spans, number = [], 0
+    with mcz.open(data) as file:
+        for row in file.clips["live"].signals[0].rows:
+            number = 0 if row.header.flags & FRESH else number + 1
+            spans.append((row.offset - head_size(number, row.size), row.stop + 2))
+    return spans
+
+
+def without_packets(data: bytes, lost: set[int]) -> bytes:
+    """The file without the packets of these frames."""
+    kept, at = [], 0
+    for frame, (start, stop) in enumerate(packet_spans(data)):
+        if frame in lost:
+            kept.append(data[at:start])
+            at = stop
+    return b"".join([*kept, data[at:]])
+
+
+# REPT --------------------------------------------------------------------------
+
+
+@CODEC
+def test_what_is_repeated(codec: str) -> None:
+    data = b"".join(pieces(codec))
+    assert mcz.verify(data) == []
+    use(data)
+    use(data, salvage=True)
+    found = scan(open_source(data))
+    repeats = [chunk for chunk in found.chunks if chunk.type == REPEAT]
+    assert [chunk.flags for chunk in repeats] == [ANCILLARY] * 5
+    opening = pieces(codec)[0].removeprefix(SIGNATURE)
+    for chunk in repeats:
+        payload = data[chunk.payload_offset :][: chunk.length]
+        assert payload == opening
+        assert [inner.type for inner in chunks_in(payload, 0)] == [b"HEAD", b"SKEL", b"CLIP"]
+    with mcz.open(data) as file:
+        clip = info(file)["clips"][0]
+        assert clip["between_bytes"] == sum(chunk.size for chunk in repeats)
+        assert sum(size for _, size, _ in layout(file)) == len(data)
+
+
+@pytest.mark.parametrize(("repeat", "found"), [(0, 0), (1, 5), (2, 2), (3, 1), (9, 0)])
+def test_every_so_many_fresh_frames_are_preceded_by_it(repeat: int, found: int) -> None:
+    data = b"".join(pieces(repeat=repeat))
+    assert sum(chunk.type == REPEAT for chunk, _ in parts_of(data)) == found
+    assert mcz.verify(data) == []
+    with pytest.raises(mcz.OptionError, match="repeat"):
+        pieces(repeat=-1)
+
+
+def test_rewriting_drops_it(tmp_path) -> None:
+    path, other = tmp_path / "a.mcz", tmp_path / "b.mcz"
+    path.write_bytes(b"".join(pieces()))
+    mcz.extract(path, other, frames=(12, 47))
+    assert all(chunk.type != REPEAT for chunk, _ in parts_of(other.read_bytes()))
+    assert mcz.verify(other) == []
+    with mcz.open(path) as a, mcz.open(other) as b:
+        np.testing.assert_array_equal(b.clips["live"].read(), a.clips["live"].read((12, 47)))
+    found, _ = read(other.read_bytes(), lost="hold")
+    assert states(found) == "d" * 35
+    assert [frame.number for frame in found] == list(range(35))
+    bvh = tmp_path / "one.bvh"
+    bvh.write_text(
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 1\n"
+        "Frame Time: 1\n2\n"
+    )
+    mcz.append([bvh], path)
+    assert mcz.verify(path) == []
+
+
+def test_its_flags_are_fixed() -> None:
+    data = b"".join(pieces())
+    chunk, payload = next(part for part in parts_of(data) if part[0].type == REPEAT)
+    bad = data.replace(build_chunk(REPEAT, payload, chunk.flags), build_chunk(REPEAT, payload, 3))
+    assert bad != data
+    assert mcz.verify(bad) != []
+
+
+def test_salvage_finds_a_clip_in_it() -> None:
+    """Without CLIP before them, frames are found from the first REPT on."""
+    parts = pieces()
+    data = b"".join([parts[0][:-4], bytes(4), *parts[1:]])
+    with mcz.open(data, salvage=True) as file:
+        found = file.clips["live"].read()
+    assert np.isnan(found[:10]).all()
+    np.testing.assert_array_equal(found[10:], rows()[10:])
+
+
+def test_salvage_is_not_misled_by_what_a_damaged_one_holds() -> None:
+    data = b"".join(pieces())
+    at = next(chunk for chunk in scan(open_source(data)).chunks if chunk.type == REPEAT).offset
+    for byte in (at, at + 5, at + 7, at + 9):
+        with mcz.open(flipped(data, byte, 1), salvage=True) as file:
+            assert list(file.clips) == ["live"]
+            np.testing.assert_array_equal(file.clips["live"].read(), rows())
+
+
+# Without losses ------------------------------------------------------------------
+
+
+@CODEC
+@pytest.mark.parametrize("lost", ["refuse", "missing", "hold", "linear"])
+def test_nothing_lost_is_nothing_changed(codec: str, lost: str) -> None:
+    parts = pieces(codec)
+    data = b"".join(parts)
+    strict = list(mcz.live_frames(io.BytesIO(data)))
+    reader = mcz.stream_decode(iter(parts), lost=lost)
+    for (number, values, valid), frame in zip(strict, reader, strict=True):
+        assert (frame.number, frame.state) == (number, "decoded")
+        np.testing.assert_array_equal(frame.values, values)
+        np.testing.assert_array_equal(frame.valid, valid)
+    summary = reader.summary
+    assert (summary.decoded, summary.n_faults) == (60, 0)
+    assert summary.is_checked
+    assert not summary.is_cut
+    assert summary.stream_bytes == len(data)
+    with mcz.open(data) as file:
+        streams = file.clips["live"].signals[0]
+        tables = [file.container.table(row, streams.counts) for row in streams.rows]
+    assert summary.payload_bytes == sum(table.lengths[table.codec(0, 0)] for table in tables)
+    assert reader.clip is not None
+    assert (reader.clip.name, reader.clip.frame_rate) == ("live", 120)
+
+
+@CODEC
+@pytest.mark.parametrize("lost", ["refuse", "hold"])
+def test_each_frame_comes_with_its_bytes(codec: str, lost: str) -> None:
+    """A row is asked for when the bytes of the one before are out, and those are enough for it."""
+    asked: list[int] = []
+    arrived: list[int] = []
+
+    def given() -> Iterator[np.ndarray]:
+        for number, row in enumerate(rows()):
+            assert arrived == list(range(number))
+            asked.append(number)
+            yield row
+
+    sent = mcz.stream_encode(given(), NAMES, codec=codec, params=CODECS[codec], unit="cm")
+    for frame in mcz.stream_decode(sent, lost=lost):
+        assert asked == list(range(frame.number + 1))
+        arrived.append(frame.number)
+    assert len(arrived) == 60
+
+
+def test_clips_follow_each_other(tmp_path) -> None:
+    first, second = tmp_path / "a.mcz", b"".join(pieces(n=12, name="second"))
+    parts = pieces(n=25)
+    first.write_bytes(b"".join(parts[:-1]))
+    data = b"".join(parts) + second.removeprefix(SIGNATURE)
+    reader = mcz.stream_decode(io.BytesIO(data), lost="hold")
+    names = []
+    for frame in reader:
+        assert reader.clip is not None
+        names.append((reader.clip.name, frame.number))
+    assert names == [("live", n) for n in range(25)] + [("second", n) for n in range(12)]
+    assert reader.summary.is_checked
+
+
+def test_parameters_change_at_a_border() -> None:
+    values = list(rows(40))
+    frames = [*values[:7], {"step": 0.5}, *values[7:]]
+    data = b"".join(mcz.stream_encode(frames, NAMES, codec="online", params=CODECS["online"]))
+    assert mcz.verify(data) == []
+    found = np.array([frame.values for frame in mcz.stream_decode(io.BytesIO(data))])
+    known = ~np.isnan(np.array(values))
+    errors = np.abs(found - values)
+    assert errors[:10][known[:10]].max() < 0.05
+    assert errors[20:][known[20:]].max() > 0.05
+    with mcz.open(data) as file:
+        quality = file.clips["live"].quality
+    assert quality is not None
+    assert "param.gof" in quality
+    assert "param.step" not in quality  # it has had two values
+
+
+def test_what_cannot_change() -> None:
+    frames = [*rows(3), {"every": 5}]
+    sent = mcz.stream_encode(frames, NAMES, codec="stairs")
+    data = b""
+    with pytest.raises(mcz.OptionError, match="nothing changes"):
+        for part in sent:
+            data += part
+    assert mcz.verify(data) == []  # it was closed first
+    assert len(read(data)[0]) == 3
+    with pytest.raises(mcz.OptionError, match="no parameter"):
+        list(mcz.stream_encode([{"nothing": 1}], NAMES, codec="stairs"))
+
+
+def test_names_of_markers() -> None:
+    def joints(names: list[str]) -> list[str]:
+        data = b"".join(mcz.stream_encode([], names, codec="stairs", unit="mm"))
+        with mcz.open(data) as file:
+            assert file.clips["live"].skeleton.unit_cm == 0.1
+            return [joint.name for joint in file.clips["live"].skeleton.joints]
+
+    assert joints(["a", "b"]) == ["a", "b"]
+    assert joints(["a.x", "a.y", "a.z", "b.x", "b.y", "b.z"]) == ["a", "b"]
+    assert joints(["a.tx", "a.ty", "a.tz"]) == ["a"]
+    assert joints(["a.x", "a.y"]) == ["a.x", "a.y"]
+    for bad in ([], ["a", ""], ["a.x", "a.z", "a.y"], ["a.x", "b.y", "b.z"]):
+        with pytest.raises(mcz.OptionError):
+            joints(bad)
+    with pytest.raises(mcz.OptionError, match="parsec"):
+        list(mcz.stream_encode([], NAMES, codec="stairs", unit="parsec"))
+    for odd in ("a.mcz", 5):
+        with pytest.raises(mcz.OptionError, match="cannot read from"):
+            mcz.stream_decode(odd)
+    assert len(list(mcz.stream_decode(b"".join(pieces(n=3))))) == 3
+    for row in ("what", [1, 2], [[1] * 9], None):
+        with pytest.raises(mcz.MotionError):
+            list(mcz.stream_encode([row], NAMES, codec="stairs"))  # type: ignore[list-item]
+    with pytest.raises(mcz.OptionError, match="lost is"):
+        mcz.stream_decode([], lost="what")  # type: ignore[arg-type]
+
+
+# Losses --------------------------------------------------------------------------
+
+
+@CODEC
+@pytest.mark.parametrize("seed", range(4))
+def test_packets_lost_at_random(codec: str, seed: int) -> None:
+    data = b"".join(pieces(codec))
+    whole, _ = read(data)
+    random = np.random.default_rng(seed)
+    lost = set(np.flatnonzero(random.random(60) < (0.05, 0.1, 0.3, 0.9)[seed]).tolist())
+    bad = without_packets(data, lost)
+    for how in ("missing", "hold", "linear"):
+        found, summary = read(bad, lost=how)
+        assert [frame.number for frame in found] == list(range(60))
+        check_decoded(found, whole)
+        came = {frame.number for frame in found if frame.state == "decoded"}
+        assert not came & lost
+        assert (summary.decoded, summary.is_checked) == (len(came), not lost)
+        assert summary.decoded + summary.concealed + summary.missing == 60
+        assert not summary.is_cut
+        if codec != "online":  # a frame needs all those before it back to a fresh one
+            assert came == {n for n in range(60) if not lost & set(range(n - n % 10, n + 1))}
+        else:  # long-term frames follow from each other, others from the last of these
+            kept = {n for n in range(60) if not _needed_by(n) & lost}
+            assert came == kept
+    with pytest.raises(mcz.FormatError):
+        read(bad)
+    with pytest.raises(mcz.FormatError):
+        read(bad, join=True)
+
+
+def _needed_by(n: int) -> set[int]:
+    """The frames that frame ``n`` is made of, with groups of 5 of which every second is intra."""
+    intra, ltr = n - n % 10, n - n % 5
+    return {intra, ltr, *range(ltr, n + 1)}
+
+
+def test_what_is_shown_for_a_lost_frame() -> None:
+    data = b"".join(pieces())
+    truth = rows()
+    bad = without_packets(data, {2, 47})  # one to the end of its run, in the midst of another
+    hold, _ = read(bad, lost="hold")
+    linear, _ = read(bad, lost="linear")
+    missing, _ = read(bad, lost="missing")
+    wanted = "dd" + 8 * "c" + 37 * "d" + 3 * "c" + 10 * "d"
+    assert states(hold) == states(linear) == wanted
+    assert states(missing) == wanted.replace("c", "m")
+    for frame in hold[2:10]:
+        np.testing.assert_array_equal(frame.values, truth[1])
+    for frame in linear[2:10]:
+        part = (frame.number - 1) / 9
+        np.testing.assert_allclose(frame.values, truth[1] + part * (truth[10] - truth[1]))
+    assert all(not frame.valid.any() for frame in missing[2:10])
+
+
+def test_a_missing_value_is_not_interpolated() -> None:
+    data = b"".join(pieces())
+    found, _ = read(without_packets(data, {16}), lost="linear")
+    gone = [n for n, frame in enumerate(found) if not frame.valid[3]]
+    assert gone == [15, 16, 17, 18, 19]
+    assert states(found)[15:20] == "dcccc"
+
+
+def test_lines_wait_for_the_next_frame_and_end_with_the_stream() -> None:
+    parts = pieces(n=20)
+    sent = [*parts[:5], *parts[6:]]
+    reader = mcz.stream_decode(iter(sent), lost="linear")
+    assert states(list(reader)) == "dddd" + 6 * "c" + 10 * "d"
+    whole, _ = read(b"".join(parts))
+    cut = b"".join([*parts[:15], *parts[16:19]])  # frame 14 is lost, and no fresh one follows
+    found, summary = read(cut, lost="linear")
+    assert states(found) == 14 * "d" + 4 * "c"
+    np.testing.assert_array_equal(found[-1].values, whole[13].values)  # held
+    assert summary.is_cut
+
+
+@CODEC
+def test_datagrams_lost(codec: str) -> None:
+    """All bytes of a frame are lost: with a fresh one the beginning of its DATA, too."""
+    parts = pieces(codec)
+    whole, _ = read(b"".join(parts))
+    random = np.random.default_rng(5)
+    for _ in range(40):
+        kept = random.random(60) < random.choice([0.6, 0.9, 0.97])
+        middle = [part for part, keep in zip(parts[1:-1], kept, strict=True) if keep]
+        data = b"".join([parts[0], *middle, parts[-1]])
+        for how in ("missing", "hold", "linear"):
+            found, _ = read(data, lost=how)
+            assert [frame.number for frame in found] == list(range(60))
+            check_decoded(found, whole)
+            assert not [f.number for f in found if f.state == "decoded" and not kept[f.number]]
+
+
+def test_a_lost_beginning_is_made_up_by_the_first_repetition() -> None:
+    parts = pieces()
+    whole, _ = read(b"".join(parts))
+    found, summary = read(b"".join(parts[1:]), lost="hold")
+    assert states(found) == "m" * 10 + "d" * 50
+    check_decoded(found, whole)
+    assert summary.n_faults == 1
+    found, summary = read(b"".join([parts[0][:40], *parts[1:]]), lost="hold")
+    assert states(found) == "m" * 10 + "d" * 50
+    never = b"".join(pieces(repeat=0)[1:])
+    assert read(never, lost="hold")[0] == []
+
+
+# Joining ---------------------------------------------------------------------------
+
+
+@CODEC
+@pytest.mark.parametrize("lost", ["refuse", "hold"])
+def test_joining_anywhere(codec: str, lost: str) -> None:
+    parts = pieces(codec)
+    data = b"".join(parts)
+    whole, _ = read(data)
+    end = len(build_packet(Packet(END, 10, b"")))  # a REPT follows; HEAD in it will do as well
+    begins = np.cumsum([len(part) for part in parts]) + end + 16
+    for at in range(0, begins[60] if lost == "refuse" else len(data), 31):
+        found, summary = read(data[at:], lost=lost, join=True)
+        check_decoded(found, whole)
+        assert set(states(found)) <= {"d"}
+        numbers = [frame.number for frame in found]
+        if at == 0:
+            assert numbers == list(range(60))
+        elif at < begins[50]:  # before the last fresh frame
+            fresh = next(n for n in range(10, 60, 10) if at <= begins[n])
+            assert numbers == list(range(fresh, 60))
+        assert not summary.is_checked or at == 0
+
+
+def test_joining_behind_the_beginning() -> None:
+    """As over TCP: who is late gets what precedes the frames, then those from a fresh one on."""
+    parts = pieces()
+    end = len(build_packet(Packet(END, 10, b"")))
+    late = b"".join([parts[0], parts[21][end:], *parts[22:]])
+    found, summary = read(late, lost="refuse", join=True)
+    assert [frame.number for frame in found] == list(range(20, 60))
+    assert (summary.n_faults, summary.is_cut) == (0, False)
+    found, _ = read(late, lost="hold")
+    assert states(found) == "m" * 20 + "d" * 40
+
+
+def test_where_one_can_join() -> None:
+    skeleton = mcz.Skeleton((mcz.Joint("a", channels=tuple(map(mcz.Channel, ("tx", "ty", "tz")))),))
+    sent: list[tuple[bytes, int | None]] = []
+
+    class Sink:
+        def write(self, data: bytes) -> int:
+            sent.append((bytes(data), writer.entry if sent else None))
+            return len(data)
+
+    writer = mcz.LiveWriter(Sink(), skeleton, "stairs", {"every": 4})
+    with writer:
+        for row in rows(10)[:, :3]:
+            writer.push(row)
+    found = [None if at is None else data[at : at + 4] for data, at in sent]
+    none = [None] * 3
+    assert found == [None, b"DATA", *none, REPEAT, *none, REPEAT, None, b"CEND"]
+
+
+# Cut off and damaged -----------------------------------------------------------------
+
+
+@CODEC
+@pytest.mark.parametrize("lost", ["refuse", "hold", "linear"])
+def test_cut_at_every_byte(codec: str, lost: str) -> None:
+    n = 13 if codec == "stairs" else 12
+    data = b"".join(pieces(codec, n=n))
+    whole, _ = read(data)
+    ends = [stop for _, stop in packet_spans(data)]
+    step = 1 if codec == "stairs" else 17
+    for size in range(0, len(data), step):
+        got: list[LiveFrame] = []
+        reader = mcz.stream_decode(io.BytesIO(data[:size]), lost=lost)
+        if lost == "refuse":
+            with pytest.raises(mcz.TruncatedError):
+                got.extend(reader)
+            got = list(mcz.stream_decode(io.BytesIO(data[:size]), lost="hold"))
+        else:
+            got.extend(reader)
+            assert reader.summary.is_cut
+            assert not reader.summary.is_checked or size >= len(data) - 1000
+        assert states(got) == "d" * sum(end <= size for end in ends)
+        check_decoded(got, whole)
+
+
+@pytest.mark.parametrize("codec", ["stairs", "online"])
+def test_every_flipped_bit(codec: str) -> None:
+    data = b"".join(pieces(codec, n=23))
+    whole, _ = read(data)
+    for byte, bit in flips(len(data), 1500, 3):
+        try:
+            found, _ = read(flipped(data, byte, bit), lost="hold")
+        except mcz.MczError as error:
+            assert str(error)
+            continue
+        check_decoded(found, whole)
+        assert [frame.number for frame in found] == list(range(len(found)))
+
+
+@pytest.mark.parametrize("lost", ["missing", "linear"])
+def test_a_damaged_packet_is_one_that_did_not_come(lost: str) -> None:
+    data = b"".join(pieces())
+    whole, _ = read(data)
+    for frame in (0, 3, 9, 10, 31, 59):
+        start, stop = packet_spans(data)[frame]
+        for byte in (start, start + 1, stop - 1):
+            found, summary = read(flipped(data, byte, 2), lost=lost)
+            assert [f.number for f in found] == list(range(60))
+            run = 10 - frame % 10
+            assert states(found) == states(read(without_packets(data, {frame}), lost=lost)[0])
+            assert states(found).count("d") == 60 - run
+            assert summary.n_faults >= 1
+            check_decoded(found, whole)
+
+
+EDITS = st.lists(
+    st.tuples(
+        st.floats(0, 1), st.sampled_from(["cut", "flip", "drop", "twice"]), st.integers(1, 80)
+    ),
+    max_size=4,
+)
+
+
+@settings(max_examples=60)
+@given(EDITS, st.sampled_from(["missing", "hold", "linear"]), st.booleans())
+def test_any_damage(edits: list[tuple[float, str, int]], lost: str, join: bool) -> None:
+    data = b"".join(pieces(n=33))
+    whole, _ = read(data)
+    for place, kind, size in edits:
+        at = int(place * len(data))
+        if kind == "cut":
+            data = data[:at]
+        elif kind == "drop":
+            data = data[:at] + data[at + size :]
+        elif kind == "twice":
+            data = data[: at + size] + data[at:]
+        elif at < len(data):
+            data = flipped(data, at, size % 8)
+    try:
+        found, _ = read(data, lost=lost, join=join)
+    except mcz.MczError as error:
+        assert str(error)
+        return
+    check_decoded(found, whole)
+    numbers = [frame.number for frame in found]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers))) if numbers else True
+
+
+@settings(max_examples=40)
+@given(st.binary(max_size=400), st.booleans())
+def test_noise(data: bytes, join: bool) -> None:
+    for how in ("hold", "linear"):
+        assert read(data, lost=how, join=join)[0] == []
+
+
+# Frames in the wrong place ---------------------------------------------------------------
+
+
+def heads_and_bodies(data: bytes) -> list[tuple[int, int, int]]:
+    """Where each packet with a frame begins, its body begins, and it ends."""
+    return [(start, stop - 2 - size, stop) for start, stop, size in _spans(data)]
+
+
+def _spans(data: bytes) -> Iterator[tuple[int, int, int]]:
+    with mcz.open(data) as file:
+        rows = file.clips["live"].signals[0].rows
+    for (start, stop), row in zip(packet_spans(data), rows, strict=True):
+        yield start, stop, row.size
+
+
+Places = list[tuple[int, int, int]]
+
+
+def burst(data: bytes, places: Places, random: np.random.Generator) -> bytes:
+    """Packets are lost, of a DATA and the next ones, with all that lies between."""
+    a, b = sorted(random.integers(0, len(places), 2))
+    if random.random() < 0.5:  # the numbers go on as if nothing were lost
+        b = min(a + 10 * int(random.integers(1, 3)), len(places) - 1)
+    return data[: places[a][0]] + data[places[b][0] :]
+
+
+def replay(data: bytes, places: Places, random: np.random.Generator) -> bytes:
+    """Old packets come again, from where they were or with the header of their DATA."""
+    at = int(random.integers(0, len(places)))
+    a = int(random.integers(0, at + 1))
+    b = min(len(places) - 1, a + int(random.integers(0, 12)))
+    start = places[a][0] - (16 if random.random() < 0.2 else 0)
+    cut = int(random.integers(0, 4))  # they may have come in the place of others
+    behind = places[min(at + cut, len(places) - 1)][0]
+    return data[: places[at][0]] + data[start : places[b][2]] + data[behind:]
+
+
+def splice(data: bytes, places: Places, random: np.random.Generator) -> bytes:
+    """The head of a packet is followed by the body of another."""
+    a, b = sorted(random.integers(0, len(places), 2))
+    if random.random() < 0.3:
+        a, b = b, a  # the latter is an old one
+    return data[: places[a][1]] + data[places[b][1] :]
+
+
+DAMAGES = {"burst": burst, "replay": replay, "splice": splice}
+
+
+def n_wrong(found: list[LiveFrame], whole: list[LiveFrame]) -> int:
+    """The frames that are said to be decoded and are others."""
+    return sum(
+        frame.state == "decoded"
+        and not np.array_equal(frame.values, whole[frame.number].values, equal_nan=True)
+        for frame in found
+    )
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("codec", ["stairs", "online"])
+def test_no_frame_in_the_wrong_place_is_said_to_be_decoded(codec: str, damage: str) -> None:
+    """Where the frame's number is not checked, some are: that is what the check is for."""
+    data = b"".join(pieces(codec, repeat=2))
+    old = as_kind_2(data)
+    whole, _ = read(data)
+    places = heads_and_bodies(data)
+    assert places == heads_and_bodies(old)
+    random = np.random.default_rng(7)
+    wrong = {"kind 3": 0, "kind 2": 0}
+    for _ in range(600 if codec == "stairs" else 150):
+        seed = int(random.integers(2**32))
+        how = ("missing", "hold", "linear")[seed % 3]
+        for kind, sent in (("kind 3", data), ("kind 2", old)):
+            bad = DAMAGES[damage](sent, places, np.random.default_rng(seed))
+            found: list[LiveFrame] = []
+            try:
+                for frame in mcz.stream_decode(io.BytesIO(bad), lost=how, join=seed % 5 == 0):
+                    found.append(frame)  # noqa: PERF402 - those before an error count
+            except mcz.ChecksumError:  # in the end the hash is wrong
+                assert kind == "kind 2"
+            wrong[kind] += n_wrong(found, whole)
+            numbers = [frame.number for frame in found]
+            assert numbers == list(range(numbers[0], numbers[0] + len(numbers))) if numbers else 1
+    assert wrong["kind 3"] == 0
+    assert wrong["kind 2"] > 0 or codec == "online"
+
+
+def test_what_is_lost_over_a_border_costs_no_more_than_that() -> None:
+    """Frames 14 to 33 are lost, with two borders; 34 is number 4 of its DATA, where 14 is due."""
+    data = b"".join(pieces())
+    whole, _ = read(data)
+    places = heads_and_bodies(data)
+    found, summary = read(data[: places[14][0]] + data[places[34][0] :], lost="hold")
+    assert states(found) == 14 * "d" + 26 * "c" + 20 * "d"
+    check_decoded(found, whole)
+    assert any("not that of frame 14" in remark for remark in summary.remarks)
+    with pytest.raises(mcz.FormatError, match="not that of frame 14"):
+        read(data[: places[14][0]] + data[places[34][0] :], join=True)
+
+
+def test_a_packet_that_tells_its_frame_puts_those_behind_it_right() -> None:
+    """Frames 5 to 14 are lost, with a border; 15, of kind 1, says which one it is."""
+    parts = pieces("online", params=CODECS["online"] | {"gof": 2, "intra_period": 5})
+    data = b"".join(parts)
+    whole, _ = read(data)
+    places = heads_and_bodies(data)
+    found, _ = read(data[: places[5][0]] + data[places[15][0] :], lost="hold")
+    check_decoded(found, whole)
+    assert states(found)[20:] == 40 * "d"
+    assert states(found)[:15] == 5 * "d" + 10 * "c"
+
+
+@pytest.mark.parametrize("cut", [0, 1, 4, 9, 12, 30])
+def test_an_unchecked_packet_hides_nothing(cut: int) -> None:
+    """Of a DATA whose first packet is lost no frame is checked: one that lacks some bytes reaches
+    into what follows it, which is found all the same."""
+    data = b"".join(pieces())
+    whole, _ = read(data)
+    places = heads_and_bodies(data)
+    for frame in (11, 12, 18, 19):
+        lacks = places[frame][1] + 2
+        bad = data[:lacks] + data[lacks + cut :]
+        bad = bad[: places[10][0]] + bad[places[10][2] :]
+        found, summary = read(bad, lost="hold")
+        check_decoded(found, whole)
+        assert [one.number for one in found] == list(range(60))
+        assert states(found)[20 if cut < 12 or frame < 18 else 30 :].strip("d") == ""
+        assert states(found)[10:20] == 10 * "c"
+        assert summary.decoded >= 40
+
+
+# Hostile -------------------------------------------------------------------------------
+
+
+def assembled(chunks: list[list[Packet]], n_frames: int = 0, end: bool = True) -> bytes:
+    """A stream with these packets in its open DATA."""
+    out = [pieces(n=1)[0]]
+    for packets in chunks:
+        out.append(build_header(b"DATA", 0, OPEN_LENGTH))
+        out += map(build_packet, packets)
+    if end:
+        fields = {"n_frames": n_frames, "source_sha256": [], "value_sha256": [bytes(32)]}
+        cend = build(payloads.CEND, fields | {"extension": b""}, "CEND")
+        out += [build_chunk(b"CEND", cend), build_foot(0, 0)]
+    return b"".join(out)
+
+
+def told(number: int, sequence: int = 0, *, fresh: bool = True) -> Packet:
+    """A packet of kind 1 with frame ``number``."""
+    header = SegmentHeader(0, number, 1, flags=FRESH if fresh else 0)
+    return Packet(SEGMENT, sequence, build_segment(header, [bytes([2] * 9)]), fresh)
+
+
+@pytest.mark.parametrize("lost", ["missing", "hold", "linear"])
+@pytest.mark.parametrize(
+    "chunks",
+    [
+        [[told(0)], [told(2**50)]],
+        [[told(0), Packet(FRAME, 2**50, b"", fresh=False)]],
+        [[told(0), numbered_frame(2**50, 2**50, b"", fresh=False)]],
+        [[told(2**50)]],
+        [[told(0), Packet(END, 2**50, b"")]],
+    ],
+)
+def test_a_gap_that_is_too_large_is_jumped_over(lost: str, chunks: list[list[Packet]]) -> None:
+    tracemalloc.start()
+    found, summary = read(assembled(chunks, end=False), lost=lost)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(found) <= 3
+    assert summary.skipped >= 2**50 - 2
+    assert any("too many" in remark for remark in summary.remarks)
+    assert peak < 2**21
+
+
+def test_many_gaps_are_paid_for_by_bytes() -> None:
+    count = 20
+    chunks = [[told(n * 60_000)] for n in range(count)]
+    data = assembled(chunks, (count - 1) * 60_000 + 1)
+    found, summary = read(data, lost="hold")
+    assert summary.concealed <= MOST_MADE_UP + len(data)
+    assert summary.concealed == 59_999
+    assert summary.skipped == (count - 2) * 59_999
+    assert [frame.number for frame in found if frame.state == "decoded"] == [
+        n * 60_000 for n in range(count)
+    ]
+
+
+def test_a_clip_that_is_said_to_be_longer() -> None:
+    found, summary = read(assembled([[told(0)]], 2**53 - 1), lost="hold")
+    assert len(found) == 1
+    assert summary.skipped == 2**53 - 2
+    found, summary = read(assembled([[told(0)]], 5), lost="hold")
+    assert states(found) == "dcccc"
+    with pytest.raises(mcz.ChecksumError, match="not those"):
+        read(assembled([[told(0)]], 1), lost="hold")
+    with pytest.raises(mcz.ChecksumError, match="others came"):
+        read(assembled([[told(0)]], 0), lost="hold")
+
+
+def test_frames_that_come_again_are_not_shown_again() -> None:
+    again = [[told(0), told(1, 1)], [told(0), told(1, 1)], [told(2)]]
+    found, _ = read(assembled(again, end=False), lost="hold")
+    assert [frame.number for frame in found] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("kind", [FRAME, NUMBERED])
+def test_a_packet_whose_frame_nobody_told(kind: int) -> None:
+    """Its place is known at the least: nothing of it is decoded, and nothing waits for it."""
+    chunks = [[told(0)], [short(kind, n, n + 3) for n in range(3)]]
+    found, _ = read(assembled([*chunks, [told(6)]], end=False), lost="hold")
+    assert states(found) == "d" + 5 * "c" + "d"
+    early = mcz.stream_decode(io.BytesIO(assembled(chunks, end=False)), lost="hold")
+    assert states(list(early)) == "dccc"
+
+
+def short(kind: int, sequence: int, number: int) -> Packet:
+    """A packet of kind 2 or 3 with frame ``number``, which starts fresh."""
+    body = bytes([2] * 9)
+    if kind == NUMBERED:
+        return numbered_frame(sequence, number, body, fresh=True)
+    return Packet(kind, sequence, body)
+
+
+@pytest.mark.parametrize("kind", [FRAME, NUMBERED])
+def test_behind_a_gap_among_several_signals_numbers_are_not_known(kind: int) -> None:
+    opening = pieces(n=1)[0]
+    clip = chunks_in(opening.removeprefix(SIGNATURE), 0)[-1]
+    payload = opening[clip.payload_offset + len(SIGNATURE) :][: clip.length]
+    fields = parse(payloads.CLIP, payload, "CLIP")
+    fields.signals.append(fields.signals[0])
+    two = build_chunk(b"CLIP", build(payloads.CLIP, fields, "CLIP"))
+    other = build_segment(SegmentHeader(1, 0, 1), [bytes([2] * 9)])
+    chunk = [
+        told(0),
+        Packet(SEGMENT, 1, other),
+        short(kind, 2, 1),
+        short(kind, 5, 2),  # packets 3 and 4 may have been of either signal
+        short(kind, 6, 3),
+        told(5, 7),
+        short(kind, 8, 6),
+    ]
+    data = assembled([chunk], end=False).removeprefix(opening)
+    found, summary = read(opening[: clip.offset + len(SIGNATURE)] + two + data, lost="hold")
+    assert states(found) == "ddcccdd"
+    assert summary.is_cut
+
+
+def test_a_segment_that_cannot_be_read_tells_no_number() -> None:
+    bad = Packet(SEGMENT, 1, b"\xff" * 20)
+    chunks = [[told(0), bad, short(FRAME, 2, 2)], [told(3), bad, short(NUMBERED, 2, 5)], [told(6)]]
+    found, summary = read(assembled(chunks, end=False), lost="hold")
+    assert states(found) == "dccdccd"
+    assert summary.n_faults >= 2
+
+
+def test_packets_of_another_data_are_not_taken_for_those_that_are_due() -> None:
+    """The end of a DATA, and the beginning of the next, are lost: numbers begin anew."""
+    parts = pieces()
+    data = b"".join(parts[:18] + parts[22:])  # frames 17 to 20, the last of which was fresh
+    found, summary = read(data, lost="hold")
+    assert states(found) == 17 * "d" + 13 * "c" + 30 * "d"
+    assert any("is due" in remark for remark in summary.remarks)
+
+
+@pytest.mark.parametrize("kind", [FRAME, NUMBERED])
+def test_looking_for_what_is_whole_is_bounded(kind: int) -> None:
+    """Many heads of packets, each right and each followed by too little."""
+    head = build_packet(Packet(kind, 5, bytes(60_000), fresh=False))[:-60_002]
+    opening = assembled([[told(0)]], end=False)
+    with pytest.raises(mcz.LimitError, match="looks like"):
+        read(opening + b"\xff" + head * 20_000 + bytes(70_000), lost="hold")
+
+
+def test_what_a_stream_may_repeat() -> None:
+    parts = pieces()
+    opening = parts[0].removeprefix(SIGNATURE)
+    head = chunks_in(opening, 0)[0]
+    for payload in (b"", opening[: head.size], opening[:-1], opening + opening, b"noise"):
+        data = parts[0] + build_chunk(REPEAT, payload, ANCILLARY) + b"".join(parts[1:])
+        found, summary = read(data, lost="hold")
+        assert states(found) == "d" * 60
+        assert summary.n_faults == 1
+
+
+def test_codecs_that_need_all_frames() -> None:
+    out = io.BytesIO()
+    skeleton = mcz.Skeleton((mcz.Joint("a", channels=tuple(map(mcz.Channel, ("tx", "ty", "tz")))),))
+    motion = mcz.Motion(skeleton, (mcz.Signal(rows()[:, :3]),), name="live")
+    mcz.write(motion, out, codec="raw")
+    assert len(read(out.getvalue())[0]) == 60  # strictly, when the clip has ended
+    with pytest.raises(mcz.UnsupportedError, match="all of its frames"):
+        read(out.getvalue(), lost="hold")
+
+
+def test_critical_chunks_that_are_not_known() -> None:
+    parts = pieces()
+    data = parts[0] + build_chunk(b"WHAT", b"") + b"".join(parts[1:])
+    with pytest.raises(mcz.UnsupportedError, match="critical"):
+        read(data, lost="hold")
+    data = parts[0] + build_chunk(b"what", b"x" * 2**21, ANCILLARY) + b"".join(parts[1:])
+    assert states(read(data, lost="hold")[0]) == "d" * 60
+
+
+def test_a_model_that_is_lost_comes_again() -> None:
+    parts = pieces("lsdt-frame")
+    opening = parts[0]
+    inner = chunks_in(opening.removeprefix(SIGNATURE), len(SIGNATURE))
+    for chunk in inner:
+        bad = flipped(opening, chunk.offset + 18, 1)
+        found, _ = read(b"".join([bad, *parts[1:]]), lost="hold")
+        assert states(found) == "m" * 10 + "d" * 50, chunk.label
+
+
+# The post filter ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("lost", ["refuse", "hold"])
+def test_filtered_frames_come_twelve_late(lost: str) -> None:
+    parts = pieces("online")
+    data = b"".join(parts)
+    plain, _ = read(data)
+    came = 0
+
+    def sent() -> Iterator[bytes]:
+        nonlocal came
+        for number, part in enumerate(parts):
+            came = number
+            yield part
+
+    found = []
+    for frame in mcz.stream_decode(sent(), lost=lost, post_filter=True):
+        found.append(frame)
+        assert came >= min(60, frame.number + 12)
+    assert [frame.number for frame in found] == list(range(60))
+    with mcz.open(data) as file:
+        wanted = mcz.post_filter(file.clips["live"].motion())
+    mask = ~np.isnan(np.array([frame.values for frame in plain]))
+    values = np.array([frame.values for frame in found])
+    np.testing.assert_array_equal(values[mask], wanted.values[mask])
+    np.testing.assert_array_equal(np.isnan(values), ~mask)
+
+
+def test_filtered_frames_of_a_stream_that_is_cut_off() -> None:
+    data = b"".join(pieces("online")[:31])
+    got: list[LiveFrame] = []
+    with pytest.raises(mcz.TruncatedError):
+        got.extend(_kept(mcz.stream_decode(io.BytesIO(data), post_filter=True), got.append))
+    assert [frame.number for frame in got] == list(range(30))
+    unknown = b"".join(pieces("online", frame_rate=None))
+    with pytest.raises(mcz.OptionError, match="rate"):
+        read(unknown, post_filter=True)
+    assert len(read(unknown, post_filter=True, rate=Fraction(120))[0]) == 60
+
+
+def _kept(reader: mcz.LiveReader, keep: Callable[[LiveFrame], None]) -> list[LiveFrame]:
+    for frame in reader:
+        keep(frame)
+    return []
+
+
+# Real clips ----------------------------------------------------------------------------------
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("codec", ["lsdt-frame", "online"])
+def test_a_real_clip_with_losses(data, codec: str) -> None:
+    motion = mcz.in_positions(mcz.read(data / "cmu/amc/17_10.amc"))
+    values = motion.values[:600]
+    names = [joint.name for joint in motion.skeleton.joints]
+    params = {"step": 0.5} | ({"segment_frames": 48} if codec == "lsdt-frame" else {})
+    sent = list(
+        mcz.stream_encode(values, names, codec=codec, params=params, frame_rate=Fraction(120))
+    )
+    whole, _ = read(b"".join(sent))
+    assert len(whole) == 600
+    random = np.random.default_rng(17)
+    for share in (0.01, 0.05, 0.1):
+        kept = [part for part in sent[1:-1] if random.random() > share]
+        found, summary = read(b"".join([sent[0], *kept, sent[-1]]), lost="linear")
+        assert [frame.number for frame in found] == list(range(600))
+        check_decoded(found, whole)
+        assert summary.decoded > 100
