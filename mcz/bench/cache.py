@@ -18,6 +18,7 @@ import mcz
 MEASURING = (
     *("cases.py", "curves.py", "deflated.py", "hou2016_training.py", "ladder.py", "measure.py"),
     *("peers.py", "spatial.py", "tasks.py", "ways_back.py"),
+    *("kwak_clips.py", "kwak_coder.py", "kwak_losses.py", "kwak_measure.py", "kwak_work.py"),
 )
 
 

@@ -185,13 +185,13 @@ def speeds_beside(case: Case, settings: Sequence[tuple[Variant, float]]) -> list
         codec = by_name(variant.codec)
         if codec.live is not None and params.get("preset") is None:
             options = codec.options(params)
-            seconds = _live_seconds(as_coded(motion, codec, options), codec, options)
+            seconds = live_seconds(as_coded(motion, codec, options), codec, options)
             live = row | {"live": True}
             rows.append(live | {f"{k}_fps": motion.n_frames / v for k, v in seconds.items()})
     return rows
 
 
-def _live_seconds(motion: Any, codec: Codec, options: Mapping[str, Any]) -> dict[str, float]:
+def live_seconds(motion: Any, codec: Codec, options: Mapping[str, Any]) -> dict[str, float]:
     """CPU time of all frames, each pushed by itself: the fastest of several runs."""
     assert codec.live is not None and codec.follow is not None
     layout = MemorySource(motion, 0, codec, BASE.segment_bytes).layout

@@ -25,7 +25,7 @@ from mcz.bench.hou2016_tasks import (
     published,
 )
 from mcz.bench.hou2016_training import SPARSITIES
-from mcz.bench.tables import Table
+from mcz.bench.tables import Table, verdict
 
 MOST_LESS = 0.7  # of the distortion: what the paper's Fig. 6 shows at most
 SHORT, LONG = 3000, 9000  # frames of the paper's short clips at most, of its long ones at least
@@ -55,16 +55,6 @@ def _plain(variant: Variant) -> Variant:
     return variant
 
 
-def _verdict(held: Sequence[bool]) -> str:
-    """
-    >>> _verdict([True, True]), _verdict([False]), _verdict([True, False, True]), _verdict([])
-    ('yes', 'no', 'on 2 of 3', '-')
-    """
-    if not held:
-        return "-"
-    return {len(held): "yes", 0: "no"}.get(sum(held), f"on {sum(held)} of {len(held)}")
-
-
 def _of_coder(found: Found, like: Callable[[Variant], Variant]) -> Iterator[tuple[str, str, str]]:
     if "lsdt-frame" in here():
         less = {c: _less(found, c, like(FRAME), like(COSINES)) for c in found.cases}
@@ -91,14 +81,14 @@ def _of_coder(found: Found, like: Callable[[Variant], Variant]) -> Iterator[tupl
             if middle:
                 claim = "of the clips between, clip-LSDT and MDTT are alike"
                 close = [abs(_mean(r) - 1) <= 0.1 for r in middle.values()]
-                yield claim, _verdict(close), _listed(found, middle)
+                yield claim, verdict(close), _listed(found, middle)
 
 
 def _beats(
     claim: str, found: Found, ratios: Mapping[str, list[float]], *, better: bool
 ) -> tuple[str, str, str]:
     held = [(_mean(r) > 1) == better for r in ratios.values()]
-    return claim, _verdict(held), _listed(found, ratios) or "no such clip here"
+    return claim, verdict(held), _listed(found, ratios) or "no such clip here"
 
 
 def _listed(found: Found, ratios: Mapping[str, list[float]]) -> str:
@@ -149,7 +139,7 @@ def _frame_claims(
     )
     yield (
         "frame-LSDT has less distortion than frame-DCT at equal CR",
-        _verdict(always),
+        verdict(always),
         f"less by {text}",
     )
     tops = {clip: max(pairs, key=lambda pair: pair[1]) for clip, pairs in less.items()}
@@ -175,12 +165,12 @@ def _window_claims(
     text = ", ".join(f"{clip} {a:+.1%}, {b:+.1%}" for clip, a, b in rows)
     yield (
         "CR of L = 60 < 120 < 240",
-        _verdict([a > 0 and b > 0 for _, a, b in rows]),
+        verdict([a > 0 and b > 0 for _, a, b in rows]),
         f"60 to 120, 120 to 240: {text}",
     )
     yield (
         "little gain from 120 to 240",
-        _verdict([b < a / 2 for _, a, b in rows]),
+        verdict([b < a / 2 for _, a, b in rows]),
         "less than half of that from 60 to 120",
     )
 
@@ -201,7 +191,7 @@ def _starts(found: Found) -> Iterator[Row]:
             yield (
                 f"DCT and Haar starts end alike: {name}",
                 "-",
-                _verdict([value <= NEARLY for value in apart]),
+                verdict([value <= NEARLY for value in apart]),
                 f"x, y and z end {ends} apart, {falls} of the fall",
             )
 
@@ -224,7 +214,7 @@ def _sparse(found: Found) -> Iterator[Row]:
     text = ", ".join(f"{clip} {min(s):.0%} to {max(s):.0%}" for clip, s in less.items() if s)
     held = [min(shares) > 0 for shares in less.values() if shares]
     claim = "LSDT distorts less than DCT and DWT at equal non-zeros"
-    yield claim, "-", _verdict(held), f"than the better of both by {text}"
+    yield claim, "-", verdict(held), f"than the better of both by {text}"
 
 
 def _best_sparsity(found: Found) -> Iterator[Row]:
@@ -263,4 +253,4 @@ def _fast(found: Found) -> Iterator[Row]:
         )
         held = [min(r["encode_fps"], r["decode_fps"]) > FAST for r in both]
         claim = f"the clip methods do more than {FAST:,} frames/s"
-        yield claim, "-", _verdict(held), f"encode and decode: {text}"
+        yield claim, "-", verdict(held), f"encode and decode: {text}"

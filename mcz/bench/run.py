@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 import mcz
-from mcz.bench import hou2016, khan2014, khan2016, peers, sweep
+from mcz.bench import hou2016, khan2014, khan2016, kwak, peers, sweep
 from mcz.bench.cases import Case, Variant, find_cases, named, variants_of
 from mcz.bench.panels import Panels
 from mcz.bench.sweep import ClipResult
@@ -20,6 +20,7 @@ PAPERS: dict[str, ModuleType] = {
     "khan2014": khan2014,
     "khan2016": khan2016,
     "hou2016": hou2016,
+    "kwak": kwak,
 }
 
 
@@ -87,6 +88,9 @@ def _paper(
     runner: Runner,
 ) -> None:
     """Add the tables of a paper for its clips among ``paths``."""
+    if module is kwak:
+        _kwak(outcome, paths, unit, runner)
+        return
     wanted: tuple[str, ...] = module.NAMES
     cases = {case.name: case for case in find_cases(paths, unit, wanted) if case.name in wanted}
     cases = {name: cases[name] for name in wanted if name in cases}
@@ -106,6 +110,22 @@ def _paper(
     else:
         results = runner.run(module.tasks(cases))
         outcome.tables.extend(module.tables(cases, results))
+    _refusals(outcome, results)
+
+
+def _kwak(outcome: Outcome, paths: Sequence[str], unit: str | None, runner: Runner) -> None:
+    """The same of one whose clips are not told by name alone."""
+    found = kwak.measure(runner, kwak.find_clips(paths, unit))
+    here = {clip.stem for clip in found.clips}
+    absent = [name for name in kwak.NAMES if name not in here]
+    if absent:
+        outcome.notes.append(f"kwak: clips that are not here: {', '.join(absent)}")
+    outcome.tables.extend(kwak.tables(found))
+    outcome.panels.extend(kwak.panels(found))
+    _refusals(outcome, found.results)
+
+
+def _refusals(outcome: Outcome, results: Mapping[Task, Any]) -> None:
     for task, result in results.items():
         if isinstance(result, dict) and "error" in result:
             outcome.notes.append(f"{task.label}: {result['error']}")

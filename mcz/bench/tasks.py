@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any
 
-from mcz.bench import curves, deflated, ladder, measure, peers, spatial, ways_back
+from mcz.bench import curves, deflated, kwak_work, ladder, measure, peers, spatial, ways_back
 from mcz.bench.cache import Cache
 from mcz.bench.cases import Case, Variant, load, why
 from mcz.codecs import by_name
@@ -97,6 +97,14 @@ def _way_back(task: Task) -> Any:
     return ways_back.way_back(task.case, *task.arguments)
 
 
+def _kwak(task: Task) -> Any:
+    return kwak_work.perform(task.case, task.variant, *task.arguments)
+
+
+def _kwak_speeds(task: Task) -> Any:
+    return kwak_work.speeds(task.case, *task.arguments)
+
+
 KINDS = {
     "sweep": _sweep,  # n_points
     "point": _point,  # pairs of parameter and value
@@ -111,8 +119,10 @@ KINDS = {
     "spatial": _spatial,  # clips, pairs of name and bases as text
     "speeds_beside": _speeds_beside,  # triples of codec, its parameters, setting
     "way_back": _way_back,  # step in cm, whether with virtual markers
+    "kwak": _kwak,  # what, form of the clip, what it says
+    "kwak_speeds": _kwak_speeds,  # form of the clip, triples of codec, its parameters, more
 }
-ALONE = ("speeds", "peers", "speeds_beside")
+ALONE = ("speeds", "peers", "speeds_beside", "kwak_speeds")
 
 
 def perform(task: Task) -> Any:
