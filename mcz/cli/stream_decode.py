@@ -89,7 +89,8 @@ def command(
             raise
         _sum_up(where, reader)
     found = reader.summary
-    whole = not (found.concealed or found.missing or found.skipped or found.is_cut)
+    gone = found.concealed or found.missing or found.skipped or found.n_faults
+    whole = not (gone or found.is_cut)
     return Exit.FINE if whole else Exit.SALVAGED
 
 

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from threading import Condition, Thread
-from time import monotonic
+from time import monotonic, sleep
 from typing import BinaryIO
 
 from mcz.cli.common import Exit, Failure, say
@@ -20,9 +20,18 @@ LOOPBACK = "127.0.0.1"
 def address_of(text: str) -> tuple[str, int]:
     """``HOST:PORT``; the loopback where there is no host. Raises Failure."""
     host, colon, port = text.rpartition(":")
-    if not colon or not (port.isascii() and port.isdigit()) or int(port) > 65_535:
+    plain = port.isascii() and port.isdigit() and len(port) <= 5 and int(port) <= 65_535
+    if not colon or not plain or not _is_name(host):
         raise Failure(f"{text!r} is not HOST:PORT", Exit.USAGE)
     return host.strip("[]") or LOOPBACK, int(port)
+
+
+def _is_name(host: str) -> bool:
+    try:
+        host.encode("idna")
+    except UnicodeError:
+        return False
+    return True
 
 
 @contextmanager
@@ -50,6 +59,7 @@ class Listener:
         self._server = socket.create_server((host, port), family=family)
         self.entry: Callable[[], int | None] = lambda: None
         self._opening: bytes | None = None
+        self._is_closed = False
         self._has_frames = False
         self._clients: list[_Client] = []
         self._changed = Condition()
@@ -92,8 +102,12 @@ class Listener:
         while True:
             try:
                 connection, where = self._server.accept()
-            except OSError:  # it was closed
-                return
+            except OSError as error:
+                if self._is_closed:
+                    return
+                say(f"a client could not connect: {error.strerror}")
+                sleep(0.1)  # what is short may be there again
+                continue
             with self._changed:
                 client = _Client(connection, f"{where[0]}:{where[1]}", not self._has_frames)
                 if self._opening is not None:
@@ -103,6 +117,7 @@ class Listener:
 
     def close(self) -> None:
         """Take no more clients, and give those that are there a while for the rest."""
+        self._is_closed = True
         with suppress(OSError):  # what waits in accept is not woken by close alone
             self._server.shutdown(socket.SHUT_RDWR)
         self._server.close()

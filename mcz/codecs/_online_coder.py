@@ -15,7 +15,7 @@ import numpy as np
 from construct import Int8ul, OneOf, Struct
 from numpy.typing import NDArray
 
-from mcz.codecs._online_units import INTRA, LTR, STR, Unit
+from mcz.codecs._online_units import GOLOMB, INTRA, LTR, MIXED, STR, Unit
 from mcz.codecs._space import APART, COURSES, MEAN, N_COORDINATES, SPACE, Space, space_of
 from mcz.codecs.base import Layout
 from mcz.coding.start import start_state
@@ -28,7 +28,6 @@ Ints = NDArray[np.int64]
 NAME = "online"
 START_TABLE = Path(__file__).with_name("online_start.json")
 N_KINDS = 2  # start tables of a coder: for LTRs that are intra coded, and others
-MIXED, GOLOMB = 0, 1  # coders
 AS_IS, REORDERED = 0, 1  # orders
 COEFFICIENT_BYTES = 40  # more than the bits of one take
 
@@ -148,7 +147,7 @@ class Coder:
     def encode(self, kind: int, frames: Floats, n_group: int, threshold: float, plan: Any) -> Unit:
         """A unit of frames, (frames, n_channels), of a group of ``n_group``; raises MotionError.
 
-        Nothing is changed by one frame that is refused.
+        One frame that is refused changes nothing that matters to the next.
         """
         if not self._analysis.size:
             self._analysis = np.ascontiguousarray(np.concatenate(self.space.analysis()))

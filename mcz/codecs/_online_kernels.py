@@ -9,16 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs._online_rate_kernels import (
-    INTRA,
-    LTR,
-    NEVER,
-    STR,
-    begin_group,
-    ltr_step,
-    settle,
-    str_step,
-)
+from mcz.codecs._online_rate_kernels import MOD as FIXED
+from mcz.codecs._online_rate_kernels import MODE, NEVER, begin_group, ltr_step, settle, str_step
+from mcz.codecs._online_units import GOLOMB, INTRA, LTR, STR
 from mcz.coding import kernels, residuals
 from mcz.coding.frames import (
     LAST,
@@ -37,7 +30,6 @@ __all__ = ["N_MEMORY", "TRACK_SIZE", "decode_frames", "encode_frames"]
 
 Floats = NDArray[np.float64]
 
-MIXED, GOLOMB = 0, 1  # coders
 N_STEPS = 512
 FIRST_STEP = 256  # the code of 1
 
@@ -259,6 +251,25 @@ def _quantize(indices: Ints, coefficients: Floats, ratio: float, threshold: floa
     return squares / max(1, len(indices))
 
 
+@inner
+def _choose(
+    indices: Ints, coefficients: Floats, wanted: float, threshold: float, is_fixed: bool
+) -> tuple[int, float]:
+    """The step code next to ``wanted`` and what ``_quantize`` returns; fills ``indices``.
+
+    Where the step is not fixed it grows until no coefficient is too large.
+    """
+    if wanted >= NEVER:
+        indices[:] = 0
+        return FIRST_STEP, 0.0
+    code = int(min(max(np.rint(8.0 * wanted) + FIRST_STEP, 0), N_STEPS - 1))
+    variance = _quantize(indices, coefficients, _ratio(code), threshold)
+    while variance < 0 and not is_fixed and code < N_STEPS - 8:
+        code += 8
+        variance = _quantize(indices, coefficients, _ratio(code), threshold)
+    return code, variance
+
+
 @kernel
 def encode_frames(
     state: Ints,
@@ -305,14 +316,11 @@ def encode_frames(
             wanted = ltr_step(plan, coefficients, kind == INTRA, n_group, laplace)
         else:
             wanted = str_step(plan, len(coefficients), n_group, gauss)
-        code, variance = FIRST_STEP, 0.0
+        code, variance = _choose(indices, coefficients, wanted, threshold, plan[MODE] == FIXED)
+        if variance < 0:
+            return at
         if wanted < NEVER:
-            code = int(min(max(np.rint(8.0 * wanted) + FIRST_STEP, 0), N_STEPS - 1))
-            variance = _quantize(indices, coefficients, _ratio(code), threshold)
-            if variance < 0:
-                return at
-        else:
-            indices[:] = 0
+            wanted = np.log2(_ratio(code))
         before = _bits_of(state)
         code = _code_frame(state, data, coder, kind, indices, code, starts, memory, lengths, tracks)
         values[:] = predicted

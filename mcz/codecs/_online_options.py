@@ -10,10 +10,13 @@ from dataclasses import replace
 from typing import Any
 
 from mcz.codecs._online_coder import AS_IS, NAME, REORDERED
-from mcz.codecs._online_plan import FLOOR_CM, MODES
+from mcz.codecs._online_plan import FLOOR_CM
+from mcz.codecs._online_units import MODES
 from mcz.codecs._space_choice import (
     BASIS,
     DOMAIN,
+    LEAST,
+    MOST,
     STEP,
     THRESHOLD,
     THRESHOLD_PARAMETER,
@@ -104,7 +107,7 @@ def choose_live(layout: Layout, chosen: Mapping[str, Any]) -> tuple[Choice, int]
         raise OptionError(f"{NAME}: step or bitrate has to be given, for no frame is known yet")
     if step is None:
         unit = layout.skeleton.unit_cm if layout.skeleton is not None else None
-        step = FLOOR_CM / (unit or 1.0)
+        step = min(max(FLOOR_CM / (unit or 1.0), LEAST), MOST)
     return choose(sample, {**chosen, "step": step})
 
 
@@ -155,8 +158,8 @@ PARAMETERS = (
         "of rc: bits of a coefficient of an LTR for each of others",
         number("alpha", 1e-3, 1e6),
     ),
-    Parameter("a", None, "of rca: a of eq. 14; default as published", number("a", -100, 100)),
-    Parameter("b", None, "of rca: b of eq. 14; default as published", number("b", -100, 100)),
+    Parameter("a", None, "of rca: a of eq. 14; default: as fitted here", number("a", -100, 100)),
+    Parameter("b", None, "of rca: b of eq. 14; default: as fitted here", number("b", -100, 100)),
     THRESHOLD_PARAMETER,
     Parameter(
         "order",

@@ -17,15 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs._online_units import MODES
 from mcz.codecs.base import Layout
 from mcz.errors import OptionError
 
 Floats = NDArray[np.float64]
 
-MODES = ("mod", "rc", "rca", "steady")
 # a and b of eq. 14 for markers and for points of a skeleton, by tools/fit_bit_allocation.py; the
 # published -0.4121 and 3.2745, 0.05 and 2.0492 are those of the authors' own coder.
 FITS = {"c3d": (-0.1311, 1.2641), "bvh": (-0.0937, 1.2619)}
+LEAST_FLOOR = 2.0**-100  # steps
 FLOOR_CM, FLOOR_STEPS = 2.0, 4.0  # no deviation is taken to be smaller; steps: unit unknown
 MOST_TERMS = 40_000  # of an entropy
 
@@ -75,11 +76,14 @@ def set_plan(plan: Plan, chosen: Mapping[str, Any], layout: Layout, step: float)
     unit = layout.skeleton.unit_cm if layout.skeleton is not None else None
     is_derived = layout.skeleton is not None and layout.skeleton.base is not None
     slope, offset = FITS["bvh" if is_derived else "c3d"]
+    numbers[kernels.AHEAD] += numbers[kernels.OWED]
+    numbers[kernels.OWED] = numbers[kernels.EXTRA] = 0.0
     numbers[kernels.MODE] = MODES.index(mode)
     numbers[kernels.GROUP_FRAMES] = chosen["gof"]
     numbers[kernels.PERIOD] = chosen["intra_period"]
     numbers[kernels.LTR_SHIFT] = math.log2(chosen["ltr_step"])
-    numbers[kernels.FLOOR] = (FLOOR_STEPS if unit is None else FLOOR_CM / unit / step) ** 2
+    floor = FLOOR_STEPS if unit is None else FLOOR_CM / unit / step
+    numbers[kernels.FLOOR] = min(max(floor, LEAST_FLOOR), 1 / LEAST_FLOOR) ** 2
     numbers[kernels.ALPHA] = chosen["alpha"]
     numbers[kernels.SLOPE] = slope if chosen["a"] is None else chosen["a"]
     numbers[kernels.OFFSET] = offset if chosen["b"] is None else chosen["b"]

@@ -10,14 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs._online_units import LTR, MODES, STR
 from mcz.jit import inner
 
 Floats = NDArray[np.float64]
 
-STR, LTR, INTRA = 0, 1, 2  # what a frame is predicted from: the last, the last LTR, nothing
-
 # How the step is chosen: it is fixed; Algorithm 1; Algorithm 2; ours.
-MOD, RC, RCA, STEADY = range(4)
+MOD, RC, RCA, STEADY = range(len(MODES))
 
 # Places in ``plan``: what is asked for, steps as log2 in units of the signal's step ...
 MODE, GROUP_BITS, GROUP_FRAMES, BASE, LTR_SHIFT, FLOOR, ALPHA, SLOPE, OFFSET, PERIOD = range(10)
@@ -25,12 +24,16 @@ BUFFER = 10  # frames
 # ... and what is remembered: bits that the group may have and has had, its frames so far, variances
 # of decoded coefficients: of the reference, the last LTR, a group's STR frames on average ...
 DUE, SPENT, AT, VARIANCE, LTR_VARIANCE, STR_VARIANCE, STR_SUM, LTR_BITS = range(11, 19)
-# ... bits beyond the rate, what an intra coded LTR took beyond another, bits at a step of 1.
-AHEAD, EXTRA, STR_COST, LTR_COST, PLAN_SIZE = range(19, 24)
+# ... bits beyond the rate, what an intra coded LTR took beyond another and what of that is still to
+# be paid, bits at a step of 1.
+AHEAD, EXTRA, OWED, STR_COST, LTR_COST, PLAN_SIZE = range(19, 25)
 
 UNKNOWN = -1.0
 MOST_ALPHA = 200.0
+MOST_CARRY = 8.0  # groups' bits that may be left: what still frames do not need is not owed to all
 NEVER = 1e3  # log2 of a step with which all coefficients are 0
+FINEST, COARSEST = -8.0, 24.0  # log2 of other steps where a rate is held
+INTRA_LEVELS = 3.0  # log2 of the steps that the largest coefficient of an intra coded LTR has
 FALL = 0.9  # of STEADY: log2 of the bits falls by so much where log2 of the step rises by 1
 FOLLOW = 2.0  # costs follow what frames cost by this share in a buffer's time
 LEAST_SHARE, LEAST_BITS = 0.1, 0.3  # of the bits of a group; of a frame
@@ -63,6 +66,7 @@ def log_step(rates: Floats, bits: float, variance: float) -> float:
 def begin_group(plan: Floats, n_frames: int) -> None:
     """What the group that begins may have: its share, and what the last one left or overdrew."""
     carry = plan[DUE] - plan[SPENT] if plan[AT] > 0 else 0.0
+    carry = min(carry, MOST_CARRY * plan[GROUP_BITS])
     if plan[AT] > 1:
         plan[STR_VARIANCE] = plan[STR_SUM] / (plan[AT] - 1)
     plan[DUE] = plan[GROUP_BITS] * (n_frames / plan[GROUP_FRAMES]) + carry
@@ -71,7 +75,7 @@ def begin_group(plan: Floats, n_frames: int) -> None:
 
 @inner
 def _alpha(plan: Floats, n_frames: int, n_coefficients: int) -> float:
-    """The bits of an LTR coefficient for each of an STR one, eq. 17; from 1 to MOST_ALPHA."""
+    """The bits of an LTR coefficient for each of an STR one: given, or eq. 17, 1 to MOST_ALPHA."""
     if plan[MODE] == RC or plan[LTR_VARIANCE] < 0 or plan[STR_VARIANCE] < 0:
         return float(plan[ALPHA])
     above = max(plan[LTR_VARIANCE], plan[FLOOR])
@@ -92,16 +96,33 @@ def _steady_step(plan: Floats) -> float:
     of_ltr = plan[LTR_COST] if plan[LTR_COST] > 0 else FIRST_COST * plan[STR_COST]
     cost = of_ltr * 2.0 ** (-FALL * plan[LTR_SHIFT]) + plan[STR_COST] * (n_frames - 1)
     due = plan[GROUP_BITS] - plan[AHEAD] * n_frames / plan[BUFFER]
-    if plan[PERIOD] > 0:
+    if plan[OWED] > 0:
         due -= plan[EXTRA] / plan[PERIOD]
-    return float(np.log2(cost / max(due, LEAST_SHARE * plan[GROUP_BITS])) / FALL)
+    found = np.log2(cost / max(due, LEAST_SHARE * plan[GROUP_BITS])) / FALL
+    return float(min(max(found, FINEST), COARSEST))
 
 
 @inner
 def ltr_step(
     plan: Floats, coefficients: Floats, intra: bool, n_frames: int, laplace: Floats
 ) -> float:
-    """log2 of the step of an LTR frame, of a group of ``n_frames``."""
+    """log2 of the step of an LTR frame, of a group of ``n_frames``.
+
+    Where a rate is held, an intra coded one, which nothing predicts, is never wholly 0.
+    """
+    found = _ltr_step(plan, coefficients, intra, n_frames, laplace)
+    if plan[MODE] == MOD:
+        return found
+    largest = np.abs(coefficients).max()
+    if intra and largest > 0:
+        found = min(found, np.log2(largest) - INTRA_LEVELS)
+    return float(max(found, FINEST))
+
+
+@inner
+def _ltr_step(
+    plan: Floats, coefficients: Floats, intra: bool, n_frames: int, laplace: Floats
+) -> float:
     if plan[MODE] == STEADY:
         plan[BASE] = _steady_step(plan)
     if plan[MODE] == MOD or plan[MODE] == STEADY or (intra and plan[LTR_VARIANCE] >= 0):
@@ -123,7 +144,7 @@ def str_step(plan: Floats, n_coefficients: int, n_frames: int, gauss: Floats) ->
         return float(plan[BASE])
     left = n_frames - plan[AT]
     bits = (plan[DUE] - plan[SPENT]) / (n_coefficients * left)
-    return log_step(gauss, bits, max(plan[VARIANCE], plan[FLOOR]))
+    return max(log_step(gauss, bits, max(plan[VARIANCE], plan[FLOOR])), FINEST)
 
 
 @inner
@@ -133,34 +154,43 @@ def settle(plan: Floats, kind: int, used: float, bits: float, variance: float) -
     plan[AT] += 1
     plan[VARIANCE] = variance
     if plan[MODE] == STEADY:
-        _settle_steady(plan, kind, used, bits)
+        _settle_steady(plan, kind, used, bits, variance == 0.0)
     if kind == STR:
         plan[STR_SUM] += variance
     elif kind == LTR:
         plan[LTR_VARIANCE], plan[LTR_BITS] = variance, bits
-        if plan[MODE] != MOD:
-            plan[BASE] = min(used, 64.0) - plan[LTR_SHIFT]
+        if plan[MODE] != MOD and used < NEVER:
+            plan[BASE] = used - plan[LTR_SHIFT]
 
 
 @inner
-def _settle_steady(plan: Floats, kind: int, used: float, bits: float) -> None:
+def _settle_steady(plan: Floats, kind: int, used: float, bits: float, empty: bool) -> None:
     """What lies beyond the rate, and what frames cost now.
+
+    Of an ``empty`` frame, in which nothing was coded, it is known only what it costs at most.
 
     What an intra coded LTR takes beyond another is shared out among all frames up to the next.
     """
-    plan[AHEAD] += bits - plan[GROUP_BITS] / plan[GROUP_FRAMES]
+    share = plan[GROUP_BITS] / plan[GROUP_FRAMES]
+    plan[AHEAD] = max(plan[AHEAD] + bits - share, -share * plan[BUFFER])
     cost = max(bits, LEAST_BITS) * 2.0 ** (FALL * used)
+    before = plan[STR_COST] if kind == STR else plan[LTR_COST]
+    if empty and before > 0:
+        cost = min(cost, before)
     if kind == STR:
         plan[STR_COST] = _followed(plan[STR_COST], cost, FOLLOW / plan[BUFFER])
     elif kind == LTR:
-        share = FOLLOW * plan[GROUP_FRAMES] / plan[BUFFER]
-        plan[LTR_COST] = _followed(plan[LTR_COST], cost, share)
+        part = FOLLOW * plan[GROUP_FRAMES] / plan[BUFFER]
+        plan[LTR_COST] = _followed(plan[LTR_COST], cost, part)
     elif plan[PERIOD] > 0:
         usual = plan[LTR_BITS] if plan[LTR_BITS] >= 0 else bits / 4
         plan[EXTRA] = max(bits - usual, 0.0)
-        plan[AHEAD] -= plan[EXTRA]
-    if plan[PERIOD] > 0:
-        plan[AHEAD] += plan[EXTRA] / (plan[PERIOD] * plan[GROUP_FRAMES])
+        plan[AHEAD] += plan[OWED] - plan[EXTRA]
+        plan[OWED] = plan[EXTRA]
+    if plan[OWED] > 0:
+        paid = min(plan[EXTRA] / (plan[PERIOD] * plan[GROUP_FRAMES]), plan[OWED])
+        plan[AHEAD] += paid
+        plan[OWED] -= paid
 
 
 @inner

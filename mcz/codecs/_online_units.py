@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from mcz.errors import FormatError
 from mcz.schema import read_varint, varint
 
-STR, LTR, INTRA = 0, 1, 2  # what the first frame of a unit is predicted from
+STR, LTR, INTRA = 0, 1, 2  # what a frame is predicted from: the last, the last LTR, nothing
+MIXED, GOLOMB = 0, 1  # coders
+MODES = ("mod", "rc", "rca", "steady")  # of an encoder's rate control
 
 
 @dataclass(frozen=True, slots=True)

@@ -195,7 +195,11 @@ def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
     """A sample of no motion, and which bases can be had without; raises OptionError for learned."""
     if which == "learned":
         raise OptionError(f"{name}: basis learned needs all frames; mcz train makes one beforehand")
-    sample = _sample(skeleton_of(name, layout), [np.zeros((1, layout.n_channels))], 0)
+    skeleton = skeleton_of(name, layout)
+    n_points = layout.n_channels // (N_COORDINATES if is_places(skeleton) else 1)
+    if n_points > MAX_POINTS:
+        raise MotionError(f"{name}: {n_points} points, at most {MAX_POINTS} in a matrix")
+    sample = _sample(skeleton, [np.zeros((1, layout.n_channels))], 0)
     return sample, at_hand(sample) if which == "auto" else which
 
 

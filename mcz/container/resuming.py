@@ -41,6 +41,7 @@ KNOWN = frozenset((*TYPES, b"INDX", b"QUAL", REPEAT))
 WANTED = frozenset((*REPEATED, b"DATA", b"CEND", REPEAT))
 SMALL = MIB  # a chunk that is not wanted is checked up to this length, and skipped beyond
 LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that a search may read in vain, in all
+TRY = 256  # bytes that a try counts as, beside those that it reads
 
 _CHUNK = b"(?=" + b"|".join(sorted(KNOWN)) + b")"
 _ANY_CHUNK = re.compile(_CHUNK)
@@ -297,7 +298,7 @@ class Resumer:
         except FormatError:
             return None
         finally:
-            self._tried += self.pipe.n_bytes - before
+            self._tried += self.pipe.n_bytes - before + TRY
             if self._tried > max(LEAST_TRIED, TRIED_PER_BYTE * self.size):
                 raise LimitError(
                     f"too much looks like a chunk or packet and is none; {self._tried} bytes read"

@@ -61,7 +61,7 @@ class Concealer:
         self._nothing = np.full(n_channels, np.nan), np.zeros(n_channels, np.bool_)
         self._last: tuple[Floats, Mask] | None = None
         self._owed = 0  # frames before the one due that wait for the next decoded one
-        self.is_whole = not join  # every frame that is shown was decoded
+        self.is_whole = not join  # every frame so far that is shown was decoded
 
     def give(self, number: int, values: Floats, mask: Mask | None) -> Iterator[LiveFrame]:
         """A frame was decoded, and those before it that are due were not."""
@@ -80,6 +80,7 @@ class Concealer:
         """No frame before ``number`` will come."""
         if self.due is None:
             self.due = max(self._first, number)
+            self.is_whole = self.due == self._first
         if self._stop is not None:
             number = min(number, self._stop)
         count = number - self.due

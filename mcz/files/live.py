@@ -21,7 +21,7 @@ from mcz.container import payloads
 from mcz.container.chunks import ANCILLARY, REPEAT, REPEATED
 from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.container.writer import Sink, Writer
-from mcz.errors import MotionError, OptionError
+from mcz.errors import LimitError, MotionError, OptionError
 from mcz.files.digest import ValueDigest
 from mcz.files.encoding import asked, open_clip, write_skeleton
 from mcz.files.masks import build_mask
@@ -79,8 +79,9 @@ class LiveWriter:
         self.options = self.codec.options(params)
         self._outlet = _Outlet(sink)
         self._writer = Writer(self._outlet)
-        self._is_open = self._has_data = False
+        self._is_open = self._has_data = self._is_stuck = False
         self._written: tuple[bytes, bool, Mask | None, Floats] | None = None
+        self._decoded: Floats | None = None
         if base is not None:
             name_skeleton(self._writer, base)
             if skeleton.base is not None:
@@ -130,10 +131,15 @@ class LiveWriter:
         """Write the next frame, (n_channels,) in source units, NaN where invalid.
 
         Returns what a reader will have, NaN where invalid. Raises MotionError for values that the
-        codec cannot hold, LimitError for a frame too large for a packet; nothing is written then.
+        codec cannot hold, LimitError for a frame too large for a packet; nothing is written then,
+        and after a LimitError the clip can only be closed: the codec has gone on without its file.
         """
-        if not self._is_open:
-            raise MotionError("the live clip is closed")
+        if not self._is_open or self._is_stuck:
+            raise MotionError(
+                "a frame was too large, the live clip can only be closed"
+                if self._is_open
+                else "the live clip is closed"
+            )
         row = np.asarray(values, np.float64)
         if row.shape != (self._n_channels,):
             raise MotionError(
@@ -146,12 +152,17 @@ class LiveWriter:
         valid = None if known.all() else known
         given = row if valid is None else np.where(valid, row, 0.0)
         stream, fresh = self._encoder.push(given, valid)
-        self._write(stream, fresh, valid)
+        try:
+            self._write(stream, fresh, valid)
+        except LimitError:
+            self._is_stuck = True
+            raise
         self._written = stream, fresh, valid, row
+        self._decoded = None
         self._outlet.send()
         return self._settle()
 
-    def change(self, **params: Any) -> None:
+    def change(self, /, **params: Any) -> None:
         """Let parameters of the codec have other values from the next group of frames on.
 
         Raises OptionError for one that cannot change, or a bad value; nothing changes then.
@@ -163,13 +174,18 @@ class LiveWriter:
         self._changed |= set(params)
 
     def _settle(self) -> Floats:
-        """Count the frame that was written, and take it into the hash and the figures."""
+        """Count the frame that was written, and take it into the hash and the figures.
+
+        An interrupt amid this leaves it to ``close``.
+        """
         assert self._written is not None
-        (stream, fresh, valid, row), self._written = self._written, None
-        decoded = self._decoder.push(stream, fresh)
+        stream, fresh, valid, row = self._written
+        if self._decoded is None:
+            self._decoded = self._decoder.push(stream, fresh)
+        decoded = self._decoded
         self._digest.update(decoded[None], None if valid is None else valid[None])
+        self.n_frames, self._written = self.n_frames + 1, None
         self._figures.add(row, decoded)
-        self.n_frames += 1
         return decoded if valid is None else np.where(valid, decoded, np.nan)
 
     def _write(self, stream: bytes, fresh: bool, valid: Mask | None) -> None:
@@ -248,7 +264,7 @@ class _Outlet:
     @property
     def size(self) -> int:
         """The bytes that were collected and not sent."""
-        return sum(map(len, self._pending))
+        return len(self._left) + sum(map(len, self._pending))
 
     def chunks(self, kinds: Sequence[bytes]) -> bytes:
         """Those of the chunks that were collected that are of these types, in order."""

@@ -68,7 +68,7 @@ def stream_encode(
     try:
         for row in frames:
             if isinstance(row, Mapping):
-                writer.change(**row)
+                writer.change(**{str(name): value for name, value in row.items()})
             else:
                 writer.push(_numbers(row))
                 yield sink.take()
@@ -83,7 +83,7 @@ def stream_encode(
 def _numbers(row: ArrayLike) -> NDArray[np.float64]:
     try:
         return np.asarray(row, np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise MotionError(f"a row that is not one of numbers: {error}") from None
 
 
@@ -219,8 +219,10 @@ class LiveReader:
             for frame in self._counted():
                 follows = waiting and frame.number == waiting[-1].number + 1
                 if stage is None or clip is not self.clip or not follows:
+                    now, self.clip = self.clip, clip or self.clip
                     yield from _rest(stage, waiting)
-                    stage, clip = self._stage(), self.clip
+                    self.clip = clip = now
+                    stage = self._stage()
                 waiting.append(frame)
                 row = stage.push(frame.values)
                 if row is not None:
@@ -258,6 +260,8 @@ class _Fed:
     def read1(self, size: int) -> bytes:
         """The next piece that is not empty, however large; empty at the end."""
         for piece in self._pieces:
+            if not isinstance(piece, bytes | bytearray | memoryview):
+                raise OptionError(f"cannot read from {piece!r}: not bytes")
             if piece:
                 return bytes(piece)
         return b""

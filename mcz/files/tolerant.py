@@ -289,7 +289,8 @@ class TolerantFrames:
             if not isinstance(error, LostFrameError) or self._lost == "refuse":
                 self._fault(f"frame {number}: {error}")
         if values is None:
-            yield from frames.reach(number + 1)
+            for due in (number, number + 1):  # the first frame that is known of counts, too
+                yield from frames.reach(due)
             return
         for frame in frames.give(number, values, mask):
             if frame.state == "decoded" and frames.is_whole:

@@ -372,13 +372,15 @@ def test_clients_early_and_late() -> None:
         started.stdin.write(NAMES)
         started.stdin.flush()
         host, port = tcp.address_of(started.address())
-        with socket.create_connection((host, port)) as early:
-            first = frames_from(early.makefile("rb"))
+        with (
+            socket.create_connection((host, port)) as early,
+            early.makefile("rb") as ahead,
+        ):
+            first = frames_from(ahead)
             for number in range(2):
                 started.say(line(ROWS[number]))
                 assert next(first).number == number
-            with socket.create_connection((host, port)) as late:
-                stream = late.makefile("rb")
+            with socket.create_connection((host, port)) as late, late.makefile("rb") as stream:
                 while not stream.peek():
                     pass  # what precedes the frames comes at once
                 second = frames_from(stream)
@@ -416,8 +418,10 @@ def test_both_ends_of_a_connection() -> None:
 def test_an_interrupt_ends_a_connection_well() -> None:
     with Started("encode", *CODER, "--listen", ":0", "--clients", "1") as started:
         started.say(NAMES)
-        with socket.create_connection(tcp.address_of(started.address())) as client:
-            stream = client.makefile("rb")
+        with (
+            socket.create_connection(tcp.address_of(started.address())) as client,
+            client.makefile("rb") as stream,
+        ):
             started.say(line(ROWS[0]))
             reader = mcz.stream_decode(stream, join=True)
             next(reader)

@@ -244,7 +244,11 @@ def test_valid_vectors(path: Path) -> None:
     check_file(path.read_bytes())
 
 
-@pytest.mark.parametrize("path", vectors("invalid"), ids=lambda path: path.stem)
+# A signal of several samples a frame is none of the twin's, which has no word for it.
+TWIN_REFUSES = [path for path in vectors("invalid") if path.stem != "samples"]
+
+
+@pytest.mark.parametrize("path", TWIN_REFUSES, ids=lambda path: path.stem)
 def test_invalid_vectors(path: Path) -> None:
     """Both decoders refuse the same of them: other faults are the container's or of hashes."""
     with suppress(FormatError), mcz.open(path) as file:

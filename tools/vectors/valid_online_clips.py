@@ -161,7 +161,7 @@ def _numbered(shelf: Groups, plan: Plan, opened: Any, requests: list[tuple[int, 
     purpose = "Each fresh frame begins an open DATA, of kind 1, others are of kind 3"
     for name, said, made in both("numbered", purpose, plan):
         shelf.plan(name, said, made, requests, **about, **live)
-    purpose = "The same, of a clip that did not know its frames, without INDX."
+    purpose = "Packets of kind 3 in a clip that did not know its frames, without INDX."
     shelf.plan("numbered-open", purpose, plan, requests, **about, **live, CLIP=opened, index=False)
     once = live | {"anew": False}
     purpose = "Fresh frames, too, are packets of kind 3 of the only open DATA."
