@@ -195,9 +195,9 @@ def _numbers(shelf: Broken) -> None:
         ("number-0", "All checks are those of frame 0.", lambda n: 0),
         ("number-u32", "The number has 2^32 more.", lambda n: n + 2**32 * (n == 2)),
     ):
-        for index in (True, False):
+        for ending, said, index in (("", "", True), ("-no-index", " Without INDX.", False)):
             data = live_file(dance(4), numbered=True, number=number, index=index)
-            shelf.add(name if index else f"{name}-no-index", f"{spec}; INDX", purpose, data)
+            shelf.add(name + ending, f"{spec}; INDX", purpose + said, data)
     purpose = "A packet of kind 3 with the check of its body alone."
     alone = _Second(lambda body: Packet(NUMBERED, 1, body))
     shelf.add("number-none", spec, purpose, live_file(dance(3), numbered=True, packet=alone))
