@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from mcz.bench.cases import Case, find_cases
 from mcz.bench.kwak_clips import BVH_POINTS, MADE, MARKED, POINTS, Clip, find_clips, places_of
 from mcz.bench.kwak_fit import Fit, Point, curve_of, fit, points_of
-from mcz.bench.kwak_papers import FITS
+from mcz.bench.kwak_papers import PRINTED_FITS
 from mcz.bjontegaard import bd_rate, bd_sqnr
 from mcz.errors import MczError
 
@@ -68,7 +68,7 @@ def gains(clips: Sequence[Clip], kind: str, found: Fit) -> None:
     for clip in clips:
         motion = places_of(clip)
         reference = curve_of(motion, {"preset": "rc"})
-        for label, (a, b) in (("published", FITS[kind]), ("fitted", (found.a, found.b))):
+        for label, (a, b) in (("published", PRINTED_FITS[kind]), ("fitted", (found.a, found.b))):
             curve = curve_of(motion, {"preset": "rca", "a": a, "b": b})
             figures = bd_sqnr(reference, curve), bd_rate(reference, curve)
             quality, rate = ("-" if x is None else f"{x:+.2f}" for x in figures)
@@ -91,7 +91,7 @@ def main(*paths: str) -> None:
         print(
             f"  a = {found.a:.4f}, b = {found.b:.4f} ({found.n_points} points, "
             f"{found.n_outliers} left out, residual {found.residual:.3f} bits rms); "
-            f"published {FITS[kind][0]:g}, {FITS[kind][1]:g}"
+            f"published {PRINTED_FITS[kind][0]:g}, {PRINTED_FITS[kind][1]:g}"
         )
         gains([clip for clip in others if clip.is_markers == (kind == "c3d")], kind, found)
 

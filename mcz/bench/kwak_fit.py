@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -137,9 +137,3 @@ def curve_of(
         payload = sum(len(unit.data) for unit in coded.units)
         found.append((payload * per_second, errors(motion, coded.values)[0]))
     return found
-
-
-def cut(motion: Motion, n_frames: int) -> Motion:
-    """Its first frames."""
-    signal = motion.signals[0].cut(0, min(n_frames, motion.n_frames))
-    return replace(motion, signals=(signal,))

@@ -50,7 +50,7 @@ DEVIATIONS = {
 
 # a and b of eq. 14 as printed, for markers and for points of a skeleton; those of our preset are
 # fitted to our coder.
-FITS = {"c3d": (-0.4121, 3.2745), "bvh": (0.05, 2.0492)}
+PRINTED_FITS = {"c3d": (-0.4121, 3.2745), "bvh": (0.05, 2.0492)}
 
 MOST_OFF = 1.0  # percent of a rate
 RCA_SAVES, FIL_SAVES = (10.0, 15.0), (9.0, 13.0)  # percent of bits

@@ -9,7 +9,7 @@ from typing import Any
 from mcz.bench.cases import Variant
 from mcz.bench.kwak_clips import CMU, POINTS, VIRTUAL, Clip
 from mcz.bench.kwak_measure import NAME, live_basis
-from mcz.bench.kwak_papers import FITS, TARGETS
+from mcz.bench.kwak_papers import PRINTED_FITS, TARGETS
 from mcz.bench.measure import Record
 from mcz.bench.tasks import Runner, Task
 from mcz.codecs import CODECS
@@ -26,7 +26,7 @@ class Method:
     ours: bool = False  # with the basis that is to be had live
 
     def variant(self, clip: Clip) -> Variant:
-        a, b = FITS["c3d" if clip.is_markers else "bvh"]
+        a, b = PRINTED_FITS["c3d" if clip.is_markers else "bvh"]
         fit = (("a", a), ("b", b)) if self.printed else ()
         basis = (("basis", live_basis(clip)),) if self.ours else ()
         return Variant(NAME, (*self.params, *fit, *basis))

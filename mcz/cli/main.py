@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from importlib import import_module
 
 import click
 
 from mcz.cli.common import EXIT_CODES, run
+from mcz.cli.lazy import lazy_group
 
 COMMANDS = (
     "sample",
@@ -28,17 +28,6 @@ COMMANDS = (
 )
 
 
-class _Commands(click.Group):
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = import_module(f"mcz.cli.{cmd_name}").command
-        return command
-
-
 def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     if value:
         from mcz import __version__
@@ -48,7 +37,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
 
 
 @click.command(
-    cls=_Commands,
+    cls=lazy_group("mcz.cli.", COMMANDS),
     help="Motion capture files (ASF, AMC, BVH, C3D), compressed and given back byte for byte.\n\n"
     "Every command has its own --help. Nothing is overwritten without --force.",
     epilog=EXIT_CODES,

@@ -33,18 +33,21 @@ def decoded_option(function: Function) -> Function:
     )(function)
 
 
+param_option = click.option(
+    "--param",
+    "params",
+    metavar="KEY=VALUE",
+    multiple=True,
+    callback=to_params,
+    help="A parameter of the codec; may be repeated.",
+)
+
+
 def encoding_options(function: Function) -> Function:
     """``--codec --param --rate --unit --verbatim --archive``, as the arguments of those names."""
     options = (
         click.option("--codec", metavar="NAME", help="Default: the best lossless codec there is."),
-        click.option(
-            "--param",
-            "params",
-            metavar="KEY=VALUE",
-            multiple=True,
-            callback=to_params,
-            help="A parameter of the codec; may be repeated.",
-        ),
+        param_option,
         click.option(
             "--rate",
             metavar="R",

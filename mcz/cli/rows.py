@@ -41,7 +41,7 @@ class Rows:
         if line is None:
             raise SourceError("it is empty; the first line should be names")
         try:
-            (names,) = csv.reader([line.decode()], strict=True)
+            (names,) = csv.reader([line.decode("utf-8-sig")], strict=True)
         except (UnicodeDecodeError, ValueError, csv.Error) as error:
             raise SourceError(f"line {self._at}: not a line of names: {error}") from None
         names = [name.strip() for name in names]
@@ -78,6 +78,8 @@ class Rows:
         if len(cells) != self._width:
             raise SourceError(f"line {self._at}: {len(cells)} values of {self._width}")
         try:
+            if any(b"_" in cell for cell in cells):  # which Python takes for a digit's neighbor
+                raise ValueError(f"a value with _ in it, among {len(cells)}")
             return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
         except ValueError as error:
             raise SourceError(f"line {self._at}: {error}") from None

@@ -18,10 +18,9 @@ from mcz.cli.common import (
     plural,
     printable,
     say,
-    to_params,
     to_rate,
 )
-from mcz.cli.options import UNITS, force_option
+from mcz.cli.options import UNITS, force_option, param_option
 from mcz.cli.piped import NAME, live_output, standard_input
 from mcz.cli.rows import Rows, skeleton_in
 
@@ -48,14 +47,7 @@ Entry = Callable[[], int | None]
     help="Wait for N clients before the first row is read (with --listen).",
 )
 @click.option("--codec", metavar="NAME", default="online", show_default=True)
-@click.option(
-    "--param",
-    "params",
-    metavar="KEY=VALUE",
-    multiple=True,
-    callback=to_params,
-    help="A parameter of the codec; may be repeated.",
-)
+@param_option
 @click.option("--rate", metavar="R", callback=to_rate, help="Frames a second.")
 @click.option("--unit", type=click.Choice(UNITS), help="Length unit of the numbers.")
 @click.option("--name", metavar="NAME", default="live", help="Of the clip.  [default: live]")
@@ -127,7 +119,8 @@ def _encode(
 ) -> str:
     """Write the stream; returns what it holds in words. ``tell`` is told where one can join."""
     from mcz.files.live import LiveWriter
-    from mcz.files.streams import in_unit, markers
+    from mcz.files.sources import in_unit
+    from mcz.files.streams import markers
 
     known = None if skeleton is None else skeleton_in(skeleton)
     n_channels = None if known is None else known.n_channels

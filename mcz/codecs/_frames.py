@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.angles import Unwrapper
 from mcz.codecs._lossy import skeleton_of
-from mcz.codecs.base import SignalSource
+from mcz.codecs.base import Layout, SignalSource
 from mcz.errors import MotionError
 
 Floats = NDArray[np.float64]
@@ -39,6 +41,35 @@ class FrameReader:
         if len(out):
             self._last = out[-1].copy()
         return out
+
+
+class LiveRows:
+    """Frames that come one by one, as ``FrameReader`` gives them, but that a gap holds the last.
+
+    A row counts as the last, for gaps and turns, once it is ``kept``: one that is refused leaves no
+    trace.
+    """
+
+    def __init__(self, name: str, layout: Layout) -> None:
+        self.name = name
+        self._unwrapper = Unwrapper(skeleton_of(name, layout))
+        self._last = np.full(layout.n_channels, np.nan)
+        self._next = self._unwrapper, self._last
+
+    def row(self, values: Floats, valid: NDArray[np.bool_] | None, at: int) -> Floats:
+        """Frame ``at``, (1, n_channels); raises MotionError where a valid value is not finite."""
+        row = np.asarray(values, np.float64)[None]
+        known = np.ones(row.shape, np.bool_) if valid is None else valid[None]
+        if not np.isfinite(row[known]).all():
+            raise MotionError(f"{self.name}: frame {at} holds a value that is not finite")
+        unwrapper = copy(self._unwrapper)
+        row = fill_gaps(unwrapper(np.where(known, row, np.nan)), known, self._last)
+        self._next = unwrapper, row[0]
+        return row
+
+    def keep(self) -> None:
+        """The row that was given last was coded."""
+        self._unwrapper, self._last = self._next
 
 
 def fill_gaps(values: Floats, valid: NDArray[np.bool_], before: Floats) -> Floats:

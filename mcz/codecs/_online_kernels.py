@@ -40,7 +40,6 @@ GOLOMB_FLAGS = 0
 C_PREFIX = N_FLAGS
 CLASSES, PLACES = 16, 4
 MOST_ONES = 16  # of a Golomb-Rice prefix; then the rest follows in plain bits
-N_MIXED, N_GOLOMB = MIXED_FLAGS + N_FLAGS, N_FLAGS + 2 * CLASSES * PLACES
 
 LAST_STEP, LTR_STEP, PRESENT, N_MEMORY = range(4)
 

@@ -9,18 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding import residuals
+from mcz.coding.frames import FIRSTS, LENGTHS, MAX_INDEX, OTHERS
 from mcz.coding.kernels import Bytes, Ints
 from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
 from mcz.jit import inner, kernel
 
 Floats = NDArray[np.float64]
 
-MAX_INDEX = 1 << 40
-LENGTHS = 0, 0  # residuals of a stream
-FIRSTS = residuals.N_CONTEXTS, residuals.N_MIXERS
-OTHERS = 2 * residuals.N_CONTEXTS, 2 * residuals.N_MIXERS
-N_SETS = 3
 BLOCK_FRAMES = 256  # at a time, so that sums stay near the processor
 
 

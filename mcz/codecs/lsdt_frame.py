@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -22,15 +21,13 @@ import numpy as np
 from construct import Struct
 from numpy.typing import NDArray
 
-from mcz.angles import Unwrapper
-from mcz.codecs._frames import FrameReader, fill_gaps
+from mcz.codecs._frames import FrameReader, LiveRows
 from mcz.codecs._lossy import (
     SEGMENT_FRAMES_PARAMETER,
     TARGET_BYTES,
     chosen_of,
     preset_parameter,
     segment_frames_of,
-    skeleton_of,
 )
 from mcz.codecs._prefix_streams import (
     CODE,
@@ -307,22 +304,16 @@ class _LiveEncoder:
         self._coder = _Coder(self.header, found, chosen["threshold"])
         self._every = options["segment_frames"] or SEGMENT_FRAMES
         self._at = 0
-        self._unwrapper = Unwrapper(skeleton_of(NAME, layout))
-        self._last = np.full(layout.n_channels, np.nan)
+        self._rows = LiveRows(NAME, layout)
 
     def push(self, values: Floats, valid: NDArray[np.bool_] | None = None) -> tuple[bytes, bool]:
-        row = np.asarray(values, np.float64)[None]
-        known = np.ones(row.shape, np.bool_) if valid is None else valid[None]
-        if not np.isfinite(row[known]).all():
-            raise MotionError(f"{NAME}: frame {self._at} holds a value that is not finite")
-        unwrapper = copy(self._unwrapper)
-        row = fill_gaps(unwrapper(np.where(known, row, np.nan)), known, self._last)
+        row = self._rows.row(values, valid, self._at)
         fresh = self._at % self._every == 0
         if fresh:
             self._coder.restart()
         stream = self._coder.build(self._coder.quantize(row))
-        # A frame that was refused did not come this far, and leaves no trace.
-        self._unwrapper, self._last, self._at = unwrapper, row[0], self._at + 1
+        self._rows.keep()
+        self._at += 1
         return stream, fresh
 
     def change(self, options: Mapping[str, Any]) -> None:

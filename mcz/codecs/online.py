@@ -11,16 +11,14 @@ states). No delay: a frame is coded before the next is known.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.angles import Unwrapper
-from mcz.codecs._frames import FrameReader, fill_gaps
-from mcz.codecs._lossy import TARGET_BYTES, skeleton_of
+from mcz.codecs._frames import FrameReader, LiveRows
+from mcz.codecs._lossy import TARGET_BYTES
 from mcz.codecs._online_coder import (
     GOLOMB,
     INTRA,
@@ -49,7 +47,7 @@ from mcz.codecs.base import (
     Span,
     model_finder,
 )
-from mcz.errors import FormatError, MotionError, OptionError
+from mcz.errors import FormatError, OptionError
 from mcz.schema import build
 
 Floats = NDArray[np.float64]
@@ -209,20 +207,12 @@ class _LiveEncoder:
         self.models = choice.models
         found = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
         self._writer = _Writer(self.header, found, chosen)
-        self._unwrapper = Unwrapper(skeleton_of(NAME, layout))
-        self._last = np.full(layout.n_channels, np.nan)
+        self._rows = LiveRows(NAME, layout)
 
     def push(self, values: Floats, valid: NDArray[np.bool_] | None = None) -> tuple[bytes, bool]:
         writer = self._writer
-        row = np.asarray(values, np.float64)[None]
-        known = np.ones(row.shape, np.bool_) if valid is None else valid[None]
-        if not np.isfinite(row[known]).all():
-            raise MotionError(f"{NAME}: frame {writer.coder.at} holds a value that is not finite")
-        unwrapper = copy(self._unwrapper)
-        row = fill_gaps(unwrapper(np.where(known, row, np.nan)), known, self._last)
-        unit = writer.code(row)
-        # A frame that was refused did not come this far, and leaves no trace.
-        self._unwrapper, self._last = unwrapper, row[0]
+        unit = writer.code(self._rows.row(values, valid, writer.coder.at))
+        self._rows.keep()
         return build_units([unit]), unit.kind == INTRA
 
     def change(self, options: Mapping[str, Any]) -> None:

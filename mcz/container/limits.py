@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from mcz.errors import LimitError
 
 MIB = 2**20
+LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that a search may read in vain, in all
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,3 +61,16 @@ def index_limit(file_bytes: int) -> int:
 def output_limit(file_bytes: int) -> int:
     """The bytes that a reader decodes from one file unless its caller allows more."""
     return max(64 * MIB, 4096 * file_bytes)
+
+
+class Search:
+    """What a search for the next whole thing reads in vain, which is seldom much."""
+
+    def __init__(self) -> None:
+        self.tried = 0
+
+    def spend(self, n_bytes: int, came: int, what: str) -> None:
+        """Count bytes that were read among ``came``; raises LimitError for too many."""
+        self.tried += n_bytes
+        if self.tried > max(LEAST_TRIED, TRIED_PER_BYTE * came):
+            raise LimitError(f"too much looks like {what} and is none; {self.tried} bytes read")

@@ -25,7 +25,7 @@ from mcz.container.chunks import (
     parse_header,
 )
 from mcz.container.following import PipeSource
-from mcz.container.limits import BASE, MIB, check
+from mcz.container.limits import BASE, MIB, Search, check
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
@@ -34,13 +34,12 @@ from mcz.container.packets import (
     check_number,
     read_packet,
 )
-from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
+from mcz.errors import FormatError, TruncatedError, UnsupportedError
 
 TYPES = (b"HEAD", b"SKEL", b"MODL", b"SRCE", b"ATTA", b"ALIA", b"CLIP", b"DATA", b"CEND")
 KNOWN = frozenset((*TYPES, b"INDX", b"QUAL", REPEAT))
 WANTED = frozenset((*REPEATED, b"DATA", b"CEND", REPEAT))
 SMALL = MIB  # a chunk that is not wanted is checked up to this length, and skipped beyond
-LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that a search may read in vain, in all
 TRY = 256  # bytes that a try counts as, beside those that it reads
 
 _CHUNK = b"(?=" + b"|".join(sorted(KNOWN)) + b")"
@@ -124,7 +123,7 @@ class Resumer:
         self._due: int | None = None  # the next packet of the open DATA
         # Where the body of the packet before begins whose check is not known to be right.
         self._unchecked: int | None = None
-        self._tried = 0
+        self._search_budget = Search()
 
     @property
     def size(self) -> int:
@@ -298,11 +297,8 @@ class Resumer:
         except FormatError:
             return None
         finally:
-            self._tried += self.pipe.n_bytes - before + TRY
-            if self._tried > max(LEAST_TRIED, TRIED_PER_BYTE * self.size):
-                raise LimitError(
-                    f"too much looks like a chunk or packet and is none; {self._tried} bytes read"
-                )
+            spent = self.pipe.n_bytes - before + TRY
+            self._search_budget.spend(spent, self.size, "a chunk or packet")
         return True
 
 

@@ -35,7 +35,7 @@ from mcz.container.directory import (
     parse_head,
     signal_rows,
 )
-from mcz.container.limits import BASE, PROFILES, check, index_limit
+from mcz.container.limits import BASE, PROFILES, Search, check, index_limit
 from mcz.container.packets import CHECK_SIZE, SHORT, Packet, check_number, read_packets
 from mcz.container.segments import FRESH, SegmentHeader, parse_header
 from mcz.container.source import ByteSource, Forward
@@ -43,7 +43,6 @@ from mcz.container.writer import build_head, payload_id
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 from mcz.schema import parse
 
-LEAST_TRIED, TRIED_PER_BYTE = 2**26, 8  # bytes that salvage may read in vain, in all
 PEEK = 64  # enough for the fields of a segment before its table
 
 
@@ -76,7 +75,7 @@ class Walker:
         self.profile = PROFILES[0]
         self.templates: dict[bytes, int] = {}  # the source format of each SRCE
         self.model_bytes = 0
-        self.tried = 0  # bytes that were read to find out whether a chunk begins somewhere
+        self.search = Search()
         self.clip: ClipRow | None = None
         self.first: list[int] = []  # the next frame of each signal of the open clip
         self.index: Chunk | None = None  # an INDX that waits for its FOOT
@@ -402,9 +401,7 @@ class Walker:
 
     def _spend(self, size: int) -> None:
         """Count what is read in search of the next chunk; what looks like one seldom is none."""
-        self.tried += size
-        if self.tried > max(LEAST_TRIED, TRIED_PER_BYTE * self.source.size):
-            raise LimitError(f"too much looks like a chunk and is none; {self.tried} bytes read")
+        self.search.spend(size, self.source.size, "a chunk")
 
     def _finish(self) -> None:
         self._close_clip()

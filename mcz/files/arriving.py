@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from types import MappingProxyType
 from typing import Any
@@ -16,10 +16,9 @@ from mcz.codecs import by_name
 from mcz.container.writer import Sink
 from mcz.errors import OptionError
 from mcz.files.live import LiveWriter
-from mcz.files.sources import UNIT_CM, read_skeleton
+from mcz.files.sources import in_unit, read_skeleton
 from mcz.formats import FORMATS, sniffed
 from mcz.formats.arriving import Arriving
-from mcz.motion import Skeleton
 
 NOTE = "coded live, frame by frame, from {format} text, which was not kept"
 
@@ -58,12 +57,12 @@ def encode_live(
     if found.wants_skeleton and skeleton is None:
         raise OptionError(f"{source_format} that comes line by line needs its skeleton file")
     base = read_skeleton(skeleton) if found.wants_skeleton and skeleton is not None else None
-    base = None if base is None else _in_unit(base, unit)
+    base = None if base is None else in_unit(base, unit)
     arriving: Arriving = found.arrive(iter(lines), base)
     notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
     writer = LiveWriter(
         sink,
-        _in_unit(arriving.skeleton, unit),
+        in_unit(arriving.skeleton, unit),
         codec,
         params,
         frame_rate=arriving.frame_rate if rate is None else rate,
@@ -101,11 +100,3 @@ def format_name_of(data: bytes) -> str:
     if name is None:
         raise OptionError("it looks like no known format; say which it is")
     return name
-
-
-def _in_unit(skeleton: Skeleton, unit: str | None) -> Skeleton:
-    if unit is None:
-        return skeleton
-    if unit not in UNIT_CM:
-        raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
-    return replace(skeleton, unit_cm=UNIT_CM[unit])

@@ -169,8 +169,7 @@ class LiveWriter:
         """
         if not self._is_open:
             raise MotionError("the live clip is closed")
-        options = self.codec.options(params)
-        self._encoder.change({name: options[name] for name in params})
+        self._encoder.change(params)
         self._changed |= set(params)
 
     def _settle(self) -> Floats:

@@ -33,6 +33,18 @@ Digest = bytes | Callable[[], bytes]
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}
 
 
+def unit_cm_of(unit: str) -> float:
+    """Centimeters of a length unit, a key of ``UNIT_CM``; raises OptionError for another."""
+    if unit not in UNIT_CM:
+        raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
+    return UNIT_CM[unit]
+
+
+def in_unit(skeleton: Skeleton, unit: str | None) -> Skeleton:
+    """``skeleton`` in the length unit of that name, None: as it is; raises OptionError."""
+    return skeleton if unit is None else replace(skeleton, unit_cm=unit_cm_of(unit))
+
+
 def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     """The skeleton in an ASF file, with its source."""
     path = Path(path)
@@ -95,9 +107,7 @@ def with_facts(motion: Motion, rate: Fraction | float | None, unit: str | None) 
             raise OptionError(f"frame rate {rate} is not positive")
         motion = replace(motion, frame_rate=value, frame_rate_exact=True)
     if unit is not None:
-        if unit not in UNIT_CM:
-            raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
-        motion = replace(motion, skeleton=replace(motion.skeleton, unit_cm=UNIT_CM[unit]))
+        motion = replace(motion, skeleton=in_unit(motion.skeleton, unit))
     return motion
 
 
@@ -188,8 +198,8 @@ class Entry:
         verbatim: bool = False,
         keep_skeleton: bool = False,
     ) -> None:
-        if unit is not None and unit not in UNIT_CM:
-            raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
+        if unit is not None:
+            unit_cm_of(unit)
         self.path, self.name = path, name
         self.codec, self.params = by_name(codec), params or {}
         self.skeleton, self.rate, self.unit = skeleton, rate, unit

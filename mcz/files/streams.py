@@ -21,7 +21,7 @@ from mcz.files.concealing import LOST, LiveFrame, Lost
 from mcz.files.followed import LiveClip
 from mcz.files.following import StrictFrames
 from mcz.files.live import LiveWriter
-from mcz.files.sources import UNIT_CM
+from mcz.files.sources import in_unit
 from mcz.files.tolerant import StreamSummary, TolerantFrames
 from mcz.motion import POSITION_KINDS, Channel, Joint, Skeleton
 
@@ -124,15 +124,6 @@ def markers(names: Sequence[str]) -> Skeleton:
         names = chosen
     channels = tuple(map(Channel, POSITION_KINDS))
     return Skeleton(tuple(Joint(name, channels=channels) for name in names))
-
-
-def in_unit(skeleton: Skeleton, unit: str | None) -> Skeleton:
-    """``skeleton`` in a length unit of that name; raises OptionError for an unknown one."""
-    if unit is None:
-        return skeleton
-    if unit not in UNIT_CM:
-        raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
-    return replace(skeleton, unit_cm=UNIT_CM[unit])
 
 
 def stream_decode(

@@ -238,6 +238,7 @@ def test_parameters_change_by_a_line(tmp_path: Path) -> None:
         (b"a\xff,b\n", "not a line of names"),
         (NAMES + b"1,2\n", "line 2: 2 values of 6"),
         (NAMES + line(ROWS[0]) + b"1,2,3,4,5,x\n", "line 3"),
+        (NAMES + b"1,2,3,4,5,1_000\n", "line 2: a value with _ in it"),
         (b"a.x,a.z,a.y\n", "not x, y and z"),
     ],
 )
@@ -247,6 +248,15 @@ def test_bad_rows(data: bytes, message: str) -> None:
     assert errors.startswith("mcz: standard input: ")
     assert message in errors
     assert "Traceback" not in errors
+
+
+def test_a_mark_of_byte_order_is_no_part_of_a_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    data = b"\xef\xbb\xbf" + NAMES + line(ROWS[0])
+    assert run("encode", *CODER, "-o", path, data=data)[0] == 0
+    with mcz.open(path) as file:
+        names = [joint.name for joint in file.clips["live"].skeleton.joints]
+    assert names == ["a", "b"]
 
 
 @pytest.mark.parametrize(

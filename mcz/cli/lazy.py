@@ -1,0 +1,24 @@
+"""Groups of commands, each of which is loaded when it is called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+
+import click
+
+
+def lazy_group(prefix: str, names: Sequence[str]) -> type[click.Group]:
+    """A group of commands that are the ``command`` of the modules called ``prefix`` and a name."""
+
+    class Commands(click.Group):
+        def list_commands(self, ctx: click.Context) -> list[str]:
+            return list(names)
+
+        def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+            if cmd_name not in names:
+                return None
+            command: click.Command = import_module(prefix + cmd_name).command
+            return command
+
+    return Commands
