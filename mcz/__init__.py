@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from mcz.metrics import Comparison, compare
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
 
-__version__ = "0.4.0"
+__version__ = "0.9.0"
 
 _HOMES = {
     "mcz.files.archive": ("Outcome", "Report", "append", "pack", "unpack"),

@@ -109,7 +109,7 @@ MODULES = (
     bad_sources,
     bad_c3d,
 )
-FORMAT_VERSION = "0.4"
+FORMAT_VERSION = "0.9"
 
 
 def vectors() -> list[Vector]:

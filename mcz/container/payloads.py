@@ -22,7 +22,7 @@ from construct import (
 from mcz.numbers import GRID
 from mcz.schema import EXTENSION, FINITE, SIZED, TEXT, UVARINT, counted
 
-FORMAT_MAJOR, FORMAT_MINOR = 0, 4
+FORMAT_MAJOR, FORMAT_MINOR = 0, 9
 LEAST_NEEDED = 0, 2  # 0.1 had another CLIP and INDX
 
 POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)
