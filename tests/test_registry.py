@@ -1,0 +1,128 @@
+"""registry.json says what SPEC.md says, and both what the code does."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+from typing import Any
+
+import pytest
+
+from mcz import sample
+from mcz.codecs import CODECS
+from mcz.codecs._bases import name_of
+from mcz.container import limits, packets
+from mcz.container.chunks import FLAGS_OF
+from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR
+from mcz.container.resuming import KNOWN
+from mcz.formats import FORMATS
+from mcz.metrics import compare
+from mcz.motion import CHANNEL_KINDS
+from mcz.transforms.wavelets import IDS, WAVELETS
+from tools import registry
+
+LIMITS = {
+    "channels": "channels of a signal",
+    "joints": "joints of a skeleton",
+    "segment_bytes": "decoded bytes of a segment (8 a value)",
+    "model_bytes": "bytes of all models",
+    "chunk_bytes": "bytes of a chunk's payload",
+    "packet_bytes": "bytes of a packet's body",
+    "text_bytes": "bytes of a template",
+}
+ANNEX = registry.REGISTRY.parent
+FOUND: dict[str, Any] = json.loads(registry.REGISTRY.read_text("utf-8"))
+
+
+def by(key: str, name: str) -> dict[Any, dict[str, Any]]:
+    """The rows of table ``name`` by their ``key``, no two of which are the same."""
+    rows = {row[key]: row for row in FOUND[name]}
+    assert len(rows) == len(FOUND[name])
+    return rows
+
+
+def test_it_is_what_the_text_says() -> None:
+    assert registry.REGISTRY.read_text("utf-8") == registry.document()
+
+
+@pytest.mark.parametrize("mark", ["**Annexes**", "## Codecs\n", "### Metrics\n"])
+def test_a_table_that_is_gone_is_missed(mark: str) -> None:
+    text = registry.SPEC.read_text("utf-8").replace(mark, "")
+    with pytest.raises(ValueError, match="no table"):
+        registry.registry(text)
+
+
+def test_version() -> None:
+    assert FOUND["format_version"] == f"{FORMAT_MAJOR}.{FORMAT_MINOR}"
+
+
+def test_chunk_types() -> None:
+    found = {name.encode(): row["flags"] for name, row in by("type", "chunk_types").items()}
+    assert found == dict.fromkeys(found, 0) | FLAGS_OF
+    assert set(found) == KNOWN
+
+
+def test_kinds_of_packets() -> None:
+    names = {row["name"]: id_ for id_, row in by("id", "packet_kinds").items()}
+    ours = packets.END, packets.SEGMENT, packets.FRAME, packets.NUMBERED
+    assert tuple(names.values()) == ours
+    assert list(names) == ["end", "segment", "frame", "numbered frame"]
+
+
+def test_profiles() -> None:
+    rows = by("id", "profiles")
+    assert set(rows) == set(limits.PROFILES)
+    for id_, row in rows.items():
+        assert row["name"] == limits.PROFILES[id_].name
+        fields = asdict(limits.PROFILES[id_])
+        found = {field: row["limits"][name] for field, name in LIMITS.items()}
+        assert found == {field: fields[field] for field in set(fields) - {"id", "name"}}
+        assert len(row["limits"]) == len(LIMITS)
+
+
+def test_codecs() -> None:
+    rows = by("id", "codecs")
+    assert {id_: (row["name"], row["version"], row["decodes"]) for id_, row in rows.items()} == {
+        codec.id: (codec.name, codec.version, codec.domain) for codec in CODECS.values()
+    }
+    assert FOUND["reserved_codecs"] == [12, 13]
+    assert not set(FOUND["reserved_codecs"]) & set(CODECS)
+
+
+def test_source_formats() -> None:
+    rows = by("id", "source_formats")
+    assert {id_: (row["name"], row["suffixes"]) for id_, row in rows.items()} == {
+        f.id: (f.name, " ".join(f.suffixes)) for f in FORMATS.values()
+    }
+
+
+def test_channel_kinds() -> None:
+    rows = by("id", "channel_kinds")
+    assert [rows[id_]["name"] for id_ in sorted(rows)] == ["", *CHANNEL_KINDS]
+
+
+def test_metrics() -> None:
+    motion = sample.acclaim_walk()
+    ours = compare(motion, motion).entries()
+    assert set(ours) | {"signal.NAME.mse"} == set(by("id", "metrics"))
+
+
+def test_bases() -> None:
+    for name, row in by("name", "bases").items():
+        assert name_of(bytes.fromhex(row["id"])) == name
+
+
+def test_wavelets() -> None:
+    rows = by("name", "wavelets")
+    assert {name: (row["id"], row["taps"]) for name, row in rows.items()} == {
+        name: (IDS[name], wavelet.n_taps) for name, wavelet in WAVELETS.items()
+    }
+
+
+def test_annexes() -> None:
+    rows = by("file", "annexes")
+    files = {path.name for path in ANNEX.iterdir()} - {registry.REGISTRY.name}
+    assert set(rows) == files
+    for name, row in rows.items():
+        assert row["sha256"] == hashlib.sha256((ANNEX / name).read_bytes()).hexdigest()

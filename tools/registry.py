@@ -1,0 +1,122 @@
+"""Write conformance/annex/registry.json from the tables of SPEC.md, or check that they agree.
+
+    python tools/registry.py [--check]
+
+SPEC.md is normative; the file is for programs that would rather not parse it.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parent.parent
+SPEC = ROOT / "SPEC.md"
+REGISTRY = ROOT / "conformance" / "annex" / "registry.json"
+Rows = list[list[str]]
+
+
+def rows_after(text: str, mark: str) -> Rows:
+    """The cells of the first table after ``mark``, which is in ``text`` once, without its head."""
+    _, found, rest = text.partition(mark)
+    table = re.search(r"(?:^\|.*\n)+", rest, re.M)
+    if not found or table is None:
+        raise ValueError(f"SPEC.md: no table after {mark!r}")
+    lines = table[0].splitlines()[2:]
+    return [[cell.strip().strip("`") for cell in line.strip("|").split("|")] for line in lines]
+
+
+def registry(text: str) -> dict[str, Any]:
+    """What the file holds, made of SPEC.md's ``text``."""
+    version = re.search(r"^Version (\d+\.\d+)", text, re.M)
+    assert version is not None
+    limits = rows_after(text, "## Limits and profiles\n")
+    return {
+        "format_version": version[1],
+        "chunk_types": _keyed(rows_after(text, "**Chunk types**"), "type", "flags", "meaning"),
+        "packet_kinds": _keyed(rows_after(text, "**Kinds of packets**"), "id", "name"),
+        "profiles": [
+            {"id": at, "name": name, "limits": {row[0]: _number(row[1 + at]) for row in limits}}
+            for at, name in enumerate(("base", "archive"))
+        ],
+        "codecs": _keyed(
+            rows_after(text, "## Codecs\n"),
+            *("id", "name", "version", "decodes", "groups", "resolutions"),
+        ),
+        "reserved_codecs": [
+            int(id_) for id_ in re.findall(r"(?:id |; )(\d+), for a", _paragraph(text, "Reserved:"))
+        ],
+        "point_sets": _keyed(rows_after(text, "**Points.**"), "id", "of", "points"),
+        "source_formats": _keyed(
+            rows_after(text, "**Source formats**"), "id", "name", "suffixes", "source_of"
+        ),
+        "channel_kinds": list(_kinds(rows_after(text, "**Channel kinds**"))),
+        "metadata_keys": _keyed(rows_after(text, "**Metadata keys**"), "key", "value"),
+        "cut_keys": _keyed(
+            rows_after(text, "- A quality record says what was cut"), "key", "value"
+        ),
+        "edit_keys": _keyed(rows_after(text, "## Replacing a joint\n"), "key", "value"),
+        "metrics": [
+            {"id": name, "unit": unit, "meaning": meaning}
+            for names, unit, meaning in rows_after(text, "### Metrics\n")
+            for name in names.split(", ")
+        ],
+        "model_kinds": _keyed(rows_after(text, "**Model kinds**"), "id", "name"),
+        "bases": _keyed(
+            rows_after(text, "Some models are well known."), "name", "annex", "id", "meaning"
+        ),
+        "wavelets": _keyed(rows_after(text, "### Wavelets\n"), "id", "name", "taps", "lo", "hi"),
+        "annexes": _keyed(rows_after(text, "**Annexes**"), "file", "sha256", "meaning"),
+    }
+
+
+def _keyed(rows: Rows, *names: str) -> list[dict[str, Any]]:
+    """Each row by the names of its columns; whole numbers as such."""
+    return [
+        {name: int(cell) if cell.isdigit() else cell for name, cell in zip(names, row, strict=True)}
+        for row in rows
+    ]
+
+
+def _kinds(rows: Rows) -> Iterator[dict[str, Any]]:
+    """A row of its own for each of several ids in one."""
+    for ids, names, meaning in rows:
+        numbers = [int(id_) for id_ in ids.split(", ")]
+        for number, name in zip(numbers, names.split() or [""], strict=True):
+            yield {"id": number, "name": name, "meaning": meaning}
+
+
+def _number(text: str) -> int:
+    """Bytes or a count, as the table of limits prints it."""
+    text = text.replace(",", "")
+    if "^" in text:
+        return 2 ** int(text.split("^")[1])
+    value, _, unit = text.partition(" ")
+    return int(value) * {"": 1, "KiB": 2**10, "MiB": 2**20}[unit]
+
+
+def _paragraph(text: str, start: str) -> str:
+    return text.split(f"\n{start}", 1)[1].split("\n\n", 1)[0]
+
+
+def document() -> str:
+    """The text of the file."""
+    made = registry(SPEC.read_text("utf-8"))
+    return json.dumps(made, indent=1, ensure_ascii=False) + "\n"
+
+
+def main() -> int:
+    made = document()
+    same = REGISTRY.is_file() and REGISTRY.read_text("utf-8") == made
+    if "--check" in sys.argv[1:]:
+        return int(not same)
+    REGISTRY.write_text(made, "utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
