@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import random
 import struct
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,13 +19,14 @@ import pytest
 
 import mcz
 from mcz.codecs import by_name
-from mcz.codecs.base import FindModel, Layout, Model, Request, Segment, Span, id_of, model_finder
-from mcz.errors import FormatError
+from mcz.codecs.base import Layout, Model, Segment, id_of, model_finder
 from mcz.files.memory import MemorySource
 from mcz.motion import Motion
 from tests import plain_lsdt, plain_wavelets
 from tests.codecs.lossy import gapped, wandering
+from tests.codecs.point_case import Case, stored
 from tests.codecs.twins import VECTORS, rough
+from tests.inventor import Bounded, Inventor, Written, invented_code, invented_model, number
 from tests.motions import smooth
 
 NAMES = ("lsdt-frame", "lsdt-clip")
@@ -51,116 +52,6 @@ OWN: tuple[dict[str, Any], ...] = (
 REAL_CLIPS = ("cmu/amc/05_01.amc", "cmu/bvh-daz/09_01.bvh", "other/ezc3d-testfiles/FP_Type1.c3d")
 
 
-@dataclass(frozen=True)
-class Case:
-    """A signal as a codec and the plain decoder are given it."""
-
-    name: str
-    header: bytes
-    layout: Layout
-    segments: tuple[Segment, ...]
-
-    def fast(self, start: int = 0, stop: int | None = None) -> bytes | None:
-        """The bytes of the values, None where they are refused."""
-        spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in self.segments]
-        stop = self.layout.n_frames if stop is None else stop
-        request = Request(start, stop, tuple(range(len(self.layout.groups))))
-        try:
-            values = by_name(self.name).decode(
-                self.header, self.layout, spans, request, self.stream
-            )
-        except FormatError:
-            return None
-        return values.astype("<f8").tobytes()
-
-    def stream(self, segment: int, resolution: int, group: int) -> bytes:
-        return self.segments[segment].streams[resolution * len(self.layout.groups) + group]
-
-    def plain(self) -> bytes | None:
-        segments = [
-            plain_lsdt.Segment(s.first, s.n_frames, s.streams, s.lead, s.tail, s.fresh)
-            for s in self.segments
-        ]
-        sizes = self.layout.n_channels, self.layout.n_frames
-        codec = by_name(self.name).id
-        try:
-            rows = plain_lsdt.decode(codec, self.header, *sizes, segments, self.find)
-        except ValueError:
-            return None
-        return np.array(rows, "<f8").tobytes()
-
-    def find(self, id_: bytes) -> tuple[int, bytes] | None:
-        assert self.layout.find_model is not None
-        model = self.layout.find_model(id_)
-        return model and (model.kind, model.data)
-
-    def check(self) -> None:
-        """All values, and some of the frames alone."""
-        values = self.plain()
-        assert values == self.fast()
-        assert values is not None
-        n, size = self.layout.n_frames, 8 * self.layout.n_channels
-        for start, stop in ((n // 3, n // 2), (n - n // 5, n)):
-            assert values[size * start : size * stop] == self.fast(start, stop)
-
-    def changed(self, chance: random.Random) -> Case:
-        """One change of the header, of a stream, or of what is said of a segment."""
-        what, i = chance.random(), chance.randrange(len(self.segments))
-        segment = self.segments[i]
-        if what < 0.2:
-            return replace(self, header=changed(self.header, chance))
-        if what < 0.35:
-            return replace(self, layout=replace(self.layout, find_model=self.other_model(chance)))
-        if what < 0.9:
-            streams = tuple(changed(stream, chance) for stream in segment.streams)
-            segment = replace(segment, streams=streams)
-        elif what < 0.95:
-            segment = replace(segment, fresh=not segment.fresh)
-        else:
-            segment = replace(segment, **{chance.choice(["lead", "tail"]): 1})
-        return replace(self, segments=(*self.segments[:i], segment, *self.segments[i + 1 :]))
-
-    def other_model(self, chance: random.Random) -> FindModel:
-        """Finds changed models in the place of those that there are."""
-        seed = chance.randrange(2**32)
-
-        def find(id_: bytes) -> Model | None:
-            model = self.find(id_)
-            if model is None:
-                return None
-            other = random.Random(seed)
-            return Model(model[0] + (other.random() < 0.1), changed(model[1], other))
-
-        return find
-
-    def check_changes(self, n_changes: int, seed: int) -> int:
-        """How many of them both refuse."""
-        chance, refused = random.Random(seed), 0
-        for _ in range(n_changes):
-            other = self.changed(chance)
-            found = other.plain()
-            assert found == other.fast()
-            refused += found is None
-        return refused
-
-
-def changed(data: bytes, chance: random.Random) -> bytes:
-    new = bytearray(data or b"\0")
-    at = chance.randrange(len(new))
-    match chance.randrange(7):
-        case 0:
-            del new[at:]
-        case 1:
-            new += bytes([chance.choice((0, 255))])
-        case 2:
-            new[0] = chance.randrange(256)
-        case 3:
-            new[at] = chance.randrange(256)
-        case _:
-            new[at] ^= 1 << chance.randrange(8)
-    return bytes(new)
-
-
 def encoded(name: str, motion: Motion, **params: object) -> Case:
     """A clip as the codec alone has it."""
     codec = by_name(name)
@@ -169,19 +60,6 @@ def encoded(name: str, motion: Motion, **params: object) -> Case:
     finder = model_finder((*coded.models, *coded.known))
     layout = replace(source.layout, n_resolutions=coded.n_resolutions, find_model=finder)
     return Case(name, coded.header, layout, tuple(coded.segments))
-
-
-def stored(file: Any, clip: Any) -> Case:
-    """The motion of a clip, all frames that the file stores."""
-    info = clip.signals[0]
-    segments = []
-    n_resolutions, n_groups = info.layout.n_resolutions, len(info.layout.groups)
-    places = [(r, g) for r in range(n_resolutions) for g in range(n_groups)]
-    for row, span in zip(info.rows, info.spans, strict=True):
-        table, streams = file.container.streams(row, info.counts, None)
-        own = tuple(streams[table.codec(*place)] for place in places)
-        segments.append(Segment(span.first, span.n_frames, own, span.lead, span.tail, span.fresh))
-    return Case(info.codec.name, info.header, info.layout, tuple(segments))
 
 
 def check_file(data: bytes) -> None:
@@ -322,65 +200,6 @@ def test_other_layouts(name: str) -> None:
 # What they never would
 
 
-class Inventor:
-    """Stands for the range coder: makes its bits up, and the data that would give them."""
-
-    def __init__(self, chance: random.Random) -> None:
-        self.chance = chance
-        self.decisions: list[tuple[int, int]] = []
-
-    def decode(self, one: int) -> int:
-        bit = int(self.chance.random() * 65536 < one)
-        self.decisions.append((one, bit))
-        return bit
-
-    def number(self, n: int) -> int:
-        value = 0
-        for _ in range(n):
-            value = 2 * value + self.decode(32768)
-        return value
-
-    def finish(self) -> None:
-        """The data are what the bits take."""
-
-    def data(self) -> bytes:
-        low, high, out = 0, 2**32 - 1, bytearray()
-        for one, bit in self.decisions:
-            w = high - low
-            middle = low + (w // 65536) * one + (w % 65536) * one // 65536
-            low, high = (low, middle) if bit else (middle + 1, high)
-            while low // 2**24 == high // 2**24:
-                out.append(low // 2**24)
-                low, high = low * 256 % 2**32, high * 256 % 2**32 + 255
-        for t in range(5):
-            step = 2 ** (32 - 8 * t)
-            if high // step * step >= low:
-                break
-        return bytes(out) + (high // step * step).to_bytes(5, "big")[1 : 1 + t]
-
-
-class Bounded(plain_wavelets.Residuals):
-    """Residuals from ``low`` to ``high``: others are made up anew."""
-
-    def __init__(self, kind: plain_wavelets.Residuals, low: int, high: int) -> None:
-        super().__init__(kind.model, kind.first_context, kind.first_mixer)
-        self.low, self.high = low, high
-
-    def residual(self, f: int, g: int) -> int:
-        model = self.model
-        while True:
-            before = model.p[:], model.n[:], model.weights[:]
-            n = len(model.coder.decisions)
-            try:
-                r = super().residual(f, g)
-            except ValueError:
-                r = self.high + 1
-            if self.low <= r <= self.high:
-                return r
-            model.p, model.n, model.weights = before
-            del model.coder.decisions[n:]
-
-
 class InventedKinds(plain_lsdt.Kinds):
     """Those of random decisions, with lengths of at most ``longest``."""
 
@@ -389,84 +208,6 @@ class InventedKinds(plain_lsdt.Kinds):
         self.lengths = Bounded(self.lengths, 0, longest)
         self.firsts = Bounded(self.firsts, -(2**40), 2**40)
         self.others = Bounded(self.others, -(2**40), 2**40)
-
-
-def number(n: int) -> bytes:
-    """A varint."""
-    out = bytearray()
-    while n > 127:
-        out.append(n % 128 + 128)
-        n //= 128
-    return bytes([*out, n])
-
-
-def invented_model(chance: random.Random, sizes: list[tuple[int, int]]) -> Model:
-    """Bases of so many points and vectors."""
-    head = number(len(sizes))
-    coder = Inventor(chance)
-    residuals = plain_wavelets.Residuals(
-        plain_wavelets.Model(plain_lsdt.plain_pca.START, coder), 2568, 17
-    )
-    bounded = Bounded(residuals, -(2**40), 2**40)
-    for n_points, n_vectors in sizes:
-        shifts = [chance.choice((0, 1, 7, 7, 7, 12, 40)) for _ in range(n_vectors)]
-        head += number(n_points) + number(n_vectors) + bytes(shifts)
-        for shift in shifts:
-            plain_lsdt.table(bounded, n_points, 2**shift >> (n_points.bit_length() >> 1))
-    return Model(1, head + coder.data())
-
-
-def invented_code(chance: random.Random, classes: list[int]) -> list[int]:
-    """Lengths of a whole code of these classes and some more."""
-    leaves = [0]
-    while len(leaves) < len(classes) or chance.random() < 0.8:
-        at = chance.randrange(len(leaves))
-        if leaves[at] < 15 and len(leaves) < 90:
-            leaves[at : at + 1] = [leaves[at] + 1] * 2
-    others = [c for c in range(90) if c not in classes]
-    own = [*classes, *chance.sample(others, len(leaves) - len(classes))]
-    lengths = [0] * (max(own) + 1)
-    for c, length in zip(own, chance.sample(leaves, len(leaves)), strict=True):
-        lengths[c] = length
-    return lengths
-
-
-class Written:
-    """Bits as they are written: integers by the codes of these lengths."""
-
-    def __init__(self) -> None:
-        self.text = ""
-
-    def plain(self, value: int, n: int) -> None:
-        self.text += f"{value:0{n}b}" if n else ""
-
-    def integer(self, value: int, lengths: list[int]) -> None:
-        n = value.bit_length() - 2
-        c = value if value < 16 else 16 + 2 * (n - 3) + (value >> n) - 2
-        codes: dict[int, int] = {}
-        code = 0
-        for length in range(1, 16):
-            for each, own in enumerate(lengths):
-                if own == length:
-                    codes[each], code = code, code + 1
-            code *= 2
-        self.plain(codes[c], lengths[c])
-        if c >= 16:
-            self.plain(value % 2**n, n)
-
-    def sparse(self, chance: random.Random, n: int, gaps: list[int], values: list[int]) -> None:
-        kept = [k for k in range(n) if chance.random() < 0.3]
-        self.plain(len(kept), n.bit_length())
-        at = 0
-        for k in kept:
-            self.integer(k - at, gaps)
-            self.integer(chance.choice((0, 1, 5, 16, 24, 31, 2**40 - 1)), values)
-            self.plain(chance.randrange(2), 1)
-            at = k + 1
-
-    def data(self) -> bytes:
-        padded = self.text + "0" * (-len(self.text) % 8)
-        return bytes(int(padded[i : i + 8], 2) for i in range(0, len(padded), 8))
 
 
 class Invention:

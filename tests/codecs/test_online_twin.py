@@ -30,8 +30,9 @@ from mcz.files.memory import MemorySource
 from mcz.motion import Motion
 from tests import plain_lsdt, plain_online
 from tests.codecs.lossy import gapped, markers, wandering
-from tests.codecs.test_lsdt_twin import Case, Inventor, changed, invented_model, number, stored
+from tests.codecs.point_case import Case, changed, stored
 from tests.codecs.twins import VECTORS, rough
+from tests.inventor import Inventor, invented_model, number
 from tests.motions import smooth
 from tests.plain_online import INTRA, LTR, STR
 from tests.plain_wavelets import Model as Start
