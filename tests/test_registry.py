@@ -26,7 +26,7 @@ LIMITS = {
     "channels": "channels of a signal",
     "joints": "joints of a skeleton",
     "segment_bytes": "decoded bytes of a segment (8 a value)",
-    "model_bytes": "bytes of all models",
+    "model_bytes": "bytes of the payloads of all MODL chunks, repeated ones too",
     "chunk_bytes": "bytes of a chunk's payload",
     "packet_bytes": "bytes of a packet's body",
     "text_bytes": "bytes of a template",

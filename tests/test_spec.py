@@ -13,12 +13,14 @@ import pytest
 
 import mcz
 from mcz.codecs import CODECS
-from mcz.container import limits
 from mcz.formats import FORMATS
 from mcz.motion import CHANNEL_KINDS
+from tests.broken.table import BREAKS
+from tools import requirements
 
 ROOT = Path(__file__).parent.parent
-SPEC = (ROOT / "SPEC.md").read_text()
+TEXT = (ROOT / "SPEC.md").read_text()
+SPEC = re.sub(r" \[[A-Z][A-Z0-9]+-\d\d\]", "", TEXT)  # without the ids of rules
 HEADINGS = set(re.findall(r"^#+ (.+)$", SPEC, re.M))
 
 
@@ -68,31 +70,6 @@ def test_channel_kinds() -> None:
         kinds += names.split()
         assert [int(n) for n in numbers.split(", ")][-1] == len(kinds)
     assert tuple(kinds) == CHANNEL_KINDS
-
-
-def number(text: str) -> int:
-    text = text.replace(",", "")
-    if "^" in text:
-        return 2 ** int(text.split("^")[1])
-    value, _, unit = text.partition(" ")
-    return int(value) * {"": 1, "KiB": 2**10, "MiB": 2**20}[unit]
-
-
-def test_profile_limits() -> None:
-    table = {row[0]: row[1:] for row in rows_under("Limits and profiles")}
-    fields = {
-        "channels of a signal": "channels",
-        "joints of a skeleton": "joints",
-        "decoded bytes of a segment (8 a value)": "segment_bytes",
-        "bytes of all models": "model_bytes",
-        "bytes of a chunk's payload": "chunk_bytes",
-        "bytes of a packet's body": "packet_bytes",
-        "bytes of a template": "text_bytes",
-    }
-    assert set(table) == set(fields)
-    for name, field in fields.items():
-        assert number(table[name][0]) == getattr(limits.BASE, field), name
-        assert number(table[name][1]) == getattr(limits.ARCHIVE, field), name
 
 
 def test_worked_example_is_the_smallest_clip() -> None:
@@ -152,3 +129,79 @@ def test_wavelets_of_the_text_and_the_annex_are_those_of_the_package() -> None:
     printed = [float(word) for word in text.split() if word[0] in "-.0123456789"]
     derived = [w.lo if name != "bior4.4" else (*w.lo, *w.hi) for name, w in WAVELETS.items()]
     assert printed == [tap for taps in derived for tap in taps]
+
+
+def test_ids_of_rules() -> None:
+    """Unique, in order within their section, and one behind every MUST and SHOULD."""
+    assert requirements.faults(TEXT) == []
+    rules = requirements.rules(TEXT)
+    assert len(rules) > 400
+    assert all(rule.words and "[" + rule.id + "]" in TEXT for rule in rules)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("A MUST [AB-01]. B MUST [AB-01].", "AB-01 stands twice"),
+        ("A MUST [AB-02]. B MUST [AB-01].", "AB: ids in the order [2, 1]"),
+        ("A MUST [AB-02].", "AB: ids in the order [2]"),
+        ("A MUST [AB-01]. B SHOULD\nNOT be.", "Heading, line 1: SHOULD\nNOT without an id"),
+        ("\nA MUST be, B MUST [AB-01].", "Heading, line 2: MUST without an id"),
+        ("A MUST [AB-1], B [AB-01].", "Heading: [AB-1] is no id"),
+        ("A MUST [Ab-01], B [AB-01].", "Heading: [Ab-01] is no id"),
+        ("A MUST [AB-001], B [AB-01].", "Heading: [AB-001] is no id"),
+    ],
+)
+def test_faults_of_ids_are_found(text: str, fault: str) -> None:
+    assert fault in requirements.faults(f"# Title\n\nMUST is a word.\n\n## Heading\n{text}\n")
+
+
+def test_rules_have_their_own_words() -> None:
+    text = (
+        "# Title\n\nA MUST [XX-01] of the head is none.\n\n## One\n\n"
+        "A reader MUST read a [AB-01], b [AB-02] and MUST NOT\nread c [AB-03], as `[AB-09]` says. "
+        "It SHOULD do so [AB-04]:\n\n```\nx = 1\nrefuse if x > 2  [AB-05]\n```\n\n### Two\n\n"
+        "It MUST refuse\n\n- d [AB-06];\n- e [AB-07].\n"
+    )
+    assert [(r.id, r.level, r.heading, r.words) for r in requirements.rules(text)] == [
+        ("AB-01", "MUST", "One", "A reader MUST read a"),
+        ("AB-02", "MUST", "One", "... b"),
+        ("AB-03", "MUST NOT", "One", "... and MUST NOT read c, as `[AB-09]` says."),
+        ("AB-04", "SHOULD", "One", "It SHOULD do so:"),
+        ("AB-05", "MUST", "One", "refuse if x > 2"),
+        ("AB-06", "MUST", "Two", "d"),
+        ("AB-07", "MUST", "Two", "e."),
+    ]
+
+
+def test_rules_that_nothing_shows_are_missed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rules = requirements.rules(TEXT)
+    binding = [rule.id for rule in rules if rule.binds]
+    named = {id_: ["valid/a.mcz"] for id_ in binding[2:]}
+    monkeypatch.setattr(requirements, "vectors_of", lambda manifest: named)
+    monkeypatch.setattr(requirements, "ARGUED", {binding[0]: "because"})
+    assert requirements.main(["--json", "--uncovered"]) == 1
+    printed = capsys.readouterr()
+    shown = {row["id"]: row for row in json.loads(printed.out)}
+    assert shown.keys() == {*binding[:2], *(rule.id for rule in rules if not rule.binds)}
+    assert (shown[binding[0]]["argued"], shown[binding[0]]["vectors"]) == ("because", [])
+    assert printed.err.endswith("1 argued, 1 with neither\n")
+    named[binding[1]] = ["valid/b.mcz"]
+    assert requirements.main(["--section", binding[1].partition("-")[0]]) == 0
+    assert "1 vectors: valid/b.mcz" in capsys.readouterr().out
+    named["XX-01"] = ["valid/c.mcz"]
+    assert requirements.main([]) == 1
+    assert "XX-01: no such rule" in capsys.readouterr().err
+
+
+def test_every_rule_is_shown_by_a_vector_or_argued(capsys: pytest.CaptureFixture[str]) -> None:
+    assert requirements.main(["--uncovered"]) == 0, capsys.readouterr().out
+
+
+def test_four_of_five_rules_are_shown_by_a_decoder_that_breaks_them() -> None:
+    binding = {rule.id for rule in requirements.rules(TEXT) if rule.level.startswith("MUST")}
+    broken = {row.id for row in BREAKS.values()}
+    assert broken <= {rule.id for rule in requirements.rules(TEXT)}
+    assert len(broken & binding) >= 0.8 * len(binding)

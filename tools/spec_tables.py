@@ -39,6 +39,7 @@ MODULES = (
     "mcz.codecs._windows",
     "mcz.codecs.lsdt_frame",
     "mcz.codecs._online_coder",
+    "mcz.codecs._online_units",
     "mcz.formats.layout",
     "mcz.formats.notes",
     "mcz.formats.c3d_layout",

@@ -15,6 +15,26 @@ STR, LTR, INTRA = 0, 1, 2  # what a frame is predicted from: the last, the last 
 MIXED, GOLOMB = 0, 1  # coders
 MODES = ("mod", "rc", "rca", "steady")  # of an encoder's rate control
 
+# A unit, as SPEC.md's table has it: (name, type, meaning).
+UNIT_FIELDS = (
+    (
+        "head",
+        "varint",
+        "4 n + kind: n frames, at least 1; kind of the first: 0 STR, 1 LTR, 2 intra coded",
+    ),
+    (
+        "distance",
+        "varint, or absent",
+        "only where kind is 1: how many frames before lies the LTR that it is predicted from",
+    ),
+    (
+        "size",
+        "varint, or absent",
+        "bytes of `data`; absent in the last unit, whose data reach to the end of the stream",
+    ),
+    ("data", "bytes", "the frames; none where their bits take none"),
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Unit:

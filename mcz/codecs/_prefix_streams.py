@@ -24,7 +24,7 @@ ADAPTIVE, PREFIX = 0, 1  # coder
 _LENGTHS = counted(ExprValidator(Int8ul, lambda n, ctx: n <= MAX_LENGTH), N_CLASSES)
 
 CODE = Struct(
-    "coder" / OneOf(Int8ul, (ADAPTIVE, PREFIX)) * "0 adaptive, 1 prefix codes",
+    "coder" / OneOf(Int8ul, (ADAPTIVE, PREFIX)) * "0 mixed, 1 prefix codes",
     "gap_lengths"
     / If(lambda ctx: ctx.coder == PREFIX, _LENGTHS)
     * "length of the code of each class of a gap, 0 to 15, at most 90; only where coder is 1",

@@ -1,0 +1,322 @@
+"""The tables of SPEC.md that no schema makes, its constants, and its worked examples."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import zlib
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mcz.codecs import CODECS, _lossless_kernels, _online_kernels, _qbc_kernels
+from mcz.coding import frames, kernels, logistic, residuals
+from mcz.container import chunks
+from mcz.formats import FORMATS, amc, c3d_restore
+from mcz.formats.c3d_layout import Kind
+from mcz.formats.layout import TEMPLATE
+from mcz.numbers import Grid, GridFlag, GridKind, rules, values_of_texts
+from mcz.schema import parse
+from mcz.transforms.wavelets import MAX_LEVELS
+from tests.test_spec import ROOT, SPEC, rows_under
+
+WORDS = " ".join(SPEC.split())
+SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "4 bytes": 4, "8 bytes": 8}
+
+
+def section(heading: str) -> str:
+    return re.split(r"\n#{2,} ", SPEC.split(f"# {heading}\n", 1)[1])[0]
+
+
+def table_after(text: str, head: str) -> list[list[str]]:
+    rows = list(takewhile(bool, text.split(head, 1)[1].splitlines()[2:]))
+    return [[c.strip() for c in row.strip("|").split("|")] for row in rows]
+
+
+def fields_of(rows: list[list[str]], data: bytes, payload: int = 0) -> dict[str, bytes]:
+    """``data`` cut into the fields of a table; ``payload`` is the size of a field of bytes."""
+    found, at = {}, 0
+    for name, kind, _ in rows:
+        size = SIZES.get(kind, payload)
+        found[name] = data[at : at + size]
+        at += size
+    assert at == len(data)
+    return found
+
+
+def test_chunk() -> None:
+    data = chunks.build_chunk(b"DATA", b"abc", 3)
+    found = fields_of(rows_under("Chunks"), data, payload=3)
+    assert found["type"] == b"DATA"
+    assert found["flags"] == bytes((chunks.ANCILLARY | chunks.SAFE_TO_COPY,)) == b"\3"
+    assert found["reserved"] == b"\0"
+    assert found["length"] == (3).to_bytes(8, "little")
+    assert found["payload"] == b"abc"
+    others = data[:6] + data[8:16]
+    assert found["header_check"] == (zlib.crc32(others) & 0xFFFF).to_bytes(2, "little")
+    assert found["crc"] == zlib.crc32(data[:-4]).to_bytes(4, "little")
+
+
+def test_foot() -> None:
+    rows = rows_under("FOOT")
+    data = chunks.build_foot(0x1234, 0x5678)
+    found = fields_of(rows, data)
+    assert [int.from_bytes(found[name], "little") for name in ("index_offset", "index_length")] == [
+        0x1234,
+        0x5678,
+    ]
+    assert found["flags"] == bytes(4)
+    assert found["crc"] == zlib.crc32(data[:4] + data[8:]).to_bytes(4, "little")
+    assert f"`{found['end_magic'].hex(' ').upper()}`" == rows[-1][2]
+    assert f"`{chunks.SIGNATURE.hex(' ').upper()}`" in section("Chunks")
+
+
+def test_groups_and_resolutions_of_codecs() -> None:
+    levels = f"1 to {MAX_LEVELS + 1}"
+    for row in rows_under("Codecs"):
+        codec = CODECS[int(row[0])]
+        assert row[4] == ("any" if codec.domain == "ordinals" else codec.grouping)
+        by_codec = {"mrdwt": levels, "dwt": levels, "awt": levels, "qbc": "1 to 2"}
+        assert row[5] == by_codec.get(codec.name, "1")
+
+
+def test_contexts_of_residuals() -> None:
+    names = ("below", "less", "more", "second", "third", "side")
+    rows = {row[0].lower(): row[1:] for row in rows_under("Residuals")}
+    assert list(rows) == list(names)
+    firsts = [getattr(residuals, f"C_{name.upper()}") for name in names]
+    mixers = [getattr(residuals, f"M_{name.upper()}") for name in names]
+    assert [int(rows[name][0]) for name in names] == firsts
+    assert [int(rows[name][1].split(" to ")[0]) for name in names] == mixers
+    assert rows["more"][1] == f"{residuals.M_MORE} to {residuals.M_SECOND - 1}"
+    counts = f"{residuals.N_CONTEXTS} contexts and {residuals.N_MIXERS} mixers"
+    assert f"There are {counts}." in section("Residuals")
+
+
+def test_contexts_of_lossless() -> None:
+    loops = _lossless_kernels
+    assert table_after(section("Codec 1: lossless"), "| bit |") == [
+        ["SAME", str(loops.C_SAME), str(loops.M_SAME)],
+        ["UP", str(loops.C_UP), str(loops.M_UP)],
+        ["ZERO", str(loops.C_ZERO), str(loops.M_ZERO)],
+        ["FAR", str(loops.C_FAR), str(loops.M_FAR)],
+        ["MINUS", str(loops.C_MINUS), str(loops.M_MINUS)],
+        ["ZERO_SIGN", str(loops.C_MINUS + 32), str(loops.M_ZERO_SIGN)],
+        ["of residuals", str(loops.C_RESIDUAL), str(loops.M_RESIDUAL)],
+    ]
+    assert f"{loops.N_CONTEXTS} contexts and {loops.N_MIXERS} mixers" in WORDS
+
+
+def test_nodes_of_the_mixer() -> None:
+    text = re.search(r"NODES = ([\d\s]+)", SPEC)
+    assert text is not None
+    assert tuple(map(int, text[1].split())) == logistic.NODES
+
+
+@pytest.mark.parametrize(
+    ("heading", "words"),
+    [
+        ("Entropy coding", f"if n < {logistic.COUNT_LIMIT}: n = n + 1"),
+        ("Entropy coding", f"clamp(dot, -{logistic.LIMIT}, {logistic.LIMIT})"),
+        ("Entropy coding", f"clamp(a.p, {kernels.LEAST_ONE}, {65536 - kernels.LEAST_ONE})"),
+        ("Entropy coding", f"-2^{kernels.MAX_WEIGHT.bit_length() - 1}, 2^24)"),
+        ("Residuals", "refuse if n > 60"),
+        ("Codec 1: lossless", f"refuse if t > {_lossless_kernels.MAX_STEPS_LENGTH}"),
+        ("Codec 1: lossless", f"{_lossless_kernels.DECIMAL_WIDTH} for base 10 and 44 for base 2"),
+        ("Codec 1: lossless", f"j = max(c - P, -{_lossless_kernels.LAST_POWER})"),
+    ],
+)
+def test_constants(heading: str, words: str) -> None:
+    assert words in section(heading)
+
+
+START = {  # annex: what the text says of each of its sets
+    "lossless": ["3376 contexts and 23 mixers"],
+    "wavelet": 5 * ["2568 contexts and 17 mixers"],
+    "qbc": ["2568 contexts, 17 mixers", "7736 contexts, 52 mixers"],
+    "pca": ["7704 contexts, 51 mixers"],
+    "window": ["7704 contexts, 51 mixers"],
+    "frame": ["contexts and mixers as in Windows"],
+    "online": [*2 * ["7719 contexts"], *2 * ["143 contexts"]],
+}
+AS_WINDOWS = 7704, 51
+
+
+@pytest.mark.parametrize("name", START)
+def test_sizes_of_start_tables(name: str) -> None:
+    document = json.loads((ROOT / f"conformance/annex/{name}_start.json").read_text())
+    tables = document.get("sets", [document])
+    assert len(tables) == len(START[name])
+    for table, words in zip(tables, START[name], strict=True):
+        assert words in WORDS
+        numbers = [int(n) for n in re.findall(r"\d+", words)] or list(AS_WINDOWS)
+        assert len("".join(table["probabilities"])) == 2 * numbers[0]
+        assert len("".join(table["counts"])) == 2 * numbers[0]
+        if len(numbers) == 2:
+            assert len(table["weights"]) == 3 * numbers[1]
+
+
+def test_places_of_residuals_in_codecs() -> None:
+    """Of first contexts and mixers the text names some; all follow from the sizes."""
+    first = residuals.N_CONTEXTS, residuals.N_MIXERS
+    second = 2 * first[0], 2 * first[1]
+    assert ((0, 0), first, second) == (frames.LENGTHS, frames.FIRSTS, frames.OTHERS)
+    assert f"context {first[0]} and mixer {first[1]}" in section("Windows")
+    assert f"context {second[0]} and mixer {second[1]}" in section("Windows")
+    assert f"LAST at context {_qbc_kernels.C_LAST} and mixer" in section("Codec 3: qbc")
+
+
+def test_every_annex_that_is_named_with_a_hash_has_it() -> None:
+    named = re.findall(r"`conformance/annex/(\w+\.\w+)` \(SHA-256 ([0-9a-f]{64})\)", WORDS)
+    named += re.findall(r"^\| `(\w+\.\w+)` \| ([0-9a-f]{64}) \|", SPEC, re.M)
+    files = {path.name for path in (ROOT / "conformance/annex").iterdir()} - {"registry.json"}
+    assert {name for name, _ in named} == files
+    for name, digest in named:
+        data = (ROOT / "conformance/annex" / name).read_bytes()
+        assert hashlib.sha256(data).hexdigest() == digest, name
+
+
+def numbers_in(text: str) -> set[int]:
+    """The numbers that "0 to 22" or "0, 1, 16, 17" lists."""
+    found = set()
+    for part in text.split(", "):
+        low, _, high = part.partition(" to ")
+        found |= set(range(int(low), int(high or low) + 1))
+    return found
+
+
+def flags_in(text: str, digits: int) -> int:
+    """The flags that a grid of so many digits may have, without regard to those that clash."""
+    if text == "all":
+        return int(sum(GridFlag))
+    found = 0
+    for name, sign in re.findall(r"([A-Z][A-Z_0-9]+)(?: \(digits ([>=]) 0\))?", text):
+        if not sign or (sign == ">") == (digits > 0):
+            found |= GridFlag[name]
+    return found
+
+
+def test_grids() -> None:
+    allowed: dict[tuple[GridKind, int], tuple[int, str, str]] = {}
+    rows = table_after(section("The grid structure"), "| kind | id |")
+    for kind, id_, digits, flags, most, ordinals in rows:
+        assert GridKind[kind] == int(id_)
+        for number in numbers_in(digits):
+            allowed[GridKind[kind], number] = flags_in(flags, number), most, ordinals
+    for kind in GridKind:
+        for digits in range(256):
+            legal = rules.fault(kind, digits, 0, 1.0) is None
+            assert legal == ((kind, digits) in allowed), (kind, digits)
+            if legal:
+                check_grid(Grid(kind, digits), *allowed[kind, digits])
+
+
+def check_grid(grid: Grid, flags: int, most: str, ordinals: str) -> None:
+    for flag in GridFlag:
+        legal = rules.fault(grid.kind, grid.digits, int(flag), 1.0) is None
+        assert legal == bool(flags & flag), (grid, flag)
+    most = most.replace("^", "**").replace("digits", str(grid.digits))
+    assert grid.limit == eval(most)
+    assert ordinals == ("-1 - M to M" if grid.signed_magnitude else "-M to M")
+
+
+def test_flags_of_grids() -> None:
+    rows = table_after(section("The grid structure"), "| flag | bit | text |")
+    assert {row[0]: int(row[1]) for row in rows} == {flag.name: int(flag) for flag in GridFlag}
+
+
+@pytest.mark.parametrize("row", rows_under("Worked examples"), ids=lambda row: row[0])
+def test_worked_examples_of_grids(row: list[str]) -> None:
+    token, spec, ordinal, value = row
+    kind, *rest = spec.split()
+    digits = int(rest.pop(0)) if rest and rest[0].isdigit() else 0
+    grid = Grid(GridKind[kind], digits, sum(GridFlag[name] for name in rest))
+    place = np.array([int(ordinal, 0)])
+    text = re.fullmatch(r"(bytes )?`([^`]+)`", token)
+    assert text is not None
+    if text[1]:
+        word = np.frombuffer(bytes.fromhex(text[2]), "<u4")
+        assert grid.ordinals_of_bits(word).tolist() == place.tolist()
+    else:
+        assert grid.texts(place).tolist() == [text[2].encode()]
+        assert grid.values(place).tolist() == values_of_texts([text[2].encode()])[0].tolist()
+    found = grid.values(place).view(np.int64)
+    wanted = np.array([float(value.split()[0])]).view(np.int64)
+    assert found.tolist() == wanted.tolist()
+
+
+def test_parts_of_source_formats() -> None:
+    rows = {row[0]: row[1:] for row in rows_under("Source reconstruction")}
+    assert {name: int(row[0]) for name, row in rows.items()} == {
+        name: known.id for name, known in FORMATS.items()
+    }
+    for name, known in FORMATS.items():
+        assert (rows[name][3] == "NOTES") == (known.join_notes is not None)
+
+
+def test_worked_example_of_a_template() -> None:
+    text = section("The text of AMC and BVH")
+    block = re.search(r"Worked example, the file\n\n```\n(.*?)\n```", text, re.S)
+    assert block is not None
+    file = block[1].replace("\n", "").replace("\\n", "\n").encode()
+    motion = amc.read(file, "a", None)
+    source = motion.source
+    assert source is not None
+    assert source.detail == b"\0\0\0\0\1\0"
+    fields = parse(TEMPLATE, source.template, "template")
+    said = {row[0]: row[1] for row in table_after(text, "| part | value |")}
+    plain = {b"": "empty", b" ": "one blank"}
+    gaps = [plain.get(g) or f"`{g.decode()}`".replace("\n", "\\n") for g in fields.gaps]
+    assert said["gaps"] == ", ".join(f"{n}: {gap}" for n, gap in enumerate(gaps))
+    assert [bytes(part) for part in fields.header] == [b":DEGREES\n"]
+    (pattern,) = fields.patterns
+    assert (pattern.tail, [(run.gap, run.column) for run in pattern.runs]) == (
+        int(said["pattern 0"].split("tail ")[1]),
+        [(0, 0), (1, 1), (2, 2), (3, 3)],
+    )
+    assert {grid.kind for grid in motion.signals[0].grids} == {GridKind.FIXED}
+    assert amc.write(motion) == file
+
+
+def test_fields_of_c3d() -> None:
+    rows = table_after(section("Template and detail of C3D"), "| kind | size | content |")
+    assert [(int(row[0]), int(row[1])) for row in rows] == [(kind, kind.size) for kind in Kind]
+    assert f"a block has {c3d_restore.BLOCK} bytes" in rows[-1][2]
+
+
+def test_signals_of_c3d() -> None:
+    rows = table_after(section("Template and detail of C3D"), "| signal | needed where |")
+    assert f"{c3d_restore.ROTATION_WORDS} rotations" in [row[2] for row in rows]
+    assert "SCALED or INTEGER" in rows[0][4]
+    assert {kind.name for kind in c3d_restore.INTEGERS} == {"SCALED", "INTEGER"}
+
+
+def test_sizes_and_ratios() -> None:
+    """Each figure of the table is one that the package states under that name."""
+    code = "\n".join(path.read_text() for path in (ROOT / "mcz/files").glob("*.py"))
+    for name, _ in rows_under("Sizes and ratios"):
+        assert f'"{name}"' in code, name
+
+
+@pytest.mark.parametrize(
+    ("heading", "folder"),
+    [("Cutting without re-encoding", "mcz/files"), ("Replacing a joint", "mcz/files")],
+)
+def test_keys_of_edits(heading: str, folder: str) -> None:
+    code = "\n".join(path.read_text() for path in Path(ROOT / folder).glob("*.py"))
+    for key, _ in rows_under(heading):
+        name = key.strip("`").removesuffix("ID")
+        assert f'"{name}' in code, key
+
+
+def test_contexts_of_online() -> None:
+    text, loops = section("Codec 11: online"), _online_kernels
+    assert f"FLAGS begins at context {loops.MIXED_FLAGS};" in text
+    assert (
+        f"FLAGS begins at context {loops.GOLOMB_FLAGS}, PREFIX at context {loops.C_PREFIX}" in text
+    )
+    assert f"FLAGS has {loops.N_FLAGS}\ncontexts, PREFIX {143 - loops.N_FLAGS}" in text
+    assert f"code < 0 or > {loops.N_STEPS - 1}" in text
