@@ -92,7 +92,7 @@ def encode(source, params):
 def decode(header, layout, spans, request, fetch):
     decoder = Decoder(header, layout)
     out = np.zeros((request.stop - request.start, layout.n_channels if request.groups else 0))
-    if not request.groups:
+    if not out.size:
         return out
     first = max(i for i, s in enumerate(spans) if s.fresh and s.first <= request.start)
     for index in range(first, len(spans)):

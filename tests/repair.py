@@ -9,74 +9,52 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import mcz
-from mcz.container import payloads
-from mcz.container.chunks import FOOT, HEADER, SIGNATURE, Chunk, build_chunk, build_foot
+from mcz.container.chunks import FOOT, build_foot
 from mcz.container.packets import END, FRAME, NUMBERED, Packet, build_packet, read_packets
 from mcz.container.scan import scan
-from mcz.container.segments import StreamCounts, parse_table
 from mcz.container.source import open_source
-from mcz.container.writer import payload_id
-from mcz.schema import build, deflate, inflate, parse
+from tools.fuzz import repair
+from tools.fuzz.repair import Piece, pieces_of, table_of, with_payload
 
-Parts = list[tuple[Chunk, bytes]]
+Parts = list[tuple[Piece, bytes]]
 
 
 def parts_of(data: bytes) -> Parts:
     """The closed chunks of a valid file and their payloads; INDX and FOOT left out."""
-    found = scan(open_source(data))
-    chunks = [chunk for chunk in found.chunks if chunk.type != b"INDX" and chunk.length is not None]
-    return [(chunk, data[chunk.payload_offset :][: chunk.length]) for chunk in chunks]
+    pieces = [piece for piece in pieces_of(data) if piece.packets is None and piece.type != b"FOOT"]
+    return [(piece, piece.payload) for piece in pieces]
 
 
 def joined(parts: Parts) -> bytes:
     """The file of these chunks, without an index."""
-    body = b"".join(build_chunk(chunk.type, payload, chunk.flags) for chunk, payload in parts)
-    return SIGNATURE + body + build_foot(0, 0)
+    return repair.joined([*(replace(piece, payload=data) for piece, data in parts), Piece(b"FOOT")])
 
 
 def replaced(parts: Parts, which: int, payload: bytes) -> Parts:
     """``parts`` with one payload exchanged, its table_crc and the ids that name it put right."""
-    chunk, old = parts[which]
-    if chunk.type == b"DATA":
-        payload = _with_table_crc(parts, which, payload)
-    changed = [*parts[:which], (chunk, payload), *parts[which + 1 :]]
-    if chunk.type not in (b"SKEL", b"SRCE", b"MODL"):
-        return changed
-    before, after = payload_id(old), payload_id(payload)
-    return [(c, p if i == which else p.replace(before, after)) for i, (c, p) in enumerate(changed)]
+    piece, old = parts[which]
+    if piece.type == b"DATA":
+        payload = _with_table_crc(old, payload)
+    pieces = [replace(piece, payload=data) for piece, data in parts]
+    return [(piece, piece.payload) for piece in with_payload(pieces, which, payload)]
 
 
-def _with_table_crc(parts: Parts, which: int, payload: bytes) -> bytes:
-    size = _table_size(parts, which)
+def _with_table_crc(old: bytes, payload: bytes) -> bytes:
+    """``payload`` with the checksum of a table as long as that of ``old``, which is unharmed."""
+    table = table_of(old)
+    assert table is not None
+    size = len(old) - sum(map(len, table.streams))
     if size > len(payload):
         return payload
     crc = struct.pack("<I", zlib.crc32(payload[: size - 4]))
     return payload[: size - 4] + crc + payload[size:]
 
 
-def _table_size(parts: Parts, which: int) -> int:
-    """Bytes of the stream table of an unharmed DATA."""
-    data = joined(parts)
-    with mcz.open(data) as file:
-        offset = len(SIGNATURE) + sum(20 + len(p) for _, p in parts[:which]) + HEADER.size
-        for clip in file.clips.values():
-            for signal in clip.signals:
-                for row in signal.rows:
-                    if row.offset == offset:
-                        counts: StreamCounts = signal.counts
-                        return parse_table(parts[which][1], counts).size
-    raise AssertionError(f"no segment at {offset}")
-
-
-def with_index_content(data: bytes, change: object) -> bytes:
+def with_index_content(data: bytes, change: Callable[[bytes], bytes]) -> bytes:
     """The file with the inflated content of its INDX passed through ``change``."""
-    foot = FOOT.unpack(data[-FOOT.size :])
-    start = foot[2]
-    outer = parse(payloads.INDX, data[start + HEADER.size : -FOOT.size - 4], "INDX")
-    content = change(inflate(outer.data, outer.size, "INDX"))  # type: ignore[operator]
-    fields = {"size": len(content), "data": deflate(content)}
-    chunk = build_chunk(b"INDX", build(payloads.INDX, fields, "INDX"))
-    return data[:start] + chunk + build_foot(start, len(chunk))
+    start = FOOT.unpack(data[-FOOT.size :])[2]
+    index = repair.changed_index(data[start : -FOOT.size], change)
+    return data[:start] + index + build_foot(start, len(index))
 
 
 def with_packets(data: bytes, change: Callable[[Packet], Packet]) -> bytes:

@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 import mcz
+from mcz.container import payloads
 from mcz.container.chunks import FOOT
+from mcz.container.writer import Writer
 from mcz.files.archive import safe_path
 from mcz.motion import joint_columns
 from mcz.sample import write_samples
@@ -189,6 +191,20 @@ def test_write_killed_leaves_the_old_file(samples: Path, tmp_path: Path) -> None
 def test_unsafe_paths(name: str) -> None:
     with pytest.raises(mcz.FormatError):
         safe_path(name)
+
+
+def test_no_file_overwrites_another(tmp_path: Path) -> None:
+    """An attachment and an alias may have one name; who writes both would lose the first."""
+    archive = tmp_path / "all.mcz"
+    with archive.open("wb") as stream:
+        writer = Writer(stream)
+        writer.attachment("a.txt", b"first")
+        writer.attachment("b.txt", b"second")
+        writer.alias("a.txt", payloads.OF_ATTACHMENT, b"b.txt")
+        writer.finish()
+    report = mcz.unpack(archive, tmp_path / "out")
+    assert tree(tmp_path / "out") == {"a.txt": b"first", "b.txt": b"second"}
+    assert [outcome.path for outcome in report.failures] == ["a.txt"]
 
 
 def test_safe_path() -> None:

@@ -89,6 +89,21 @@ def test_reads_like_any_clip() -> None:
     use(data, salvage=True)
 
 
+def test_the_hash_is_compared_at_the_end() -> None:
+    data = live(frames())
+    with mcz.open(data) as file:
+        cend = file.container.directory.clips["live"].cend
+    assert cend is not None
+    payload = bytearray(data[cend.payload_offset : cend.offset + cend.size - 4])
+    payload[-1] ^= 1  # of the hash
+    bad = data[: cend.offset] + build_chunk(b"CEND", bytes(payload))
+    found = []
+    with pytest.raises(mcz.ChecksumError):
+        for number, _, _ in live_frames(io.BytesIO(bad)):
+            found.append(number)
+    assert found == list(range(23))
+
+
 @given(st.integers(0, 30), st.integers(1, 12), st.integers(0, 2**32))
 def test_any_number_of_frames(n: int, every: int, seed: int) -> None:
     codecs.CODECS[live_codec.ID] = live_codec.CODEC

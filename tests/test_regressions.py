@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -19,24 +20,30 @@ from mcz.cli.common import run
 from mcz.cli.figures import figure_lines
 from mcz.cli.info import _tree
 from mcz.cli.main import cli
-from mcz.codecs import by_name
-from mcz.container import payloads
+from mcz.codecs import CODECS, by_name
+from mcz.container import payloads, strict
 from mcz.container.chunks import build_header
 from mcz.container.limits import BASE
+from mcz.container.scan import scan
+from mcz.container.source import open_source
 from mcz.container.writer import Writer
 from mcz.files.encoding import write_clip
 from mcz.files.report import validate
 from mcz.files.targets import replacing
+from mcz.formats import FORMATS, c3d
 from mcz.formats.cells import Cells
 from mcz.formats.hierarchy import write_hierarchy
 from mcz.formats.layout import MAX_RUNS, Layout, Pattern, Run, parse_layout
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.sample import write_samples
-from mcz.schema import parse, varint
+from mcz.sample import marker_walk, write_samples
+from mcz.schema import build, parse, varint
 from mcz.transforms import dwt
 from tests.motions import smooth
 from tests.repair import with_index_content
+from tools.fuzz.repair import joined, pieces_of, with_payload
+from tools.vectors.craft import Crafter, finished
+from tools.vectors.motions import dance
 
 BVH = (
     "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\nFrames: 3\n"
@@ -468,3 +475,95 @@ def test_figures_of_a_clip_that_was_cut_are_shown_in_cm() -> None:
 def test_extract_says_which_clip_lacks_a_joint() -> None:
     with pytest.raises(mcz.MotionError, match="clip 'smooth': no joint 'tail' among"):
         mcz.extract(written(smooth(3, name="smooth")), io.BytesIO(), joints=["tail"])
+
+
+def test_salvage_of_a_c3d_without_frames() -> None:
+    """Its points have a mask then, of no rows."""
+    motion = marker_walk()
+    first = motion.signals[0]
+    nothing = replace(first, values=first.values[:0], mask=None)
+    data = c3d.write(replace(motion, signals=(nothing,), source=None))
+    out = io.BytesIO()
+    mcz.write(c3d.read(data, "none"), out)
+    with mcz.open(out.getvalue(), salvage=True) as file:
+        assert file.only_clip().source_bytes() == data
+
+
+def test_head_of_another_version_counts_for_more_than_an_index_that_cannot_be_read() -> None:
+    head, *rest = pieces_of(written(smooth(3)))
+    newer = replace(head, payload=bytes((1, 0, 1, 0, 0)))
+    with pytest.raises(mcz.UnsupportedError, match=r"needs format 1\.0"):
+        mcz.open(joined([newer, *rest], lambda content: b"\xff" * len(content)))
+
+
+@pytest.mark.parametrize("codec", [codec.name for codec in CODECS.values()])
+def test_header_of_a_clip_without_frames(codec: str) -> None:
+    motion = smooth(0)
+    params = {"domain": "channels"} if by_name(codec).places else {}
+    with mcz.open(written(motion, codec=codec, **params)) as file:
+        assert file.only_clip().read().shape == (0, motion.skeleton.n_channels)
+
+    def longer(fields: Any) -> None:
+        fields.signals[0].header = bytes(fields.signals[0].header) + b"\xff"
+
+    with (
+        mcz.open(edited_clip(written(motion, codec=codec, **params), longer)) as file,
+        pytest.raises(mcz.FormatError),
+    ):
+        file.only_clip().read()
+
+
+def edited_clip(data: bytes, edit: Any) -> bytes:
+    """The file of one clip whose CLIP has passed through ``edit``."""
+    pieces = pieces_of(data)
+    (which,) = (n for n, piece in enumerate(pieces) if piece.type == b"CLIP")
+    fields = parse(payloads.CLIP, pieces[which].payload, "CLIP")
+    edit(fields)
+    return joined(with_payload(pieces, which, build(payloads.CLIP, fields, "CLIP")))
+
+
+def test_source_of_a_clip_is_none_of_a_skeleton(tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text(BVH)
+    out = io.BytesIO()
+    mcz.encode(tmp_path / "a.bvh", out)
+    pieces = pieces_of(out.getvalue())
+    (which,) = (n for n, piece in enumerate(pieces) if piece.type == b"SRCE")
+    asf = bytes((FORMATS["asf"].id,)) + pieces[which].payload[1:]
+    data = joined(with_payload(pieces, which, asf))
+
+    def of_skeletons(fields: Any) -> None:
+        fields.source[0].format = FORMATS["asf"].id
+
+    data = edited_clip(data, of_skeletons)
+    with mcz.open(data) as file, pytest.raises(mcz.FormatError, match="other sort"):
+        scan(file.container.source, whole=True)
+
+
+def test_sorts_of_source_formats_are_those_of_the_registry() -> None:
+    assert {f.id for f in FORMATS.values() if f.is_skeleton} == strict.OF_SKELETONS
+    assert {f.id for f in FORMATS.values() if not f.is_skeleton} == strict.OF_CLIPS
+
+
+def _listed(change: Callable[[Any], None]) -> bytes:
+    """A file of two attachments and their alias, whose INDX is changed."""
+
+    def edit(fields: Any) -> Any:
+        change(fields)
+        return fields
+
+    crafter = Crafter(table=edit)
+    crafter.parts("a.txt", b"1")
+    crafter.parts("b.txt", b"2")
+    crafter.clip(dance())
+    return finished(crafter)
+
+
+def test_an_index_lists_everything_once_and_in_the_order_of_the_file() -> None:
+    scan(open_source(_listed(lambda fields: None)), whole=True)
+    changes: dict[str, Callable[[Any], None]] = {
+        "or in another order": lambda fields: fields.attachments.reverse(),
+        "two entries of b'SKEL' have the id": lambda fields: fields.shared.append(fields.shared[0]),
+    }
+    for message, change in changes.items():
+        with pytest.raises(mcz.FormatError, match=message):
+            scan(open_source(_listed(change)), whole=True)

@@ -2,7 +2,8 @@
 
 conformance/README.md is the contract: an .mcz on standard input; on standard output one line of
 JSON that lists the arrays or the sources, then their bytes back to back. Exit 0 fine, 1 refused,
-3 unsupported. The command ``mcz`` has other exit codes; do not mix them up.
+3 unsupported. The command ``mcz`` has other exit codes; do not mix them up. With ``--serve`` one
+process answers many requests.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from mcz.files.clip import Clip
     from mcz.files.file import File
 
-OPTIONS = ("--clip", "--frames", "--joints", "--resolution", "--post-filter")
+OPTIONS = ("--clip", "--frames", "--joints", "--resolution", "--post-filter", "--serve")
 MAX_LINE = 2**20
 Part = tuple[dict[str, Any], bytes]  # a row of the listing, and its bytes
 
@@ -33,20 +34,39 @@ def main(arguments: list[str] | None = None) -> int:
     if given.capabilities:
         print(json.dumps({"options": OPTIONS}))  # noqa: T201
         return 0
-    try:
-        answer = b"".join(respond(sys.stdin.buffer.read(), given))
-    except UnsupportedError as error:
-        return _refuse(3, error)
-    except MczError as error:
-        return _refuse(1, error)
-    sys.stdout.buffer.write(answer)
+    if given.serve:
+        return serve(sys.stdin.buffer, sys.stdout.buffer)
+    code, output = answer(sys.stdin.buffer.read(), given)
+    sys.stdout.buffer.write(output)
     sys.stdout.buffer.flush()
+    return code
+
+
+def answer(data: bytes, given: argparse.Namespace) -> tuple[int, bytes]:
+    """Exit code and output of one request about the file ``data``."""
+    try:
+        return 0, b"".join(respond(data, given))
+    except UnsupportedError as error:
+        return _refuse(3, error), b""
+    except MczError as error:
+        return _refuse(1, error), b""
+
+
+def serve(requests: BinaryIO, answers: BinaryIO) -> int:
+    """Answer requests, each a line of JSON and a file, until they end."""
+    while line := requests.readline():
+        request = json.loads(line)
+        data = requests.read(request["bytes"])
+        code, output = answer(data, _parser().parse_args(request["arguments"]))
+        answers.write(json.dumps({"exit": code, "bytes": len(output)}).encode() + b"\n" + output)
+        answers.flush()
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="mcz.cli.conformance", description=__doc__)
     parser.add_argument("--capabilities", action="store_true")
+    parser.add_argument("--serve", action="store_true")
     parser.add_argument("--source", action="store_true")
     parser.add_argument("--clip")
     parser.add_argument("--frames", type=_range)
@@ -74,9 +94,10 @@ def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
     """The answer to a request about the file ``data``; raises MczError where anything is wrong."""
     import mcz
     from mcz.container.scan import scan
+    from mcz.container.source import open_source
 
+    scan(open_source(data), whole=True)  # INDX may be of no use where something is unsupported
     with mcz.open(data) as file:
-        scan(file.container.source, whole=True)
         listing = "sources" if given.source else "arrays"
         parts = list(_sources(file) if given.source else _arrays(file, given))
     line = json.dumps({listing: [row for row, _ in parts]}, ensure_ascii=False).encode("utf-8")
@@ -93,9 +114,15 @@ def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
     clips: Iterable[Clip] = file.clips.values()
     if given.clip is not None:
         clips = [file.only_clip(given.clip)]
+    lacking: UnsupportedError | None = None
     for clip in clips:
-        _ = clip.frame_numbers
-        yield from _clip_arrays(clip, given)
+        try:
+            _ = clip.frame_numbers
+            yield from _clip_arrays(clip, given)
+        except UnsupportedError as error:
+            lacking = lacking or error
+    if lacking is not None:  # and nothing else is wrong, which would count for more
+        raise lacking
 
 
 def _clip_arrays(clip: Clip, given: argparse.Namespace) -> Iterator[Part]:

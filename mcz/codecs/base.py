@@ -222,8 +222,8 @@ class Codec:
     """One row of the codec table.
 
     ``decode`` returns int64 ordinals or binary64 values, as ``domain`` says, of shape
-    (rows, channels of the requested groups in the order requested).
-    ``segmented``: memory is bounded by a segment.
+    (rows, channels of the requested groups in the order requested). It checks the header also where
+    no frame is requested.
 
     A clip may be cut without the codec's help, SPEC.md, "Cutting without re-encoding": whole
     segments at its ends, groups, and the streams of the finest resolutions are left out, and what
@@ -252,7 +252,6 @@ class Codec:
     encode: Encode
     decode: Decode
     grouping: Grouping = "joint"
-    segmented: bool = True
     parameters: tuple[Parameter, ...] = field(default=())
     dial: Dial | None = None
     cut: Cut | None = None

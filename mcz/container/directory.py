@@ -225,7 +225,10 @@ def parse_index(payload: bytes, limit: int) -> Directory:
     fields = parse(payloads.INDEX, inflate(outer.data, outer.size, "INDX"), "INDX")
     directory = Directory(head=fields.head)
     for row in fields.shared:
-        directory.shared[row.type, row.id] = Chunk(row.type, 0, row.offset, row.length)
+        place = row.type, row.id
+        if place in directory.shared:
+            raise FormatError(f"INDX: two entries of {row.type!r} have the id {row.id.hex()}")
+        directory.shared[place] = Chunk(row.type, 0, row.offset, row.length)
     for row in fields.attachments:
         parts = [Chunk(b"ATTA", 0, part.offset, part.length) for part in row.parts]
         if not parts:

@@ -33,7 +33,7 @@ from mcz.container.directory import (
     parse_index,
     signal_rows,
 )
-from mcz.container.limits import Profile, check, check_decoded, index_limit, output_limit
+from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.packets import (
     CHECK_SIZE,
     NUMBERED,
@@ -91,16 +91,21 @@ class Container:
         if not foot.index_length:
             return scan(self.source).directory
         self.index = foot
+        head = None if self.source.remote else self._head()
         directory = self._index(foot, tail)
         directory.end = self.source.size
-        if not self.source.remote:
-            head = read_chunk(self.source, len(SIGNATURE))
-            if head.type != b"HEAD" or self.source.size < head.offset + head.size:
-                raise FormatError(f"the first chunk is {head.label}, not HEAD")
-            limit = len(directory.head)
-            if read_payload(self.source, head, limit) != directory.head:
-                raise FormatError("HEAD is not what the index says")
+        if head not in (None, directory.head):
+            raise FormatError("HEAD is not what the index says")
         return directory
+
+    def _head(self) -> bytes:
+        """The payload of HEAD; raises UnsupportedError: behind it nothing is known then."""
+        head = read_chunk(self.source, len(SIGNATURE))
+        if head.type != b"HEAD":
+            raise FormatError(f"the first chunk is {head.label}, not HEAD")
+        payload = read_payload(self.source, head, BASE.chunk_bytes)
+        parse_head(payload)
+        return payload
 
     def _foot(self, tail: bytes) -> Foot:
         foot = None

@@ -207,8 +207,7 @@ class Walker:
         if self.strict:
             strict.check_path(fields.name, chunk.label)
         row = rows.get(fields.name) or AttachmentRow(fields.name, fields.size, [])
-        last = self.found.chunks[-1] if self.found.chunks else None
-        follows = row.parts and row.parts[-1] == last
+        follows = row.parts and row.parts[-1].offset + row.parts[-1].size == chunk.offset
         if (
             fields.part != len(row.parts)
             or fields.size != row.size

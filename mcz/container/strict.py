@@ -18,6 +18,7 @@ from mcz.errors import FormatError
 from mcz.schema import inflate, parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
+OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset({2, 3, 4})  # the registry's source formats
 
 
 def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
@@ -50,7 +51,7 @@ def check_skeleton(
     for base in fields.base:
         _refer(directory, b"SKEL", base, where)
     for source in fields.source:
-        _check_source(source, where, directory, templates)
+        _check_source(source, where, directory, templates, OF_CLIPS)
     return bool(fields.source)
 
 
@@ -62,18 +63,23 @@ def check_template(payload: bytes, where: str, profile: Profile) -> int:
     return int(fields.format)
 
 
-def _check_source(source: Any, where: str, directory: Directory, templates: Templates) -> None:
+def _check_source(
+    source: Any, where: str, directory: Directory, templates: Templates, others: frozenset[int]
+) -> None:
+    """``others``: the formats that are known to be of the other sort."""
     id_ = bytes(source.template)
     _refer(directory, b"SRCE", id_, where)
     if templates.get(id_, source.format) != source.format:
         raise FormatError(f"{where}: source format {source.format}, its SRCE has {templates[id_]}")
+    if source.format in others:
+        raise FormatError(f"{where}: source format {source.format} is of the other sort of source")
 
 
 def check_clip(fields: Any, where: str, directory: Directory, templates: Templates) -> bool:
     """Check what CLIP refers to and names; return whether it has a source file."""
     _refer(directory, b"SKEL", fields.skeleton, where)
     for source in fields.source:
-        _check_source(source, where, directory, templates)
+        _check_source(source, where, directory, templates, OF_SKELETONS)
         if source.path:
             check_path(source.path, where)
     keys = [pair.key for pair in fields.metadata]
@@ -94,8 +100,10 @@ def check_index(payload: bytes, chunk: Chunk, directory: Directory, limit: int) 
         raise FormatError(f"chunk {chunk.label}: its copy of HEAD differs from HEAD")
     for what in ("shared", "attachments", "aliases", "clips"):
         ours, theirs = getattr(directory, what), getattr(listed, what)
-        if list(ours) != list(theirs) and (what == "clips" or ours.keys() != theirs.keys()):
-            raise FormatError(f"chunk {chunk.label}: it lists other {what} than there are")
+        if list(ours) != list(theirs):
+            raise FormatError(
+                f"chunk {chunk.label}: it lists other {what} than there are, or in another order"
+            )
         for key, row in ours.items():
             if row != theirs[key]:
                 raise FormatError(

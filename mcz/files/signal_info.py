@@ -97,7 +97,7 @@ def read_signal(
         frame_rate,
         parse_grids(own.grids, n_channels, where),
         own.n_resolutions,
-        find_model=partial(_model, container),
+        find_model=partial(_model, container, row.clip.offset),
     )
     info = SignalInfo(
         index,
@@ -117,9 +117,10 @@ def read_signal(
     return info
 
 
-def _model(container: Container, id_: bytes) -> Model | None:
-    """The model with this id, None where the file has none."""
-    if (b"MODL", id_) not in container.directory.shared:
+def _model(container: Container, before: int, id_: bytes) -> Model | None:
+    """The model with this id, None where the file has none before this offset, that of the clip."""
+    chunk = container.directory.shared.get((b"MODL", id_))
+    if chunk is None or chunk.offset > before:
         return None
     fields = container.shared(b"MODL", id_, payloads.MODL)
     return Model(fields.kind, bytes(fields.data))

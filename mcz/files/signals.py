@@ -69,20 +69,21 @@ class SignalReader:
     ) -> Iterator[tuple[int, int, NDArray[Any], NDArray[np.bool_] | None]]:
         """The same block by block: its frames a <= f < b, values and mask (None: all valid)."""
         spans = self._prepare(start, stop)
+        if start == stop:  # the header has to be right all the same
+            self._decode(spans, start, stop)
         for a, b in self._ranges(start, stop):
             yield a, b, *self._finish(self._decode(spans, a, b), a, b)
 
     def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
         """The range in blocks of a few segments, which bound the memory beside the result."""
-        if self.info.codec.segmented:
-            rows = self.info.rows
-            for index in self.info.covering(start, stop):
-                end = min(rows[index].header.stop, stop)
-                full = (end - start) * self.info.layout.samples_per_frame >= BLOCK_ROWS
-                # A block that began amid what hangs together would be decoded from its start.
-                if full and index + 1 < len(rows) and rows[index + 1].header.flags & FRESH:
-                    yield start, end
-                    start = end
+        rows = self.info.rows
+        for index in self.info.covering(start, stop):
+            end = min(rows[index].header.stop, stop)
+            full = (end - start) * self.info.layout.samples_per_frame >= BLOCK_ROWS
+            # A block that began amid what hangs together would be decoded from its start.
+            if full and index + 1 < len(rows) and rows[index + 1].header.flags & FRESH:
+                yield start, end
+                start = end
         if start < stop:
             yield start, stop
 
@@ -112,11 +113,10 @@ class SignalReader:
         return info.spans
 
     def _check_size(self, start: int, stop: int) -> None:
-        """Raise LimitError for more than may be decoded; a codec of whole clips decodes all."""
+        """Raise LimitError for more than may be decoded."""
         layout = self.info.layout
         n_columns = sum(len(layout.groups[g]) for g in self.groups)
-        n_frames = stop - start if self.info.codec.segmented else layout.n_frames
-        size = n_frames * layout.samples_per_frame * max(1, n_columns) * 8
+        size = (stop - start) * layout.samples_per_frame * max(1, n_columns) * 8
         check_decoded(f"clip {self.name!r}: values", size, self.container.max_decoded)
 
     def _salvage(
@@ -207,13 +207,14 @@ class SignalReader:
         found: list[tuple[int, int, bytes]] = []
         changes: dict[int, dict[int, Grid]] = {}
         for index in self.info.covering(start, stop):
-            if self.info.rows[index].packet in SHORT:
-                continue  # it has no notes
             header = self.info.rows[index].header
-            table, streams = self._streams(index)
             shift = (header.first - start) * per_frame
             n_rows = header.n_frames * per_frame
             row = max(0, shift)
+            if self.info.rows[index].packet in SHORT:
+                changes.setdefault(row, {})  # it has no notes, and the grids of the clip
+                continue
+            table, streams = self._streams(index)
             for group in self.groups:
                 at = table.group_notes(group)
                 notes = _notes(

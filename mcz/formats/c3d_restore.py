@@ -150,13 +150,12 @@ def _with_gaps(points: Signal, residuals: Signal) -> Signal:
     valid = valid_points(points)
     if valid is None:
         return points
-    values = points.values.reshape(len(valid), -1, 3)
+    values = points.values.reshape(*valid.shape, 3)  # either may be 0
     lost = ~valid & (residuals.values >= 0) & ~np.isnan(values).any(axis=2)
     if not lost.any():
         return points
-    return replace(
-        points, values=np.where(lost[:, :, None], np.nan, values).reshape(len(valid), -1)
-    )
+    gapped = np.where(lost[:, :, None], np.nan, values)
+    return replace(points, values=gapped.reshape(points.values.shape))
 
 
 def valid_points(signal: Signal) -> NDArray[np.bool_] | None:

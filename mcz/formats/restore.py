@@ -36,6 +36,8 @@ def restore(motion: Motion, source: Source) -> bytes:
     layout = parse_layout(source.template, source.detail, signal.n_channels)
     runs = _pattern_runs(layout, source.notes, signal.n_rows)
     numbered = any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
+    if numbered and signal.samples_per_frame != 1:
+        raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
     numbers = motion.frame_numbers
     if numbers is None:
         numbers = np.arange(1, signal.n_rows + 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 from pathlib import Path
 
@@ -239,6 +240,14 @@ def test_a_basis_is_in_the_file_and_a_decoder_without_it_refuses() -> None:
         coded.read(changes={"layout": bare})
     with pytest.raises(mcz.UnsupportedError):
         coded.read(changes={"layout": replace(coded.layout, find_model=None)})
+
+
+def test_an_archive_has_the_well_known_models_too() -> None:
+    data = _bases.known_models()["cmu31"].data
+    for archive in (False, True):
+        out = io.BytesIO()
+        mcz.write(markers(20, 31), out, codec="lsdt-clip", basis="known", archive=archive)
+        assert (data in out.getvalue()) == archive
 
 
 def test_a_model_of_another_kind_or_shape_is_refused() -> None:

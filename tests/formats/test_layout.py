@@ -24,6 +24,7 @@ from mcz.formats.layout import (
 from mcz.formats.notes import RowNotes, join_notes
 from mcz.formats.restore import restore
 from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
+from mcz.numbers import Grid, GridKind
 from mcz.schema import build
 
 GAPS = st.sampled_from([b"", b" ", b"\n", b"\r\n", b"\nname ", b"\0\xff"])
@@ -166,6 +167,17 @@ def test_bad_exceptions_are_refused(exceptions: Exceptions) -> None:
     signal = Signal(np.zeros((3, 2)), exceptions=exceptions)
     with pytest.raises(FormatError):
         restore(Motion(motion.skeleton, (signal,)), Source("bvh", template, detail))
+
+
+def test_frame_numbers_of_several_rows_each_are_refused() -> None:
+    template, detail = Layout(
+        (b"",), (Pattern((Run(b"", FRAME_NUMBER), Run(b" ", 0)), b"\n"),)
+    ).build()
+    skeleton = Skeleton((Joint("a", channels=(Channel("rx"),)),))
+    signal = Signal(np.zeros((4, 1)), (Grid(GridKind.FIXED, 1),), samples_per_frame=2)
+    motion = Motion(skeleton, (signal,), frame_numbers=np.array([7, 8]))
+    with pytest.raises(FormatError, match="frame numbers of 2 rows each"):
+        restore(motion, Source("amc", template, detail))
 
 
 def test_a_new_layout_in_every_row_stays_linear() -> None:
