@@ -21,11 +21,14 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
 from tools.vectors import (  # noqa: E402 - needs the path
+    bad_bounds,
     bad_c3d,
     bad_chunks,
     bad_clips,
+    bad_codecs,
     bad_cut,
     bad_data,
+    bad_gaps,
     bad_index,
     bad_khan,
     bad_lossless,
@@ -39,16 +42,28 @@ from tools.vectors import (  # noqa: E402 - needs the path
     bad_online_streams,
     bad_online_units,
     bad_qbc,
+    bad_rules,
+    bad_rules_codecs,
+    bad_rules_points,
+    bad_rules_sources,
     bad_shared,
     bad_sources,
+    random_files,
     sources,
     sources_c3d,
+    sources_c3d_gaps,
+    sources_gaps,
+    sources_lossy,
+    sources_styles,
     sources_text,
     uncommon,
+    valid_common,
     valid_container,
     valid_cut,
     valid_filtered,
+    valid_gaps,
     valid_khan,
+    valid_kin,
     valid_lossless,
     valid_lossless_clips,
     valid_lsdt,
@@ -62,8 +77,14 @@ from tools.vectors import (  # noqa: E402 - needs the path
     valid_online_clips,
     valid_qbc,
     valid_raw,
+    valid_rules,
+    valid_rules_codecs,
+    valid_rules_points,
 )
 from tools.vectors.craft import OK, REFUSED, Vector  # noqa: E402
+from tools.vectors.facts import codecs_of, formats_of, since  # noqa: E402
+from tools.vectors.faults import Fault, faults  # noqa: E402
+from tools.vectors.requirements import requirements  # noqa: E402
 
 CONFORMANCE = ROOT / "conformance"
 MODULES = (
@@ -71,6 +92,8 @@ MODULES = (
     valid_numbers,
     valid_notes,
     valid_raw,
+    valid_rules,
+    valid_rules_codecs,
     valid_lossless,
     valid_lossless_clips,
     valid_mrdwt,
@@ -84,9 +107,18 @@ MODULES = (
     valid_online_clips,
     valid_cut,
     valid_filtered,
+    valid_common,
+    valid_kin,
+    valid_rules_points,
+    valid_gaps,
     sources,
     sources_c3d,
     sources_text,
+    sources_styles,
+    sources_gaps,
+    sources_lossy,
+    sources_c3d_gaps,
+    random_files,
     uncommon,
     bad_chunks,
     bad_index,
@@ -108,6 +140,13 @@ MODULES = (
     bad_online_streams,
     bad_sources,
     bad_c3d,
+    bad_bounds,
+    bad_codecs,
+    bad_rules,
+    bad_rules_codecs,
+    bad_rules_sources,
+    bad_rules_points,
+    bad_gaps,
 )
 FORMAT_VERSION = "0.9"
 
@@ -120,34 +159,52 @@ def vectors() -> list[Vector]:
     return found
 
 
-def row(vector: Vector) -> dict[str, Any]:
-    """The manifest's row of ``vector``."""
-    expected: dict[str, Any] = {}
-    if OK not in vector.exit:
-        expected["refusal"] = "invalid" if REFUSED in vector.exit else "unsupported"
-    else:
-        for mode in vector.modes:
-            expected[mode] = (
-                _listed(vector.arrays) if mode == "arrays" else _sources(vector.sources)
-            )
+def rows(made: Sequence[Vector]) -> list[dict[str, Any]]:
+    """The manifest's rows of all vectors."""
+    names = [vector.name for vector in made]
+    ids = requirements(names)
+    wrong = faults([name for name in names if name.startswith("invalid/")])
+    return [row(vector, ids[vector.name], wrong.get(vector.name)) for vector in made]
+
+
+def row(vector: Vector, ids: Sequence[str] = (), fault: Fault | None = None) -> dict[str, Any]:
+    """The manifest's row of ``vector``, which shows the requirements ``ids``."""
     fields = {
         "file": f"{vector.name}.mcz",
         "group": vector.name.partition("/")[0],
         "spec": list(vector.spec),
+        "requirements": list(ids),
         "purpose": vector.purpose,
         "format_version": FORMAT_VERSION,
+        "since": since(vector),
+        "codecs": codecs_of(vector),
         "licence": "CC0-1.0",
         "sha256": _hash(vector.data),
         "exit": list(vector.exit),
         "modes": list(vector.modes),
-        "expected": expected,
+        "expected": _expected(vector),
     }
+    if "sources" in vector.modes:
+        fields["formats"] = formats_of(vector)
+    if fault:
+        fields |= {"fault": fault.kind, "effect": fault.effect, "reason": fault.reason}
+    if vector.seed is not None:
+        fields["seed"] = vector.seed
     if vector.parts:
         fields["parts"] = [
             {"arguments": list(arguments), "arrays": _listed(arrays)}
             for arguments, arrays in vector.parts
         ]
     return fields
+
+
+def _expected(vector: Vector) -> dict[str, Any]:
+    if OK not in vector.exit:
+        return {"refusal": "invalid" if REFUSED in vector.exit else "unsupported"}
+    return {
+        mode: _listed(vector.arrays) if mode == "arrays" else _sources(vector.sources)
+        for mode in vector.modes
+    }
 
 
 def _listed(arrays: Sequence[tuple[dict[str, Any], bytes]]) -> list[dict[str, Any]]:
@@ -169,7 +226,7 @@ def files() -> dict[str, bytes]:
         "format_version": FORMAT_VERSION,
         "licence": "CC0-1.0",
         "zlib": zlib.ZLIB_RUNTIME_VERSION,
-        "vectors": [row(vector) for vector in made],
+        "vectors": rows(made),
     }
     text = json.dumps(manifest, indent=1, ensure_ascii=False) + "\n"
     return {f"vectors/{vector.name}.mcz": vector.data for vector in made} | {

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from mcz.formats.c3d_layout import C3D_DETAIL, C3D_TEMPLATE
+from mcz.formats.c3d_layout import C3D_DETAIL, C3D_TEMPLATE, MAX_ZEROS
 from mcz.motion import Motion
-from mcz.schema import varint
+from mcz.schema import parse, varint
 from tools.vectors.bad_sources import Unrestorable, _srce
 from tools.vectors.craft import Vector, file_of
 from tools.vectors.edits import Edit, both, plus, put
@@ -18,6 +19,7 @@ def vectors() -> Iterable[Vector]:
     shelf = Unrestorable("invalid/sources")
     _template(shelf)
     _detail(shelf)
+    _zeros(shelf)
     _signals(shelf)
     return shelf.vectors
 
@@ -33,7 +35,11 @@ def _template(shelf: Unrestorable) -> None:
         ("processor", "a processor of 87", floats, field("processor", b"\x57")),
         ("word", "words of 3 bytes", floats, field("word", b"\3")),
         ("points", "65,536 points", floats, field("points", beyond)),
+        ("channels", "65,536 analog channels", floats, field("channels", beyond)),
         ("subframes", "no samples a frame", floats, field("subframes", b"\0")),
+        ("subframes-many", "65,536 samples a frame", floats, field("subframes", beyond)),
+        ("rotations-many", "65,536 rotations", floats, field("rotations", beyond)),
+        ("ratio-many", "a ratio of 65,536", floats, field("ratio", beyond)),
         ("unsigned", "unsigned is 2", integers, field("unsigned", b"\2")),
         ("unsigned-floats", "unsigned floats", floats, field("unsigned", b"\1")),
         ("rotations", "rotations of integers", integers, field("rotations", b"\1")),
@@ -58,11 +64,30 @@ def _detail(shelf: Unrestorable) -> None:
         ("values-long", "its fields have a byte more", put(C3D_DETAIL, "values", b"\7" + bytes(7))),
         ("values", "another number of the last frame", _last_frame),
         ("tail", "a byte behind it, which is closed", plus(b"\0")),
+        ("cut", "it ends early", lambda data: data[:-1]),
     )
     for name, purpose, edit in cases:
         detail = edit(motion.source.detail)
         data = file_of(replace(motion, source=replace(motion.source, detail=detail)))
         shelf.add(f"c3d-detail-{name}", SPEC, f"A detail of C3D: {purpose}.", data)
+
+
+def _zeros(shelf: Unrestorable) -> None:
+    """More zeros behind the data than there may be, of which size and hash are right."""
+    whole = made(first=3).build()
+    motion = take(whole, "prop")
+    source = motion.source
+    assert source is not None
+    n_zeros = parse(C3D_DETAIL, source.detail, "detail").zeros
+    whole += bytes(MAX_ZEROS + 1 - n_zeros)
+    more = replace(
+        source,
+        detail=put(C3D_DETAIL, "zeros", varint(MAX_ZEROS + 1))(source.detail),
+        size=len(whole),
+        sha256=hashlib.sha256(whole).digest(),
+    )
+    data = file_of(replace(motion, source=more))
+    shelf.add("c3d-detail-zeros", SPEC, "A detail of C3D: 2^20 + 1 zeros.", data)
 
 
 def _last_frame(detail: bytes) -> bytes:

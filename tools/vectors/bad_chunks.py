@@ -30,10 +30,11 @@ def _chunks(shelf: Broken) -> None:
     text = good.replace(b"\r\n", b"\n", 1)
     shelf.add("signature", "Chunks", "The signature after a transfer as text.", text)
     shelf.add("no-bytes", "Strict reading", "Nothing at all.", b"")
-    shelf.edited("crc", "Chunks", "One flipped bit in a payload.", DATA_frame=flip(-8))
+    shelf.edited("crc", "Chunks", "One flipped bit in the crc of a DATA.", DATA_frame=flip(-1))
+    purpose = "A header_check that is the high half of the CRC-32, not the low one."
+    shelf.edited("header-check", "Chunks", purpose, SKEL_frame=_high_check)
     huge, long = struct.pack("<Q", 2**53), struct.pack("<Q", 2**40)
     cases: tuple[tuple[str, str, str, str, dict[str, bytes]], ...] = (
-        ("header-check", "A wrong header_check.", "", "SKEL", {"header_check": b"ab"}),
         ("type-digit", "A chunk type with a digit.", "", "CLIP", {"type": b"CL1P"}),
         ("reserved-byte", "The reserved byte is 1.", "", "SKEL", {"reserved": b"\1"}),
         ("reserved-flag", "A reserved flag is set.", "", "CEND", {"flags": b"\4"}),
@@ -55,6 +56,11 @@ def _chunks(shelf: Broken) -> None:
     crafter.clip(dance())
     crafter.plain_chunk(b"QUAL", b"\0", 0)
     shelf.add("QUAL-critical", "QUAL; Chunks", "QUAL is not ancillary.", finished(crafter))
+
+
+def _high_check(chunk: bytes) -> bytes:
+    check = zlib.crc32(chunk[:6] + chunk[8:16]) >> 16
+    return framed(header_check=struct.pack("<H", check))(chunk)
 
 
 def _ends(shelf: Broken) -> None:
@@ -122,7 +128,7 @@ def _foot(shelf: Broken) -> None:
         return edit
 
     cases: tuple[tuple[str, str, Callable[[bytes], bytes]], ...] = (
-        ("FOOT-damaged", "A flipped bit in the index offset.", flip(8)),
+        ("FOOT-damaged", "A flipped bit in the crc of a FOOT.", flip(7)),
         ("FOOT-flags", "A flag of FOOT is set.", rebuilt(flags=1)),
         ("FOOT-magic", "The end magic is that of the beginning.", at(24, b"\x89MCZ")),
         ("FOOT-offset", "The index ends a byte late.", rebuilt(shift=1)),

@@ -52,7 +52,7 @@ def vectors() -> Iterable[Vector]:
 
 def _tables(shelf: Broken) -> None:
     cases: tuple[tuple[str, str, Edit], ...] = (
-        ("table-crc", "A wrong table_crc.", table(N_GROUPS, table_crc=b"crc?")),
+        ("table-crc", "A table_crc of table and streams.", _crc_of_all),
         ("bit-beyond-streams", "A bit beyond the last stream.", table(N_GROUPS, present=b"\x07")),
         ("streams-too-short", "The streams end before the table says.", lambda data: data[:-1]),
         ("streams-too-long", "A byte follows the last stream.", plus(b"\0")),
@@ -147,8 +147,8 @@ def _packets(shelf: Broken) -> None:
             {"packet": _packet(sequence=1), "end_packet": ended(2)},
         ),
         ("sequence-end", "The end packet repeats a number.", {"end_packet": ended(0)}),
-        ("head-damaged", "A flipped bit in the length of a packet.", {"packet": flip(2)}),
-        ("body-damaged", "A flipped bit in the body of a packet.", {"packet": flip(-3)}),
+        ("head-check", "A head_check of kind and sequence alone.", {"packet": _check_of_two}),
+        ("body-damaged", "A flipped bit in the body_check of a packet.", {"packet": flip(-1)}),
         ("kind", "A segment in a packet of kind 3.", {"packet": _packet(kind=3)}),
         ("kind-4", "A packet of kind 4.", {"packet": _packet(kind=4)}),
         ("kind-bits", "A reserved bit of kind is set.", {"packet": _packet(kind=0x11)}),
@@ -266,6 +266,18 @@ def _packet(**changes: Any) -> Edit:
         return build_packet(replace(Packet(SEGMENT, 0, body), **changes))
 
     return edit
+
+
+def _crc_of_all(payload: bytes) -> bytes:
+    size = parse_table(payload, StreamCounts(N_GROUPS, 1)).size
+    crc = struct.pack("<I", zlib.crc32(payload[: size - 4] + payload[size:]))
+    return payload[: size - 4] + crc + payload[size:]
+
+
+def _check_of_two(packet: bytes) -> bytes:
+    size = _head_size(packet)
+    check = struct.pack("<H", zlib.crc32(packet[:2]) & 0xFFFF)
+    return packet[:size] + check + packet[size + 2 :]
 
 
 def _overlong(packet: bytes) -> bytes:

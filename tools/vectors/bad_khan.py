@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from mcz.codecs._pca_streams import MAX_INDEX
 from mcz.codecs.pca import SCALED
 from mcz.container import payloads
@@ -22,7 +24,7 @@ from tools.vectors.components import (
     part_of,
     stream_of,
 )
-from tools.vectors.craft import Broken, Vector
+from tools.vectors.craft import Broken, Vector, rehash
 from tools.vectors.edits import headed, plus, put, stream
 
 SPEC = f"{HEADING}; Residuals"
@@ -94,10 +96,20 @@ def _heads(shelf: Broken) -> None:
 
 
 def _with(part: Part, n_frames: int, n_channels: int) -> bytes:
-    """A file of one segment, in place of zeros."""
+    """A file of one segment, in place of zeros; the hash is of what a lax reader decodes."""
     plan, motion = _zeros(n_frames, n_channels)
     data = stream_of(part, plan.decimals)
-    return file_with(plan, motion, segments=stream(0, lambda _: data))
+    edits = {"segments": stream(0, lambda _: data), "CEND": rehash(_lax(part, n_frames))}
+    return file_with(plan, motion, **edits)
+
+
+def _lax(part: Part, n_frames: int) -> np.ndarray:
+    """The values of 2 decimals, whatever the head may not say."""
+    values = np.tile(np.array(part.means) / 100, (n_frames, 1))
+    for i, row in enumerate(part.basis):
+        column = np.array([frame[i] for frame in part.coefficients]) / 100
+        values = values + column[:, None] * np.ldexp(np.array(row, np.float64), -part.shifts[i])
+    return values
 
 
 def _bits(shelf: Broken) -> None:
@@ -118,7 +130,7 @@ def _bits(shelf: Broken) -> None:
         (
             "first-beyond",
             "A first coefficient of 2^40 + 1.",
-            Part((1,), ((1,),), ((beyond,), (2,)), **one),
+            Part((1,), ((1,),), ((beyond,),), **{**one, "n_frames": 1}),
         ),
         (
             "coefficient-beyond",
@@ -126,4 +138,4 @@ def _bits(shelf: Broken) -> None:
             Part((1,), ((1,),), ((-MAX_INDEX,), (-beyond,)), **one),
         ),
     ):
-        shelf.add(name, SPEC, purpose, _with(part, 2, 1))
+        shelf.add(name, SPEC, purpose, _with(part, part.n_frames, 1))

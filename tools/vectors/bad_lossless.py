@@ -12,6 +12,7 @@ from mcz.codecs import lossless
 from mcz.container import payloads
 from mcz.motion import Motion
 from mcz.numbers import Grid, GridKind
+from mcz.schema import varint
 from tools.vectors.coded import (
     BINARY32,
     BINARY64,
@@ -119,7 +120,7 @@ def _coded(shelf: Broken) -> None:
         "tap-minus-512": ("A tap of -512", SIX, Coded(taps=(5, -512))),
     }
     for name, (purpose, grid, head) in cases.items():
-        values = [4.0, 2.0, 8.0, -3.0, -5.0, 0.0] if name == "drop-of-decimal" else half
+        values = [4.0, 2.0, 8.0, -2.0, -6.0, 0.0] if name == "drop-of-decimal" else half
         if name in ("drop-of-binary32", "drop-of-binary64"):
             values = [2.0, 8.0, -2.0, 0.0, 0.5]
         motion = column(values, grid)
@@ -181,7 +182,7 @@ def _units(shelf: Broken) -> None:
     shelf.add("cut-in-unit", HEADING, "The stream ends within a unit.", data)
     head = replace(head, multiples=(0, 2**44))
     purpose = "2^44 units"
-    _faulty(shelf, "multiple-beyond", purpose, SINGLE, [[0], [0]], head)
+    _faulty(shelf, "multiple-beyond", purpose, SINGLE, [[0], [0]], head, [[0.0], [2.0**42]])
 
 
 def _sizes(shelf: Broken) -> None:
@@ -214,10 +215,7 @@ def _out_of_range(shelf: Broken) -> None:
         "length-61": ("A residual of more than 60 bits", 2**62),
     }
     for name, (purpose, ordinal) in plain.items():
-        _faulty(shelf, name, purpose, WHOLE, [[5], [ordinal]], Coded())
-    far = int(DOUBLE.ordinals(np.array([1e300]))[0][0])
-    purpose = "A class one beyond the greatest"
-    _faulty(shelf, "class-beyond", purpose, DOUBLE, [[0], [far]], Coded(top=(far >> 52) - 1))
+        _faulty(shelf, name, purpose, WHOLE, [[5], [ordinal]], Coded(), [[5], [ordinal]])
     purpose = "A class more than 4,095 beyond the expected one"
     narrow = Coded(form=65, top=0)  # one digit of base 2: the class is the ordinal
     data = build_stream([[0], [5000]], (DOUBLE,), [narrow], faulty=True)
@@ -228,24 +226,56 @@ def _out_of_range(shelf: Broken) -> None:
 
 
 def _faulty(
-    shelf: Broken, name: str, purpose: str, grid: Grid, ordinals: Sequence[Any], head: Coded
+    shelf: Broken,
+    name: str,
+    purpose: str,
+    grid: Grid,
+    ordinals: Sequence[Any],
+    head: Coded,
+    values: Sequence[Any],
 ) -> None:
+    """``values``, which are hashed: what a reader takes that overlooks the fault."""
     data = build_stream(ordinals, (grid,), [head], faulty=True)
     zeros = column([0.0] * len(ordinals), grid)
-    shelf.add(name, HEADING, f"{purpose}.", _with(zeros, data))
+    found = np.array(values, zeros.signals[0].values.dtype)
+    shelf.add(name, HEADING, f"{purpose}.", _with(zeros, data, CEND=rehash(found)))
 
 
 def _below(shelf: Broken) -> None:
-    """Good bits under a head for other numbers, in which the first row lies out of range."""
-    ordinals = SIX.ordinals(np.array([1e-7, 1e-7, 1e-7]))[0].reshape(-1, 1)
-    data = build_stream(ordinals, (SIX,), [Coded(top=400)])
-    assert data[1:3] == b"\x90\3"
-    data = _with(column([0.0] * 3, SIX), data[:1] + b"\x0a" + data[3:])
-    shelf.add("class-below", HEADING, "A class below 0.", data)
-    ordinals = SIX.ordinals(np.array([9.99999] * 3))[0].reshape(-1, 1)
-    data = build_stream(ordinals, (SIX,), [Coded(form=6, scale=0)])
-    data = _with(column([0.0] * 3, SIX), at(1, b"\3")(data))
-    shelf.add("mantissa-beyond", HEADING, "A mantissa of four digits in form 3.", data)
+    """Good bits under a head for other numbers: the only row lies out of range.
+
+    The hashes are of what a reader takes that overlooks it.
+    """
+
+    def add(name: str, purpose: str, data: bytes, magnitude: int) -> None:
+        ordinal = np.array([magnitude], np.int64)
+        edit = rehash(SIX.values(ordinal).reshape(1, 1))
+        shelf.add(name, HEADING, purpose, _with(column([0.0], SIX), data, CEND=edit))
+
+    per_class, top = 900_000, 100  # of six decimal digits
+    head = b"\4" + varint(top) + b"\0"
+    magnitude = (top + 1) * per_class + 1
+    add("class-beyond", "A class one beyond the greatest.", head + _beyond(), magnitude)
+    (ordinal,) = SIX.ordinals(np.array([1e-7]))[0].tolist()
+    own = (ordinal - 1) // per_class
+    data = build_stream([[ordinal]], (SIX,), [Coded(top=400)])
+    assert data[1:3] == varint(400)
+    data = data[:1] + varint(400 - own - 1) + data[3:]
+    add("class-below", "A class below 0.", data, ordinal - (own + 1) * per_class)
+    (ordinal,) = SIX.ordinals(np.array([9.99999]))[0].tolist()
+    own, mantissa = (ordinal - 1) // per_class, (ordinal - 1) % per_class
+    data = at(1, b"\3")(build_stream([[ordinal]], (SIX,), [Coded(form=6, scale=0)]))
+    purpose = "A mantissa of four digits in form 3."
+    add("mantissa-beyond", purpose, data, own * 900 + 1 + mantissa)
+
+
+def _beyond() -> bytes:
+    """The bits of one number, scale 0, whose class is one beyond the greatest of base 10.
+
+    They are those of class 14 of base 2, which is within its 44: with nothing to predict from and
+    the least mantissa the bits of both bases are alike.
+    """
+    return build_stream([[2]], (DOUBLE,), [Coded(form=66, top=31, scale=0)])[5:]
 
 
 def _ordinals(shelf: Broken) -> None:

@@ -153,7 +153,8 @@ def _windows(shelf: Broken, name: str) -> None:
             "frequencies-varint": ("4 frequencies, in two bytes.", {"n_frequencies": b"\x84\0"}),
         }
     for case, (purpose, parts) in cases.items():
-        data = silent(plan, CLIP=says(header(plan, **parts)))
+        made = replace(plan, frequencies=8) if case == "frequencies-9" else plan
+        data = silent(made, CLIP=says(header(made, **parts)))
         shelf.add(case, spec_of(name), purpose, data)
     one = replace(plan, segments=(9,), window=2048)
     said = says(header(one, window=varint(2049)))

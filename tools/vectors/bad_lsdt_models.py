@@ -18,7 +18,7 @@ from mcz.coding.streams import code
 from mcz.container import payloads
 from mcz.motion import Channel, Joint, Skeleton
 from mcz.schema import build, varint
-from tools.vectors.craft import Broken, Vector
+from tools.vectors.craft import Broken, Vector, rehash
 from tools.vectors.edits import Edit, flip, framed, swap
 from tools.vectors.spatial import (
     CLIP,
@@ -32,6 +32,7 @@ from tools.vectors.spatial import (
     header,
     motion_of,
     still,
+    values_of,
 )
 from tools.vectors.spatial_faults import (
     Bits,
@@ -59,7 +60,7 @@ def vectors() -> Iterable[Vector]:
     return found
 
 
-def _with_model(plan: Plan, kind: int, data: bytes, **edits: Any) -> bytes:
+def with_model(plan: Plan, kind: int, data: bytes, **edits: Any) -> bytes:
     """The file of ``plan`` with another model, which the clip names."""
     old = plan.model
     assert old is not None
@@ -75,6 +76,9 @@ def _models(shelf: Broken, name: str) -> None:
     own = plan.bases[0]
     wide = Basis(own.shifts, np.pad(own.entries, ((0, 0), (0, 1))))
     narrow = Basis(own.shifts, own.entries[:, :3])
+    padded = replace(own, entries=np.pad(narrow.entries, ((0, 0), (0, 1))))
+    seen = values_of(replace(plan, bases=(padded,)))
+    edits = {"model-points-3": {"CEND": rehash(seen)}}
     cases: dict[str, tuple[str, int, Sequence[Basis]]] = {
         "model-kind": ("A model of kind 2, with the bases that are due.", 2, plan.bases),
         "model-bases-2": ("A model of two bases, where one is due.", 1, (own, own)),
@@ -82,7 +86,8 @@ def _models(shelf: Broken, name: str) -> None:
         "model-points-5": ("Vectors of 5 entries for 4 points, the last 0.", 1, (wide,)),
     }
     for case, (purpose, kind, bases) in cases.items():
-        shelf.add(case, spec, purpose, _with_model(plan, kind, build_bases(bases)))
+        made = with_model(plan, kind, build_bases(bases), **edits.get(case, {}))
+        shelf.add(case, spec, purpose, made)
     apart = Plan(name, 6, (9,), apart=True, bases=(basis_of(2, 2),) * 3)
     other = basis_of(3, 2)
     for case, purpose, bases in (
@@ -90,11 +95,11 @@ def _models(shelf: Broken, name: str) -> None:
         ("model-bases-4", "A model of four bases, where three are due.", (*apart.bases, other)),
         ("model-third", "The third basis has vectors of 3 entries.", (*apart.bases[:2], other)),
     ):
-        shelf.add(case, spec, purpose, _with_model(apart, 1, build_bases(bases)))
+        shelf.add(case, spec, purpose, with_model(apart, 1, build_bases(bases)))
     changed = _changed_model()
     purpose = "A bit of the model is not as it was when its id was made; the checksum is right."
     shelf.add("model-changed", f"{spec}; MODL", purpose, file_with(plan, MODL_frame=changed))
-    after = _with_model(plan, 1, build_bases(plan.bases)[:-1])
+    after = with_model(plan, 1, build_bases(plan.bases)[:-1])
     shelf.add("model-byte-missing", spec, "Bases without their last byte.", after)
 
 
@@ -115,21 +120,21 @@ def _bad_bases(shelf: Broken, name: str) -> None:
     cases: dict[str, tuple[str, bytes]] = {
         "bases-none": ("A model of no bytes", b""),
         "bases-0": ("No bases", b"\0" + good[1:]),
-        "bases-17": ("17 bases", b"\x11" + 17 * b"\1\1\0" + _entries(17 * [(1, 1, 0)])),
+        "bases-17": ("17 bases", b"\x11" + 17 * b"\1\1\0" + coded_entries(17 * [(1, 1, 0)])),
         "bases-varint": ("One basis, in two bytes", b"\x81\0" + good[1:]),
         "bases-points-0": ("Vectors of no entries", n_bases + b"\0" + good[2:]),
         "bases-points-2049": (
             "Vectors of 2049 entries",
-            n_bases + varint(2049) + b"\1\0" + _entries([(1, 2049, 0)]),
+            n_bases + varint(2049) + b"\1\0" + coded_entries([(1, 2049, 0)]),
         ),
         "bases-vectors-0": ("No vectors", n_bases + n_points + b"\0"),
         "bases-vectors-4": (
             "4 vectors of 3 entries",
-            n_bases + n_points + b"\4" + bytes(4) + _entries([(4, 3, 0)]),
+            n_bases + n_points + b"\4" + bytes(4) + coded_entries([(4, 3, 0)]),
         ),
         "bases-shift-41": (
             "41 binary digits",
-            good[:3] + b"\6\x29" + _entries([(1, 3, 6), (1, 3, 41)]),
+            good[:3] + b"\6\x29" + coded_entries([(1, 3, 6), (1, 3, 41)]),
         ),
         "bases-shifts-cut": ("A head that ends in its shifts", good[:4]),
         "bases-head-cut": ("A head that ends in a number", b"\1\x83"),
@@ -137,20 +142,23 @@ def _bad_bases(shelf: Broken, name: str) -> None:
         "bases-byte-0-behind": ("A byte 0 behind the bits of the model", good + b"\0"),
         "bases-entry-beyond": (
             "An entry of 2^40 + 1",
-            good[:5] + _entries(pair, [[1, 2, 3]], [[4, 5, MOST + 1]]),
+            good[:5] + coded_entries(pair, [[1, 2, 3]], [[4, 5, MOST + 1]]),
         ),
         "bases-entry-below": (
             "An entry of -2^40 - 1",
-            good[:5] + _entries(pair, [[1, 2, 3]], [[4, 5, -MOST - 1]]),
+            good[:5] + coded_entries(pair, [[1, 2, 3]], [[4, 5, -MOST - 1]]),
         ),
     }
     assert n_vectors + shifts + rest == good[2:]
     for case, (purpose, data) in cases.items():
-        made = _with_model(plan, 1, data)
+        none = {"segments": stream_with(plan, b"")} if case == "bases-vectors-0" else {}
+        made = with_model(plan, 1, data, **none)
         shelf.add(case, spec_of(name, "Bases"), f"{purpose}.", made)
 
 
-def _entries(tables: Sequence[tuple[int, int, int]], *entries: Sequence[Sequence[int]]) -> bytes:
+def coded_entries(
+    tables: Sequence[tuple[int, int, int]], *entries: Sequence[Sequence[int]]
+) -> bytes:
     """The bits of tables of (vectors, points, shift), zeros unless they are given."""
 
     def loop(state: Ints, data: Any) -> bool:
@@ -180,6 +188,8 @@ def _courses(shelf: Broken, name: str) -> None:
     lean = Basis(courses.shifts[:4], courses.entries[:4])
     more = Basis(np.append(courses.shifts, 6), np.pad(courses.entries, ((0, 1), (0, 0))))
     wide = Basis(courses.shifts, np.pad(courses.entries, ((0, 0), (0, 1))))
+    still_ = replace(courses, entries=np.pad(lean.entries, ((0, 1), (0, 0))))
+    seen = values_of(replace(plan, courses=still_))  # as if the last course were zeros
     cases: dict[str, tuple[str, Sequence[Basis]]] = {
         "courses-4": ("4 courses, where 5 are due.", (lean,)),
         "courses-6": ("6 courses, where 5 are due.", (more,)),
@@ -187,7 +197,8 @@ def _courses(shelf: Broken, name: str) -> None:
         "courses-and-mean": ("A mean behind the courses, without its flag.", (courses, mean)),
     }
     for case, (purpose, bases) in cases.items():
-        shelf.add(case, spec, purpose, _with_model(plan, 1, build_bases(bases)))
+        edits = {"CEND": rehash(seen)} if case == "courses-4" else {}
+        shelf.add(case, spec, purpose, with_model(plan, 1, build_bases(bases), **edits))
     plan = replace(plan, courses=None, mean=mean)
     twice = Basis(np.array([6, 6]), np.concatenate([mean.entries] * 2))
     shift = mean.shifts
@@ -196,15 +207,15 @@ def _courses(shelf: Broken, name: str) -> None:
         ("mean-5", "A mean of 5 entries.", Basis(shift, np.pad(mean.entries, ((0, 0), (0, 1))))),
         ("means", "A mean of two vectors.", replace(twice, shifts=np.repeat(shift, 2))),
     ):
-        shelf.add(case, spec, purpose, _with_model(plan, 1, build_bases([basis])))
+        shelf.add(case, spec, purpose, with_model(plan, 1, build_bases([basis])))
     both_due = replace(plan, courses=courses)
     turned = build_bases([mean, courses])
     purpose = "The mean comes before the courses."
-    shelf.add("mean-first", spec, purpose, _with_model(both_due, 1, turned))
+    shelf.add("mean-first", spec, purpose, with_model(both_due, 1, turned))
     apart = Plan(name, 9, (9,), apart=True, mean=basis_of(9, 1), fill=still)
     thirds = build_bases([basis_of(3, 3, entries=apart.mean.entries)] if apart.mean else [])
     purpose = "A mean of three vectors, of x, y and z apart."
-    shelf.add("mean-apart", spec, purpose, _with_model(apart, 1, thirds))
+    shelf.add("mean-apart", spec, purpose, with_model(apart, 1, thirds))
     said = says(header(plan, flags=b"\4", model=b""))
     shelf.add("mean-absent", spec, "A mean of a model that is not named.", silent(plan, CLIP=said))
 
@@ -216,14 +227,14 @@ def _too_many(shelf: Broken, name: str) -> None:
     plan = Plan(name, 1, (3,), window=2048, frequencies=257, fill=still)
     slight = replace(plan, courses=basis_of(257, 257, entries=entries[:, :257], shifts=[0] * 257))
     purpose = "257 courses of 2048 cosines and as many frames, more than 2^30 products."
-    shelf.add("courses-products", spec, purpose, _with_model(slight, 1, build_bases([great])))
+    shelf.add("courses-products", spec, purpose, with_model(slight, 1, build_bases([great])))
     points = basis_of(2048, 1, entries=np.zeros((1, 2048)), shifts=[0])
     plan = Plan(name, 2048, (1,), window=1, bases=(points,), mean=points, prefix=True, fill=still)
     skeleton = Skeleton((Joint("", channels=(Channel(""),) * 2048),))
     table = b"\2" + varint(2048) * 2 + bytes(2048) + varint(2048) + b"\1\0"
-    table += _entries([(2048, 2048, 0), (1, 2048, 0)])
+    table += coded_entries([(2048, 2048, 0), (1, 2048, 0)])
     empty = stream_with(plan, Bits().plain(0, 2048).data())
     motion = motion_of(plan, skeleton=skeleton)
     purpose = "A basis of 2^22 entries, and a mean of 2048 more."
-    data = _with_model(plan, 1, table, motion=motion, segments=empty)
+    data = with_model(plan, 1, table, motion=motion, segments=empty)
     shelf.add("bases-entries", spec, purpose, data)

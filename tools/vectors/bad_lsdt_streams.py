@@ -39,6 +39,7 @@ from tools.vectors.spatial_faults import (
     faulty_bits,
     longer_frame,
     longer_row,
+    overlooked,
     sized,
     spec_of,
     stream_with,
@@ -64,11 +65,11 @@ def vectors() -> Iterable[Vector]:
     return found
 
 
-def _with(plan: Plan, data: bytes, overlooked: Plan | None = None) -> bytes:
-    """The file of ``plan`` with other bits; ``overlooked``: what a lax reader makes of them."""
+def _with(plan: Plan, data: bytes, seen: Plan | None = None) -> bytes:
+    """The file of ``plan`` with other bits; ``seen``: what a lax reader makes of them."""
     edits: dict[str, Any] = {"segments": stream_with(plan, data)}
-    if overlooked is not None:
-        edits["CEND"] = rehash(values_from(overlooked))
+    if seen is not None:
+        edits["CEND"] = rehash(values_from(seen))
     return file_with(plan, **edits)
 
 
@@ -178,7 +179,7 @@ def _lists(shelf: Broken, name: str) -> None:
             "A coefficient, but no code of a gap",
             4,
             quiet,
-            Bits().plain(1, 3).plain(0, 15),
+            Bits().plain(1, 3).plain(0, 31),
         ),
         "no-value-code": (
             "A coefficient, but no code of a value",
@@ -203,10 +204,10 @@ def _lists(shelf: Broken, name: str) -> None:
         plan = Plan(name, n, (1,), fill=still, prefix=True, lengths=lengths)
         if name != FRAME:
             plan = replace(plan, n_channels=1, segments=(n,), window=n)
-        loud = None
-        if case.startswith("size"):
-            size = {"size-beyond": MOST + 1, "size-below": -MOST - 1}.get(case, 2 * MOST)
-            loud = replace(plan, fill=listed([[size]]))
+        size = {"size-beyond": MOST + 1, "size-below": -MOST - 1}.get(case, 2 * MOST)
+        seen = {"gap-rest": [0, 1], "count-5": [1] * 4, "size": [size], "no": [1]}
+        row = seen.get(case, seen.get(case.partition("-")[0]))
+        loud = None if row is None else replace(plan, fill=listed([row]))
         shelf.add(case, spec, f"{purpose}.", _with(plan, bits.data(), loud))
 
 
@@ -220,7 +221,10 @@ def _bits(shelf: Broken, name: str) -> None:
             ("byte-0-behind", f"A byte 0 behind the bits{how}.", plus(b"\0")),
             ("byte-missing", f"Bits without their last byte{how}.", lambda data: data[:-1]),
         ):
-            data = file_with(plan, segments=stream(0, _window_edit(name, edit)))
+            edits = {"segments": stream(0, _window_edit(name, edit))}
+            if case == "byte-missing" and prefix:  # else zeros are as good, but for the hash
+                edits["CEND"] = rehash(values_from(overlooked(plan, edit)))
+            data = file_with(plan, **edits)
             shelf.add(f"{case}{end}", spec_of(name, heading), purpose, data)
     bits = Bits(PAIR).sparse(4, (1, 2), (0, -1))
     plan = Plan(name, 4, (1,), prefix=True, lengths=PAIR, fill=listed([[0, 2, -1]]))

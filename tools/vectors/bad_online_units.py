@@ -50,7 +50,7 @@ def only_units(plan: Plan) -> list[Unit]:
     return units
 
 
-def _head(kind: int, n_frames: int) -> bytes:
+def head_of(kind: int, n_frames: int) -> bytes:
     return varint(4 * n_frames + kind)
 
 
@@ -64,10 +64,10 @@ def _kinds(shelf: Broken) -> None:
     ):
         plan = Plan((units,))
         *others, last = only_units(plan)
-        data = _head(NO_KIND, last.n_frames)
+        data = head_of(NO_KIND, last.n_frames)
         data += varint(last.distance) * (last.kind == LTR) + last.data
         if others:
-            data = _head(INTRA, 3) + varint(len(others[0].data)) + others[0].data + data
+            data = head_of(INTRA, 3) + varint(len(others[0].data)) + others[0].data + data
         shelf.add(f"kind-3-{case}", HEADING, f"{what} is of kind 3.", with_stream(plan, data))
 
 
@@ -94,23 +94,23 @@ def _sizes(shelf: Broken) -> None:
     }
     for case, (purpose, plan, units) in cases.items():
         shelf.add(case, HEADING, purpose, with_stream(plan, build_units(units)))
-    tail = _head(STR, 3) + last.data
+    tail = head_of(STR, 3) + last.data
     for case, purpose, size in (
         ("size-beyond", "The first unit has a byte more than the stream.", len(tail) + 1),
         ("size-great", "The first unit has 2^40 bytes more than there are.", 2**40),
         ("size-less", "The first unit says a byte less than it has.", -1),
         ("size-more", "The first unit says a byte more than it has.", 1),
     ):
-        data = _head(INTRA, 3) + varint(len(first.data) + size) + first.data + tail
+        data = head_of(INTRA, 3) + varint(len(first.data) + size) + first.data + tail
         shelf.add(case, HEADING, purpose, with_stream(SPLIT, data))
     purpose = "The last unit has a size, which it must not."
-    data = _head(INTRA, 6) + varint(len(six.data)) + six.data
+    data = head_of(INTRA, 6) + varint(len(six.data)) + six.data
     shelf.add("size-last", HEADING, purpose, with_stream(SIX, data))
     purpose = "A unit of one frame behind the last."
-    data = build_units([six]) + _head(STR, 1) + last.data
+    data = build_units([six]) + head_of(STR, 1) + last.data
     shelf.add("unit-behind", HEADING, purpose, with_stream(SIX, data))
     purpose = "A unit without a size, which is not the last."
-    data = _head(INTRA, 3) + first.data + tail
+    data = head_of(INTRA, 3) + first.data + tail
     shelf.add("size-absent", HEADING, purpose, with_stream(SPLIT, data))
 
 
@@ -118,25 +118,28 @@ def _cut_heads(shelf: Broken) -> None:
     """Streams that end in a number, or have one in too many bytes."""
     (six,) = only_units(SIX)
     first, last = only_units(TWO)
-    start = _head(INTRA, 3) + varint(len(first.data)) + first.data
+    start = head_of(INTRA, 3) + varint(len(first.data)) + first.data
     assert len(first.data) < 128
     cases: dict[str, tuple[str, Plan, bytes]] = {
         "stream-empty": ("A stream of no bytes.", SIX, b""),
         "head-cut": ("A stream that ends in its head.", SIX, b"\x9a"),
         "head-varint": ("A head in two bytes, for which one is enough.", SIX, b"\x9a\0" + six.data),
         "head-absent": ("A stream that ends behind its first unit.", TWO, start),
-        "distance-absent": ("A stream that ends behind a head.", TWO, start + _head(LTR, 3)),
+        "distance-absent": ("A stream that ends behind a head.", TWO, start + head_of(LTR, 3)),
         "distance-varint": (
             "A distance in two bytes, for which one is enough.",
             TWO,
-            start + _head(LTR, 3) + b"\x83\0" + last.data,
+            start + head_of(LTR, 3) + b"\x83\0" + last.data,
         ),
         "size-varint": (
             "A size in two bytes, for which one is enough.",
             TWO,
-            _head(INTRA, 3) + bytes((len(first.data) | 128, 0)) + first.data + build_units([last]),
+            head_of(INTRA, 3)
+            + bytes((len(first.data) | 128, 0))
+            + first.data
+            + build_units([last]),
         ),
-        "size-none": ("A stream that ends before a size.", TWO, _head(INTRA, 3)),
+        "size-none": ("A stream that ends before a size.", TWO, head_of(INTRA, 3)),
     }
     for case, (purpose, plan, data) in cases.items():
         shelf.add(case, HEADING, purpose, with_stream(plan, data))

@@ -274,14 +274,11 @@ def _marks(shelf: Broken) -> None:
 
 def _curves(shelf: Broken) -> None:
     """Bits of curves that say what the rules of decoding refuse."""
-    plan, beyond = Plan(9, decimals=0), MAX_INDEX + 1
+    plan = Plan(9, decimals=0)
     marks = [(MAX_INDEX - 5,), (9 - MAX_INDEX,)]
     good = Path(marks, {0: [Piece(3, (4,), (5,)), Piece(5)]})
+    _beyond(shelf, marks)
     cases: dict[str, tuple[str, list[Piece]]] = {
-        "break-beyond": ("A break of 2^40 + 1", [Piece(3, (beyond,))]),
-        "break-below": ("A break of -2^40 - 1", [Piece(3, (-beyond,))]),
-        "middle-beyond": ("A middle point of 2^40 + 1", [Piece(3, (4,), (beyond,))]),
-        "middle-below": ("A middle point of -2^40 - 1", [Piece(8, None, (-beyond,))]),
         "break-54-bits": ("A residual of 54 bits of a break", [Piece(3, (2**53 + 2**40,))]),
         "length-minus": ("A curve over -3 frames", [Piece(-3, (4,))]),
         "length-beyond": ("A curve over 9 of 8 frames", [Piece(9, (4,))]),
@@ -303,6 +300,38 @@ def _curves(shelf: Broken) -> None:
         new = _lone_curve((marks[0][0] + marks[1][0]) >> 1, 40, length)
         data = file_with(plan, [bent], motion_of(plan, [bent]), segments=stream(1, _as(new)))
         shelf.add(name, f"{HEADING}; Residuals", purpose, data)
+
+
+def _beyond(shelf: Broken, marks: list[tuple[int]]) -> None:
+    """Points beyond the limits, the last that is coded; the hashes are of such curves."""
+    start, end = marks[0][0], marks[1][0]
+    for word, point in (("beyond", MAX_INDEX + 1), ("below", -MAX_INDEX - 1)):
+        for what, plan, piece, values in (
+            ("break", Plan(3, 2, 0), Piece(1, (point,)), [start, point, end]),
+            ("middle", Plan(9, 8, 0), Piece(8, None, (point,)), _curve(start, point, end)),
+        ):
+            rest = [Piece(1)] * (plan.n_frames - 1 - piece.n_frames)
+            found, frames, curves = curves_of(plan, Path(marks, {0: [piece, *rest]}), 0, 1)
+            first = streams.Curves(curves.lengths[:1], curves.ends[:1], curves.mids[:1])
+            new = coded_curves(found, frames, first, (8, 6), faulty=True)
+            lax = rehash(np.array([values], np.float64).T)
+            made = [Path(marks, spoken=(1,))]
+            edits = {"segments": stream(1, _as(new)), "CEND": lax}
+            data = file_with(plan, made, motion_of(plan, made), **edits)
+            purpose = f"A {what if rest else 'middle point'} of {_power(point)}."
+            shelf.add(f"{what}-{word}", f"{HEADING}; Residuals", purpose, data)
+
+
+def _curve(start: int, middle: int, end: int) -> list[float]:
+    """The frames of one curve over eight, and its end."""
+    times = [i / 8 for i in range(9)]
+    return [
+        ((1 - t) * (1 - t) * start + ((2 * t) * (1 - t)) * middle) + (t * t) * end for t in times
+    ]
+
+
+def _power(point: int) -> str:
+    return "2^40 + 1" if point > 0 else "-2^40 - 1"
 
 
 @kernel

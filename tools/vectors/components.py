@@ -17,6 +17,7 @@ from mcz.codecs import _pca_streams as streams
 from mcz.codecs import pca, raw
 from mcz.codecs.base import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.coding import kernels
+from mcz.coding.streams import scale_of
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import varint
 from tools.vectors.craft import Whole, file_of, partial
@@ -78,17 +79,22 @@ def stream_of(part: Part, decimals: int) -> bytes:
     means = np.array(part.means, np.int64)
     basis = np.array(part.basis, np.int64).reshape(count, len(means))
     rows = np.array(part.coefficients, np.int64).reshape(part.n_frames, count)
-    sides = bytes((*part.shifts, *part.forms))
     head = bytes((part.step,)) if decimals == pca.SCALED else b""
-    head += bytes((part.mean_scale,)) + (varint(count) if part.said is None else part.said) + sides
+    head += bytes((part.mean_scale,)) + (varint(count) if part.said is None else part.said)
+    head += bytes((*part.shifts, *part.forms))
     data, state = np.zeros(UNEXAMINED, np.uint8), streams._start_states()[0].copy()
     kernels.start(state, data, 1)
-    # What a head may not say is coded as if it said the most that it may.
-    spoken = bytes(min(b, streams.MAX_SHIFT) for b in part.shifts)
-    spoken += bytes(f - (f & 63 > streams.MAX_SCALE) for f in part.forms)
-    scale = min(part.mean_scale, streams.MAX_SCALE)
-    done = streams._loop(state, data, means, basis, rows, spoken, scale)
-    assert done != part.faulty
+    # What has no code is the last of its table, so that the next one follows all the same.
+    loops, forms = streams._kernels(), np.array(part.forms, np.int64)
+    shifts = np.array(part.shifts, np.int64)
+    scales = np.array([scale_of(form & 63) for form in part.forms], np.int64)
+    firsts = (np.int64(1) << shifts) >> (len(means).bit_length() // 2)
+    faults = (
+        loops.code_table(state, data, means[None], np.array([scale_of(part.mean_scale)]), 0),
+        loops.code_table(state, data, basis, firsts, 1),
+        loops.code_coefficients(state, data, rows, forms >> 6, scales) >= 0,
+    )
+    assert any(faults) == part.faulty
     return head + data[: kernels.finish(state, data)].tobytes()
 
 

@@ -57,7 +57,8 @@ class Vector:
 
     ``name`` is its path below vectors/ without the suffix; ``arrays`` are rows of the contract
     with the bytes behind them, ``sources`` pairs of path and bytes; ``modes`` are the calls that
-    are made: "arrays", "sources". ``parts`` are (arguments, arrays) of partial reads.
+    are made: "arrays", "sources". ``parts`` are (arguments, arrays) of partial reads. ``seed``
+    is that of a file made at random, ``since`` a format version that the bytes do not tell.
     """
 
     name: str
@@ -69,6 +70,8 @@ class Vector:
     sources: tuple[tuple[str, bytes], ...] = ()
     modes: tuple[str, ...] = ("arrays",)
     parts: tuple[tuple[tuple[str, ...], tuple[tuple[dict[str, Any], bytes], ...]], ...] = ()
+    seed: int | None = None
+    since: str = ""
 
 
 class Crafter(Writer):
@@ -344,16 +347,12 @@ def partial(motion: Motion, frames: tuple[int, int], joints: Sequence[int] | Non
     """Arguments and arrays of a partial read: of joints, or of all channels of all signals."""
     arguments = ("--clip", motion.name, "--frames", f"{frames[0]}:{frames[1]}")
     if joints is None:
-        cut = []
-        for signal in motion.signals:
-            a, b = (frame * signal.samples_per_frame for frame in frames)
-            mask = signal.mask[a:b] if signal.mask is not None else None
-            cut.append(replace(signal, values=signal.values[a:b], mask=mask))
+        cut = [signal.cut(*frames) for signal in motion.signals]
         return arguments, arrays(replace(motion, signals=tuple(cut), frame_numbers=None))
     columns = [c for joint in joints for c in motion.skeleton.columns(joint)]
     signal, rows = motion.signals[0], slice(*frames)
     mask = signal.mask[rows][:, columns] if signal.mask is not None else None
-    part = Signal(signal.values[rows][:, columns].astype("<f8"), mask=mask)
+    part = Signal(signal.values[rows][:, columns], mask=mask)
     names = tuple(Channel("", str(column)) for column in columns)
     bones = Skeleton((Joint("", channels=names),))
     listed = ",".join(map(str, joints))

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import _window_streams, lsdt_frame
+from mcz.codecs import _prefix_streams, _window_streams, lsdt_frame
+from mcz.codecs._prefix_streams import codes_from
 from mcz.codecs._windows import WINDOWS_HEADER, space_of_windows, temporal_of
+from mcz.codecs.lsdt_frame import FRAME_HEADER
 from mcz.coding import kernels
 from mcz.coding.huffman import class_of, codes_of
 from mcz.coding.residuals import bits, code_residual, side_of
@@ -28,6 +30,7 @@ from tools.vectors.spatial import (
     Plan,
     file_with,
     header,
+    segments_of,
     still,
     tables,
 )
@@ -40,10 +43,15 @@ def sized(*windows: bytes) -> bytes:
     return b"".join(varint(len(window)) + window for window in windows)
 
 
+def _start_of(codec: str) -> Ints:
+    own: Any = lsdt_frame if codec == FRAME else _window_streams
+    state: Ints = own._start_states()[0].copy()
+    return state
+
+
 def adaptive(codec: str, loop: Callable[[Ints, NDArray[np.uint8]], bool], *, faulty: bool) -> bytes:
     """The bits that ``loop`` writes; ``faulty``: the last integer has no code."""
-    own: Any = lsdt_frame if codec == FRAME else _window_streams
-    data, state = np.zeros(UNEXAMINED, np.uint8), own._start_states()[0].copy()
+    data, state = np.zeros(UNEXAMINED, np.uint8), _start_of(codec)
     kernels.start(state, data, 1)
     assert loop(state, data) != faulty
     return data[: kernels.finish(state, data)].tobytes()
@@ -51,21 +59,23 @@ def adaptive(codec: str, loop: Callable[[Ints, NDArray[np.uint8]], bool], *, fau
 
 def faulty_bits(plan: Plan, table: Ints) -> bytes:
     """A table whose last coefficient may not be, in adaptive bits: a window's or a segment's."""
-    starts = plan.starts
 
     def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
-        if plan.codec == FRAME:
-            frames = lsdt_frame._kernels()
-            memory = np.zeros(len(starts) - 1, np.int64)
-            tracks = np.zeros((int(starts[-1]), frames.TRACK_SIZE), np.int64)
-            found = frames.code_frames(state, data, table.copy(), starts, memory, tracks, 1)
-        else:
-            windows = _window_streams._kernels()
-            lengths = np.zeros(len(table), np.int64)
-            found = windows.code_window(state, data, table.copy(), starts, lengths)
-        return bool(found < 0)
+        return _code(plan, state, data, table.copy()) < 0
 
     return adaptive(plan.codec, loop, faulty=True)
+
+
+def _code(plan: Plan, state: Ints, data: NDArray[np.uint8], table: Ints) -> int:
+    """Code a table in place, a window's or a segment's; the row or frame of a fault, or -1."""
+    starts = plan.starts
+    if plan.codec == FRAME:
+        frames = lsdt_frame._kernels()
+        memory = np.zeros(len(starts) - 1, np.int64)
+        tracks = np.zeros((int(starts[-1]), frames.TRACK_SIZE), np.int64)
+        return int(frames.code_frames(state, data, table, starts, memory, tracks, 1))
+    windows = _window_streams._kernels()
+    return int(windows.code_window(state, data, table, starts, np.zeros(len(table), np.int64)))
 
 
 @kernel
@@ -144,6 +154,26 @@ class Bits:
     def data(self, padding: str = "0") -> bytes:
         text = self.text + padding * (-len(self.text) % 8)
         return bytes(int(text[i : i + 8], 2) for i in range(0, len(text), 8))
+
+
+def overlooked(plan: Plan, edit: Edit) -> Plan:
+    """What is read of edited bits, of prefix codes, where nobody counts their bytes.
+
+    The only segment has one window, or it is of lsdt-frame.
+    """
+    ((table,),) = tables(plan)
+    (segment,) = segments_of(plan)
+    stream = segment.streams[0]
+    data = np.frombuffer(edit(stream if plan.codec == FRAME else stream[1:]), np.uint8).copy()
+    kind = FRAME_HEADER if plan.codec == FRAME else WINDOWS_HEADER
+    codes = codes_from(parse(kind, header(plan), plan.codec).code, plan.codec)
+    assert codes is not None
+    found = np.zeros_like(table)
+    starts = plan.starts if plan.codec == FRAME else np.array([0, found.shape[1]])
+    loops = _prefix_streams._kernels()
+    coder = np.array([0, 0])
+    assert loops.code_vectors(coder, data, found, starts, codes.gaps, codes.values) < 0
+    return replace(plan, fill=lambda number, n_rows, n: found)
 
 
 def values_from(plan: Plan) -> NDArray[np.float64]:

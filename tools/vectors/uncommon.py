@@ -170,6 +170,12 @@ def _frames(shelf: Whole) -> None:
             masked,
             True,
         ),
+        (
+            "frame-packets-grid",
+            "A frame on another grid, of kind 1, among those of kind 2.",
+            _on_two_grids(long),
+            True,
+        ),
     )
     for name, purpose, motion, index in cases:
         for kind in (2, 3):
@@ -192,6 +198,15 @@ def _frames(shelf: Whole) -> None:
         purpose = f"Packets of kind {kind} among those of another signal."
         spec = "Open DATA and packets; INDX"
         shelf.hold(f"{name}-packets-signals", spec, purpose, data, both_signals)
+
+
+def _on_two_grids(motion: Motion) -> Motion:
+    """Frame 3 with another grid of a channel than all others."""
+    signal = motion.signals[0]
+    values, fine = signal.values.copy(), Grid(GridKind.TEXT64)
+    values[3, 2] = 1e-9
+    changes = ((3, 2, fine), (4, 2, signal.grids[2]))
+    return replace(motion, signals=(replace(signal, values=values, grid_changes=changes),))
 
 
 def _segments(shelf: Whole) -> None:

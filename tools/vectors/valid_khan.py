@@ -90,7 +90,11 @@ def _waves(name: str, codec: Codec) -> Iterable[Vector]:
     shelf = Whole(f"valid/{name}")
     heading = f"Codec {codec.id}: {name}"
     cases = (
-        ("scaled", "Scaled coefficients in three segments.", waved.Plan(45, waved.BIOR, levels=2)),
+        (
+            "scaled",
+            "Scaled coefficients in three segments.",
+            waved.Plan(45, waved.BIOR, levels=2, decimals=SCALED, unit=0.01, ends=(16, 32)),
+        ),
         (
             "decimals",
             "Coefficients of 2 decimals.",

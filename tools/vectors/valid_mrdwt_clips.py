@@ -311,7 +311,7 @@ def _quality(shelf: Waves) -> None:
                     "frames": "12",
                     "channels": "6",
                     "mse": "0.0017",
-                    "point_set": "joints",
+                    "point_set": "acclaim",
                     "max_position_error_frame": "7",
                 }
             ),

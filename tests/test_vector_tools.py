@@ -1,0 +1,161 @@
+"""What makes the conformance vectors: files made at random, and the tables behind the manifest."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from conformance import run
+from mcz.cli import conformance
+from mcz.codecs import CODECS
+from mcz.errors import MczError
+from tools import make_vectors
+from tools.vectors import faults, requirements
+from tools.vectors.craft import Vector, arrays
+from tools.vectors.facts import codecs_of, formats_of, since
+from tools.vectors.random_clips import NAMES
+from tools.vectors.random_files import COUNT, _parts, random_file
+
+ROWS = {row["file"].removesuffix(".mcz"): row for row in run.load_manifest()}
+SEEDS = st.integers(COUNT, 2**32 - 1)
+
+
+def vector_of(seed: int) -> Vector:
+    """The file of this seed as a vector."""
+    made = random_file(seed)
+    return Vector(
+        "valid/random/any",
+        ("Grammar",),
+        "A file made at random.",
+        made.data,
+        arrays=arrays(*made.motions),
+        sources=tuple(made.sources),
+        modes=("arrays", "sources"),
+        parts=tuple(_parts(random.Random(seed), made.motions)),
+        seed=seed,
+    )
+
+
+@settings(max_examples=25)
+@given(SEEDS)
+def test_files_made_at_random_are_what_they_say(seed: int) -> None:
+    vector = vector_of(seed)
+    for request in run.requests(make_vectors.row(vector), conformance.OPTIONS):
+        given_ = conformance._parser().parse_args(list(request.arguments))
+        answer = b"".join(conformance.respond(vector.data, given_))
+        assert run.judge(request, 0, answer) is None, request.arguments
+
+
+@settings(max_examples=10)
+@given(SEEDS, st.data())
+def test_files_made_at_random_and_changed_are_read_or_refused(
+    seed: int, data: st.DataObject
+) -> None:
+    whole = random_file(seed).data
+    at = data.draw(st.integers(0, len(whole) - 1))
+    bit = data.draw(st.integers(0, 7))
+    changed = whole[:at] + bytes((whole[at] ^ 1 << bit,)) + whole[at + 1 :]
+    try:
+        b"".join(conformance.respond(changed, conformance._parser().parse_args([])))
+    except MczError:
+        return
+    pytest.fail(f"bit {bit} of byte {at} is of no consequence")
+
+
+def test_a_seed_gives_the_same_file() -> None:
+    for seed in (3, 17, 999):
+        first, second = random_file(seed), random_file(seed)
+        assert first.data == second.data
+        assert first.traits == second.traits
+
+
+def test_stored_files_made_at_random_have_everything() -> None:
+    stored = [row for name, row in ROWS.items() if name.startswith("valid/random/")]
+    assert sorted(row["seed"] for row in stored) == list(range(COUNT))
+    found = Counter(name for row in stored for name in row["codecs"])
+    assert set(found) == {codec.name for codec in CODECS.values()} == set(NAMES)
+    assert min(found.values()) >= 5
+    said = " ".join(row["purpose"] for row in stored)
+    for trait in (
+        "packets of kind 2",
+        "packets of kind 3",
+        "REPT",
+        "unknown chunks in a clip",
+        "unknown ancillary chunks",
+        "frames that are not shown",
+        "an open clip",
+        "several signals",
+        "a source",
+        "an alias",
+        "an extension of HEAD",
+        "an extension of a signal",
+        "a body without INDX",
+        "what nobody refers to",
+    ):
+        assert trait in said, trait
+
+
+def test_every_invalid_vector_has_a_fault() -> None:
+    for name, row in ROWS.items():
+        own = {"fault", "effect", "reason"} & set(row)
+        assert len(own) == (3 if row["group"] == "invalid" else 0), name
+    kinds = Counter(row["fault"] for row in ROWS.values() if "fault" in row)
+    assert kinds["checksum"] <= faults.MOST_CHECKSUMS
+    assert min(kinds["malformed"], kinds["impossible"]) > 150
+    effects = {row["effect"] for row in ROWS.values() if "effect" in row}
+    assert effects == set(faults.EFFECTS)
+    every = {name for row in ROWS.values() if "fault" in row for name in row["codecs"]}
+    assert every == set(NAMES)
+
+
+def test_faults_refuse_what_they_do_not_know() -> None:
+    names = [name for name in ROWS if name.startswith("invalid/")]
+    assert set(faults.faults(names)) == set(names)
+    with pytest.raises(ValueError, match="nothing is said of invalid/raw/new"):
+        faults.faults([*names, "invalid/raw/new"])
+    with pytest.raises(ValueError, match="no vector needs .*head-check"):
+        faults.faults([name for name in names if name != "invalid/packets/head-check"])
+
+
+def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ["valid/raw/plain", "valid/raw/widths", "invalid/raw/absent"]
+    monkeypatch.setattr(requirements, "ARGUED", {})
+    monkeypatch.setattr(requirements, "BREAKS", {})
+    monkeypatch.setattr(requirements, "VECTORS", {"RAW-01": ("valid/*",), "A-02": ("*/plain",)})
+    assert requirements.requirements(names) == {
+        "valid/raw/plain": ["A-02", "RAW-01"],
+        "valid/raw/widths": ["RAW-01"],
+        "invalid/raw/absent": [],
+    }
+    for table in ({"RAW-01": ("valid/lossless/*",)}, {"RAW-01": ()}, {"RAW": ("valid/*",)}):
+        monkeypatch.setattr(requirements, "VECTORS", table)
+        with pytest.raises(ValueError, match="requirements"):
+            requirements.requirements(names)
+    monkeypatch.setattr(requirements, "VECTORS", {"RAW-01": ("valid/*",)})
+    monkeypatch.setattr(requirements, "ARGUED", {"RAW-01": "as well"})
+    with pytest.raises(ValueError, match="both shown and argued"):
+        requirements.requirements(names)
+
+
+def test_facts_are_those_of_the_files() -> None:
+    def vector(name: str) -> Vector:
+        data = (run.VECTORS / f"{name}.mcz").read_bytes()
+        return Vector(name, ("HEAD",), "As it is.", data)
+
+    for name, codecs, version in (
+        ("valid/container/minimal", [], "0.2"),
+        ("valid/mrdwt/signals", ["lossless", "mrdwt"], "0.2"),
+        ("valid/pca-rdo/clips", ["pca-rdo", "raw"], "0.3"),
+        ("valid/raw/packets-frames", ["raw"], "0.3"),
+        ("valid/raw/packets-numbered", ["raw"], "0.4"),
+        ("valid/online/cosines", ["online"], "0.4"),
+        ("invalid/numbers/kind-11", [], "0.2"),
+        ("invalid/lossless/kind-3", ["lossless"], "0.2"),
+    ):
+        assert (codecs_of(vector(name)), since(vector(name))) == (codecs, version), name
+    assert formats_of(vector("valid/sources/amc")) == ["amc", "asf"]
+    assert formats_of(vector("valid/container/attachments")) == []

@@ -1,0 +1,52 @@
+"""Which vectors show which requirement of SPEC.md, by their ids, such as CHUNK-07.
+
+The manifest's ``requirements`` are made of the vectors that catch a broken rule (``tests.broken``)
+and of ``VECTORS``, what else shows it; ``ARGUED`` says of the rules that no vector can show why
+that is so.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+
+from tests.broken.table import BREAKS
+from tools.vectors import requirements_codecs, requirements_container, requirements_points
+
+# Globs of vector names without their suffix, "valid/*/frames-1"; * stands for / as well.
+VECTORS: dict[str, tuple[str, ...]] = {
+    **requirements_container.VECTORS,
+    **requirements_codecs.VECTORS,
+    **requirements_points.VECTORS,
+}
+
+ARGUED: dict[str, str] = {
+    **requirements_container.ARGUED,
+    **requirements_codecs.ARGUED,
+    **requirements_points.ARGUED,
+}
+
+ID = re.compile(r"[A-Z][A-Z0-9]*(?:-[A-Z0-9]+)*-[0-9]{2,}")
+
+
+def requirements(names: Iterable[str]) -> dict[str, list[str]]:
+    """The ids, sorted, that each of the vectors ``names`` shows.
+
+    Raises ValueError for an id that is none, or is both shown and argued, and for a glob that
+    matches no vector.
+    """
+    found: dict[str, list[str]] = {name: [] for name in names}
+    table = {id_: list(globs) for id_, globs in VECTORS.items()}
+    for row in BREAKS.values():
+        table.setdefault(row.id, []).extend(row.vectors)
+    for id_ in sorted({*table, *ARGUED}):
+        if not ID.fullmatch(id_) or (id_ in table and id_ in ARGUED):
+            raise ValueError(f"requirements: {id_!r} is no id, or is both shown and argued")
+    for id_, globs in sorted(table.items()):
+        shown = [[name for name in found if fnmatchcase(name, glob)] for glob in globs]
+        if not globs or not all(shown):
+            raise ValueError(f"requirements: a glob of {id_} matches no vector: {globs}")
+        for name in sorted({name for part in shown for name in part}):
+            found[name].append(id_)
+    return found
