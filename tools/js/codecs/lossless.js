@@ -1,0 +1,477 @@
+// SPEC.md, "Codec 1: lossless".
+
+import { ByteReader } from "../bytes.js";
+import { RangeDecoder, bits, clamp } from "../entropy.js";
+import { Refused } from "../errors.js";
+import {
+  BINARY32,
+  BINARY64,
+  GENERAL,
+  TEXT32,
+  TEXT64,
+  VAX_F,
+  binary32Ordinal,
+} from "../grids.js";
+import { halvesOf, setHalves, setInteger } from "../int64.js";
+import { Residuals, side } from "../residuals.js";
+import { restart, startModels } from "../start-models.js";
+
+export const id = 1;
+export const name = "lossless";
+export const version = 0;
+
+const CODED = 0;
+const CONSTANT = 1;
+const COPY = 2;
+
+// Forms; 1 to 15 are classes of so many decimal digits.
+const PLAIN = 0;
+const MULTIPLES = 32;
+const CLASSES_24 = 88;
+const CLASSES_53 = 117;
+
+const MAX_TAPS = 8;
+const MAX_TAP = 511;
+const MAX_SCALE = 172;
+
+// The first context and the mixer of each kind of bit.
+const SAME = 0;
+const UP = 384;
+const ZERO = 432;
+const FAR = 464;
+const MINUS = 768;
+const ZERO_SIGN = 800;
+const RESIDUALS = 808;
+const SAME_MIXER = 0;
+const UP_MIXER = 1;
+const ZERO_MIXER = 2;
+const FAR_MIXER = 3;
+const ZERO_SIGN_MIXER = 4;
+const MINUS_MIXER = 5;
+const RESIDUALS_MIXER = 6;
+
+const TWO_40 = 2 ** 40;
+const TWO_44 = 2 ** 44;
+const TWO_52 = 2 ** 52;
+const TWO_53 = 2 ** 53;
+
+/** B^j for 0 <= j <= 63; the last ones stand for "too large", and all are exact. */
+const POWERS_OF_2 = Float64Array.from({ length: 64 }, (_, j) => 2 ** Math.min(j, 62));
+const POWERS_OF_10 = Float64Array.from({ length: 64 }, (_, j) => Number(`1e${Math.min(j, 18)}`));
+
+/**
+ * Opens a signal.
+ *
+ * @param {Uint8Array} header the codec's header in CLIP
+ * @param {{channels: object[], groups: number[][], grids: object[], nResolutions: number}} layout
+ * @returns {{decodes: "ordinals", alone: true, decode: (segments: object[]) => BigInt64Array}}
+ * @throws {Refused}
+ */
+export function open(header, layout) {
+  if (header.length !== 0) throw new Refused("lossless: the header is not empty");
+  if (layout.nResolutions !== 1) {
+    throw new Refused(`lossless: ${layout.nResolutions} resolutions, not 1`);
+  }
+  return {
+    decodes: "ordinals",
+    alone: true, // lead, tail and freshness mean nothing
+    decode: (segments) => new SignalDecoder(layout, segments).decode(),
+  };
+}
+
+/** Decodes a run of segments. */
+class SignalDecoder {
+  constructor(layout, segments) {
+    this.layout = layout;
+    this.segments = segments;
+    this.nChannels = layout.channels.length;
+    const nRows = segments.reduce((sum, segment) => sum + segment.nRows, 0);
+    this.ordinals = new BigInt64Array(nRows * this.nChannels);
+    this.bits = new BitDecoder(this.ordinals);
+  }
+
+  /** @returns {BigInt64Array} the ordinals of all rows, row after row */
+  decode() {
+    let row = 0;
+    for (const segment of this.segments) {
+      this.decodeSegment(segment, row);
+      row += segment.nRows;
+    }
+    return this.ordinals;
+  }
+
+  decodeSegment({ streams, nRows }, firstRow) {
+    const { grids } = this.layout;
+    const groups = this.layout.groups.map((columns, g) => {
+      const reader = new ByteReader(streams[0][g], `lossless stream of group ${g}`);
+      const heads = columns.map((column) => readHead(reader, grids[column], column));
+      return { columns, heads, reader };
+    });
+    const heads = groups.flatMap((group) => group.heads);
+    const copies = heads.filter(({ kind }) => kind === COPY);
+    const sources = copies.map((copy) => sourceOf(copy, groups));
+    for (const { column, ordinal } of heads.filter(({ kind }) => kind === CONSTANT)) {
+      this.eachRow(firstRow, nRows, column, () => ordinal);
+    }
+    for (const group of groups) this.decodeBits(group, nRows, firstRow);
+    copies.forEach(({ column }, i) => {
+      const from = sources[i] - column;
+      this.eachRow(firstRow, nRows, column, (at) => this.ordinals[at + from]);
+    });
+  }
+
+  /** Sets a column to what `ordinalAt` says, which is given the index in `ordinals`. */
+  eachRow(firstRow, nRows, column, ordinalAt) {
+    const start = firstRow * this.nChannels + column;
+    const end = start + nRows * this.nChannels;
+    for (let at = start; at < end; at += this.nChannels) this.ordinals[at] = ordinalAt(at);
+  }
+
+  decodeBits({ heads, reader }, nRows, firstRow) {
+    const coded = heads.filter(({ kind }) => kind === CODED);
+    if (coded.length === 0) {
+      reader.end();
+      return;
+    }
+    const channels = coded.map((head) => new CodedChannel(head));
+    this.bits.start(reader.rest());
+    this.bits.decode(channels, nRows, this.nChannels, firstRow * this.nChannels);
+    this.bits.coder.finish(reader.what);
+  }
+}
+
+/** The column that a copy repeats. */
+function sourceOf({ group, channel }, groups) {
+  const from = groups[group]?.heads[channel];
+  if (!from || from.kind === COPY) {
+    const why = from ? "which is a copy itself" : "which there is not";
+    throw new Refused(`lossless: a copy of channel ${channel} of group ${group}, ${why}`);
+  }
+  return from.column;
+}
+
+// Heads
+
+function readHead(reader, grid, column) {
+  const kind = reader.u8();
+  switch (kind & 3) {
+    case CODED:
+      return { kind: CODED, column, ...readCoded(reader, kind, grid) };
+    case CONSTANT:
+      return { kind: CONSTANT, column, ordinal: readConstant(reader, kind) };
+    case COPY:
+      if (kind !== COPY) reader.refuse(`kind ${kind} of a copy has reserved bits set`);
+      return { kind: COPY, column, group: reader.varint(), channel: reader.varint() };
+    default:
+      return reader.refuse(`kind ${kind} of a channel is reserved`);
+  }
+}
+
+function readConstant(reader, kind) {
+  const size = kind >> 2;
+  if (size > 8) reader.refuse(`kind ${kind} of a constant: more than 8 bytes, or reserved bits`);
+  let zigzag = 0n;
+  reader.take(size).forEach((byte, i) => {
+    if (i === size - 1 && byte === 0) reader.refuse("a constant has more bytes than it needs");
+    zigzag |= BigInt(byte) << BigInt(8 * i);
+  });
+  return zigzag & 1n ? -(zigzag >> 1n) - 1n : zigzag >> 1n;
+}
+
+function readCoded(reader, kind, grid) {
+  const nTaps = (kind >> 3) & 15;
+  if (nTaps > MAX_TAPS) reader.refuse(`${nTaps} taps`);
+  const spelled = (kind & 128) !== 0;
+  const form = spelled ? reader.u8() : formOf(grid);
+  const drop = spelled ? reader.u8() : 0;
+  if (drop > greatestDrop(form)) reader.refuse(`form ${form} with a drop of ${drop}`);
+  let unit = 1;
+  let top = 0;
+  if (form === MULTIPLES) {
+    unit = reader.f64();
+    if (!(unit >= 2 ** -200 && unit <= 2 ** 80)) reader.refuse(`unit ${unit}`);
+  } else if (form !== PLAIN) {
+    top = reader.varint();
+    if (top > greatestTop(form)) reader.refuse(`top class ${top} of form ${form}`);
+  }
+  const q = reader.u8();
+  if (q > MAX_SCALE) reader.refuse(`scale ${q}`);
+  const scale = Math.floor(((4 + (q % 4)) * 2 ** (q >> 2)) / 4);
+  const taps = new Float64Array(nTaps);
+  for (let i = 0; i < nTaps; i++) {
+    taps[i] = reader.zigzag();
+    if (Math.abs(taps[i]) > MAX_TAP) reader.refuse(`a tap of ${taps[i]}`);
+  }
+  return { form, drop, unit, top, scale, taps, fromLast: (kind & 4) !== 0 };
+}
+
+/** The form of a channel whose head does not tell. */
+function formOf(grid) {
+  switch (grid.kind) {
+    case GENERAL:
+      return grid.digits;
+    case TEXT64:
+    case BINARY64:
+      return CLASSES_53;
+    case TEXT32:
+    case BINARY32:
+    case VAX_F:
+      return CLASSES_24;
+    default:
+      return PLAIN;
+  }
+}
+
+/** Greatest `drop` of a form; -1 where there is no such form. */
+function greatestDrop(form) {
+  if (form === PLAIN) return 19;
+  if (form <= 15 || form === MULTIPLES) return 0;
+  if (form === CLASSES_24) return 22;
+  if (form === CLASSES_53) return 51;
+  return -1;
+}
+
+function greatestTop(form) {
+  return form === CLASSES_24 ? 255 : form === CLASSES_53 ? 2047 : 614;
+}
+
+// Bits
+
+/** A coded channel: its head, what it remembers, and the numbers of its form. */
+class CodedChannel {
+  constructor(head) {
+    this.column = head.column;
+    this.form = head.form;
+    this.drop = head.drop;
+    this.unit = head.unit;
+    this.fromLast = head.fromLast;
+    this.taps = head.taps;
+    this.last = 0;
+    this.differences = new Float64Array(head.taps.length);
+    this.fast = 16 * head.scale;
+    this.slow = 16 * head.scale;
+    this.side1 = 0;
+    this.side2 = 0;
+
+    // The numbers of classes; they mean nothing for plain forms.
+    const decimal = head.form <= 15;
+    this.decimal = decimal;
+    this.top = head.top;
+    this.powers = decimal ? POWERS_OF_10 : POWERS_OF_2;
+    this.nDigits = decimal ? head.form : head.form - 64 - head.drop; // P
+    this.width = decimal ? 13 : 44; // W
+    const least = decimal ? 10 ** (head.form - 1) : 2 ** (this.nDigits - 1);
+    this.least = least; // L
+    this.greatest = (decimal ? 10 : 2) * least - 1; // B * L - 1
+    this.perClass = (decimal ? 9 : 1) * least; // K
+    this.limit = this.powers[this.width] - 1;
+    // Whether all magnitudes are below 2^53.
+    this.small = (head.top + 1) * this.perClass * 2 ** head.drop < TWO_53;
+  }
+
+  predict() {
+    const { taps, differences } = this;
+    let sum = 16;
+    for (let i = 0; i < taps.length; i++) sum += taps[i] * differences[i];
+    return (this.fromLast ? this.last : 0) + Math.floor(sum / 32);
+  }
+}
+
+/** beside(value, scale) of the specification. */
+function beside(value, scale) {
+  return clamp(bits(value) - bits(scale) + 3, 0, 7);
+}
+
+/** Decodes the coded channels of a group in a segment, one group after the other. */
+class BitDecoder {
+  /** @param {BigInt64Array} ordinals where they go */
+  constructor(ordinals) {
+    this.ordinals = ordinals;
+    this.halves = halvesOf(ordinals);
+    [this.startModel] = startModels("lossless_start.json");
+    this.model = this.startModel.copy();
+    this.residuals = new Residuals(this.model, RESIDUALS, RESIDUALS_MIXER);
+    this.coder = null;
+    this.near = 0;
+    this.other = 3;
+  }
+
+  /** Begins with the bits of a group. */
+  start(data) {
+    restart(this.model, this.startModel);
+    this.coder = new RangeDecoder(data);
+  }
+
+  /** Ordinal of row r and a channel goes to firstIndex + r * nChannels + its column. */
+  decode(channels, nRows, nChannels, firstIndex) {
+    for (let row = 0; row < nRows; row++) {
+      this.near = 0;
+      this.other = 3;
+      const first = firstIndex + row * nChannels;
+      for (let i = 0; i < channels.length; i++) {
+        const channel = channels[i];
+        if (channel.form === PLAIN || channel.form === MULTIPLES) {
+          this.plain(channel, first + channel.column);
+        } else {
+          this.classes(channel, first + channel.column);
+        }
+        this.other = channel.side1;
+      }
+    }
+  }
+
+  residual(channel, minus, f, g) {
+    const { side1, side2 } = channel;
+    return this.residuals.decode(this.coder, minus, f, g, this.near, side1, side2, this.other);
+  }
+
+  remember(channel, value, predicted) {
+    const { differences, slow } = channel;
+    for (let i = differences.length - 1; i > 0; i--) differences[i] = differences[i - 1];
+    if (differences.length > 0) differences[0] = clamp(value - channel.last, -TWO_40, TWO_40);
+    channel.last = value;
+    const error = value - predicted;
+    const size = 16 * Math.min(Math.abs(error), TWO_44);
+    this.near = (this.near + bits(size) - bits(slow)) >> 1;
+    channel.fast += Math.floor((size - channel.fast) / 2);
+    channel.slow = slow + Math.floor((size - slow) / 32);
+    channel.side2 = channel.side1;
+    channel.side1 = side(error);
+  }
+
+  /** Forms 0 and 32. */
+  plain(channel, index) {
+    const predicted = clamp(channel.predict(), -TWO_44, TWO_44);
+    const value = predicted + this.residual(channel, false, channel.fast, channel.slow);
+    if (!(value >= -TWO_44 && value < TWO_44)) {
+      throw new Refused(`lossless: the value ${value} is beyond 2^44`);
+    }
+    this.remember(channel, value, predicted);
+    const { drop } = channel;
+    if (channel.form === MULTIPLES) {
+      setInteger(this.halves, index, binary32Ordinal(value * channel.unit));
+    } else if (drop <= 8) {
+      setInteger(this.halves, index, value * 2 ** drop + this.coder.number(drop));
+    } else {
+      // value * 2^drop, and the low bits apart: drop is at most 19.
+      const low = (value % 2 ** (32 - drop)) * 2 ** drop + this.coder.number(drop);
+      setHalves(this.halves, index, low, Math.floor(value / 2 ** (32 - drop)));
+    }
+  }
+
+  /** The other forms. */
+  classes(channel, index) {
+    const { coder, model } = this;
+    const { fast, slow, powers, least, greatest } = channel;
+    const predicted = clamp(channel.predict(), -channel.limit, channel.limit);
+    const s = Math.abs(predicted);
+    const guess = guessed(channel, s);
+    const c = this.classOf(channel, s, guess);
+    if (c === ZERO_CLASS) {
+      const z = ZERO_SIGN;
+      const negative = model.mixed(coder, ZERO_SIGN_MIXER, z, z + 1, z + 2);
+      this.remember(channel, 0, predicted);
+      setHalves(this.halves, index, -negative, -negative);
+      return;
+    }
+    const k = c - channel.width + channel.top;
+    if (!(k >= 0 && k <= channel.top)) {
+      throw new Refused(`lossless: class ${k} of 0 to ${channel.top}`);
+    }
+
+    // the sign
+    const besideFast = beside(s, fast);
+    const besideSlow = beside(s, slow);
+    const either = c === guess ? besideFast : 8 + besideSlow;
+    const m8 = MINUS + 8 + besideSlow;
+    const differs = model.mixed(coder, MINUS_MIXER, MINUS + besideFast, m8, MINUS + 16 + either);
+    const minus = predicted < 0 !== (differs === 1);
+
+    // the mantissa
+    const j = Math.max(c - channel.nDigits, -63);
+    const power = powers[Math.abs(j)];
+    const expected = predicted < 0 === minus ? expectedMantissa(channel, s, j, power) : least;
+    let f;
+    let g;
+    if (j >= 0) {
+      f = Math.floor(fast / power);
+      g = Math.floor(slow / power);
+    } else {
+      const b = Math.min(power, TWO_52);
+      const h = Math.floor(TWO_52 / b);
+      f = Math.min(fast, h) * b;
+      g = Math.min(slow, h) * b;
+    }
+    const m = expected + this.residual(channel, minus, f, g);
+    if (!(m >= least && m <= greatest)) {
+      throw new Refused(`lossless: mantissa ${m} of ${least} to ${greatest}`);
+    }
+    let v;
+    if (j >= 0) v = m * power;
+    else if (power > 2 * m) v = 0;
+    else v = Math.floor((m + Math.floor(power / 2)) / power);
+    this.remember(channel, minus && v > 0 ? -v : v, predicted);
+    this.setClass(channel, index, minus, k, m);
+  }
+
+  /** The class, counted so that the class top is W; ZERO_CLASS for a zero. */
+  classOf(channel, s, guess) {
+    const { coder, model } = this;
+    const { fast, slow, powers } = channel;
+    const under = s - (guess > 0 ? powers[guess - 1] : 0);
+    const over = powers[guess] - s;
+    const u = under < over ? 0 : 1;
+    const e = Math.min(under, over);
+    const rf = beside(e, fast);
+    const rs = beside(e, slow);
+    const here = clamp(bits(s) - bits(slow) + 3, 0, 11);
+    const a = SAME + 16 * rf + 2 * rs + u;
+    const c = SAME + 224 + 8 * Math.min(guess, 15) + rf;
+    if (model.mixed(coder, SAME_MIXER, a, SAME + 128 + 8 * here + rs, c)) return guess;
+    const greater = model.mixed(coder, UP_MIXER, UP + u, UP + 2 + rf, UP + 10 + rs);
+    if (!greater && model.mixed(coder, ZERO_MIXER, ZERO + u, ZERO + 2 + rf, ZERO + 10 + rs)) {
+      return ZERO_CLASS;
+    }
+    let t = 0;
+    for (;;) {
+      const b = FAR + 32 + 8 * t + rf;
+      if (!model.mixed(coder, FAR_MIXER, FAR + 2 * t + greater, b, FAR + 160 + 8 * t + rs)) break;
+      t++;
+      if (t > 12) throw new Refused("lossless: a class more than 4096 from the expected one");
+    }
+    const steps = t === 0 ? 0 : 2 ** (t - 1) + coder.number(t - 1);
+    return greater ? guess + 1 + steps : guess - 1 - steps;
+  }
+
+  /** Sets the ordinal of a sign, a class k and a mantissa m. */
+  setClass(channel, index, minus, k, m) {
+    const inClass = (channel.decimal ? 1 : 0) + m - channel.least;
+    if (channel.small) {
+      const magnitude = (k * channel.perClass + inClass) * 2 ** channel.drop;
+      setInteger(this.halves, index, minus ? -1 - magnitude : magnitude);
+    } else {
+      const place = BigInt(k) * BigInt(channel.perClass) + BigInt(inClass);
+      const magnitude = place << BigInt(channel.drop);
+      this.ordinals[index] = minus ? -1n - magnitude : magnitude;
+    }
+  }
+}
+
+const ZERO_CLASS = -Infinity;
+
+/** The least g >= 0 with B^g > s. */
+function guessed(channel, s) {
+  if (!channel.decimal) return bits(s);
+  let g = 0;
+  while (POWERS_OF_10[g] <= s) g++;
+  return g;
+}
+
+/** The mantissa m' that is expected where the sign is. */
+function expectedMantissa(channel, s, j, power) {
+  const { least, greatest } = channel;
+  if (j >= 0) return clamp(Math.floor((s + Math.floor(power / 2)) / power), least, greatest);
+  if (s === 0) return least;
+  if (power > Math.floor(greatest / s)) return greatest;
+  return clamp(s * power, least, greatest);
+}

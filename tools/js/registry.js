@@ -1,0 +1,49 @@
+// SPEC.md, "Registry" and the table of "Codecs".
+
+import { Refused, Unsupported } from "./errors.js";
+
+/** Source formats: what each is a source of. */
+const SOURCE_FORMATS = new Map([
+  [1, { name: "asf", of: "skeleton" }],
+  [2, { name: "amc", of: "clip" }],
+  [3, { name: "bvh", of: "clip" }],
+  [4, { name: "c3d", of: "clip" }],
+]);
+
+/** Names of the source formats that this decoder restores. */
+export const SOURCE_FORMAT_NAMES = [...SOURCE_FORMATS.values()].map((format) => format.name);
+
+/**
+ * Checks a statement about a source: its format is that of its SRCE, and a source of such a thing.
+ * A format that this decoder does not know may be anything; it is unsupported when it is restored.
+ *
+ * @param {number} format as stated
+ * @param {{format: number}} template the SRCE
+ * @param {"clip" | "skeleton"} of
+ * @param {string} what named in messages
+ * @throws {Refused}
+ */
+export function checkSourceFormat(format, template, of, what) {
+  if (format !== template.format) {
+    throw new Refused(`${what}: source format ${format}, that of its SRCE is ${template.format}`);
+  }
+  const known = SOURCE_FORMATS.get(format);
+  if (known && known.of !== of) {
+    throw new Refused(`${what}: ${known.name} is no source of a ${of}`);
+  }
+}
+
+/** The name of a source format, or its id where this decoder does not know it. */
+export function sourceFormatLabel(format) {
+  return SOURCE_FORMATS.get(format)?.name ?? `format ${format}`;
+}
+
+/**
+ * @param {number} format id of a source format
+ * @returns {string} its name
+ * @throws {Unsupported} where it is not known
+ */
+export function sourceFormatName(format) {
+  if (!SOURCE_FORMATS.has(format)) throw new Unsupported(`source format ${format}`);
+  return SOURCE_FORMATS.get(format).name;
+}
