@@ -1,0 +1,167 @@
+"""Properties of the readers of source files: what is read can be kept, and comes back whole."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zlib
+from contextlib import suppress
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import mcz
+from mcz.files.report import validate
+from mcz.formats import FORMATS, asf
+from mcz.formats.arriving import Floats
+from mcz.motion import Motion, Skeleton
+from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from tools.fuzz.guard import hold
+from tools.fuzz.seeds import sources
+
+FRAMES = 3  # of a sample, as a seed
+STORED = 3  # one of so many motions that are read is stored, too, which takes long
+
+WORDS = {
+    "bvh": (
+        "HIERARCHY ROOT JOINT OFFSET CHANNELS MOTION Frames: Xposition Yposition Zposition "
+        "Xrotation Yrotation Zrotation { } 0.0 -0 1e-3 1e300 nan inf 16777217 -1.#IND 1,5 "
+        "0.30000000000000004 End|Site Frame|Time:|.0083333 \\x0d\\x0a \\x09 \\xef\\xbb\\xbf"
+    ),
+    "asf": (
+        ":version :name :units :documentation :root :bonedata :hierarchy begin end id name "
+        "direction length axis dof limits order position orientation mass angle deg rad rx ry rz "
+        "tx ty tz l XYZ ZYX TX RZ root (-inf inf) # 1e-014 nan \\x0d\\x0a"
+    ),
+    "amc": (
+        ":FULLY-SPECIFIED :DEGREES :RADIANS #!OML:ASF root lowerback lfemur 1 2 3 -0 1e-014 "
+        "nan 1e300 0.30000000000000004 \\x0d\\x0a \\x09"
+    ),
+    "c3d": (
+        "POINT ANALOG USED SCALE RATE DATA_START FRAMES LABELS LABELS2 DESCRIPTIONS UNITS OFFSET "
+        "GEN_SCALE FORMAT UNSIGNED SIGNED TRIAL ACTUAL_START_FIELD ACTUAL_END_FIELD EVENT "
+        "\\x02\\x50 \\x54 \\x55 \\x56 \\xff\\xff \\x00\\x80 \\x00\\x00\\x80\\x3f"
+    ),
+}
+
+
+def words(name: str) -> list[str]:
+    """Words of the format ``name`` that mutations put in."""
+    return [word.replace("|", " ") for word in WORDS[name].split()]
+
+
+def seeds(name: str) -> dict[str, bytes]:
+    """Small files of the format ``name``: a few frames of the samples, and what vectors restore."""
+    return {f"{name}-sample": _sample(name)} | sources(name)
+
+
+def _sample(name: str) -> bytes:
+    if name == "asf":
+        return asf.write(acclaim_walk().skeleton)
+    walk = {"amc": acclaim_walk, "bvh": bvh_walk, "c3d": marker_walk}[name]()
+    signal = walk.signals[0]
+    mask = None if signal.mask is None else signal.mask[:FRAMES]
+    cut = replace(signal, values=signal.values[:FRAMES], mask=mask)
+    return FORMATS[name].write(replace(walk, signals=(cut,), source=None))
+
+
+def check_bvh(data: bytes) -> bool:
+    return _check("bvh", data)
+
+
+def check_c3d(data: bytes) -> bool:
+    return _check("c3d", data)
+
+
+def check_amc(data: bytes) -> bool:
+    """As it is, and with the first skeleton that fits."""
+    for bones in _bones():
+        with suppress(mcz.SourceError):
+            return _check("amc", data, bones)
+    return _check("amc", data)
+
+
+@cache
+def _bones() -> list[Skeleton]:
+    return [asf.read(data, "bones") for data in seeds("asf").values()]
+
+
+@cache
+def _folder() -> Path:
+    return Path(tempfile.mkdtemp(prefix="mcz-fuzz-"))
+
+
+def _check(name: str, data: bytes, *skeleton: Skeleton) -> bool:
+    read = FORMATS[name].read
+    rows = _arrived(name, data, *skeleton)
+    motion: Motion = read(data, "fuzz", *skeleton)
+    hold(same(motion, read(data, "fuzz", *skeleton)), "read twice, it differs")
+    hold(FORMATS[name].write(motion) == data, "written again, it differs")
+    if rows is not None:
+        hold(np.array_equal(rows, motion.values, equal_nan=True), "line by line, it differs")
+    if zlib.crc32(data) % STORED:
+        return True
+    out = io.BytesIO()
+    mcz.write(motion, out)
+    with mcz.open(out.getvalue()) as file:
+        clip = file.only_clip()
+        hold(clip.source_bytes() == data, "restored, it differs")
+        hold(same(motion, clip.motion()), "stored, the motion differs")
+        hold(not validate(file), "stored, the file is not valid")
+    return True
+
+
+def _arrived(name: str, data: bytes, *skeleton: Skeleton) -> Floats | None:
+    """The rows of a text that is read line by line, None where it cannot be."""
+    arrive = FORMATS[name].arrive
+    if arrive is None:
+        return None
+    try:
+        arriving = arrive(iter(io.BytesIO(data)), *skeleton)
+        rows = [row for _, row in arriving.frames]
+    except mcz.MczError:
+        return None
+    return np.array(rows).reshape(len(rows), arriving.skeleton.n_channels)
+
+
+def check_asf(data: bytes) -> bool:
+    """By way of a file, as a skeleton is kept under its own name."""
+    skeleton = asf.read(data, "fuzz")
+    hold(skeleton == asf.read(data, "fuzz"), "read twice, it differs")
+    hold(asf.write(skeleton) == data, "written again, it differs")
+    path, out = _folder() / "fuzz.asf", io.BytesIO()
+    path.write_bytes(data)
+    mcz.encode(path, out)
+    with mcz.open(out.getvalue()) as file:
+        ((id_, stored),) = file.skeletons
+        hold(file.skeleton_bytes(id_) == data, "restored, it differs")
+        hold(stored.joints == skeleton.joints, "stored, the joints differ")
+        hold(not validate(file), "stored, the file is not valid")
+    return True
+
+
+def same(one: Motion, other: Motion) -> bool:
+    """Whether all that is said of a motion agrees, each value to the bit."""
+    facts = [
+        (m.frame_rate, m.frame_rate_exact, m.metadata, m.skeleton.joints) for m in (one, other)
+    ]
+    numbers = [m.frame_numbers if m.frame_numbers is not None else () for m in (one, other)]
+    return (
+        facts[0] == facts[1]
+        and np.array_equal(*numbers)
+        and len(one.signals) == len(other.signals)
+        and all(map(_same_signal, one.signals, other.signals))
+    )
+
+
+def _same_signal(one: mcz.Signal, other: mcz.Signal) -> bool:
+    masks = [np.ones(s.values.shape, bool) if s.mask is None else s.mask for s in (one, other)]
+    return (
+        one.values.dtype == other.values.dtype
+        and one.values.shape == other.values.shape
+        and one.values.tobytes() == other.values.tobytes()
+        and np.array_equal(*masks)
+        and (one.name, one.samples_per_frame) == (other.name, other.samples_per_frame)
+    )
