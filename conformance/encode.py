@@ -160,6 +160,7 @@ def _encode(pair: Pair, task: Task, paths: Mapping[bytes, Path]) -> Result:
         return Result(task, declined=True, seconds=first.seconds)
     fault = _encoder_fault(first) or _restored(pair.decoder, task, first.output)
     second = first if fault else pair.encoder.ask(arguments, task.content, limit)
+    fault = fault or _encoder_fault(second)
     same = second.output == first.output
     return Result(task, fault, False, same, len(first.output), first.seconds)
 

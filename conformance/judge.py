@@ -147,7 +147,7 @@ def listing_of(output: bytes, listing: str) -> tuple[list[dict[str, Any]], bytes
         if not isinstance(rows, list):
             raise ValueError(f"the line is no object with a list {listing!r}")
         return [_row(row, listing) for row in rows], body
-    except (ValueError, TypeError, RecursionError) as error:
+    except (ValueError, TypeError, OverflowError, RecursionError) as error:
         raise Wrong("bad listing", str(error)) from None
 
 
@@ -158,9 +158,16 @@ def _row(row: Any, listing: str) -> dict[str, Any]:
     missing = {"bytes", *FIELDS[listing]} - set(row)
     if missing:
         raise ValueError(f"a row without {', '.join(sorted(missing))}")
-    numbers = {"bytes": int(row["bytes"])}
+    numbers = {"bytes": _integer(row["bytes"])}
     if numbers["bytes"] < 0:
         raise ValueError(f"a row of {row['bytes']} bytes")
     if listing == "arrays":
-        return row | numbers | {"shape": [int(length) for length in row["shape"]]}
+        return row | numbers | {"shape": [_integer(length) for length in row["shape"]]}
     return row | numbers
+
+
+def _integer(value: Any) -> int:
+    number = int(value)
+    if number != value and str(number) != value:
+        raise ValueError(f"{value!r} is no whole number"[:200])
+    return number

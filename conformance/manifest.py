@@ -99,7 +99,8 @@ class Capabilities:
         if not isinstance(document, dict):
             raise ValueError("the capabilities are no object")
         version = document.get("format")
-        if version is not None and not re.fullmatch(r"\d+\.\d+", str(version)):
+        is_known = isinstance(version, str) and re.fullmatch(r"[0-9]+\.[0-9]+", version)
+        if version is not None and not is_known:
             raise ValueError(f"format is {version!r}, no version such as 0.9")
         sources = _words(document, "sources")
         if sources is not None and not sources <= set(FORMATS):

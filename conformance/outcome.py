@@ -53,7 +53,7 @@ def capabilities(command: Sequence[str], limits: Limits) -> Capabilities:
         return Capabilities()
     try:
         return Capabilities.parse(answer.output)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"--capabilities writes no declaration: {error}") from None
 
 

@@ -9,6 +9,7 @@ language can be tested without installing this package.
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import os
 import shlex
@@ -129,4 +130,6 @@ def _remarks(can: Capabilities, vectors: Sequence[Vector]) -> list[str]:
 
 
 if __name__ == "__main__":
+    if isinstance(sys.stdout, io.TextIOWrapper):  # what a decoder says may not fit its encoding
+        sys.stdout.reconfigure(errors="backslashreplace")
     sys.exit(main())

@@ -113,7 +113,7 @@ def _exchange(
     try:
         answer = json.loads(line)
         code, size = int(answer["exit"]), int(answer["bytes"])
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
         raise _Lost("bad answer", f"a server's line is {line[:100]!r}") from None
     if not (0 <= code < 256 and size >= 0):
         raise _Lost("bad answer", f"exit {code}, {size} bytes")

@@ -218,6 +218,8 @@ WRONG = {
     "turns an array": (f"{IS_PLAIN} rows[0]['shape'].reverse()", "wrong listing"),
     "lists too little": (f"{IS_PLAIN} rows = rows[:1]", "bad listing"),
     "lists no rows": (f"{IS_PLAIN} rows = 3", "bad listing"),
+    "lists without end": (f"{IS_PLAIN} rows[0]['bytes'] = float('inf')", "bad listing"),
+    "lists half a byte": (f"{IS_PLAIN} rows[0]['bytes'] += 0.5", "bad listing"),
     "refuses": (f"{IS_PLAIN} code = 1", "wrongly refused"),
     "has not": (f"{IS_PLAIN} code = 3", "called unsupported"),
     "exits with 7": (f"{IS_PLAIN} code = 7", "bad exit code"),
@@ -230,7 +232,7 @@ def test_a_fault_has_a_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str, serve: list[str]
 ) -> None:
     edit, kind = WRONG[fault]
-    limits = ["--timeout", "3" if fault == "hangs" else "60", "--memory", "200", "--jobs", "2"]
+    limits = ["--timeout", "10" if fault == "hangs" else "60", "--memory", "200", "--jobs", "2"]
     command = decoder(tmp_path, edit)
     code, document = result(capsys, "--decoder", command, "--only", "raw", *limits, *serve)
     assert code == 1
@@ -364,6 +366,7 @@ def test_without_sources(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         b'{"codecs": "raw"}',
         b'{"sources": ["fbx"]}',
         b'{"format": "new"}',
+        b'{"format": 0.9}',
         b"\xff",
         b"{",
     ],

@@ -20,6 +20,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
+from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR  # noqa: E402 - needs the path
 from tools.vectors import (  # noqa: E402 - needs the path
     bad_bounds,
     bad_c3d,
@@ -148,7 +149,7 @@ MODULES = (
     bad_rules_points,
     bad_gaps,
 )
-FORMAT_VERSION = "0.9"
+FORMAT_VERSION = f"{FORMAT_MAJOR}.{FORMAT_MINOR}"
 
 
 def vectors() -> list[Vector]:

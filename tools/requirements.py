@@ -128,8 +128,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--uncovered", action="store_true", help="those without vectors alone")
     options = parser.parse_args(arguments)
 
-    known = rules((ROOT / "SPEC.md").read_text())
-    named = vectors_of(json.loads((ROOT / "conformance/manifest.json").read_text()))
+    known = rules((ROOT / "SPEC.md").read_text("utf-8"))
+    named = vectors_of(json.loads((ROOT / "conformance/manifest.json").read_text("utf-8")))
     unknown = sorted({*named, *ARGUED} - {rule.id for rule in known})
     lacking = [r.id for r in known if r.binds and r.id not in named and r.id not in ARGUED]
     shown = [rule for rule in known if options.section in (None, rule.section)]

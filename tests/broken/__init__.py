@@ -34,6 +34,10 @@ class Break:
         return f"{self.id}{self.variant and '.'}{self.variant}"
 
 
+class StaleError(BaseException):
+    """A break does not fit its module; no ``except Exception`` may take that for a broken rule."""
+
+
 class _Loader(SourceFileLoader):
     """Loads a module from its changed source."""
 
@@ -46,9 +50,12 @@ class _Loader(SourceFileLoader):
             if module == fullname:
                 if source.count(old) != 1:
                     times = source.count(old)
-                    raise ImportError(f"{self.broken.name}: {times} times in {module}: {old!r}")
+                    raise StaleError(f"{self.broken.name}: {times} times in {module}: {old!r}")
                 source = source.replace(old, new)
-        return compile(source, self.path, "exec", dont_inherit=True)
+        try:
+            return compile(source, self.path, "exec", dont_inherit=True)
+        except SyntaxError as error:
+            raise StaleError(f"{self.broken.name}: {error}") from None
 
 
 class _Finder(MetaPathFinder):

@@ -24,7 +24,10 @@ def faults(vector: dict[str, Any]) -> list[str]:
 
 
 def answer(data: bytes, arguments: Sequence[str]) -> tuple[int, bytes]:
-    """Exit code and output of one request; a crash has code 2 and its last line as output."""
+    """Exit code and output of one request; a crash has code 2 and its last line as output.
+
+    A name or module that is not there is a slip in the break, and is raised.
+    """
     from mcz.cli import conformance
     from mcz.errors import MczError, UnsupportedError
 
@@ -35,6 +38,8 @@ def answer(data: bytes, arguments: Sequence[str]) -> tuple[int, bytes]:
         return 3, b""
     except MczError:
         return 1, b""
+    except (ImportError, NameError):
+        raise
     except Exception:
         return 2, traceback.format_exc().splitlines()[-1].encode()
 

@@ -178,7 +178,13 @@ CLIPS: tuple[Break, ...] = (
     Break(
         "REG-01",
         ("invalid/clip/frame-numbers-zeros", "invalid/clip/frame-numbers-sign"),
-        (("mcz.files.frames", "if not _TEXT.fullmatch(text):", "if False:"),),
+        (
+            (
+                "mcz.files.frames",
+                "if not _TEXT.fullmatch(text):\n            raise ValueError",
+                "if False:\n            raise ValueError",
+            ),
+        ),
     ),
     Break(
         "GRAM-10",

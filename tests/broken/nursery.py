@@ -14,7 +14,7 @@ import sys
 from tests.broken import answers, install
 from tests.broken.table import BREAKS
 
-SECONDS = 120  # of a child; one that hangs was caught, but is not to hold up the others
+SECONDS = 120  # of a child; one that hangs fails the test, and is not to hold up the others
 
 
 def main() -> None:

@@ -33,13 +33,13 @@ BREAKS: tuple[Break, ...] = (
         (
             (
                 SEGMENTS,
-                "return bool(self.header.flags & FRAME_NOTES) + group",
-                "return self._codec_start() - self.counts.n_groups + group",
+                "return bool(self.header.flags & FRAME_NOTES) + group\n",
+                "return self._codec_start() - self.counts.n_groups + group  # as a mask\n",
             ),
             (
                 SEGMENTS,
-                "return self._codec_start() - self.counts.n_groups + group",
-                "return bool(self.header.flags & FRAME_NOTES) + group",
+                "return self._codec_start() - self.counts.n_groups + group\n",
+                "return bool(self.header.flags & FRAME_NOTES) + group\n",
             ),
         ),
     ),

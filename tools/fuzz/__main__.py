@@ -120,7 +120,7 @@ def _run(
         "--seeds": seeds,
         "--findings": findings,
         "--figures": figures,
-        "--cache": Path(tempfile.gettempdir()) / "mcz-fuzz-numba",
+        "--cache": Path.home() / ".cache" / "mcz-fuzz",
         "--seconds": seconds,
         "--runs": given.runs,
         "--seed": given.seed + outcome.deaths,

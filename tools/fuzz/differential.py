@@ -30,6 +30,7 @@ from mcz.cli.conformance import respond
 from mcz.container import reader
 from mcz.errors import MczError, UnsupportedError
 from tools.fuzz import guard
+from tools.fuzz.files import hides_frames
 from tools.fuzz.mutation import Mutation, plain_change
 from tools.fuzz.repair import with_hashes
 from tools.fuzz.seeds import vectors
@@ -262,15 +263,7 @@ def is_choice(data: bytes, one: int, other: int) -> bool:
     """Whether SPEC.md leaves it to a reader which of two exit codes it has for ``data``."""
     if {one, other} == {REFUSED, UNSUPPORTED}:
         return True
-    return {one, other} == {DECODED_OK, REFUSED} and _hides_frames(data)
-
-
-def _hides_frames(data: bytes) -> bool:
-    try:
-        with mcz.open(data) as file:
-            return any(s.skip or s.spare for clip in file.clips.values() for s in clip.signals)
-    except MczError:
-        return False
+    return {one, other} == {DECODED_OK, REFUSED} and hides_frames(data)
 
 
 def equal(one: bytes, other: bytes) -> bool:

@@ -208,8 +208,18 @@ def _live(data: bytes, strict: dict[tuple[str, int], Arrays]) -> None:
     except (LimitError, UnsupportedError):  # a clip that can only be read as a whole
         return
     except MczError as error:
-        hold(False, f"what decodes cannot be followed: {type(error).__name__} {error}")
+        hold(hides_frames(data), f"what decodes cannot be followed: {type(error).__name__} {error}")
+        return
     hold(next(rows, None) is None, "a live frame too few")
+
+
+def hides_frames(data: bytes) -> bool:
+    """Whether a clip has stored frames that it does not show, whose streams nobody need decode."""
+    try:
+        with mcz.open(data) as file:
+            return any(s.skip or s.spare for clip in file.clips.values() for s in clip.signals)
+    except MczError:
+        return False
 
 
 def _rows(strict: dict[tuple[str, int], Arrays]) -> Iterator[Any]:
