@@ -13,8 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
+from typing import TypeVar
 
 from mcz.errors import MczError
+
+Result = TypeVar("Result")
 
 SECONDS = 10.0  # of processor time, so that a busy machine raises no alarm
 MEMORY = 1536 * 2**20  # bytes of data beyond those of the start
@@ -57,18 +60,20 @@ def _too_long(number: int, frame: FrameType | None) -> None:
     raise HangError(f"more than {SECONDS} s of processor time")
 
 
-def timed(check: Callable[[bytes], bool], data: bytes) -> bool:
-    """``check(data)`` within ``SECONDS``; a first excess may be that of a compiler."""
-    for again in (True, False):
-        signal.setitimer(signal.ITIMER_VIRTUAL, SECONDS)
-        try:
-            return check(data)
-        except HangError:
-            if not again:
-                raise
-        finally:
-            signal.setitimer(signal.ITIMER_VIRTUAL, 0)
-    return False
+def timed(call: Callable[[bytes], Result], data: bytes) -> Result:
+    """``call(data)`` within ``SECONDS``; a first excess may be that of a compiler."""
+    try:
+        return _timed(call, data)
+    except HangError:
+        return _timed(call, data)
+
+
+def _timed(call: Callable[[bytes], Result], data: bytes) -> Result:
+    signal.setitimer(signal.ITIMER_VIRTUAL, SECONDS)
+    try:
+        return call(data)
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
 
 
 @dataclass(slots=True)

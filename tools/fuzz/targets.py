@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 
 from tools.fuzz import files, readers
+from tools.fuzz.guard import HangError, timed
 from tools.fuzz.mutation import Mutation
+from tools.fuzz.repair import with_hashes
 from tools.fuzz.seeds import vectors
 
 AFRESH = 0.4
@@ -38,10 +41,11 @@ def _reader(name: str, check: Check) -> Target:
     return Target(name, purpose, check, seeds, words=readers.words(name))
 
 
-def mutator(raw: float, seeds: Callable[[], dict[str, bytes]]) -> Mutator:
+def mutator(raw: float, seeds: Callable[[], dict[str, bytes]], hashed: float = 0) -> Mutator:
     """Mutations by structure, repaired; ``raw`` is how often bytes are changed as they are.
 
-    Most of what libFuzzer keeps is refused, so that some mutations begin with a seed.
+    ``hashed`` is how often the hashes of values and sources are made right, too. Most of what
+    libFuzzer keeps is refused, so that some mutations begin with a seed.
     """
     known = cache(lambda: sorted(seeds().values()))
 
@@ -50,7 +54,12 @@ def mutator(raw: float, seeds: Callable[[], dict[str, bytes]]) -> Mutator:
 
         rng = random.Random(seed)
         begin = rng.choice(known()) if rng.random() < AFRESH else data
-        return Mutation(rng, atheris.Mutate).of(begin, most, raw)
+        made = Mutation(rng, atheris.Mutate).of(begin, most, raw)
+        if rng.random() < hashed:
+            with suppress(Exception, HangError):  # what goes wrong does so in the check, too
+                right = timed(partial(with_hashes, max_decoded=files.DECODED), made)
+                made = right if len(right) <= most else made
+        return made
 
     return mutate
 
@@ -73,7 +82,7 @@ TARGETS: dict[str, Target] = {
             "whole files: strict, in parts, salvaged, live, verified",
             files.check_file,
             vectors,
-            mutator(0.3, vectors),
+            mutator(0.2, vectors, hashed=0.5),
         ),
         _decoder("lossless", "lossless", "raw", "numbers", "notes"),
         _decoder("wavelets", "mrdwt", "dwt", "awt"),
