@@ -567,3 +567,20 @@ def test_an_index_lists_everything_once_and_in_the_order_of_the_file() -> None:
     for message, change in changes.items():
         with pytest.raises(mcz.FormatError, match=message):
             scan(open_source(_listed(change)), whole=True)
+
+
+BONES = mcz.Skeleton((mcz.Joint("knee", channels=(mcz.Channel("rx"),)),), angle_unit="deg")
+
+
+def test_amc_that_arrives_with_zeros_behind_its_first_frame_number() -> None:
+    lines = [b":DEGREES\n", b"2\0\0 \n", b"knee 1.5\n", b"3\n", b"knee 2\n"]
+    arriving = FORMATS["amc"].arrive(iter(lines), BONES)  # type: ignore[misc]
+    assert arriving.first_number == 2
+    assert [row.tolist() for _, row in arriving.frames] == [[1.5], [2.0]]
+
+
+def test_amc_that_arrives_with_nothing_in_its_first_frame() -> None:
+    """Later frames have no bones then either, as they would be others in each frame."""
+    lines = [b":DEGREES\n", b"1\n", b"2\n", b"knee 2\n"]
+    with pytest.raises(mcz.SourceError, match="'knee', which the first frame does not have"):
+        list(FORMATS["amc"].arrive(iter(lines), BONES).frames)  # type: ignore[misc]

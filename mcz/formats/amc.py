@@ -166,7 +166,7 @@ def _header(source: Lines) -> tuple[bytes, int | None]:
     header = bytearray()
     for line in source:
         if _FIRST_FRAME.fullmatch(line.rstrip(b"\n")):
-            return bytes(header), _frame_number(source, line.strip())
+            return bytes(header), _frame_number(source, _WORDS.findall(line)[0])
         header += line
     return bytes(header), None
 
@@ -184,7 +184,7 @@ class _ArrivingFrames:
         self.source, self.skeleton = source, skeleton
         self._unit = _unit(header)
         self._columns: Mapping[str, int] = {}
-        self._counts: dict[str, int] = {}  # of the values of each bone
+        self._counts: dict[str, int] | None = None  # of the values of each bone of the first frame
 
     def rows(self, number: int) -> Iterator[Frame]:
         """All frames, the first of which has this number."""
@@ -210,8 +210,8 @@ class _ArrivingFrames:
         name = words[0].decode("utf-8", "backslashreplace")
         if name in bones:
             raise self.source.error(f"bone {name[:40]!r} twice in a frame")
-        count = self._counts.get(name)
-        if done or (self._counts and count is None):
+        count = None if self._counts is None else self._counts.get(name)
+        if done or (self._counts is not None and count is None):
             raise self.source.error(f"bone {name[:40]!r}, which the first frame does not have")
         if count is not None and count != len(words) - 1:
             raise self.source.error(
@@ -220,14 +220,14 @@ class _ArrivingFrames:
         bones[name] = words[1:]
 
     def _is_whole(self, bones: Mapping[str, list[bytes]]) -> bool:
-        if self._counts:
+        if self._counts is not None:
             return len(bones) == len(self._counts)
         joints = {joint.name for joint in self.skeleton.joints if joint.channels}
         return joints <= set(match_names(self.skeleton, dict.fromkeys(bones, 0)).values())
 
     def _row(self, bones: Mapping[str, list[bytes]]) -> NDArray[np.float64]:
         """The values of a frame, (n_channels,), NaN where a bone did not come."""
-        if not self._counts:
+        if self._counts is None:
             self._counts = {name: len(texts) for name, texts in bones.items()}
             self.skeleton, self._columns = fit(self.skeleton, self._counts, self._unit)
         row = np.full(self.skeleton.n_channels, np.nan)
