@@ -169,7 +169,8 @@ class LiveWriter:
         """
         if not self._is_open:
             raise MotionError("the live clip is closed")
-        self._encoder.change(params)
+        options = self.codec.options(params)
+        self._encoder.change({name: options[name] for name in params})
         self._changed |= set(params)
 
     def _settle(self) -> Floats:
