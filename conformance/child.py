@@ -64,6 +64,7 @@ class Child:
         self.process = subprocess.Popen(
             _limited(command, limits.memory, max_file), start_new_session=POSIX, **files
         )
+        self._inherited = _own_peak()
 
     def watch(self) -> None:
         """Kill the process unless ``unwatch`` is called within the time limit."""
@@ -95,7 +96,11 @@ class Child:
             return
 
     def end(self) -> tuple[int, int]:
-        """Wait for the end; exit code, and the most bytes that were resident, 0 if unknown."""
+        """Wait for the end; exit code, and the most bytes that were resident, 0 if unknown.
+
+        Linux counts what this process held when it started the other one: up to there nothing is
+        known.
+        """
         if not hasattr(os, "wait4"):
             self.process.wait()
             self.unwatch()
@@ -107,7 +112,22 @@ class Child:
         _, status, usage = os.wait4(self.process.pid, 0)
         self.process.returncode = os.waitstatus_to_exitcode(status)
         self.unwatch()
-        return self.process.returncode, usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+        peak = _peak_bytes(usage)
+        return self.process.returncode, peak if peak > self._inherited else 0
+
+
+def _own_peak() -> int:
+    """The most bytes that this process ever held, 0 if unknown."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0
+    return _peak_bytes(resource.getrusage(resource.RUSAGE_SELF))
+
+
+def _peak_bytes(usage: Any) -> int:
+    peak: int = usage.ru_maxrss
+    return peak * (1 if sys.platform == "darwin" else 1024)
 
 
 def _limited(command: Sequence[str], memory: int, max_file: int) -> list[str]:

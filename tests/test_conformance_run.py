@@ -23,6 +23,7 @@ from conformance.child import Limits
 from conformance.manifest import Capabilities, select
 
 HERE = Path(run.__file__).parent
+ROOT = HERE.parent
 BVH, ASF, AMC = b"HIERARCHY", b":root", b":FULLY-SPECIFIED"
 
 
@@ -168,11 +169,28 @@ def decoder(folder: Path, edit: str = "", declared: dict[str, Any] | None = None
     return script(folder, DECODER.format(edit=edit or "pass", declared=given))
 
 
-def result(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any]]:
-    """Exit code and JSON document of a run."""
-    code = run.main([*arguments, "--json"])
-    document: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return code, document
+RUNNER = """
+import sys
+from pathlib import Path
+from conformance import manifest, run
+
+manifest.HERE = Path(sys.argv[1])
+manifest.VECTORS = manifest.HERE / "vectors"
+ballast = b"x" * int(sys.argv[2])
+sys.exit(run.main(sys.argv[3:]))
+"""
+
+
+def result(*arguments: str, ballast: int = 0) -> tuple[int, dict[str, Any]]:
+    """Exit code and JSON document of a run in a process of its own, small as the command's is."""
+    done = subprocess.run(
+        [sys.executable, "-c", RUNNER, str(manifest.HERE), str(ballast), *arguments, "--json"],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        check=False,
+    )
+    document: dict[str, Any] = json.loads(done.stdout)
+    return done.returncode, document
 
 
 def kinds(document: dict[str, Any]) -> dict[str, set[str]]:
@@ -188,10 +206,8 @@ def kinds(document: dict[str, Any]) -> dict[str, set[str]]:
 
 
 @pytest.mark.parametrize("serve", [[], ["--serve"]], ids=["processes", "served"])
-def test_an_honest_decoder_passes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], serve: list[str]
-) -> None:
-    code, document = result(capsys, "--decoder", decoder(tmp_path), *serve)
+def test_an_honest_decoder_passes(tmp_path: Path, serve: list[str]) -> None:
+    code, document = result("--decoder", decoder(tmp_path), *serve)
     assert (code, kinds(document)) == (0, {})
     assert document["badge"] == "MCZ 0.9 conformance: 6/6 full decoder"
     assert document["tables"]["group"]["valid"] == {"passed": 4}
@@ -228,15 +244,21 @@ WRONG = {
 
 @pytest.mark.parametrize("serve", [[], ["--serve"]], ids=["processes", "served"])
 @pytest.mark.parametrize("fault", WRONG)
-def test_a_fault_has_a_name(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str, serve: list[str]
-) -> None:
+def test_a_fault_has_a_name(tmp_path: Path, fault: str, serve: list[str]) -> None:
     edit, kind = WRONG[fault]
     limits = ["--timeout", "10" if fault == "hangs" else "60", "--memory", "200", "--jobs", "2"]
     command = decoder(tmp_path, edit)
-    code, document = result(capsys, "--decoder", command, "--only", "raw", *limits, *serve)
+    code, document = result("--decoder", command, "--only", "raw", *limits, *serve)
     assert code == 1
     assert kinds(document) == {"valid/raw/plain": {kind}}  # the others are as they were
+
+
+@pytest.mark.parametrize("serve", [[], ["--serve"]], ids=["processes", "served"])
+def test_a_large_runner_accuses_nobody(tmp_path: Path, serve: list[str]) -> None:
+    """What the runner itself holds is not its decoder's."""
+    limits = ["--memory", "100", "--jobs", "2"]
+    code, document = result("--decoder", decoder(tmp_path), *limits, *serve, ballast=2**28)
+    assert (code, kinds(document)) == (0, {})
 
 
 def test_what_is_accepted_is_named_with_its_effect(
@@ -251,21 +273,19 @@ def test_what_is_accepted_is_named_with_its_effect(
     assert shown.endswith("4 passed, 2 failed\nMCZ 0.9 conformance: 4/6 full decoder\n")
 
 
-def test_too_much_on_standard_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_too_much_on_standard_error(tmp_path: Path) -> None:
     command = decoder(tmp_path, f"{IS_PLAIN} sys.stderr.write('x' * 2**26)")
-    _, document = result(capsys, "--decoder", command, "--only", "valid/raw")
+    _, document = result("--decoder", command, "--only", "valid/raw")
     assert kinds(document) == {"valid/raw/plain": {"output too long"}}
 
 
-def test_what_a_decoder_started_ends_with_it(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_a_decoder_started_ends_with_it(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     edit = f"os.fork(); held = open({str(pipe)!r}, 'wb', 0); time.sleep(20); held.write(b'x')"
     options = ["--timeout", "2", "--only", "valid/mrdwt"]
-    code, document = result(capsys, "--decoder", decoder(tmp_path, edit), *options)
+    code, document = result("--decoder", decoder(tmp_path, edit), *options)
     assert (code, kinds(document)) == (1, {"valid/mrdwt/plain": {"hang"}})
     os.set_blocking(reader, True)
     assert os.read(reader, 1) == b""  # all that held it are gone, and none got so far as to write
@@ -282,13 +302,11 @@ LINES = {
 
 
 @pytest.mark.parametrize("kind", LINES)
-def test_a_server_that_does_not_answer(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
-) -> None:
+def test_a_server_that_does_not_answer(tmp_path: Path, kind: str) -> None:
     text = DECODER.replace("code, output = answer(one", f"{LINES[kind]}; code, output = answer(one")
     command = script(tmp_path, text.format(edit="pass", declared=EVERYTHING))
     options = ["--serve", "--only", "valid/mrdwt", "--timeout", "3"]
-    code, document = result(capsys, "--decoder", command, *options)
+    code, document = result("--decoder", command, *options)
     assert (code, kinds(document)) == (1, {"valid/mrdwt/plain": {kind}})
 
 
@@ -301,14 +319,12 @@ def test_serving_must_be_declared(tmp_path: Path, capsys: pytest.CaptureFixture[
 # Partial decoders
 
 
-def test_a_partial_decoder_is_judged_on_what_it_has(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_partial_decoder_is_judged_on_what_it_has(tmp_path: Path) -> None:
     declared = {"codecs": ["raw"], "sources": ["bvh"]}
     command = decoder(tmp_path, "if rows == [] and code == 0: code = 3", declared)
     junit, badge = tmp_path / "junit.xml", tmp_path / "badge.json"
     files = ["--junit", str(junit), "--badge", str(badge)]
-    code, document = result(capsys, "--decoder", command, *files)
+    code, document = result("--decoder", command, *files)
     assert (code, kinds(document)) == (0, {})
     assert document["not_asked_vectors"] == [
         {"file": "valid/mrdwt/plain.mcz", "lacks": ["codec mrdwt"]},
@@ -342,19 +358,18 @@ def test_a_partial_decoder_is_judged_on_what_it_has(
 )
 def test_declarations(
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
     declared: dict[str, Any],
     passed: int,
     said: str,
 ) -> None:
-    code, document = result(capsys, "--decoder", decoder(tmp_path, declared=declared))
+    code, document = result("--decoder", decoder(tmp_path, declared=declared))
     assert (code, document["passed"]) == (0, passed)
     assert document["badge"] == f"MCZ 0.9 conformance: {said}"
     assert bool(document["remarks"]) == ("qbc" in declared.get("codecs", []))
 
 
-def test_without_sources(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, document = result(capsys, "--decoder", decoder(tmp_path), "--arrays-only")
+def test_without_sources(tmp_path: Path) -> None:
+    code, document = result("--decoder", decoder(tmp_path), "--arrays-only")
     assert (code, document["passed"], document["not_asked"]) == (0, 5, 1)
     assert "all codecs, no sources: 5/5" in document["badge"]
 
@@ -481,17 +496,15 @@ sys.exit(code)
 """
 
 
-def encoded(
-    folder: Path, capsys: pytest.CaptureFixture[str], edit: str = "", *more: str
-) -> tuple[int, dict[str, Any]]:
+def encoded(folder: Path, edit: str = "", *more: str) -> tuple[int, dict[str, Any]]:
     encoder = script(folder, ENCODER.format(edit=edit, asf=ASF), "encoder.py")
-    return result(capsys, "--decoder", decoder(folder), "--encoder", encoder, *more)
+    return result("--decoder", decoder(folder), "--encoder", encoder, *more)
 
 
-def test_an_honest_encoder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_honest_encoder(tmp_path: Path) -> None:
     edit = "assert ('--skeleton' in sys.argv) == (name == 'walk.amc')"
     for more in ((), ("--serve",)):
-        code, document = encoded(tmp_path, capsys, edit, *more)
+        code, document = encoded(tmp_path, edit, *more)
         assert code == 0
         found = {row["source"]: (row["status"], row["fault"]) for row in document["encoder"]}
         assert found == dict.fromkeys(("walk.bvh", "walk.amc", "walk.asf"), ("restored", None))
@@ -511,16 +524,16 @@ WRONG_ENCODERS = {
 
 
 @pytest.mark.parametrize("kind", WRONG_ENCODERS)
-def test_wrong_encoders(tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str) -> None:
+def test_wrong_encoders(tmp_path: Path, kind: str) -> None:
     more = ("--only", "sources/bvh", "--timeout", "3" if kind == "hang" else "60")
-    code, document = encoded(tmp_path, capsys, WRONG_ENCODERS[kind], *more)
+    code, document = encoded(tmp_path, WRONG_ENCODERS[kind], *more)
     assert (code, document["failed"]) == (1, 0)
     (row,) = document["encoder"]
     assert row["status"] == "failed" and row["fault"].startswith(kind)
 
 
-def test_an_encoder_may_decline(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, document = encoded(tmp_path, capsys, "if name != 'walk.bvh': sys.exit(3)")
+def test_an_encoder_may_decline(tmp_path: Path) -> None:
+    code, document = encoded(tmp_path, "if name != 'walk.bvh': sys.exit(3)")
     assert code == 0
     found = {row["source"]: row["status"] for row in document["encoder"]}
     assert found == {"walk.bvh": "restored", "walk.amc": "declined", "walk.asf": "declined"}

@@ -25,7 +25,7 @@ from mcz.motion import Motion
 from tests import plain_lsdt, plain_wavelets
 from tests.codecs.lossy import gapped, wandering
 from tests.codecs.point_case import Case, stored
-from tests.codecs.twins import VECTORS, rough
+from tests.codecs.twins import VECTORS, clips_of, rough
 from tests.inventor import Bounded, Inventor, Written, invented_code, invented_model, number
 from tests.motions import smooth
 
@@ -64,7 +64,7 @@ def encoded(name: str, motion: Motion, **params: object) -> Case:
 
 def check_file(data: bytes) -> None:
     with mcz.open(io.BytesIO(data)) as file:
-        for clip in file.clips.values():
+        for clip in clips_of(file, *FAMILY):
             stored(file, clip).check()
 
 

@@ -31,7 +31,7 @@ from mcz.motion import Motion
 from tests import plain_lsdt, plain_online
 from tests.codecs.lossy import gapped, markers, wandering
 from tests.codecs.point_case import Case, changed, stored
-from tests.codecs.twins import VECTORS, rough
+from tests.codecs.twins import VECTORS, clips_of, rough
 from tests.inventor import Inventor, invented_model, number
 from tests.motions import smooth
 from tests.plain_online import INTRA, LTR, STR
@@ -119,7 +119,7 @@ def encoded(motion: Motion, **params: object) -> Online:
 
 def check_file(data: bytes) -> None:
     with mcz.open(io.BytesIO(data)) as file:
-        for clip in file.clips.values():
+        for clip in clips_of(file, CODEC.name):
             online(stored(file, clip)).check()
 
 

@@ -49,7 +49,7 @@ TWINS = Twins("mrdwt", plain)
 # Vectors whose fault lies beside header and streams, or shows in the hash of the values alone.
 BESIDE = (
     "groups resolutions-0 samples integers hash-near hash-order segment-not-fresh segment-tail "
-    "segment-lead-less segment-lead-more segment-lead-none "
+    "segment-lead-less segment-lead-more segment-lead-none segment-lead-hidden "
     "approximation-byte-missing detail-byte-missing detail-half-missing"
 ).split()
 
