@@ -14,6 +14,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Protocol
@@ -64,7 +65,7 @@ class Child:
         self.process = subprocess.Popen(
             _limited(command, limits.memory, max_file), start_new_session=POSIX, **files
         )
-        self._inherited = _own_peak()
+        self._inherited = peak_of("self")
 
     def watch(self) -> None:
         """Kill the process unless ``unwatch`` is called within the time limit."""
@@ -112,22 +113,17 @@ class Child:
         _, status, usage = os.wait4(self.process.pid, 0)
         self.process.returncode = os.waitstatus_to_exitcode(status)
         self.unwatch()
-        peak = _peak_bytes(usage)
+        peak = usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024)
         return self.process.returncode, peak if peak > self._inherited else 0
 
 
-def _own_peak() -> int:
-    """The most bytes that this process ever held, 0 if unknown."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return 0
-    return _peak_bytes(resource.getrusage(resource.RUSAGE_SELF))
-
-
-def _peak_bytes(usage: Any) -> int:
-    peak: int = usage.ru_maxrss
-    return peak * (1 if sys.platform == "darwin" else 1024)
+def peak_of(process: int | str) -> int:
+    """The most bytes of a running process that were resident, 0 where the system does not say."""
+    with suppress(OSError, ValueError):
+        for line in Path(f"/proc/{process}/status").read_text("utf-8").splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024
+    return 0
 
 
 def _limited(command: Sequence[str], memory: int, max_file: int) -> list[str]:

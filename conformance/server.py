@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-from conformance.child import Answer, Child, Limits, excess, size_of, tail
+from conformance.child import Answer, Child, Limits, excess, peak_of, size_of, tail
 
 MAX_LINE = 2**12  # bytes of the line before an answer
 MAX_ERRORS = 2**28  # bytes on standard error over the life of a process
@@ -39,7 +39,7 @@ class Server:
         try:
             code, output = _exchange(child.process, arguments, content, max_output)
             child.unwatch()
-            fault, detail = excess(child, _peak(child.process.pid), len(output), max_output)
+            fault, detail = excess(child, peak_of(child.process.pid), len(output), max_output)
             if fault:
                 self._stop()
         except _Lost as lost:
@@ -123,12 +123,3 @@ def _exchange(
     if len(output) < size:
         raise _Lost
     return code, output
-
-
-def _peak(pid: int) -> int:
-    """The most bytes of process ``pid`` that were resident, 0 where the system does not say."""
-    with suppress(OSError, ValueError):
-        for line in Path(f"/proc/{pid}/status").read_text("utf-8").splitlines():
-            if line.startswith("VmHWM:"):
-                return int(line.split()[1]) * 1024
-    return 0
