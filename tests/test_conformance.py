@@ -17,6 +17,7 @@ import pytest
 from conformance import run
 from mcz.cli import conformance
 from mcz.errors import MczError, UnsupportedError
+from tests.broken.table import BREAKS
 from tools import make_vectors
 
 ROOT = Path(run.__file__).parent.parent
@@ -133,99 +134,25 @@ OURS = f"{sys.executable} -m mcz.cli.conformance"
 
 
 def test_runner_passes_our_adapter() -> None:
-    for only in ("valid/notes/m", "uncommon/container/n", "invalid/chunks/t", "lossless/copy"):
+    for only in ("valid/notes/m", "uncommon/container/newer", "invalid/chunks/t"):
         code, shown = runner("--decoder", OURS, "--only", only)
         assert code == 0, shown
         assert re.search(r"(?m)^conformance: (\d+) of \1 passed", shown), shown
         assert re.search(r"(?m)^\d+ passed, 0 failed$", shown), shown
 
 
-# What may go wrong in a decoder: each edit of ours is caught by the vectors that it names.
-WRONG = {
-    "ignores exceptions": (
-        "mcz.files.signals._values_of_texts = lambda texts, name: 0.0",
-        ["valid/notes/exceptions"],
-    ),
-    "ignores hashes": ("", ["invalid/clip/value-hash", "invalid/raw/another-value"]),
-    "decodes another order of bytes": (
-        "mcz.codecs.CODECS[0] = replace(raw, decode=lambda *a: raw.decode(*a).byteswap())",
-        ["valid/raw/plain", "valid/numbers/integer"],
-    ),
-    "forgets copies": (
-        "mcz.codecs.lossless._Segment.group = lambda self, group: self._own(group)[0]",
-        ["valid/lossless/copy-later"],
-    ),
-    "takes bits of any size": (
-        "import mcz.coding.kernels as k; k.coded_size = lambda state: mock.ANY",
-        ["invalid/lossless/byte-0-behind", "invalid/mrdwt/detail-byte-0-behind"],
-    ),
-    "sets no detail back": (
-        "mcz.codecs._wavelet_codec.INWARD = 0",
-        ["valid/mrdwt/scaled", "valid/mrdwt/unit-least"],
-    ),
-    "starts all bands with one table": (
-        (
-            "import mcz.codecs._wavelet_streams as w; f = w._start_states\n"
-            "w._start_states = lambda: f()[:1] * 5"
-        ),
-        ["valid/mrdwt/start-tables", "valid/mrdwt/wavelet-db3"],
-    ),
-    "decodes too little of a coarser band": (
-        (
-            "import mcz.codecs._wavelet_streams as w\n"
-            "w._prefixes = lambda counts, wanted, coding: list(wanted)"
-        ),
-        ["valid/mrdwt/segments"],
-    ),
-    "takes every curve for a straight one": (
-        (
-            "import mcz.codecs.qbc as q\n"
-            "q.parse_curves = lambda s, m, k, name, whole: q.straight(m, k)"
-        ),
-        ["valid/qbc/predicted", "valid/qbc/rounding"],
-    ),
-    "starts all groups of frames with one table": (
-        (
-            "import mcz.codecs._online_coder as o; f = o._start_states\n"
-            "o._start_states = lambda: f()[:1] * 2 + f()[2:3] * 2"
-        ),
-        ["valid/online/groups-mixed", "valid/online/groups-mixed-golomb"],
-    ),
-    "takes what it has for the frame that is needed": (
-        "import mcz.codecs._online_coder as o; o.Coder._check = lambda *a: None",
-        ["invalid/online/distance-older", "invalid/online/distance-segment"],
-    ),
-    "shows frames from the first that is stored": (
-        (
-            "S = mcz.files.signals.SignalReader; f = S.read\n"
-            "S.read = lambda s, a, b: f(s, a - s.info.skip, b - s.info.skip)"
-        ),
-        ["valid/mrdwt/cut-frames-21-30", "valid/cut/frames-1-5"],
-    ),
-}
-LAX = """
-import sys
-from dataclasses import replace
-from unittest import mock
-import mcz.files.clip, mcz.files.signals, mcz.codecs
-from mcz.cli import conformance
-raw = mcz.codecs.CODECS[0]
-mcz.files.clip.Clip.check_hash = lambda *a: None
-{edit}
-sys.exit(conformance.main())
-"""
-
-
-@pytest.mark.parametrize("fault", WRONG)
-def test_runner_catches_a_wrong_decoder(tmp_path: Path, fault: str) -> None:
-    edit, caught = WRONG[fault]
-    script = tmp_path / "decoder.py"
-    script.write_text(LAX.format(edit=edit))
-    for only in caught:
-        code, shown = runner("--decoder", f"{sys.executable} {script}", "--only", only, "--json")
-        assert code == 1, shown
-        failed = [v["file"] for v in json.loads(shown)["vectors"] if not v["passed"]]
-        assert f"{only}.mcz" in failed
+@pytest.mark.parametrize(("rule", "kind"), [("RAW-03", "wrong values"), ("RAW-04", "accepted")])
+def test_runner_catches_a_broken_decoder(rule: str, kind: str) -> None:
+    """Through the command; test_broken.py has all rules, without one."""
+    (caught,) = BREAKS[rule].vectors
+    command = f"{sys.executable} -m tests.broken {rule}"
+    only = ("--only", caught, "--only", "valid/raw/plain")
+    code, shown = runner("--decoder", command, *only, "--json")
+    assert code == 1, shown
+    rows = {row["file"].removesuffix(".mcz"): row for row in json.loads(shown)["vectors"]}
+    assert rows.keys() == {caught, "valid/raw/plain"}
+    assert rows["valid/raw/plain"]["passed"]
+    assert {fault["kind"] for fault in rows[caught]["faults"]} == {kind}
 
 
 def test_runner_ends_a_decoder_that_hangs(tmp_path: Path) -> None:

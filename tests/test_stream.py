@@ -638,7 +638,7 @@ def test_no_frame_in_the_wrong_place_is_said_to_be_decoded(codec: str, damage: s
     assert places == heads_and_bodies(old)
     random = np.random.default_rng(7)
     wrong = {"kind 3": 0, "kind 2": 0}
-    for _ in range(600 if codec == "stairs" else 150):
+    for _ in range(300 if codec == "stairs" else 100):
         seed = int(random.integers(2**32))
         how = ("missing", "hold", "linear")[seed % 3]
         for kind, sent in (("kind 3", data), ("kind 2", old)):

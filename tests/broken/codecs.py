@@ -94,6 +94,17 @@ GENERAL: tuple[Break, ...] = (
         ),
     ),
     Break(
+        "CODEC-05",
+        (
+            "invalid/mrdwt/frames-0-header",
+            "invalid/qbc/frames-0-resolutions",
+            "invalid/lsdt-clip/frames-0-model",
+            "uncommon/container/frames-0-model-missing",
+        ),
+        ((SIGNALS, "if start == stop:", "if False:"),),
+        "frames-0",
+    ),
+    Break(
         "RAW-01",
         ("invalid/clip/codec-header",),
         ((BASE, "    if header:\n", '    if header and name != "raw":\n'),),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tests.broken import Break
 
+ADAPTER = "mcz.cli.conformance"
 DIRECTORY = "mcz.container.directory"
 FILE = "mcz.files.file"
 FORMATS = "mcz.formats"
@@ -89,6 +90,18 @@ LIMITED: tuple[Break, ...] = (
                 "if needed[0] == ours[0] and not payloads.LEAST_NEEDED <= needed <= ours:",
             ),
         ),
+    ),
+    Break(
+        "HEAD-01",
+        (
+            "uncommon/container/newer-major-index",
+            "uncommon/container/unknown-critical-index",
+        ),
+        (
+            (ADAPTER, "scan(open_source(data), whole=True)", "pass"),
+            (READER, "None if self.source.remote else self._head()", "None"),
+        ),
+        "index",
     ),
     Break(
         "HEAD-02",

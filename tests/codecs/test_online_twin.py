@@ -200,7 +200,9 @@ KNOWN = st.tuples(
 
 
 @given(st.one_of(st.tuples(MOTIONS, PARAMS), KNOWN))
-@settings(suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+@settings(
+    max_examples=40, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow]
+)
 def test_any_parameters(case: tuple[Motion, dict[str, Any]]) -> None:
     motion, params = case
     try:

@@ -8,6 +8,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "CODEC-03": ("uncommon/container/unknown-codec",),
     "CODEC-04": ("uncommon/*/newer-version", "uncommon/container/newer-codec"),
     "CODEC-05": (
+        "invalid/*/frames-0-header",
         "invalid/mrdwt/header-*",
         "invalid/qbc/header-*",
         "invalid/pca/header-*",

@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from mcz.codecs import raw
+from mcz.codecs.base import Codec
 from mcz.formats.c3d_layout import C3D_DETAIL, C3D_TEMPLATE
 from mcz.motion import Motion, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.schema import build, parse
 from tests.formats.c3d_files import SGI, Made
 from tools.vectors import waved
+from tools.vectors.coded import codec_of
 from tools.vectors.craft import Vector, Whole, file_of
 from tools.vectors.motions import numbers
 from tools.vectors.sources import BOTH
@@ -40,10 +43,17 @@ def vectors() -> Iterable[Vector]:
     return shelf.vectors
 
 
-def _hold(shelf: Whole, name: str, purpose: str, motion: Motion, spec: str = SPEC) -> None:
+def _hold(
+    shelf: Whole,
+    name: str,
+    purpose: str,
+    motion: Motion,
+    spec: str = SPEC,
+    codec: Codec = raw.CODEC,
+) -> None:
     """The clip as it is, with size and hash of what it makes."""
     motion = unhashed(motion)
-    data = file_of(motion)
+    data = file_of(motion, codec=codec)
     sources = ((path_of(motion), restored(motion)),)
     shelf.hold(f"c3d-{name}", spec, purpose, data, motion, sources=sources, modes=BOTH)
 
@@ -173,6 +183,9 @@ def _gaps(shelf: Whole) -> None:
             f"every sort, and NaN that it calls valid; {order}."
         )
         _hold(shelf, f"gaps-{order}", purpose, motion, f"Masks; {SPEC}")
+        if order == "sgi":
+            purpose = f"{purpose.removesuffix('.')}, in codec 1."
+            _hold(shelf, "gaps-lossless", purpose, motion, f"Masks; {SPEC}", codec_of())
     file = made(4, size=2)
     file.points[:, :, 3] = [[0, 5], [0xFFFF, 7], [0x8000, 0], [1, 0xFFFF]]
     whole = take(file.build(), "gaps-integers")

@@ -1,0 +1,92 @@
+"""Invalid or unsupported: what decoders took that were fuzzed, and no vector had."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from mcz.codecs import by_name
+from mcz.codecs._bases import build_bases, model_of
+from mcz.codecs.base import id_of
+from mcz.container import payloads
+from mcz.schema import varint
+from tools.vectors.bad_lsdt_models import with_model
+from tools.vectors.craft import (
+    UNSUPPORTED,
+    Broken,
+    Crafter,
+    Vector,
+    Whole,
+    file_of,
+    finished,
+)
+from tools.vectors.edits import Edit, at, put, span, swap
+from tools.vectors.faults import CODECS
+from tools.vectors.motions import dance
+from tools.vectors.spatial import CLIP, Plan, basis_of, file_with
+from tools.vectors.spatial_faults import spec_of
+
+
+def vectors() -> Iterable[Vector]:
+    shelves: list[Broken | Whole] = []
+    for codec in CODECS:
+        shelf = Broken(f"invalid/{codec}")
+        _without_frames(shelf, codec)
+        shelves.append(shelf)
+    later = Whole("uncommon/container", exit=(UNSUPPORTED,))
+    _models(shelves[CODECS.index(CLIP)], later)
+    _other_index(later)
+    return [vector for shelf in [*shelves, later] for vector in shelf.vectors]
+
+
+def _without_frames(shelf: Broken, name: str) -> None:
+    """Headers of clips in which there is nothing to decode."""
+    codec = by_name(name)
+    spec = f"Codec {codec.id}: {name}; CLIP"
+
+    def edited(edit: Edit) -> bytes:
+        crafter = Crafter(CLIP=edit)
+        segments = {"segment_frames": 8} if codec.id > 1 else {}
+        crafter.clip(dance(0), codec=codec, grouping=codec.grouping, **segments)
+        return finished(crafter)
+
+    purpose = "A byte behind the header, of a clip of no frames."
+    shelf.add("frames-0-header", spec, purpose, edited(_longer_header))
+    purpose = "99 resolutions of a clip of no frames."
+    edit = put(payloads.CLIP, "signals.0.n_resolutions", b"\x63")
+    shelf.add("frames-0-resolutions", spec, purpose, edited(edit))
+
+
+def _longer_header(payload: bytes) -> bytes:
+    start, stop = span(payloads.CLIP, payload, "signals.0.header")
+    header = payload[start + 1 : stop] + b"\0"
+    return payload[:start] + varint(len(header)) + header + payload[stop:]
+
+
+def _models(shelf: Broken, later: Whole) -> None:
+    """Models of clips in which there is nothing to decode."""
+    plan = Plan(CLIP, 4, (), bases=(basis_of(4, 3),))
+    data = with_model(plan, 1, build_bases(plan.bases) + b"\0")
+    purpose = "Bases with a byte behind their last, of a clip of no frames."
+    shelf.add("frames-0-model", spec_of(CLIP, "Bases"), purpose, data)
+    other = swap(id_of(model_of(plan.bases)), bytes(range(16)))
+    purpose = "A clip of no frames whose model is not there."
+    later.add(
+        "frames-0-model-missing",
+        "Bases; MODL",
+        purpose,
+        file_with(plan, CLIP=other),
+        exit=later.exit,
+    )
+
+
+def _other_index(shelf: Whole) -> None:
+    """An index that this version cannot read, in a file that says that it needs a later one."""
+    edit = at(0, b"\xff" * 9)
+    crafter = Crafter(INDX=edit)
+    crafter.plain_chunk(b"ROOM", b"what the room looked like")
+    crafter.clip(dance())
+    purpose = "A critical chunk of unknown type, and an INDX that this version cannot read."
+    shelf.add("unknown-critical-index", "Chunks; INDX", purpose, finished(crafter), exit=shelf.exit)
+    data = file_of(dance(), HEAD=at(2, b"\1\0"), INDX=edit)
+    purpose = "Another major version, and an INDX that this one cannot read."
+    shelf.add("newer-major-index", "HEAD; INDX", purpose, data, exit=shelf.exit)
