@@ -141,7 +141,7 @@ def test_runner_passes_our_adapter() -> None:
         assert re.search(r"(?m)^\d+ passed, 0 failed$", shown), shown
 
 
-@pytest.mark.parametrize(("rule", "kind"), [("RAW-03", "wrong values"), ("RAW-04", "accepted")])
+@pytest.mark.parametrize(("rule", "kind"), [("RAW-03", "wrongly refused"), ("RAW-04", "accepted")])
 def test_runner_catches_a_broken_decoder(rule: str, kind: str) -> None:
     """Through the command; test_broken.py has all rules, without one."""
     (caught,) = BREAKS[rule].vectors
