@@ -41,6 +41,8 @@ def test_a_broken_rule_is_caught(name: str, nursery: subprocess.Popen[str]) -> N
     assert isinstance(found, dict), found
     assert len(found) == len(BREAKS[name].vectors)
     assert all(found.values()), [file for file, faults in found.items() if not faults]
+    told = [fault for faults in found.values() for fault in faults]
+    assert BREAKS[name].crashes == all(f": {answers.CRASH}: " in fault for fault in told), told
 
 
 def test_without_a_break_nothing_is_caught() -> None:

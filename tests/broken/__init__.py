@@ -21,13 +21,15 @@ class Break:
     """One rule broken: in each patch (module, old, new) the text ``old`` of that module is ``new``.
 
     ``old`` occurs there once. Each of ``vectors`` alone shows it: the broken decoder fails it.
-    Where several breaks have one ``id``, ``variant`` tells them apart.
+    Where several breaks have one ``id``, ``variant`` tells them apart. ``crashes``: no vector gets
+    an answer, since what the rule keeps out leads beyond the ends of what is there.
     """
 
     id: str
     vectors: tuple[str, ...]
     patches: tuple[tuple[str, str, str], ...]
     variant: str = ""
+    crashes: bool = False
 
     @property
     def name(self) -> str:

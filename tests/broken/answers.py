@@ -9,6 +9,8 @@ from typing import Any
 
 from conformance import run
 
+CRASH = "crash"
+
 
 def faults(vector: dict[str, Any]) -> list[str]:
     """What is wrong with the answers about ``vector``, as the runner would say it."""
@@ -17,7 +19,8 @@ def faults(vector: dict[str, Any]) -> list[str]:
     found = []
     for request in run.requests(vector, conformance.OPTIONS):
         code, output = answer(request.path.read_bytes(), request.arguments)
-        fault = run.judge(request, code, output) if code in (0, 1, 3) else output.decode()
+        answered = code in (0, 1, 3)
+        fault = run.judge(request, code, output) if answered else f"{CRASH}: {output.decode()}"
         if fault:
             found.append(f"{' '.join(request.arguments)}: {fault}")
     return found

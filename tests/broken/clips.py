@@ -313,6 +313,7 @@ PACKED: tuple[Break, ...] = (
         "PACK-13",
         ("invalid/packets/frame-of-first-group",),
         ((SEGMENTS, "if (counts.n_groups, counts.n_resolutions) != (1, 1):", "if False:"),),
+        crashes=True,
     ),
     Break(
         "PACK-14",

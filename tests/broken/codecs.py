@@ -278,6 +278,7 @@ CODER: tuple[Break, ...] = (
                 '        at += 1\n    raise RecursionError("no end")',
             ),
         ),
+        crashes=True,
     ),
 )
 

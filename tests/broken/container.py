@@ -133,6 +133,7 @@ CONVENTIONS: tuple[Break, ...] = (
         ("uncommon/container/unknown-codec",),
         (("mcz.codecs", 'UnsupportedError(f"codec {id_}', 'ValueError(f"codec {id_}'),),
         "codec",
+        crashes=True,
     ),
     Break(
         "CONV-16",
@@ -208,6 +209,7 @@ FRAMING: tuple[Break, ...] = (
                 "if offset + size > self.size:\n            raise MemoryError(",
             ),
         ),
+        crashes=True,
     ),
     Break(
         "CHUNK-08",

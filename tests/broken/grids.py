@@ -249,6 +249,7 @@ TEXTS: tuple[Break, ...] = (
             ),
         ),
         "decimals",
+        crashes=True,
     ),
     Break(
         "TEXT-03",

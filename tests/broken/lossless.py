@@ -318,6 +318,7 @@ BITS: tuple[Break, ...] = (
             (KERNELS, "    while at <= MAX_STEPS_LENGTH:", "    while at < 999:"),
             (KERNELS, "    if at > MAX_STEPS_LENGTH:\n        return -1\n", ""),
         ),
+        crashes=True,
     ),
     Break(
         "LOSS-29",

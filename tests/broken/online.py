@@ -27,6 +27,7 @@ BREAKS: tuple[Break, ...] = (
                 "if layout.n_resolutions != 1:",
             ),
         ),
+        crashes=True,
     ),
     Break(
         "ONLINE-03",

@@ -140,12 +140,14 @@ BREAKS: tuple[Break, ...] = (
         ("invalid/notes/change-channel",),
         ((SIGNALS, " or any(c >= n_channels for c in channels):", ":"),),
         "changes",
+        crashes=True,
     ),
     Break(
         "NOTES-03",
         ("invalid/notes/exception-channel",),
         ((SIGNALS, "or e.channel >= n_channels or", "or"),),
         "exceptions",
+        crashes=True,
     ),
     Break(
         "NOTES-04",

@@ -32,6 +32,7 @@ LIMITED: tuple[Break, ...] = (
                 "    if value > limit << 99:\n        raise LimitError(\n",
             ),
         ),
+        crashes=True,
     ),
     Break(
         "LIMIT-03",

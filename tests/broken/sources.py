@@ -107,6 +107,7 @@ TEMPLATES: tuple[Break, ...] = (
                 "if False:",
             ),
         ),
+        crashes=True,
     ),
     Break(
         "SRC-09",
@@ -129,6 +130,7 @@ TEMPLATES: tuple[Break, ...] = (
         "SRC-11",
         (f"{X}template-column",),
         ((LAYOUT, "    if free > n_channels + 1:\n", "    if False:\n"),),
+        crashes=True,
     ),
     Break(
         "SRC-12",
@@ -179,6 +181,7 @@ TEXTS: tuple[Break, ...] = (
         "AMC-03",
         (f"{X}notes-pattern",),
         ((RESTORE, "if numbers.max() >= len(layout.patterns):", "if False:"),),
+        crashes=True,
     ),
     Break(
         "AMC-04",
@@ -273,6 +276,7 @@ BYTES: tuple[Break, ...] = (
         "C3D-02",
         (f"{X}c3d-template-word",),
         ((C3D, '"word" / OneOf(Int8ul, (2, 4))', '"word" / Int8ul'),),
+        crashes=True,
     ),
     Break(
         "C3D-03",
@@ -365,6 +369,7 @@ BYTES: tuple[Break, ...] = (
             ),
         ),
         "sizes",
+        crashes=True,
     ),
     Break(
         "C3D-14",

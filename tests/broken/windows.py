@@ -28,6 +28,7 @@ BREAKS: tuple[Break, ...] = (
                 "if layout.n_resolutions != 1:",
             ),
         ),
+        crashes=True,
     ),
     Break(
         "WIND-02",

@@ -7,7 +7,6 @@ import functools
 import io
 import os
 import struct
-import time
 import warnings
 from pathlib import Path
 from typing import Any
@@ -197,17 +196,3 @@ def test_every_file_goes_through_an_mcz_file(tmp_path: Path) -> None:
                     assert np.array_equal(one.values, other.values, equal_nan=True), path
         n += 1
     print(f"{n} files")
-
-
-def test_reading_and_writing_are_fast() -> None:
-    path = next(path for path in files() if path.name == "arthuman-sample.c3d")
-    data = path.read_bytes()
-    best = np.full(2, np.inf)
-    for _ in range(3):
-        begin = time.perf_counter()
-        motion = c3d.read(data, path.stem)
-        middle = time.perf_counter()
-        c3d.write(motion)
-        best = np.minimum(best, [middle - begin, time.perf_counter() - middle])
-    print(f"{len(data) / 1e6:.1f} MB: read {best[0]:.3f} s, write {best[1]:.3f} s")
-    assert best.max() < 1

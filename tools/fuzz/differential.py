@@ -14,17 +14,16 @@ import hashlib
 import json
 import random
 import re
-import select
 import shutil
-import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 from unittest import mock
 
 import mcz
+from conformance.child import Limits
+from conformance.server import Server
 from mcz.cli.conformance import _parser as contract
 from mcz.cli.conformance import respond
 from mcz.container import reader
@@ -37,6 +36,7 @@ from tools.fuzz.seeds import vectors
 
 HERE = Path(__file__).parent
 DECODED = 2**21  # bytes that either may decode to
+MOST_OUTPUT = 2**26  # bytes of all signals of a file
 LARGEST = 2**15  # bytes of a mutant
 PATIENCE = 60.0  # seconds of wall time for one answer
 HASHED = 0.6  # of the mutants get hashes of what this package makes of them
@@ -55,7 +55,7 @@ class Answer:
 
 def main(arguments: list[str] | None = None) -> int:
     given = _options(arguments)
-    if shutil.which("node") is None or not (given.js / "mcz.js").exists():
+    if shutil.which("node") is None or not (given.js / "conformance.js").exists():
         print("DIFFERENTIAL FUZZING SKIPPED: there is no node, or no decoder", file=sys.stderr)
         return 0
     given.findings.mkdir(parents=True, exist_ok=True)
@@ -150,66 +150,22 @@ class Other:
     """The decoder in JavaScript, in one process, which is started again where it dies."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder.resolve()
-        self._process: subprocess.Popen[bytes] | None = None
+        program = str(folder.resolve() / "conformance.js")
+        command = ["node", "--max-old-space-size=1536", program, "--decoded-limit", str(DECODED)]
+        self._server = Server(command, Limits(PATIENCE, memory=0))
 
     def __enter__(self) -> Other:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._end()
-
-    def _end(self) -> None:
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-            for pipe in (self._process.stdin, self._process.stdout):
-                assert pipe is not None
-                pipe.close()
-            self._process = None
-
-    def _started(self) -> subprocess.Popen[bytes]:
-        if self._process is None or self._process.poll() is not None:
-            self._end()
-            command = ["node", "--max-old-space-size=1536", str(HERE / "serve.mjs")]
-            pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-            self._process = subprocess.Popen([*command, str(self._folder)], bufsize=0, **pipes)
-        return self._process
+        self._server.close()
 
     def answer(self, data: bytes, request: list[str]) -> Answer:
-        process = self._started()
-        assert process.stdin is not None
-        asked = {"arguments": request, "limit": DECODED, "bytes": len(data)}
-        try:
-            process.stdin.write(json.dumps(asked).encode() + b"\n" + data)
-            told = json.loads(self._read_line(process))
-            output = self._read(process, told["bytes"])
-        except TimeoutError:
-            self._end()
-            return Answer(HUNG, message=f"no answer in {PATIENCE} s")
-        except (OSError, ValueError) as error:
-            self._end()
-            return Answer(FAILED, message=f"the process died: {error}")
-        return Answer(told["exit"], output, told["message"])
-
-    def _read_line(self, process: subprocess.Popen[bytes]) -> bytes:
-        line = b""
-        while not line.endswith(b"\n"):
-            line += self._read(process, 1)
-        return line
-
-    def _read(self, process: subprocess.Popen[bytes], size: int) -> bytes:
-        assert process.stdout is not None
-        parts, left = [], size
-        while left:
-            if not select.select([process.stdout], [], [], PATIENCE)[0]:
-                raise TimeoutError
-            part = process.stdout.read(left)
-            if not part:
-                raise OSError("its output ended")
-            parts.append(part)
-            left -= len(part)
-        return b"".join(parts)
+        told = self._server.ask(request, data, MOST_OUTPUT)
+        if told.fault or told.code < 0:
+            code = HUNG if told.fault == "hang" else FAILED
+            return Answer(code, message=f"{told.fault or told.code}: {told.detail}")
+        return Answer(told.code, told.output, told.errors.strip())
 
 
 @dataclass(slots=True)

@@ -88,11 +88,6 @@ def _bones() -> list[Skeleton]:
     return [asf.read(data, "bones") for data in seeds("asf").values()]
 
 
-@cache
-def _folder() -> Path:
-    return Path(tempfile.mkdtemp(prefix="mcz-fuzz-"))
-
-
 def _check(name: str, data: bytes, *skeleton: Skeleton) -> bool:
     read = FORMATS[name].read
     rows = _arrived(name, data, *skeleton)
@@ -131,9 +126,11 @@ def check_asf(data: bytes) -> bool:
     skeleton = asf.read(data, "fuzz")
     hold(skeleton == asf.read(data, "fuzz"), "read twice, it differs")
     hold(asf.write(skeleton) == data, "written again, it differs")
-    path, out = _folder() / "fuzz.asf", io.BytesIO()
-    path.write_bytes(data)
-    mcz.encode(path, out)
+    out = io.BytesIO()
+    with tempfile.TemporaryDirectory(prefix="mcz-fuzz-") as folder:
+        path = Path(folder, "fuzz.asf")
+        path.write_bytes(data)
+        mcz.encode(path, out)
     with mcz.open(out.getvalue()) as file:
         ((id_, stored),) = file.skeletons
         hold(file.skeleton_bytes(id_) == data, "restored, it differs")

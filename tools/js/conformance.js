@@ -1,5 +1,6 @@
 // The command of conformance/README.md: an MCZ file on standard input, its arrays or its source
-// files on standard output. With --serve many requests, each with its own answer.
+// files on standard output. With --serve many requests, each with its own answer. Before these,
+// --decoded-limit N sets another limit of what is decoded than SPEC.md has, for tests.
 
 import { readFileSync, readSync, writeSync } from "node:fs";
 
@@ -23,36 +24,38 @@ const FAILED = 2;
 
 function main(words) {
   setAnnex(readAnnex);
+  const limits = {};
+  if (words[0] === "--decoded-limit") limits.decodedLimit = Number(words.splice(0, 2)[1]);
   if (words.includes("--serve")) {
-    serve();
+    serve(limits);
     return OK;
   }
   if (words.includes("--capabilities")) {
     write([line(CAPABILITIES)]);
     return OK;
   }
-  const { exit, parts } = answer(words, new Uint8Array(readFileSync(STDIN)));
+  const { exit, parts } = answer(words, new Uint8Array(readFileSync(STDIN)), limits);
   write(parts);
   return exit;
 }
 
 /** Answers requests until the input ends. */
-function serve() {
+function serve(limits) {
   const input = new Input();
   for (let request = input.line(); request !== null; request = input.line()) {
     const { arguments: words, bytes } = JSON.parse(request);
-    const { exit, parts } = answer(words, input.take(bytes));
+    const { exit, parts } = answer(words, input.take(bytes), limits);
     const size = parts.reduce((sum, part) => sum + part.length, 0);
     write([line({ exit, bytes: size }), ...parts]);
   }
 }
 
 /** The exit code and the output that a request is answered with; reasons go to standard error. */
-function answer(words, bytes) {
+function answer(words, bytes, limits) {
   try {
     const parts = words.includes("--source")
-      ? listSources(sources(bytes))
-      : listArrays(decode(bytes, parse(words)));
+      ? listSources(sources(bytes, limits))
+      : listArrays(decode(bytes, { ...parse(words), ...limits }));
     return { exit: OK, parts };
   } catch (error) {
     const known = error instanceof MczError;
