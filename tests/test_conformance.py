@@ -266,6 +266,7 @@ def test_the_example_of_the_readme(tmp_path: Path) -> None:
 
 def test_the_readme_names_every_fault_and_argument() -> None:
     text = " ".join((run.HERE / "README.md").read_text("utf-8").split())
+    assert f"conformance: {len(VECTORS)}/{len(VECTORS)} full decoder" in text
     code = "".join((run.HERE / name).read_text("utf-8") for name in SAYS)
     kinds = set(re.findall(r'(?:Fault|Wrong|_Lost)\(f?"([a-z ]+?)(?: \(|")', code))
     assert {"wrong order", "bad answer", "other bytes", "crash"} <= kinds

@@ -21,9 +21,9 @@ from mcz.schema import build, varint
 from tools.vectors import components, spatial, waved
 from tools.vectors.components import part_of
 from tools.vectors.craft import Broken, Vector, file_of, rehash
-from tools.vectors.edits import Edit, headed, plus, put, stream
+from tools.vectors.edits import Edit, headed, plus, put, says, stream
 from tools.vectors.spatial import MDTT, PCA_RDO, basis_of
-from tools.vectors.spatial_faults import says, silent, sized, spec_of
+from tools.vectors.spatial_faults import silent, sized, spec_of
 
 BEYOND = 2**40 + 1
 

@@ -13,8 +13,6 @@ import numpy as np
 
 from mcz.codecs._pca_streams import MAX_INDEX
 from mcz.codecs.pca import SCALED
-from mcz.container import payloads
-from mcz.schema import varint
 from tools.vectors.components import (
     HEADING,
     Part,
@@ -25,7 +23,7 @@ from tools.vectors.components import (
     stream_of,
 )
 from tools.vectors.craft import Broken, Vector, rehash
-from tools.vectors.edits import headed, plus, put, stream
+from tools.vectors.edits import headed, plus, says, stream
 
 SPEC = f"{HEADING}; Residuals"
 
@@ -53,8 +51,8 @@ def _headers(shelf: Broken) -> None:
         ("header-and-byte", b"\x02\x00"),
     ):
         purpose = f"The header {header.hex(' ') or 'of no bytes'}, over nothing but zeros."
-        said = put(payloads.CLIP, "signals.0.header", varint(len(header)) + header)
-        shelf.add(name, HEADING, purpose, file_with(plan, motion, CLIP=said))
+        data = file_with(plan, motion, CLIP=says(header))
+        shelf.add(name, HEADING, purpose, data)
 
 
 def _segments(shelf: Broken) -> None:

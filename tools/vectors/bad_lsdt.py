@@ -5,8 +5,6 @@ Where a reader can overlook the fault, the hash is that of what it then decodes.
 
 from __future__ import annotations
 
-import math
-import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,7 +16,7 @@ from mcz.motion import Channel, Joint, Skeleton
 from mcz.numbers import Grid, GridKind
 from mcz.schema import build, varint
 from tools.vectors.craft import Broken, Vector, rehash
-from tools.vectors.edits import headed, put
+from tools.vectors.edits import BAD_STEPS, binary64, headed, put, says
 from tools.vectors.spatial import (
     CLIP,
     FRAME,
@@ -34,7 +32,6 @@ from tools.vectors.spatial import (
 )
 from tools.vectors.spatial_faults import (
     Bits,
-    says,
     silent,
     spec_of,
     stream_with,
@@ -57,10 +54,6 @@ def vectors() -> Iterable[Vector]:
             _codes(shelf, name)
         found += shelf.vectors
     return found
-
-
-def _binary64(value: float) -> bytes:
-    return struct.pack("<d", value)
 
 
 def _headers(shelf: Broken, name: str) -> None:
@@ -96,16 +89,8 @@ def _headers(shelf: Broken, name: str) -> None:
         shelf.add(case, spec_of(name, "Space"), purpose, data)
     data = silent(plan, CLIP=says(b""))
     shelf.add("header-none", spec_of(name, "Space"), "A header of no bytes.", data)
-    steps = {
-        "0": 0.0,
-        "minus": -1.0,
-        "NaN": math.nan,
-        "infinite": math.inf,
-        "tiny": 2.0**-100 * (1 - 2.0**-53),
-        "huge": 2.0**100 * (1 + 2.0**-52),
-    }
-    for case, step in steps.items():
-        data = silent(plan, CLIP=says(header(plan, step=_binary64(step))))
+    for case, step in BAD_STEPS.items():
+        data = silent(plan, CLIP=says(header(plan, step=binary64(step))))
         shelf.add(f"step-{case}", spec_of(name, "Space"), f"A step of {step!r}.", data)
     _points(shelf, name)
 

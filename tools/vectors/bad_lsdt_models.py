@@ -19,7 +19,7 @@ from mcz.container import payloads
 from mcz.motion import Channel, Joint, Skeleton
 from mcz.schema import build, varint
 from tools.vectors.craft import Broken, Vector, rehash
-from tools.vectors.edits import Edit, flip, framed, swap
+from tools.vectors.edits import Edit, flip, framed, says, swap
 from tools.vectors.spatial import (
     CLIP,
     FRAME,
@@ -36,7 +36,6 @@ from tools.vectors.spatial import (
 )
 from tools.vectors.spatial_faults import (
     Bits,
-    says,
     silent,
     spec_of,
     stream_with,

@@ -6,7 +6,6 @@ Where a reader can overlook the fault, the hash is that of what it then decodes.
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,7 +20,19 @@ from mcz.schema import build, varint
 from mcz.transforms import dwt
 from mcz.transforms.wavelets import MAX_TAP, by_id
 from tools.vectors.craft import Broken, Vector, rehash
-from tools.vectors.edits import Edit, Made, at, both, headed, plus, put, stream
+from tools.vectors.edits import (
+    BAD_STEPS,
+    Edit,
+    Made,
+    at,
+    binary64,
+    both,
+    headed,
+    plus,
+    put,
+    says,
+    stream,
+)
 from tools.vectors.valid_cut import HEADING as CUT_HEADING
 from tools.vectors.valid_mrdwt_clips import dance_of
 from tools.vectors.waved import (
@@ -60,14 +71,10 @@ def vectors() -> Iterable[Vector]:
     return shelf.vectors
 
 
-def _silent(plan: Plan, n_channels: int = 1, **edits: Any) -> bytes:
+def of_zeros(plan: Plan, n_channels: int = 1, **edits: Any) -> bytes:
     """A file of zeros, all of whose streams are empty."""
     made = [zeros(plan)] * n_channels
     return file_with(plan, made, motion_of(plan, made), **edits)
-
-
-def _says(data: bytes) -> Edit:
-    return put(payloads.CLIP, "signals.0.header", varint(len(data)) + data)
 
 
 def _headers(shelf: Broken) -> None:
@@ -88,29 +95,17 @@ def _headers(shelf: Broken) -> None:
         ("header-none", "A header of no bytes.", plan, dict.fromkeys(_FIELDS, b"")),
         ("header-cut", "A header without its last field.", plan, {"least": b""}),
         ("header-and-byte", "A byte behind the header.", plan, {"least": b"\1\0"}),
-        ("header-and-unit", "A unit where decimals are said.", plan, {"unit": _binary64(1.0)}),
+        ("header-and-unit", "A unit where decimals are said.", plan, {"unit": binary64(1.0)}),
         ("unit-missing", "No unit of scaled coefficients.", scaled, {"unit": b""}),
     )
     for name, purpose, made, parts in cases:
-        shelf.add(name, HEADING, purpose, _silent(made, CLIP=_says(header(made, **parts))))
-    units = {
-        "0": 0.0,
-        "minus": -1.0,
-        "NaN": math.nan,
-        "infinite": math.inf,
-        "tiny": 2.0**-100 * (1 - 2.0**-53),
-        "huge": 2.0**100 * (1 + 2.0**-52),
-    }
-    for name, unit in units.items():
-        edit = _says(header(scaled, unit=_binary64(unit)))
-        shelf.add(f"unit-{name}", HEADING, f"A unit of {unit!r}.", _silent(scaled, CLIP=edit))
+        shelf.add(name, HEADING, purpose, of_zeros(made, CLIP=says(header(made, **parts))))
+    for name, unit in BAD_STEPS.items():
+        edit = says(header(scaled, unit=binary64(unit)))
+        shelf.add(f"unit-{name}", HEADING, f"A unit of {unit!r}.", of_zeros(scaled, CLIP=edit))
 
 
 _FIELDS = ("wavelet", "lo", "hi", "levels", "coded_frames", "decimals", "unit", "least")
-
-
-def _binary64(value: float) -> bytes:
-    return struct.pack("<d", value)
 
 
 def _filters(shelf: Broken) -> None:
@@ -133,10 +128,10 @@ def _filters(shelf: Broken) -> None:
     spec = f"{HEADING}; Wavelets"
     for name, (purpose, lo, hi) in cases.items():
         said = header(FLAT, wavelet=b"\0", lo=counted(lo), hi=counted(hi))
-        data = _silent(FLAT, CLIP=_says(said))
+        data = of_zeros(FLAT, CLIP=says(said))
         shelf.add(f"taps-{name}", spec, f"{purpose}.", data)
     said = b"\0" + counted(two) + counted(two)[:-4]
-    data = _silent(FLAT, CLIP=_says(said))
+    data = of_zeros(FLAT, CLIP=says(said))
     shelf.add("taps-cut", spec, "A header that ends within a tap.", data)
 
 
@@ -151,13 +146,13 @@ def _signal(shelf: Broken) -> None:
         return [(head, streams[::2]) for head, streams in made]
 
     more = put(payloads.CLIP, "signals.0.n_resolutions", b"\4")
-    data = _silent(plan, 2, CLIP=more, segments=extended)
+    data = of_zeros(plan, 2, CLIP=more, segments=extended)
     shelf.add("resolutions", spec, "Four resolutions of two levels.", data)
     none = put(payloads.CLIP, "signals.0.n_resolutions", b"\0")
-    data = _silent(plan, 2, CLIP=none, segments=lambda made: [(made[0][0], [])])
+    data = of_zeros(plan, 2, CLIP=none, segments=lambda made: [(made[0][0], [])])
     shelf.add("resolutions-0", spec, "No resolution at all.", data)
     together = put(payloads.CLIP, "signals.0.groups", b"\0")
-    data = _silent(plan, 2, CLIP=together, segments=fewer)
+    data = of_zeros(plan, 2, CLIP=together, segments=fewer)
     shelf.add("groups", spec, "A group of two channels.", data)
     twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
 
@@ -165,11 +160,11 @@ def _signal(shelf: Broken) -> None:
         signals = (replace(found.signals[0], samples_per_frame=2),)
         return replace(found, signals=signals)
 
-    data = _silent(plan, CLIP=twice, CEND=rehash(np.zeros((16, 1))), row=rows)
+    data = of_zeros(plan, CLIP=twice, CEND=rehash(np.zeros((16, 1))), row=rows)
     shelf.add("samples", spec, "Two rows a frame.", data)
     run = build(payloads.GRID_RUN, {"n_channels": 2, "grid": WHOLE}, "grids")
     integers = put(payloads.CLIP, "signals.0.grids", b"\1" + run)
-    data = _silent(plan, 2, CLIP=integers, CEND=rehash(np.zeros((8, 2), np.int64)))
+    data = of_zeros(plan, 2, CLIP=integers, CEND=rehash(np.zeros((8, 2), np.int64)))
     purpose = "All grids are INTEGER, but the codec decodes no ordinals."
     shelf.add("integers", spec, purpose, data)
 
@@ -187,15 +182,15 @@ def _segments(shelf: Broken) -> None:
         ("segment-not-fresh", "A segment that needs the one before.", headed(1, flags=0)),
     )
     for name, purpose, edit in cases:
-        shelf.add(name, spec, purpose, _silent(plan, segments=edit))
+        shelf.add(name, spec, purpose, of_zeros(plan, segments=edit))
     plan = Plan(6, HAAR)
     more, fewer = (header(plan, coded_frames=bytes((n,))) for n in (8, 5))
     purpose = "The last segment ends inside a coefficient, and not with the coded frames."
-    shelf.add("end-inside", spec, purpose, _silent(plan, CLIP=_says(more)))
+    shelf.add("end-inside", spec, purpose, of_zeros(plan, CLIP=says(more)))
     purpose = "Fewer coded frames than are stored."
-    shelf.add("frames-fewer", spec, purpose, _silent(plan, CLIP=_says(fewer)))
+    shelf.add("frames-fewer", spec, purpose, of_zeros(plan, CLIP=says(fewer)))
     purpose = "Coded frames, 0 of them, of a clip that has some."
-    data = _silent(plan, CLIP=_says(header(plan, coded_frames=b"\0")))
+    data = of_zeros(plan, CLIP=says(header(plan, coded_frames=b"\0")))
     shelf.add("frames-0", spec, purpose, data)
 
 
@@ -203,12 +198,12 @@ def _missing(shelf: Broken) -> None:
     """The last frames need approximations that no segment holds."""
     spec = f"{HEADING}; {CUT_HEADING}"
     plan = Plan(16, DB2)
-    said = _says(header(plan, coded_frames=varint(32)))
+    said = says(header(plan, coded_frames=varint(32)))
     purpose = "A clip without the segment that bears upon its last frames."
-    shelf.add("missing-after", spec, purpose, _silent(plan, CLIP=said))
-    far = _says(header(plan, coded_frames=varint(2**52)))
+    shelf.add("missing-after", spec, purpose, of_zeros(plan, CLIP=said))
+    far = says(header(plan, coded_frames=varint(2**52)))
     purpose = "The same with 2^52 coded frames."
-    shelf.add("missing-after-2-52", spec, purpose, _silent(plan, CLIP=far))
+    shelf.add("missing-after-2-52", spec, purpose, of_zeros(plan, CLIP=far))
 
 
 def _heads(shelf: Broken) -> None:
@@ -283,7 +278,7 @@ def _bits(shelf: Broken) -> None:
     purpose = "A byte 0 behind the head of a single approximation, which has no bits."
     shelf.add("byte-for-nothing", spec, purpose, data)
     silent = Plan(8, HAAR, 1)
-    data = _silent(silent, segments=stream(1, _as(b"\0")))
+    data = of_zeros(silent, segments=stream(1, _as(b"\0")))
     shelf.add(
         "detail-of-0",
         spec,

@@ -6,8 +6,6 @@ zeros, which every header makes of frames with nothing in them.
 
 from __future__ import annotations
 
-import math
-import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -20,11 +18,10 @@ from mcz.container import payloads
 from mcz.numbers import Grid, GridKind
 from mcz.schema import build
 from tools.vectors.craft import Broken, Vector, rehash
-from tools.vectors.edits import headed, put, swap
+from tools.vectors.edits import BAD_STEPS, binary64, headed, put, says, swap
 from tools.vectors.grouped import HEADING, REORDERED, Plan, header
 from tools.vectors.grouped_files import file_with
 from tools.vectors.spatial import basis_of, still
-from tools.vectors.spatial_faults import says
 
 SPACE = f"{HEADING}; Space"
 
@@ -78,16 +75,8 @@ def _headers(shelf: Broken) -> None:
 
 def _steps(shelf: Broken) -> None:
     plan = Plan(("I6",), 2)
-    steps = {
-        "0": 0.0,
-        "minus": -1.0,
-        "NaN": math.nan,
-        "infinite": math.inf,
-        "tiny": 2.0**-100 * (1 - 2.0**-53),
-        "huge": 2.0**100 * (1 + 2.0**-52),
-    }
-    for case, step in steps.items():
-        said = says(header(plan, step=struct.pack("<d", step)))
+    for case, step in BAD_STEPS.items():
+        said = says(header(plan, step=binary64(step)))
         shelf.add(f"step-{case}", SPACE, f"A step of {step!r}.", _silent(plan, CLIP=said))
 
 

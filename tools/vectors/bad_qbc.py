@@ -5,8 +5,6 @@ Where a reader can overlook the fault, the hash is that of what it then decodes.
 
 from __future__ import annotations
 
-import math
-import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -40,7 +38,19 @@ from tools.vectors.curved import (
     paths,
     still,
 )
-from tools.vectors.edits import Edit, Made, at, both, headed, plus, put, stream
+from tools.vectors.edits import (
+    BAD_STEPS,
+    Edit,
+    Made,
+    at,
+    binary64,
+    both,
+    headed,
+    plus,
+    put,
+    says,
+    stream,
+)
 from tools.vectors.valid_cut import HEADING as CUT_HEADING
 from tools.vectors.valid_cut import window
 
@@ -67,14 +77,6 @@ def _silent(plan: Plan, n_joints: int = 1, **edits: Any) -> bytes:
     return file_with(plan, made, motion_of(plan, made), **edits)
 
 
-def _says(data: bytes) -> Edit:
-    return put(payloads.CLIP, "signals.0.header", varint(len(data)) + data)
-
-
-def _binary64(value: float) -> bytes:
-    return struct.pack("<d", value)
-
-
 def _headers(shelf: Broken) -> None:
     """Headers over nothing but zeros, which any reading of them gives."""
     plan = Plan(16, decimals=3)
@@ -91,24 +93,16 @@ def _headers(shelf: Broken) -> None:
         ("header-none", "A header of no bytes.", plan, none),
         ("header-cut", "A header without its last field.", plan, {"decimals": b""}),
         ("header-and-byte", "A byte behind the header.", plan, {"decimals": b"\3\0"}),
-        ("header-and-step", "A step where decimals are said.", plan, {"step": _binary64(1.0)}),
+        ("header-and-step", "A step where decimals are said.", plan, {"step": binary64(1.0)}),
         ("step-missing", "One step.", scaled, {"step": b""}),
-        ("step-cut", "Half of a step.", scaled, {"step": _binary64(1.0)[:4]}),
+        ("step-cut", "Half of a step.", scaled, {"step": binary64(1.0)[:4]}),
     )
     for name, purpose, made, parts in cases:
-        shelf.add(name, HEADING, purpose, _silent(made, CLIP=_says(header(made, **parts))))
-    steps = {
-        "0": 0.0,
-        "minus": -1.0,
-        "NaN": math.nan,
-        "infinite": math.inf,
-        "tiny": 2.0**-100 * (1 - 2.0**-53),
-        "huge": 2.0**100 * (1 + 2.0**-52),
-    }
-    for name, step in steps.items():
-        edit = _says(header(scaled, step=_binary64(step)))
+        shelf.add(name, HEADING, purpose, _silent(made, CLIP=says(header(made, **parts))))
+    for name, step in BAD_STEPS.items():
+        edit = says(header(scaled, step=binary64(step)))
         shelf.add(f"step-{name}", HEADING, f"A step of {step!r}.", _silent(scaled, CLIP=edit))
-        edit = _says(header(scaled, position_step=_binary64(step)))
+        edit = says(header(scaled, position_step=binary64(step)))
         purpose = f"A step of positions of {step!r}."
         shelf.add(f"position-step-{name}", HEADING, purpose, _silent(scaled, CLIP=edit))
 
@@ -158,11 +152,11 @@ def _segments(shelf: Broken) -> None:
     plan = Plan(12)
     more, fewer, none = (header(plan, coded_frames=bytes((n,))) for n in (20, 11, 0))
     purpose = "The last segment ends between two marks, and not with the coded frames."
-    shelf.add("end-inside", spec, purpose, _silent(plan, CLIP=_says(more)))
+    shelf.add("end-inside", spec, purpose, _silent(plan, CLIP=says(more)))
     purpose = "Fewer coded frames than are stored."
-    shelf.add("frames-fewer", spec, purpose, _silent(plan, CLIP=_says(fewer)))
+    shelf.add("frames-fewer", spec, purpose, _silent(plan, CLIP=says(fewer)))
     purpose = "Coded frames, 0 of them, of a clip that has some."
-    shelf.add("frames-0", spec, purpose, _silent(plan, CLIP=_says(none)))
+    shelf.add("frames-0", spec, purpose, _silent(plan, CLIP=says(none)))
     hidden = (
         ("end-inside-hidden", 12, 20, "The last segment ends between two marks"),
         ("frames-fewer-hidden", 16, 11, "Fewer coded frames than are stored"),
@@ -170,7 +164,7 @@ def _segments(shelf: Broken) -> None:
     for name, stored, n_coded, purpose in hidden:
         plan = Plan(stored)
         edits = window(motion_of(plan, [still(plan)]), 0, 9)
-        said = _says(header(plan, coded_frames=bytes((n_coded,))))
+        said = says(header(plan, coded_frames=bytes((n_coded,))))
         data = _silent(plan, **{**edits, "CLIP": both(edits["CLIP"], said)})
         shelf.add(name, spec, f"{purpose}, behind all frames that are shown.", data)
 
@@ -179,13 +173,13 @@ def _missing(shelf: Broken) -> None:
     """The last frames need a mark that no segment holds."""
     spec = f"{HEADING}; {CUT_HEADING}"
     plan = Plan(16)
-    said = _says(header(plan, coded_frames=varint(32)))
+    said = says(header(plan, coded_frames=varint(32)))
     purpose = "A clip without the segment that has the mark behind its last frames."
     shelf.add("missing-after", spec, purpose, _silent(plan, CLIP=said))
-    far = _says(header(plan, coded_frames=varint(2**52)))
+    far = says(header(plan, coded_frames=varint(2**52)))
     purpose = "The same with 2^52 coded frames."
     shelf.add("missing-after-2-52", spec, purpose, _silent(plan, CLIP=far))
-    next_alone = _says(header(plan, coded_frames=b"\x11"))
+    next_alone = says(header(plan, coded_frames=b"\x11"))
     purpose = "The one coded frame that is not stored is the mark behind."
     shelf.add("missing-mark", spec, purpose, _silent(plan, CLIP=next_alone))
 

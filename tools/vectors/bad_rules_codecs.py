@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from tools.vectors import bad_mrdwt, waved
 from tools.vectors.craft import Broken, Vector, file_of
-from tools.vectors.edits import Edit, both, raw_stream, stream
+from tools.vectors.edits import Edit, both, raw_stream, says, stream
 from tools.vectors.motions import HUNDREDTHS, column
 from tools.vectors.valid_cut import window
 
@@ -37,7 +37,7 @@ def _with(ordinals: list[list[int]], width: int) -> Edit:
 def _hidden(shelf: Broken) -> None:
     plan = waved.Plan(6, waved.HAAR)
     edits = window(waved.motion_of(plan, [waved.zeros(plan)]), 0, 4)
-    said = bad_mrdwt._says(waved.header(plan, coded_frames=b"\x08"))
-    data = bad_mrdwt._silent(plan, **{**edits, "CLIP": both(edits["CLIP"], said)})
+    said = says(waved.header(plan, coded_frames=b"\x08"))
+    data = bad_mrdwt.of_zeros(plan, **{**edits, "CLIP": both(edits["CLIP"], said)})
     purpose = "The last segment ends inside a coefficient, behind all frames that are shown."
     shelf.add("end-inside-hidden", f"{waved.HEADING}; CLIP", purpose, data)

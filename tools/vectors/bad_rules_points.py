@@ -18,13 +18,13 @@ from mcz.schema import build, varint
 from tools.vectors.bad_lsdt_models import coded_entries, with_model
 from tools.vectors.bad_online_units import SIX, SPLIT, head_of, only_units
 from tools.vectors.craft import Broken, Vector, rehash
-from tools.vectors.edits import stream
+from tools.vectors.edits import says, stream
 from tools.vectors.grouped import HEADING, INTRA, ONE, Plan
 from tools.vectors.grouped_files import both, file_with, numbered, values_of
 from tools.vectors.spatial import CLIP, PCA_RDO, basis_of, header, listed, motion_of, still
 from tools.vectors.spatial import Plan as Windows
 from tools.vectors.spatial import file_with as windows_with
-from tools.vectors.spatial_faults import Bits, says, spec_of, stream_with
+from tools.vectors.spatial_faults import Bits, spec_of, stream_with
 
 WIDE = 2049  # channels
 

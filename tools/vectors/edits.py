@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import struct
 import zlib
 from collections.abc import Callable, Sequence
@@ -11,8 +12,18 @@ from typing import Any
 
 import construct
 
+from mcz.container import payloads
 from mcz.container.segments import SegmentHeader, StreamCounts, parse_table
 from mcz.schema import varint
+
+BAD_STEPS = {  # that no codec takes, by what their vectors are called
+    "0": 0.0,
+    "minus": -1.0,
+    "NaN": math.nan,
+    "infinite": math.inf,
+    "tiny": 2.0**-100 * (1 - 2.0**-53),
+    "huge": 2.0**100 * (1 + 2.0**-52),
+}
 
 Edit = Callable[[bytes], bytes]
 Made = list[tuple[SegmentHeader, Sequence[bytes]]]  # segments before they are built
@@ -71,6 +82,15 @@ def _item(schema: construct.FocusedSeq, stream: io.BytesIO, index: int) -> tuple
     start = stream.tell()
     items.subcon.parse_stream(stream)
     return items.subcon, start, stream.tell()
+
+
+def says(data: bytes) -> Edit:
+    """Put another header of the codec into CLIP."""
+    return put(payloads.CLIP, "signals.0.header", varint(len(data)) + data)
+
+
+def binary64(value: float) -> bytes:
+    return struct.pack("<d", value)
 
 
 def swap(old: bytes, new: bytes) -> Edit:

@@ -16,11 +16,10 @@ from mcz.codecs.lsdt_frame import FRAME_HEADER
 from mcz.coding import kernels
 from mcz.coding.huffman import class_of, codes_of
 from mcz.coding.residuals import bits, code_residual, side_of
-from mcz.container import payloads
 from mcz.jit import kernel
 from mcz.motion import Motion
 from mcz.schema import parse, varint
-from tools.vectors.edits import Edit, put, stream
+from tools.vectors.edits import Edit, stream
 from tools.vectors.spatial import (
     CLIP,
     FRAME,
@@ -214,11 +213,6 @@ def spec_of(name: str, *more: str) -> str:
 def silent(plan: Plan, motion: Motion | None = None, **edits: Any) -> bytes:
     """A file of zeros."""
     return file_with(replace(plan, fill=still), motion, **edits)
-
-
-def says(data: bytes) -> Edit:
-    """Put another header into CLIP."""
-    return put(payloads.CLIP, "signals.0.header", varint(len(data)) + data)
 
 
 def stream_with(plan: Plan, data: bytes) -> Any:
