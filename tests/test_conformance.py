@@ -59,6 +59,7 @@ def faults(value: Any, schema: dict[str, Any], where: str) -> list[str]:
 
 
 def test_manifest_follows_its_schema() -> None:
+    assert all("description" in key for key in SCHEMA["$defs"]["vector"]["properties"].values())
     assert faults(MANIFEST, SCHEMA, "manifest") == []
     assert faults({**MANIFEST, "more": 1}, SCHEMA, "m") == ["m: unknown key 'more'"]
 
