@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import struct
 from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mcz import schema
@@ -237,6 +238,31 @@ def test_the_nearest_number_of_a_grid(value: float, digits: int) -> None:
     general = Grid(GridKind.GENERAL, digits + 1)
     found = general.values(general.ordinals(np.array([value]))[0])[0]
     assert abs(found - value) <= abs(value) * 10.0**-digits * 0.51 or abs(value) < 1e-306
+
+
+def by_steps(value: float, digits: int) -> int:
+    """The ordinal on GENERAL by the steps of SPEC.md, "Value to ordinal", of a value of 1e-6 on."""
+    power = math.floor(math.log10(value)) + 1
+    while Fraction(10) ** power > Fraction(value):
+        power -= 1
+    shift = digits - 1 - power
+    mantissa = round(value * 10.0**shift if shift >= 0 else value / 10.0**-shift)
+    if abs(shift) > 22 or len(str(mantissa)) != digits:
+        text = f"{value:.{digits - 1}e}"
+        mantissa, power = int(text.split("e")[0].replace(".", "")), int(text.split("e")[1])
+    block: int = 10 ** (digits - 1)
+    return (power + 307) * 9 * block + mantissa - block + 1
+
+
+@given(st.integers(-6, 36), st.integers(-60, 60), st.integers(1, 15))
+@example(5, -7, 15)
+def test_around_powers_of_ten(power: int, steps: int, digits: int) -> None:
+    """Where the logarithm of a value is rounded to one that it has not reached."""
+    value = 10.0**power
+    for _ in range(abs(steps)):
+        value = math.nextafter(value, math.copysign(math.inf, steps))
+    (found,), _ = Grid(GridKind.GENERAL, digits).ordinals(np.array([value]))
+    assert found == by_steps(value, digits)
 
 
 TABLE = [  # grid, text, ordinal: the worked examples of SPEC.md, "Number grids"

@@ -185,6 +185,12 @@ TEXTS: tuple[Break, ...] = (
         ),
     ),
     Break(
+        "GRID-11",
+        ("valid/sources/bvh-lossy-general-below",),
+        ((MAGNITUDES, "power -= values < _POWERS[power - _LEAST_POWER]", "pass"),),
+        "logarithm",
+    ),
+    Break(
         "TEXT-01",
         (f"{STYLE}upper", f"{STYLE}exponent1"),
         (

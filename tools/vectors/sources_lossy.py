@@ -46,14 +46,21 @@ def vectors() -> Iterable[Vector]:
     return shelf.vectors
 
 
-def lossy(plan: Plan, columns: Columns, name: str) -> tuple[Motion, Codec]:
-    """A clip of codec 2 whose approximations are ``columns``, 0 behind their ends."""
+def lossy(
+    plan: Plan, columns: Columns, name: str, details: Sequence[int] = ()
+) -> tuple[Motion, Codec]:
+    """A clip of codec 2 whose approximations are ``columns``, 0 behind their ends.
+
+    ``details`` are those of level 1, of all channels; there are no others.
+    """
     motion = blank(plan.n_frames, [grid for grid, _ in columns], name)
     channels = []
     for place in range(motion.signals[0].n_channels):
         own = columns[min(place, len(columns) - 1)][1]
         bands: list[Sequence[int]] = [[*own, *[0] * (plan.lengths[-1] - len(own))]]
         bands += [[0] * plan.lengths[level] for level in range(plan.levels, 0, -1)]
+        if details:
+            bands[-1] = details
         channels.append(Wave(bands))
     signal = replace(motion.signals[0], values=waved.values_of(plan, channels))
     return replace(motion, signals=(signal,)), waved.codec_of(plan, channels)
@@ -146,12 +153,23 @@ def _general(shelf: Whole) -> None:
         15,
         [(Grid(GridKind.GENERAL, digits), tiny) for digits in (1, 3, 8, 9, 14, 15)],
     )  # fmt: skip
+    _below_tens(shelf)
     taps = (1e-307, 1e-308)
     plan = Plan(24, Wavelet(taps, (0.0, 0.0)), 1, 3)
     least = [10_000, 1000, 999, 995, 994, 500, 9999, 9994, 9950, 9940, -999, -500]
     made = lossy(plan, [(Grid(GridKind.GENERAL, d), least) for d in (1, 2, 3, 15)], "least")
     purpose = "Values of a lossy clip at the lower end of GENERAL, at 1e-307, and below it."
     _hold(shelf, "lossy-general-least", purpose, [made])
+
+
+def _below_tens(shelf: Whole) -> None:
+    """Numbers a few last places below 10^5, whose rounded logarithm is 5."""
+    plan = Plan(8, Wavelet((1.0, 1.0), (1e-10, 1e-11)), 1, 0)
+    tens, places = [100_000] * 2 + [-100_000] * 2, [0, -1, 2, 5]
+    grids = [Grid(GridKind.GENERAL, digits) for digits in (13, 14, 15)]
+    made = lossy(plan, [(grid, tens) for grid in grids], "lossy-general-below", places)
+    purpose = "Values of a lossy clip less than a last place below a power of ten, or a few."
+    _hold(shelf, "lossy-general-below", purpose, [made])
 
 
 def _words(shelf: Whole) -> None:
