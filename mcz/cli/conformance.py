@@ -22,6 +22,7 @@ from mcz.errors import LimitError, MczError, UnsupportedError
 if TYPE_CHECKING:
     from mcz.files.clip import Clip
     from mcz.files.file import File
+    from mcz.files.signal_info import SignalInfo
 
 OPTIONS = ("--clip", "--frames", "--joints", "--resolution", "--post-filter", "--serve")
 MAX_LINE = 2**20
@@ -116,25 +117,32 @@ def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
         clips = [file.only_clip(given.clip)]
     lacking: UnsupportedError | None = None
     for clip in clips:
-        try:
-            _ = clip.frame_numbers
-            yield from _clip_arrays(clip, given)
-        except UnsupportedError as error:
-            lacking = lacking or error
+        _ = clip.frame_numbers
+        for signal in clip.signals:
+            try:
+                yield from _signal_arrays(clip, signal, given)
+            except UnsupportedError as error:
+                lacking = lacking or error
+                _read_segments(file, signal)
     if lacking is not None:  # and nothing else is wrong, which would count for more
         raise lacking
 
 
-def _clip_arrays(clip: Clip, given: argparse.Namespace) -> Iterator[Part]:
-    """The canonical array of each signal, then its mask where any value is invalid."""
-    for signal in clip.signals:
-        if given.joints is not None and signal.channels is not None:
-            continue
-        resolution = signal.coarser(given.resolution) if signal.index else given.resolution
-        values, mask = _values(clip, given, resolution, signal.index)
-        yield _part(clip.name, signal.name, "values", values)
-        if mask is not None and not mask.all():
-            yield _part(clip.name, signal.name, "mask", mask)
+def _signal_arrays(clip: Clip, signal: SignalInfo, given: argparse.Namespace) -> Iterator[Part]:
+    """The canonical array of a signal, then its mask where any value is invalid."""
+    if given.joints is not None and signal.channels is not None:
+        return
+    resolution = signal.coarser(given.resolution) if signal.index else given.resolution
+    values, mask = _values(clip, given, resolution, signal.index)
+    yield _part(clip.name, signal.name, "values", values)
+    if mask is not None and not mask.all():
+        yield _part(clip.name, signal.name, "mask", mask)
+
+
+def _read_segments(file: File, signal: SignalInfo) -> None:
+    """The tables of segments that nothing decodes have to be right all the same."""
+    for row in signal.rows:
+        file.container.streams(row, signal.counts, None)
 
 
 def _values(

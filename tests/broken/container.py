@@ -442,8 +442,17 @@ GRAMMAR: tuple[Break, ...] = (
     ),
     Break(
         "STRICT-05",
-        ("invalid/clip/value-hash-behind-unknown-codec",),
+        (
+            "invalid/clip/value-hash-behind-unknown-codec",
+            "invalid/clip/value-hash-beside-unknown-codec",
+        ),
         ((CLI, "lacking = lacking or error", "raise"),),
+    ),
+    Break(
+        "STRICT-05",
+        ("invalid/data/table-crc-unknown-codec",),
+        ((CLI, "_read_segments(file, signal)\n    if", "pass\n    if"),),
+        "tables",
     ),
 )
 

@@ -52,7 +52,7 @@ def vectors() -> Iterable[Vector]:
 
 def _tables(shelf: Broken) -> None:
     cases: tuple[tuple[str, str, Edit], ...] = (
-        ("table-crc", "A table_crc of table and streams.", _crc_of_all),
+        ("table-crc", "A table_crc of table and streams.", crc_of_all),
         ("bit-beyond-streams", "A bit beyond the last stream.", table(N_GROUPS, present=b"\x07")),
         ("streams-too-short", "The streams end before the table says.", lambda data: data[:-1]),
         ("streams-too-long", "A byte follows the last stream.", plus(b"\0")),
@@ -268,7 +268,7 @@ def _packet(**changes: Any) -> Edit:
     return edit
 
 
-def _crc_of_all(payload: bytes) -> bytes:
+def crc_of_all(payload: bytes) -> bytes:
     size = parse_table(payload, StreamCounts(N_GROUPS, 1)).size
     crc = struct.pack("<I", zlib.crc32(payload[: size - 4] + payload[size:]))
     return payload[: size - 4] + crc + payload[size:]

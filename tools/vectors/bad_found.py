@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
-from mcz.codecs import by_name
+import numpy as np
+
+from mcz.codecs import by_name, raw
 from mcz.codecs._bases import build_bases, model_of
 from mcz.codecs.base import id_of
 from mcz.container import payloads
+from mcz.files.digest import value_hash
+from mcz.motion import Channel, Signal
 from mcz.schema import varint
+from tools.vectors.bad_data import crc_of_all
 from tools.vectors.bad_lsdt_models import with_model
 from tools.vectors.craft import (
     UNSUPPORTED,
@@ -32,6 +38,9 @@ def vectors() -> Iterable[Vector]:
         shelf = Broken(f"invalid/{codec}")
         _without_frames(shelf, codec)
         shelves.append(shelf)
+    clips, data = Broken("invalid/clip"), Broken("invalid/data")
+    _unsupported(clips, data)
+    shelves += [clips, data]
     later = Whole("uncommon/container", exit=(UNSUPPORTED,))
     _models(shelves[CODECS.index(CLIP)], later)
     _other_index(later)
@@ -77,6 +86,23 @@ def _models(shelf: Broken, later: Whole) -> None:
         file_with(plan, CLIP=other),
         exit=later.exit,
     )
+
+
+def _unsupported(clips: Broken, data: Broken) -> None:
+    """Faults in a clip whose motion is of an unknown codec, which is legal."""
+    crafter = Crafter(DATA=crc_of_all)
+    crafter.clip(dance(), codec=replace(raw.CODEC, id=2**20))
+    purpose = "A table_crc of table and streams, of a codec that nobody knows."
+    data.add("table-crc-unknown-codec", "DATA; Strict reading", purpose, finished(crafter))
+    analog = Signal(np.arange(8.0).reshape(8, 1), name="analog", samples_per_frame=2)
+    analog = replace(analog, channels=(Channel("", "force"),))
+    both_signals = replace(dance(), signals=(*dance().signals, analog))
+    hashes = varint(2) + value_hash(dance().signals[0].values, None) + b"v" * 32
+    wrong = put(payloads.CEND, "value_sha256", hashes)
+    unknown = put(payloads.CLIP, "signals.0.codec", varint(2**20))
+    made = file_of(both_signals, CEND=wrong, CLIP=unknown, index=False)
+    purpose = "A wrong value hash of the second signal, where the codec of the first is unknown."
+    clips.add("value-hash-beside-unknown-codec", "CEND; Strict reading", purpose, made)
 
 
 def _other_index(shelf: Whole) -> None:
