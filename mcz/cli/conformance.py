@@ -177,9 +177,16 @@ def _sources(file: File) -> Iterator[Part]:
     """Every file that is held under a name: of clips, attached, and further names."""
     from mcz.files.archive import named_files
 
+    lacking: UnsupportedError | None = None
     for path, restore in named_files(file):
-        data = restore()
+        try:
+            data = restore()
+        except UnsupportedError as error:
+            lacking = lacking or error
+            continue
         yield {"path": path, "bytes": len(data)}, data
+    if lacking is not None:
+        raise lacking
 
 
 if __name__ == "__main__":

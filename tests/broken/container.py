@@ -446,13 +446,19 @@ GRAMMAR: tuple[Break, ...] = (
             "invalid/clip/value-hash-behind-unknown-codec",
             "invalid/clip/value-hash-beside-unknown-codec",
         ),
-        ((CLI, "lacking = lacking or error", "raise"),),
+        ((CLI, "lacking = lacking or error\n                _", "raise\n                _"),),
     ),
     Break(
         "STRICT-05",
         ("invalid/data/table-crc-unknown-codec",),
         ((CLI, "_read_segments(file, signal)\n    if", "pass\n    if"),),
         "tables",
+    ),
+    Break(
+        "STRICT-05",
+        ("invalid/sources/hash-behind-unknown-codec",),
+        ((CLI, "lacking = lacking or error\n            continue", "raise"),),
+        "sources",
     ),
 )
 

@@ -16,6 +16,7 @@ from mcz.motion import Channel, Signal
 from mcz.schema import varint
 from tools.vectors.bad_data import crc_of_all
 from tools.vectors.bad_lsdt_models import with_model
+from tools.vectors.bad_sources import Unrestorable
 from tools.vectors.craft import (
     UNSUPPORTED,
     Broken,
@@ -28,6 +29,7 @@ from tools.vectors.craft import (
 from tools.vectors.edits import Edit, at, put, span, swap
 from tools.vectors.faults import CODECS
 from tools.vectors.motions import dance
+from tools.vectors.sources import PLAIN, take
 from tools.vectors.spatial import CLIP, Plan, basis_of, file_with
 from tools.vectors.spatial_faults import spec_of
 
@@ -39,8 +41,10 @@ def vectors() -> Iterable[Vector]:
         _without_frames(shelf, codec)
         shelves.append(shelf)
     clips, data = Broken("invalid/clip"), Broken("invalid/data")
+    sources = Unrestorable("invalid/sources")
     _unsupported(clips, data)
-    shelves += [clips, data]
+    _unsupported_source(sources)
+    shelves += [clips, data, sources]
     later = Whole("uncommon/container", exit=(UNSUPPORTED,))
     _models(shelves[CODECS.index(CLIP)], later)
     _other_index(later)
@@ -103,6 +107,16 @@ def _unsupported(clips: Broken, data: Broken) -> None:
     made = file_of(both_signals, CEND=wrong, CLIP=unknown, index=False)
     purpose = "A wrong value hash of the second signal, where the codec of the first is unknown."
     clips.add("value-hash-beside-unknown-codec", "CEND; Strict reading", purpose, made)
+
+
+def _unsupported_source(shelf: Broken) -> None:
+    first, second = (replace(take(PLAIN, name), name=name) for name in ("first", "second"))
+    crafter = Crafter()
+    crafter.clip(first, codec=replace(raw.CODEC, id=2**20))
+    crafter.edits["CEND"] = put(payloads.CEND, "source_sha256", b"\1" + b"s" * 32)
+    crafter.clip(second)
+    purpose = "A source with another hash, behind one of a clip whose codec is unknown."
+    shelf.add("hash-behind-unknown-codec", "CEND; Strict reading", purpose, finished(crafter))
 
 
 def _other_index(shelf: Whole) -> None:
