@@ -45,14 +45,18 @@ class Answer:
     detail: str = ""
 
 
-class Asker(Protocol):
-    """What answers requests, one at a time."""
-
-    def ask(self, arguments: Sequence[str], data: Path | bytes, max_output: int) -> Answer: ...
+class Worker(Protocol):
+    """What holds a process, or several."""
 
     def kill(self) -> None: ...
 
     def close(self) -> None: ...
+
+
+class Asker(Worker, Protocol):
+    """What answers requests, one at a time."""
+
+    def ask(self, arguments: Sequence[str], data: Path | bytes, max_output: int) -> Answer: ...
 
 
 class Child:

@@ -1,6 +1,6 @@
 """An encoder under test: what it writes is judged by the decoder, byte for byte.
 
-README.md, "Encoders", is the contract. The source files come out of the vectors themselves.
+README.md, "The contract", says how it is asked. The source files come from the vectors.
 """
 
 from __future__ import annotations
@@ -66,9 +66,6 @@ class Pair:
     def __init__(self, encoder: Asker, decoder: Asker) -> None:
         self.encoder = encoder
         self.decoder = decoder
-
-    def ask(self, arguments: Sequence[str], data: Path | bytes, max_output: int) -> Answer:
-        return self.decoder.ask(arguments, data, max_output)
 
     def kill(self) -> None:
         self.encoder.kill()

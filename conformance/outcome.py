@@ -9,12 +9,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from conformance.child import Asker, Limits, Once
+from conformance.child import Asker, Limits, Once, Worker
 from conformance.judge import Fault, judge_answer
 from conformance.manifest import Capabilities, Request, Vector, all_requests
 from conformance.server import Server
 
-Worker = TypeVar("Worker", bound=Asker)
+AnyWorker = TypeVar("AnyWorker", bound=Worker)
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -93,14 +93,14 @@ def starter(command: Sequence[str], limits: Limits, *, serve: bool) -> Callable[
 
 
 def spread(
-    work: Callable[[Worker, Item], Result],
+    work: Callable[[AnyWorker, Item], Result],
     items: Sequence[Item],
-    start: Callable[[], Worker],
+    start: Callable[[], AnyWorker],
     jobs: int,
 ) -> Iterator[Result]:
     """Results of ``work`` in the order of ``items``, ``jobs`` at a time, an asker each."""
     askers = [start() for _ in range(max(1, min(jobs, len(items))))]
-    free: queue.SimpleQueue[Worker] = queue.SimpleQueue()
+    free: queue.SimpleQueue[AnyWorker] = queue.SimpleQueue()
     for asker in askers:
         free.put(asker)
 

@@ -1,4 +1,4 @@
-"""One process for many requests (README.md, "Many requests, one process")."""
+"""One process for many requests (README.md, "The contract": --serve)."""
 
 from __future__ import annotations
 

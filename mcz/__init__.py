@@ -10,6 +10,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mcz.conversion import Fit, convert, from_positions
+    from mcz.editing.archive import Outcome, Report, append, pack, unpack
+    from mcz.editing.extraction import ExtractedClip, Extraction, extract
+    from mcz.editing.replacing import Replacement, replace
     from mcz.errors import (
         AccessError,
         ChecksumError,
@@ -24,33 +28,31 @@ if TYPE_CHECKING:
         TruncatedError,
         UnsupportedError,
     )
-    from mcz.files.archive import Outcome, Report, append, pack, unpack
-    from mcz.files.clip import Clip
-    from mcz.files.concealing import LiveFrame
-    from mcz.files.conversion import Fit, convert, from_positions
-    from mcz.files.editing import Replacement, replace
-    from mcz.files.extraction import ExtractedClip, Extraction, extract
-    from mcz.files.file import Attachment, File, encode, open, read, write
-    from mcz.files.filtering import post_filter
-    from mcz.files.following import live_frames
-    from mcz.files.live import LiveWriter
-    from mcz.files.positions import in_positions
-    from mcz.files.report import Problem, verify
-    from mcz.files.sources import read_skeleton
-    from mcz.files.streams import LiveReader, stream_decode, stream_encode
-    from mcz.files.tolerant import StreamSummary
     from mcz.kinematics import positions
+    from mcz.kinematics.marker_motion import in_positions
+    from mcz.live.concealment import LiveFrame
+    from mcz.live.generators import LiveReader, stream_decode, stream_encode
+    from mcz.live.reader_with_losses import StreamSummary
+    from mcz.live.strict_reader import live_frames
+    from mcz.live.writer import LiveWriter
     from mcz.metrics import Comparison, compare
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
+    from mcz.reading.clip import Clip
+    from mcz.reading.file import Attachment, File, open
+    from mcz.reading.post_filtering import post_filter
+    from mcz.reading.read import read
+    from mcz.reading.report import Problem, verify
+    from mcz.reading.source_files import read_skeleton
+    from mcz.writing.file import encode, write
 
 __version__ = "0.9.0"
 
 _HOMES = {
-    "mcz.files.archive": ("Outcome", "Report", "append", "pack", "unpack"),
-    "mcz.files.clip": ("Clip",),
-    "mcz.files.concealing": ("LiveFrame",),
-    "mcz.files.conversion": ("Fit", "convert", "from_positions"),
-    "mcz.files.editing": ("Replacement", "replace"),
+    "mcz.editing.archive": ("Outcome", "Report", "append", "pack", "unpack"),
+    "mcz.reading.clip": ("Clip",),
+    "mcz.live.concealment": ("LiveFrame",),
+    "mcz.conversion": ("Fit", "convert", "from_positions"),
+    "mcz.editing.replacing": ("Replacement", "replace"),
     "mcz.errors": (
         "AccessError",
         "ChecksumError",
@@ -65,19 +67,21 @@ _HOMES = {
         "TruncatedError",
         "UnsupportedError",
     ),
-    "mcz.files.extraction": ("ExtractedClip", "Extraction", "extract"),
-    "mcz.files.file": ("Attachment", "File", "encode", "open", "read", "write"),
-    "mcz.files.filtering": ("post_filter",),
-    "mcz.files.positions": ("in_positions",),
-    "mcz.files.following": ("live_frames",),
-    "mcz.files.live": ("LiveWriter",),
+    "mcz.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
+    "mcz.reading.file": ("Attachment", "File", "open"),
+    "mcz.reading.read": ("read",),
+    "mcz.writing.file": ("encode", "write"),
+    "mcz.reading.post_filtering": ("post_filter",),
+    "mcz.kinematics.marker_motion": ("in_positions",),
+    "mcz.live.strict_reader": ("live_frames",),
+    "mcz.live.writer": ("LiveWriter",),
     "mcz.kinematics": ("positions",),
-    "mcz.files.report": ("Problem", "verify"),
+    "mcz.reading.report": ("Problem", "verify"),
     "mcz.metrics": ("Comparison", "compare"),
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
-    "mcz.files.sources": ("read_skeleton",),
-    "mcz.files.streams": ("LiveReader", "stream_decode", "stream_encode"),
-    "mcz.files.tolerant": ("StreamSummary",),
+    "mcz.reading.source_files": ("read_skeleton",),
+    "mcz.live.generators": ("LiveReader", "stream_decode", "stream_encode"),
+    "mcz.live.reader_with_losses": ("StreamSummary",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

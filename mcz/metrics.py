@@ -115,7 +115,7 @@ def compare(original: Motion, decoded: Motion, *, virtual_markers: bool = True) 
                 channels.add(left, right)
             if marked:
                 ours, ours_marked = points_and_markers_of(original.skeleton, left)
-                theirs, theirs_marked = _places(original.skeleton, decoded.skeleton, right)
+                theirs, theirs_marked = _positions(original.skeleton, decoded.skeleton, right)
                 points.add(start, ours, _scaled(theirs, scale))
                 markers.add(start, ours_marked, _scaled(theirs_marked, scale))
             elif placed:
@@ -135,7 +135,7 @@ def compare(original: Motion, decoded: Motion, *, virtual_markers: bool = True) 
         rms_coordinate_error=points.rms,
         mean_position_error=points.mean,
         max_position_error=points.greatest,
-        where=points.place(original.skeleton, a.samples_per_frame),
+        where=points.located(original.skeleton, a.samples_per_frame),
         mismatched_points=points.mismatched if placed else None,
         sqnr_db=points.sqnr_db,
         virtual_marker_mean_cm=_times(markers.mean, unit),
@@ -222,7 +222,7 @@ class _PointErrors:
     def greatest(self) -> Number:
         return _mean(self._worst, min(1, self._n))
 
-    def place(self, skeleton: Skeleton, per_frame: int) -> tuple[int, str] | None:
+    def located(self, skeleton: Skeleton, per_frame: int) -> tuple[int, str] | None:
         """Frame and point of the greatest distance, the first of equals."""
         if not self._n:
             return None
@@ -324,13 +324,13 @@ def _same_axes(a: Skeleton, b: Skeleton, notes: list[str]) -> bool:
 
 
 def _has_markers_of(a: Skeleton, b: Skeleton) -> bool:
-    """Whether ``b`` holds the places of the points of ``a``, then those of its virtual markers."""
+    """Whether ``b`` holds the positions of points of ``a``, then of its virtual markers."""
     if point_set(b) != "markers" or point_set(a) == "markers":
         return False
     return b.n_joints == len(point_names(a)) + 3 * a.n_joints
 
 
-def _places(a: Skeleton, b: Skeleton, values: Values) -> tuple[Values, Values]:
+def _positions(a: Skeleton, b: Skeleton, values: Values) -> tuple[Values, Values]:
     """Points and virtual markers of ``b``, which may hold both as markers, those of ``a``."""
     if _has_markers_of(a, b):
         both = positions_of(b, values)

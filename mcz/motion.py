@@ -85,7 +85,7 @@ class Joint:
 
 def _is_vector(vector: Any) -> bool:
     with suppress(TypeError):
-        return len(vector) == 3 and all(map(math.isfinite, vector))
+        return len(vector) == 3 and all(map(math.isfinite, vector))  # SKEL-08
     return False
 
 
@@ -111,11 +111,11 @@ class Skeleton:
 
     def __post_init__(self) -> None:
         for index, joint in enumerate(self.joints):
-            if not -1 <= joint.parent < index:
+            if not -1 <= joint.parent < index:  # SKEL-05
                 raise MotionError(
                     f"joint {index} ({joint.name!r}): parent {joint.parent} is not before it"
                 )
-        if self.unit_cm is not None and not (np.isfinite(self.unit_cm) and self.unit_cm > 0):
+        if self.unit_cm is not None and not 0 < self.unit_cm < math.inf:  # SKEL-01
             raise MotionError(f"unit of {self.unit_cm} cm")
         if self.angle_unit not in ("deg", "rad", ""):
             raise MotionError(f"angle unit {self.angle_unit!r}")
@@ -141,7 +141,7 @@ class Skeleton:
 
     def columns(self, joint: int) -> range:
         """The columns of joint ``joint``."""
-        start = sum(len(j.channels) for j in self.joints[:joint])
+        start = sum(len(j.channels) for j in self.joints[:joint])  # SKEL-06
         return range(start, start + len(self.joints[joint].channels))
 
     def addresses(self) -> list[str]:
@@ -227,7 +227,7 @@ class Signal:
     exceptions: Exceptions = field(default_factory=Exceptions)
     grid_changes: tuple[tuple[int, int, Grid], ...] = ()
     channels: tuple[Channel, ...] | None = None  # None: those of the skeleton
-    ordinals: NDArray[np.int64] | None = None  # on their grids; see ``place``
+    ordinals: NDArray[np.int64] | None = None  # on their grids; see ``to_ordinals``
 
     def __post_init__(self) -> None:
         if self.values.ndim != 2:
@@ -250,7 +250,7 @@ class Signal:
             raise MotionError(
                 f"signal {self.name!r}: {len(self.values)} rows at {self.samples_per_frame} a frame"
             )
-        self._check_places()
+        self._check_order()
         if self.ordinals is not None and self.ordinals.shape != self.values.shape:
             raise MotionError(f"signal {self.name!r}: ordinals do not match the values")
         if self.mask is not None and (
@@ -258,12 +258,12 @@ class Signal:
         ):
             raise MotionError(f"signal {self.name!r}: mask does not match the values")
 
-    def _check_places(self) -> None:
+    def _check_order(self) -> None:
         """Exceptions and grid changes lie in the signal, exceptions in order."""
         rows, channels = self.exceptions.rows, self.exceptions.channels
-        places = rows * max(1, self.n_channels) + channels
+        cells = rows * max(1, self.n_channels) + channels
         inside = (rows >= 0) & (rows < self.n_rows) & (channels >= 0) & (channels < self.n_channels)
-        if not inside.all() or (np.diff(places) <= 0).any():
+        if not inside.all() or (np.diff(cells) <= 0).any():
             raise MotionError(f"signal {self.name!r}: exceptions outside of it or out of order")
         for row, channel, _ in self.grid_changes:
             whole = row >= 0 and row % self.samples_per_frame == 0
@@ -310,7 +310,7 @@ class Signal:
             ordinals=None if self.ordinals is None else self.ordinals[first:last],
         )
 
-    def place(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def to_ordinals(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """The ordinal of every value, and whether it gives exactly this value back.
 
         A binary grid has many NaNs, of which ``values`` shows only that they are NaN: where

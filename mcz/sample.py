@@ -173,7 +173,9 @@ def bvh_walk() -> Motion:
                 channels=tuple(Channel(kind) for kind in kinds),
             )
         )
-    values = np.rint(np.stack(columns, axis=1) * 1e4) / 1e4
+    # Values halfway between two decimals are common, and the last bit of a sine, which differs from
+    # machine to machine, would decide them: that bit is rounded away first.
+    values = np.rint(np.round(np.stack(columns, axis=1), 9) * 1e4) / 1e4
     skeleton = Skeleton(tuple(joints), name="walk")
     signal = _signal(values, Grid(GridKind.FIXED, 4))
     return Motion(skeleton, (signal,), Fraction(FRAME_RATE), name="walk")

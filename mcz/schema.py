@@ -29,7 +29,7 @@ from construct import (
 from mcz.errors import FormatError, LimitError, MczError, TruncatedError
 
 MAX_RATIO = 1032  # raw deflate never inflates to more than this times its size
-MAX_COUNT = 2**53 - 1  # every count, size and offset; JavaScript's largest exact integer
+MAX_COUNT = 2**53 - 1  # every count, size and offset; JavaScript's largest exact integer (CONV-01)
 
 
 class Varint(Construct):
@@ -64,13 +64,13 @@ def take_varint(source: Iterable[int], where: str) -> int:
     value = shift = 0
     for byte in source:
         value |= (byte & 0x7F) << shift
-        if value > MAX_COUNT or shift > 49:  # 8 bytes hold 56 bits
+        if value > MAX_COUNT or shift > 49:  # 8 bytes hold 56 bits (CONV-03)
             raise FormatError(f"{where}: varint beyond 2^53 - 1")
         if byte < 0x80:
-            if byte == 0 and shift:
+            if byte == 0 and shift:  # CONV-02
                 raise FormatError(f"{where}: varint {value} is not in its shortest form")
             return value
-        shift += 7
+        shift += 7  # CONV-04
     raise TruncatedError(f"{where}: a varint runs past the end")
 
 
@@ -91,7 +91,7 @@ class _Zigzag(Adapter):
 class _Utf8(Adapter):
     def _decode(self, obj: bytes, context: Any, path: str) -> str:
         try:
-            return obj.decode("utf-8")
+            return obj.decode("utf-8")  # CONV-05, CONV-06
         except UnicodeDecodeError as error:
             raise FormatError(f"{path}: not UTF-8: {error}") from None
 
@@ -103,7 +103,7 @@ class Sized(Construct):
     """A varint length, then that many bytes."""
 
     def _parse(self, stream: Any, context: Any, path: str) -> bytes:
-        data: bytes = stream_read(stream, UVARINT._parse(stream, context, path), path)
+        data: bytes = stream_read(stream, UVARINT._parse(stream, context, path), path)  # CONV-13
         return data
 
     def _build(self, obj: bytes, stream: Any, context: Any, path: str) -> Any:
@@ -115,8 +115,9 @@ UVARINT = Varint()
 SVARINT = _Zigzag(UVARINT)
 SIZED = Sized()
 TEXT = _Utf8(SIZED)
+# CONV-10
 EXTENSION = GreedyBytes  # the end of an open structure: ignored by readers, kept on rewriting
-FINITE = ExprValidator(Float64l, lambda obj, ctx: obj - obj == 0)
+FINITE = ExprValidator(Float64l, lambda obj, ctx: obj - obj == 0)  # SKEL-08
 
 
 def counted(item: Construct, most: int = MAX_COUNT, kind: str = "") -> Construct:
@@ -149,6 +150,7 @@ def parse(
     TruncatedError, LimitError or FormatError; ``where`` opens the message.
     """
     try:
+        # CONV-12
         whole = Struct("fields" / schema, Terminated).parse(data, left=dict(limits or {}))
     except MczError as error:
         error.args = (f"{where}: {error}",)
@@ -178,14 +180,14 @@ def _plain(error: Exception) -> str:
 
 def inflate(data: bytes, size: int, where: str) -> bytes:
     """The ``size`` bytes whose raw deflate is ``data``; never more memory than ``size`` + 1."""
-    if size > MAX_RATIO * (len(data) + 1):
+    if size > MAX_RATIO * (len(data) + 1):  # LIMIT-14
         raise LimitError(f"{where}: {size} bytes cannot come of {len(data)}")
     inflater = zlib.decompressobj(-15)
     try:
         out = inflater.decompress(data, size + 1)
     except zlib.error as error:
         raise FormatError(f"{where}: {error}") from None
-    if len(out) != size or not inflater.eof or inflater.unused_data:
+    if len(out) != size or not inflater.eof or inflater.unused_data:  # CONV-08, CONV-09
         raise FormatError(f"{where}: deflate of {len(data)} bytes does not give {size} bytes")
     return out
 

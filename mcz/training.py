@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs._bases import build_bases
-from mcz.codecs._frames import fill_gaps
+from mcz.codecs.basis_models import build_bases
+from mcz.codecs.gaps import fill_gaps
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import point_names, positions
 from mcz.motion import Motion
@@ -55,7 +55,7 @@ def training_set(motions: Iterable[Motion]) -> TrainingSet:
     """The positions of ``motions``.
 
     Raises MotionError where their points, their up axes or what is known of their units differ,
-    where a motion has no positions, and where no place is known.
+    where a motion has no positions, and where no position is known.
     """
     first: tuple[str, TrainingSet] | None = None
     clips: list[Floats] = []
@@ -76,13 +76,13 @@ def training_set(motions: Iterable[Motion]) -> TrainingSet:
 
 def _of_one(motion: Motion) -> TrainingSet:
     skeleton = motion.skeleton
-    places = positions(motion)
-    if not places.shape[1]:
+    points = positions(motion)
+    if not points.shape[1]:
         raise MotionError(f"motion {motion.name!r} has no points to train on")
-    rows = places.reshape(len(places), 3 * places.shape[1])
+    rows = points.reshape(len(points), 3 * points.shape[1])
     known = np.isfinite(rows)
     filled = fill_gaps(rows, known, np.full(rows.shape[1], np.nan))
-    clip = filled.reshape(places.shape) * (skeleton.unit_cm or 1.0)
+    clip = filled.reshape(points.shape) * (skeleton.unit_cm or 1.0)
     n_filled = int((~known.all(axis=1)).sum())
     unit = "cm" if skeleton.unit_cm else ""
     return TrainingSet(point_names(skeleton), (clip,), skeleton.up_axis or "y", unit, n_filled)

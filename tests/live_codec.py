@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.base import Codec, Encoded, Parameter, Segment, integer, number
+from mcz.codecs.contract import Codec, Encoded, Segment
+from mcz.codecs.parameters import Parameter, integer, number
 from mcz.errors import FormatError, LostFrameError, OptionError
 from mcz.schema import read_varint, varint
 
@@ -116,7 +117,7 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     grouping="all",
-    places=True,
+    positions=True,
     live=Encoder,
     follow=Decoder,
     parameters=(

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.base import Codec, Encoded, Parameter, Segment, integer
+from mcz.codecs.contract import Codec, Encoded, Segment
+from mcz.codecs.parameters import Parameter, integer
 from mcz.errors import FormatError
 
 ID = 251

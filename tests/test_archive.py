@@ -17,7 +17,7 @@ import mcz
 from mcz.container import payloads
 from mcz.container.chunks import FOOT
 from mcz.container.writer import Writer
-from mcz.files.archive import safe_path
+from mcz.editing.archive import safe_path
 from mcz.motion import joint_columns
 from mcz.sample import write_samples
 
@@ -220,7 +220,7 @@ def test_remote_archive_costs_few_requests(samples: Path) -> None:
 
     from mcz.codecs import by_name
     from mcz.container.writer import Writer
-    from mcz.files.encoding import write_clip
+    from mcz.writing.clip_writer import write_clip
 
     out = io.BytesIO()
     writer = Writer(out)

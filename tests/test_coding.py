@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.fft import dct
 
 import mcz
-from mcz.codecs import _prefix_streams as prefix
+from mcz.codecs.spatial import prefix_streams as prefix
 from mcz.coding.huffman import MAX_LENGTH, N_CLASSES, class_of, code_lengths, codes_of
 from mcz.transforms.dct import dct_matrix
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import mcz
+from mcz.conversion import converted_files
 from mcz.errors import MotionError, OptionError
-from mcz.files.conversion import converted_files
 from mcz.formats import FORMATS
 from mcz.kinematics import point_names, positions, reach
 from mcz.kinematics.euler import ORDERS, euler_angles, euler_order

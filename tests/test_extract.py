@@ -16,19 +16,20 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz import codecs
-from mcz.codecs.base import Encoded
+from mcz.codecs import raw
+from mcz.codecs.contract import Encoded
 from mcz.container import payloads
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH
 from mcz.container.source import open_source
+from mcz.container.value_hash import canonical
 from mcz.container.writer import Writer
 from mcz.errors import FormatError
-from mcz.files.digest import canonical
-from mcz.files.encoding import write_clip
-from mcz.files.report import validate
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
+from mcz.reading.report import validate
 from mcz.schema import build, parse, varint
+from mcz.writing.clip_writer import write_clip
 from tests import overlap_codec
 from tests.motions import smooth
 from tests.repair import flipped, flips, joined, parts_of, replaced, use
@@ -56,7 +57,7 @@ def _counted_cut(header: bytes, layout: Any, first: int, stop: int, groups: Any)
 
 def _running_encode(source: Any, params: Any) -> Encoded:
     """Raw, but only every third segment is said to start fresh."""
-    encoded = codecs.raw.encode(source, params)
+    encoded = raw.encode(source, params)
     runs = (replace(s, fresh=i % 3 == 0) for i, s in enumerate(encoded.segments))
     return Encoded(encoded.header, runs)
 
@@ -71,8 +72,8 @@ EXTRA = (
         decode=_counted_decode,
         cut=_counted_cut,
     ),
-    replace(codecs.raw.CODEC, id=253, name="running", encode=_running_encode),
-    replace(codecs.raw.CODEC, id=254, name="one", grouping="all"),
+    replace(raw.CODEC, id=253, name="running", encode=_running_encode),
+    replace(raw.CODEC, id=254, name="one", grouping="all"),
 )
 LENGTH = {"overlap": "length", "counted": "length"}  # else segment_frames
 
@@ -586,7 +587,7 @@ def test_resolution_beside_a_signal_without_any() -> None:
 
 
 def test_decimate_takes_whole_frames() -> None:
-    from mcz.files.decimation import decimated_rows
+    from mcz.reading.decimation import decimated_rows
 
     values = np.arange(21)[:, None]
     assert decimated_rows(values, 3, 2)[:, 0].tolist() == [0, 1, 2, 6, 7, 8, 12, 13, 14, 18, 19, 20]
@@ -596,7 +597,7 @@ def test_decimate_takes_whole_frames() -> None:
 
 @pytest.mark.parametrize("step", [2, 3, 8, 64])
 def test_decimated_motions(step: int) -> None:
-    from mcz.files.decimation import decimated
+    from mcz.reading.decimation import decimated
 
     motion = rich()
     thin = decimated(motion, step)

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 
 import mcz
-from mcz.files.digest import canonical
-from mcz.files.frames import frame_number_metadata, parse_frame_numbers
-from mcz.files.report import info
+from mcz.container.frame_numbers import frame_number_metadata, parse_frame_numbers
+from mcz.container.value_hash import canonical
 from mcz.motion import Signal
 from mcz.numbers import Grid, GridKind
+from mcz.reading.report import info
 from tests.motions import motions, skeleton, smooth
 
 
@@ -240,7 +240,7 @@ def test_nan_payloads_survive_in_ordinals() -> None:
     signal = Signal(grid.values(ordinals), (grid,), ordinals=ordinals)
     with mcz.open(written(mcz.Motion(bones, (signal,)))) as file:
         back = file.clips["motion"].motion().signals[0]
-    np.testing.assert_array_equal(grid.bits(back.place()[0]), words)
+    np.testing.assert_array_equal(grid.bits(back.to_ordinals()[0]), words)
 
 
 def test_reading_a_closed_file() -> None:

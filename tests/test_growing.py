@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import mcz
-from mcz.files.appending import growing
+from mcz.editing.appending import growing
 from mcz.sample import write_samples
 
 TEXT = (

@@ -120,7 +120,7 @@ def test_flipped_bits(data: bytes) -> None:
 
 
 def test_verify_finds_every_flipped_bit(data: bytes) -> None:
-    from mcz.files.report import validate
+    from mcz.reading.report import validate
 
     for byte, bit in flips(len(data), POSITIONS, seed=2):
         try:

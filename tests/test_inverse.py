@@ -11,20 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.bench.ways_back import angle_errors
 from mcz.errors import MotionError, OptionError
-from mcz.files.positions import virtual_marker_names
-from mcz.kinematics import (
-    points_and_markers_of,
-    positions_of,
-    reach,
-    solve_ik,
-    unsolved_channels,
-)
-from mcz.kinematics.targets import Targets
+from mcz.kinematics import points_and_markers_of, positions_of, reach
+from mcz.kinematics.inverse import solve_ik
+from mcz.kinematics.marker_motion import virtual_marker_names
+from mcz.kinematics.targets import Targets, unsolved_channels
 from mcz.motion import Channel, Joint, Signal, Skeleton
 from mcz.sample import acclaim_walk, bvh_walk
 from tests.skeletons import skeletons, values_for
+from tools.papers.hou2016.ways_back import angle_errors
 
 WALKS = {"amc": acclaim_walk(), "bvh": bvh_walk()}
 POSITION = tuple(map(Channel, ("tx", "ty", "tz")))
@@ -86,7 +81,7 @@ def test_the_jacobian_is_that_of_the_places(skeleton: Skeleton) -> None:
     targets = Targets(skeleton, markers=True)
     columns = np.ascontiguousarray(values_for(skeleton).T)
     pose = targets.chain.pose(columns)
-    places = targets.places(columns, pose)
+    places = targets.positions(columns, pose)
     points, markers = points_and_markers_of(skeleton, columns.T)
     there = np.concatenate([points, markers], axis=1)
     assert np.allclose(np.moveaxis(places, 2, 0), there, rtol=1e-12, atol=1e-9)
@@ -97,7 +92,7 @@ def test_the_jacobian_is_that_of_the_places(skeleton: Skeleton) -> None:
         for steps, share in ((1, 8), (-1, -8), (2, -1), (-2, 1)):  # of fourth order
             moved = columns.copy()
             moved[column] += steps * step
-            slope += share * targets.places(moved, targets.chain.pose(moved)) / 12e-6
+            slope += share * targets.positions(moved, targets.chain.pose(moved)) / 12e-6
         assert np.abs(slope - slopes[column]).max() < 1e-5 * max(1.0, np.abs(slope).max())
 
 
@@ -254,7 +249,9 @@ def test_noise_is_not_followed_by_what_it_hardly_shows() -> None:
 def test_what_does_not_fit() -> None:
     walk = WALKS["amc"]
     skeleton, points = walk.skeleton, positions_of(walk.skeleton, walk.values[:2])
-    with pytest.raises(MotionError, match=r"has 31 points, and their places are of shape \(2, 30"):
+    with pytest.raises(
+        MotionError, match=r"has 31 points, and their positions are of shape \(2, 30"
+    ):
         solve_ik(skeleton, points[:, 1:])
     with pytest.raises(MotionError, match="has 93 virtual markers"):
         solve_ik(skeleton, points, points)

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 import mcz
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import (
-    FramePlaces,
     chain,
     depths,
     point_names,
@@ -21,9 +20,10 @@ from mcz.kinematics import (
     positions,
     positions_of,
     reach,
-    sensitivities,
     virtual_markers_of,
 )
+from mcz.kinematics.sensitivity import sensitivities
+from mcz.kinematics.single import FramePositions
 from mcz.motion import Channel, Joint, Signal, Skeleton
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.skeletons import reference_points, skeletons, values_for
@@ -306,10 +306,10 @@ def test_a_frame_alone_is_as_among_many(skeleton: Skeleton, plain: bool, seed: i
         skeleton = replace(skeleton, joints=tuple(map(_turning_and_moving, skeleton.joints)))
     values = values_for(skeleton, seed=seed)
     meant = positions_of(skeleton, values)
-    place = FramePlaces(skeleton)
+    place = FramePositions(skeleton)
     agree(np.array([place(row) for row in values]), meant, reach(skeleton))
     skeleton = replace(skeleton, unit_cm=2.0)
-    place = FramePlaces(skeleton, virtual_markers=True)
+    place = FramePositions(skeleton, virtual_markers=True)
     meant = np.concatenate([meant, virtual_markers_of(skeleton, values)], axis=1)
     agree(np.array([place(row) for row in values]), meant, 3 + reach(skeleton))
 
@@ -321,9 +321,9 @@ def _turning_and_moving(joint: Joint) -> Joint:
 
 def test_a_frame_alone_knows_what_is_missing() -> None:
     skeleton = Skeleton((Joint("a", channels=MARKER), Joint("b", channels=MARKER)), unit_cm=1.0)
-    found = FramePlaces(skeleton)(np.array([1.0, np.nan, 3.0, 4.0, 5.0, 6.0]))
+    found = FramePositions(skeleton)(np.array([1.0, np.nan, 3.0, 4.0, 5.0, 6.0]))
     np.testing.assert_array_equal(found, [[np.nan] * 3, [4, 5, 6]])
     with pytest.raises(MotionError):
-        FramePlaces(Skeleton((Joint("a", channels=(Channel("rx"),)),), angle_unit=""))
+        FramePositions(Skeleton((Joint("a", channels=(Channel("rx"),)),), angle_unit=""))
     with pytest.raises(OptionError):
-        FramePlaces(replace(skeleton, unit_cm=None), virtual_markers=True)
+        FramePositions(replace(skeleton, unit_cm=None), virtual_markers=True)

@@ -32,13 +32,13 @@ from mcz.container.packets import (
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH, SegmentHeader
 from mcz.container.writer import Writer
-from mcz.files.encoding import write_clip
-from mcz.files.following import live_frames
-from mcz.files.live import LiveWriter
-from mcz.files.report import info, layout
-from mcz.files.sizes import packet_framing
+from mcz.live.strict_reader import live_frames
+from mcz.live.writer import LiveWriter
 from mcz.motion import POSITION_KINDS, Channel, Joint, Skeleton
+from mcz.reading.report import info, layout
+from mcz.reading.sizes import packet_framing
 from mcz.schema import build, parse
+from mcz.writing.clip_writer import write_clip
 from tests import live_codec
 from tests.motions import skeleton, smooth
 from tests.repair import as_kind_2, flipped, use, with_packets
@@ -619,7 +619,7 @@ WRITES = """
 import sys, time
 import numpy as np
 from mcz import codecs
-from mcz.files.live import LiveWriter
+from mcz.live.writer import LiveWriter
 from tests import live_codec
 from tests.motions import skeleton
 codecs.CODECS[live_codec.ID] = live_codec.CODEC

@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 import mcz
 from mcz import codecs
 from mcz.angles import Unwrapper, turns, unwrap
-from mcz.codecs.base import Encoded, Segment
+from mcz.codecs.contract import Encoded, Segment
 from mcz.errors import MotionError
-from mcz.files.quality import quality_entries
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.writing.quality import quality_entries
 from tests import overlap_codec
 from tests.motions import POSITIONS, motions, skeleton, smooth
 from tests.test_spec import SPEC

@@ -20,14 +20,14 @@ import mcz
 from conformance import run
 from mcz.cli import conformance
 from mcz.errors import MotionError, OptionError
-from mcz.files.filtering import filtered_motion, filtered_part, live_filter
 from mcz.motion import Channel, Motion, Signal
+from mcz.reading.post_filtering import filtered_motion, filtered_part, live_filter
 from mcz.sample import acclaim_walk, marker_walk
 from mcz.transforms.post_filter import CUTOFFS, DELAY, RING, SCALE, PostFilter, filter_rows
 from mcz.transforms.post_filter import filter_taps as taps_of
 from tools import make_vectors
-from tools.vectors import valid_filtered
-from tools.vectors.valid_filtered import plain_rows, plain_taps
+from tools.vectors.valid import filtered as filtered_vectors
+from tools.vectors.valid.filtered import plain_rows, plain_taps
 
 ROOT = Path(__file__).parents[1]
 SECTION = (ROOT / "SPEC.md").read_text("utf-8").split("\n## Post filter\n")[1].split("\n## ")[0]
@@ -302,15 +302,14 @@ def test_resolutions_are_filtered_before_they_are_thinned() -> None:
 # Vectors
 
 
-@pytest.mark.parametrize("vector", valid_filtered.vectors(), ids=lambda vector: vector.name)
+@pytest.mark.parametrize("vector", filtered_vectors.vectors(), ids=lambda vector: vector.name)
 def test_vectors(vector) -> None:
     row = make_vectors.row(vector)
     asked = list(run.requests(row, conformance.OPTIONS))
     assert any("--post-filter" in request.arguments for request in asked)
     for request in asked:
-        given = conformance._parser().parse_args(list(request.arguments))
-        answer = b"".join(conformance.respond(vector.data, given))
-        assert run.judge(request, 0, answer) is None, request.arguments
+        answer = conformance.answer(vector.data, request.arguments)
+        assert run.judge(request, *answer) is None, request.arguments
     assert len(list(run.requests(row, []))) == 1
 
 

@@ -18,10 +18,10 @@ import mcz
 from mcz import codecs
 from mcz.cli.main import main
 from mcz.errors import OptionError
-from mcz.files.clip import Clip
-from mcz.files.preview import preview, preview_motion
-from mcz.files.signal_info import SignalInfo
 from mcz.motion import Motion, Signal
+from mcz.reading.clip import Clip
+from mcz.reading.preview_motion import preview_motion
+from mcz.reading.signal_info import SignalInfo
 from tests import overlap_codec
 from tests.motions import skeleton, smooth
 
@@ -68,7 +68,7 @@ def test_the_coarsest_resolution_where_no_frame_is_exact() -> None:
             resolution = step.bit_length() - 1
             assert frames.tolist() == list(range(0, 301, step))
             assert np.array_equal(values, clip.read(resolution=resolution, decimate=True))
-            assert preview(clip).is_regular
+            assert clip.previewed().is_regular
 
 
 def test_one_resolution_has_no_preview() -> None:
@@ -125,7 +125,7 @@ def test_as_a_motion_at_a_lower_rate() -> None:
     with mcz.open(written(smooth(190), "qbc", delta=40)) as file:
         found = preview_motion(only(file))  # the last frame is nearer: it does not fit a rate
         assert found.frame_numbers.tolist() == [1, 41, 81, 121, 161]
-        assert not preview(only(file)).is_regular
+        assert not only(file).previewed().is_regular
     with mcz.open(written(smooth(0), "qbc")) as file:
         assert preview_motion(only(file)).n_frames == 0
 

@@ -11,11 +11,11 @@ import pytest
 
 from mcz import sample
 from mcz.codecs import CODECS
-from mcz.codecs._bases import name_of
+from mcz.codecs.basis_models import name_of
 from mcz.container import limits, packets
 from mcz.container.chunks import FLAGS_OF
 from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR
-from mcz.container.resuming import KNOWN
+from mcz.container.walk_with_losses import KNOWN
 from mcz.formats import FORMATS
 from mcz.metrics import compare
 from mcz.motion import CHANNEL_KINDS

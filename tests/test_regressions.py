@@ -27,23 +27,23 @@ from mcz.container.limits import BASE
 from mcz.container.scan import scan
 from mcz.container.source import open_source
 from mcz.container.writer import Writer
-from mcz.files.encoding import write_clip
-from mcz.files.report import validate
-from mcz.files.targets import replacing
 from mcz.formats import FORMATS, c3d
 from mcz.formats.cells import Cells
 from mcz.formats.hierarchy import write_hierarchy
 from mcz.formats.layout import MAX_RUNS, Layout, Pattern, Run, parse_layout
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind
+from mcz.reading.report import validate
 from mcz.sample import marker_walk, write_samples
 from mcz.schema import build, parse, varint
 from mcz.transforms import dwt
+from mcz.writing.atomic import replacing
+from mcz.writing.clip_writer import write_clip
 from tests.motions import smooth
 from tests.repair import with_index_content
 from tools.fuzz.repair import joined, pieces_of, with_payload
-from tools.vectors.craft import Crafter, finished
-from tools.vectors.motions import dance
+from tools.vectors.build.files import Crafter, finished
+from tools.vectors.build.motions import dance
 
 BVH = (
     "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\nFrames: 3\n"
@@ -499,7 +499,7 @@ def test_head_of_another_version_counts_for_more_than_an_index_that_cannot_be_re
 @pytest.mark.parametrize("codec", [codec.name for codec in CODECS.values()])
 def test_header_of_a_clip_without_frames(codec: str) -> None:
     motion = smooth(0)
-    params = {"domain": "channels"} if by_name(codec).places else {}
+    params = {"domain": "channels"} if by_name(codec).positions else {}
     with mcz.open(written(motion, codec=codec, **params)) as file:
         assert file.only_clip().read().shape == (0, motion.skeleton.n_channels)
 

@@ -16,14 +16,16 @@ from hypothesis import strategies as st
 import mcz
 from mcz import codecs
 from mcz.cli.main import main
-from mcz.codecs import lossless, mrdwt, raw
+from mcz.codecs import raw
+from mcz.codecs.lossless import lossless
+from mcz.codecs.wavelet import mrdwt
+from mcz.conversion import convert
+from mcz.editing.recoding import recorded_options
+from mcz.editing.replacing import edited_quality
 from mcz.errors import AccessError, ExistsError, MotionError, OptionError
-from mcz.files.clip import Clip
-from mcz.files.conversion import convert
-from mcz.files.editing import edited_quality
-from mcz.files.recoding import recorded_options
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
+from mcz.reading.clip import Clip
 from tests import overlap_codec
 from tests.motions import motions, smooth
 
@@ -66,7 +68,7 @@ def edited(data: bytes, joint: int | str, values: Any, **options: Any) -> tuple[
     """The file with other values, checked as a whole."""
     out = io.BytesIO()
     with mcz.open(data) as file:
-        found = only(file).replace(joint, values, out, **options)
+        found = mcz.replace(file, None, joint, values, out, **options)
     assert found.size == len(out.getvalue())
     _check(out.getvalue())
     return out.getvalue(), found
@@ -409,7 +411,7 @@ def test_other_clips_and_files_stay(tmp_path: Path, samples: Path) -> None:
         joint = clip.skeleton.addresses()[0]
         new = clip.read(joints=[joint])
         new[:, 0] += 1
-        found = clip.replace(joint, new, out)
+        found = mcz.replace(file, name, joint, new, out)
         rows = file.container.directory.clips
         before = {
             n: [file.container.payload(s.chunk()) for s in rows[n].segments] for n in file.clips
@@ -491,7 +493,7 @@ def test_codecs_that_cannot_say_why() -> None:
     with pytest.raises(OptionError, match="channels of its own"):
         edited(written(Motion(smooth().skeleton, (own,))), 0, np.zeros(20))
     with mcz.open(written(smooth(20)), salvage=True) as file, pytest.raises(OptionError):
-        only(file).replace("knee", np.zeros(20), io.BytesIO())
+        mcz.replace(file, None, "knee", np.zeros(20), io.BytesIO())
 
 
 def test_frames_of_none() -> None:
@@ -525,7 +527,7 @@ def test_a_stranger_among_copies() -> None:
 
 
 def test_edited_quality_adds_the_codec(tmp_path: Path) -> None:
-    from mcz.files.recoding import recode
+    from mcz.editing.recoding import recode
 
     data = written(smooth(30), "qbc")
     with mcz.open(data) as file:

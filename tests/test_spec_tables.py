@@ -12,8 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcz.codecs import CODECS, _lossless_kernels, _online_kernels, _qbc_kernels
-from mcz.coding import frames, kernels, logistic, residuals
+from mcz.codecs import CODECS
+from mcz.codecs.curves import kernels as qbc_kernels
+from mcz.codecs.lossless import kernels as lossless_kernels
+from mcz.codecs.online import kernels as online_kernels
+from mcz.coding import logistic, mixing, residuals, space_kernels
 from mcz.container import chunks
 from mcz.formats import FORMATS, amc, c3d_restore
 from mcz.formats.c3d_layout import Kind
@@ -28,7 +31,12 @@ SIZES = {"u8": 1, "u16": 2, "u32": 4, "u64": 8, "4 bytes": 4, "8 bytes": 8}
 
 
 def section(heading: str) -> str:
-    return re.split(r"\n#{2,} ", SPEC.split(f"# {heading}\n", 1)[1])[0]
+    return re.split(r"\n#{1,3} ", SPEC.split(f"# {heading}\n", 1)[1])[0]
+
+
+def words_of(heading: str) -> str:
+    """The section on one line."""
+    return " ".join(section(heading).split())
 
 
 def table_after(text: str, head: str) -> list[list[str]]:
@@ -93,11 +101,11 @@ def test_contexts_of_residuals() -> None:
     assert [int(rows[name][1].split(" to ")[0]) for name in names] == mixers
     assert rows["more"][1] == f"{residuals.M_MORE} to {residuals.M_SECOND - 1}"
     counts = f"{residuals.N_CONTEXTS} contexts and {residuals.N_MIXERS} mixers"
-    assert f"There are {counts}." in section("Residuals")
+    assert f"There are {counts}." in words_of("Residuals")
 
 
 def test_contexts_of_lossless() -> None:
-    loops = _lossless_kernels
+    loops = lossless_kernels
     assert table_after(section("Codec 1: lossless"), "| bit |") == [
         ["SAME", str(loops.C_SAME), str(loops.M_SAME)],
         ["UP", str(loops.C_UP), str(loops.M_UP)],
@@ -121,16 +129,16 @@ def test_nodes_of_the_mixer() -> None:
     [
         ("Entropy coding", f"if n < {logistic.COUNT_LIMIT}: n = n + 1"),
         ("Entropy coding", f"clamp(dot, -{logistic.LIMIT}, {logistic.LIMIT})"),
-        ("Entropy coding", f"clamp(a.p, {kernels.LEAST_ONE}, {65536 - kernels.LEAST_ONE})"),
-        ("Entropy coding", f"-2^{kernels.MAX_WEIGHT.bit_length() - 1}, 2^24)"),
+        ("Entropy coding", f"clamp(a.p, {mixing.LEAST_ONE}, {65536 - mixing.LEAST_ONE})"),
+        ("Entropy coding", f"-2^{mixing.MAX_WEIGHT.bit_length() - 1}, 2^24)"),
         ("Residuals", "refuse if n > 60"),
-        ("Codec 1: lossless", f"refuse if t > {_lossless_kernels.MAX_STEPS_LENGTH}"),
-        ("Codec 1: lossless", f"{_lossless_kernels.DECIMAL_WIDTH} for base 10 and 44 for base 2"),
-        ("Codec 1: lossless", f"j = max(c - P, -{_lossless_kernels.LAST_POWER})"),
+        ("Codec 1: lossless", f"refuse if t > {lossless_kernels.MAX_STEPS_LENGTH}"),
+        ("Codec 1: lossless", f"{lossless_kernels.DECIMAL_WIDTH} for base 10 and 44 for base 2"),
+        ("Codec 1: lossless", f"j = max(c - P, -{lossless_kernels.LAST_POWER})"),
     ],
 )
 def test_constants(heading: str, words: str) -> None:
-    assert words in section(heading)
+    assert words in words_of(heading)
 
 
 START = {  # annex: what the text says of each of its sets
@@ -163,10 +171,14 @@ def test_places_of_residuals_in_codecs() -> None:
     """Of first contexts and mixers the text names some; all follow from the sizes."""
     first = residuals.N_CONTEXTS, residuals.N_MIXERS
     second = 2 * first[0], 2 * first[1]
-    assert ((0, 0), first, second) == (frames.LENGTHS, frames.FIRSTS, frames.OTHERS)
-    assert f"context {first[0]} and mixer {first[1]}" in section("Windows")
-    assert f"context {second[0]} and mixer {second[1]}" in section("Windows")
-    assert f"LAST at context {_qbc_kernels.C_LAST} and mixer" in section("Codec 3: qbc")
+    assert ((0, 0), first, second) == (
+        space_kernels.LENGTHS,
+        space_kernels.FIRSTS,
+        space_kernels.OTHERS,
+    )
+    assert f"context {first[0]} and mixer {first[1]}" in words_of("Space")
+    assert f"context {second[0]} and mixer {second[1]}" in words_of("Space")
+    assert f"LAST at context {qbc_kernels.C_LAST} and mixer" in words_of("Codec 3: qbc")
 
 
 def test_every_annex_that_is_named_with_a_hash_has_it() -> None:
@@ -296,14 +308,14 @@ def test_signals_of_c3d() -> None:
 
 def test_sizes_and_ratios() -> None:
     """Each figure of the table is one that the package states under that name."""
-    code = "\n".join(path.read_text() for path in (ROOT / "mcz/files").glob("*.py"))
+    code = "\n".join(path.read_text() for path in (ROOT / "mcz/reading").glob("*.py"))
     for name, _ in rows_under("Sizes and ratios"):
         assert f'"{name}"' in code, name
 
 
 @pytest.mark.parametrize(
     ("heading", "folder"),
-    [("Cutting without re-encoding", "mcz/files"), ("Replacing a joint", "mcz/files")],
+    [("Cutting without re-encoding", "mcz/editing"), ("Replacing a joint", "mcz/editing")],
 )
 def test_keys_of_edits(heading: str, folder: str) -> None:
     code = "\n".join(path.read_text() for path in Path(ROOT / folder).glob("*.py"))
@@ -313,10 +325,10 @@ def test_keys_of_edits(heading: str, folder: str) -> None:
 
 
 def test_contexts_of_online() -> None:
-    text, loops = section("Codec 11: online"), _online_kernels
-    assert f"FLAGS begins at context {loops.MIXED_FLAGS};" in text
+    text, loops = words_of("Codec 11: online"), online_kernels
+    assert f"FLAGS begins at context {loops.MIXED_FLAGS}." in text
     assert (
         f"FLAGS begins at context {loops.GOLOMB_FLAGS}, PREFIX at context {loops.C_PREFIX}" in text
     )
-    assert f"FLAGS has {loops.N_FLAGS}\ncontexts, PREFIX {143 - loops.N_FLAGS}" in text
+    assert f"FLAGS has {loops.N_FLAGS} contexts, PREFIX {143 - loops.N_FLAGS}" in text
     assert f"code < 0 or > {loops.N_STEPS - 1}" in text

@@ -38,9 +38,9 @@ from mcz.container.packets import (
 from mcz.container.scan import scan
 from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.container.source import open_source
-from mcz.files.concealing import LiveFrame
-from mcz.files.report import info, layout
-from mcz.files.tolerant import MOST_MADE_UP
+from mcz.live.concealment import LiveFrame
+from mcz.live.reader_with_losses import MOST_MADE_UP
+from mcz.reading.report import info, layout
 from mcz.schema import build, parse
 from tests import live_codec
 from tests.repair import as_kind_2, flipped, flips, parts_of, use

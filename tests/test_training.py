@@ -13,14 +13,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import mcz
-from mcz.bench import hou2016_training as study
 from mcz.bench.cases import Case
-from mcz.bench.curves import bases, references
-from mcz.bench.spatial import measured_convergence, measured_distortions
 from mcz.bench.tables import Table
 from mcz.cli.common import run
 from mcz.cli.main import cli
-from mcz.codecs._bases import parse_bases
+from mcz.codecs.basis_models import parse_bases
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion
 from mcz.training import (
@@ -42,6 +39,9 @@ from mcz.transforms.lsdt import (
     settled,
     start_basis,
 )
+from tools.papers.curves import bases, references
+from tools.papers.hou2016 import training as study
+from tools.papers.hou2016.spatial import measured_convergence, measured_distortions
 
 Floats = NDArray[np.float64]
 
@@ -132,7 +132,7 @@ def test_a_dictionary_of_sparse_frames_is_found(start: str) -> None:
 
 
 def test_of_equal_magnitudes_the_first_is_kept() -> None:
-    from mcz.transforms._lsdt_kernels import truncate
+    from mcz.transforms.lsdt_kernels import truncate
 
     rows = np.array([[1.0, -2.0, 2.0, -1.0], [3.0, 3.0, 3.0, 3.0]])
     products = np.empty((4, 4))

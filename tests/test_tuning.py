@@ -15,10 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs.base import Dial
-from mcz.files.sizes import clip_sizes
-from mcz.files.tuning import GOAL, PROMISED, Target, search
+from mcz.codecs.parameters import Dial
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.reading.sizes import clip_sizes
+from mcz.writing.tuning import GOAL, PROMISED, Target, search
 
 DIAL = Dial("T_g", 2.0**-20, 2.0**20)
 

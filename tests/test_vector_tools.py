@@ -15,10 +15,10 @@ from mcz.codecs import CODECS
 from mcz.errors import MczError
 from tools import make_vectors
 from tools.vectors import faults, requirements
-from tools.vectors.craft import Vector, arrays
-from tools.vectors.facts import codecs_of, formats_of, since
-from tools.vectors.random_clips import NAMES
-from tools.vectors.random_files import COUNT, _parts, random_file
+from tools.vectors.build.files import Vector, arrays
+from tools.vectors.build.random_parts import NAMES
+from tools.vectors.contents import codecs_of, formats_of, since
+from tools.vectors.valid.random import COUNT, _parts, random_file
 
 ROWS = {row["file"].removesuffix(".mcz"): row for row in run.load_manifest()}
 SEEDS = st.integers(COUNT, 2**32 - 1)
@@ -45,9 +45,8 @@ def vector_of(seed: int) -> Vector:
 def test_files_made_at_random_are_what_they_say(seed: int) -> None:
     vector = vector_of(seed)
     for request in run.requests(make_vectors.row(vector), conformance.OPTIONS):
-        given_ = conformance._parser().parse_args(list(request.arguments))
-        answer = b"".join(conformance.respond(vector.data, given_))
-        assert run.judge(request, 0, answer) is None, request.arguments
+        answer = conformance.answer(vector.data, request.arguments)
+        assert run.judge(request, *answer) is None, request.arguments
 
 
 @settings(max_examples=10)
@@ -124,7 +123,7 @@ def test_faults_refuse_what_they_do_not_know() -> None:
 def test_requirements_refuse_what_no_vector_shows(monkeypatch: pytest.MonkeyPatch) -> None:
     names = ["valid/raw/plain", "valid/raw/widths", "invalid/raw/absent"]
     monkeypatch.setattr(requirements, "ARGUED", {})
-    monkeypatch.setattr(requirements, "BREAKS", {})
+    monkeypatch.setattr(requirements, "caught", dict)
     monkeypatch.setattr(requirements, "VECTORS", {"RAW-01": ("valid/*",), "A-02": ("*/plain",)})
     assert requirements.requirements(names) == {
         "valid/raw/plain": ["A-02", "RAW-01"],

@@ -1,11 +1,11 @@
 """Fit a and b of eq. 14 of Kwak and Bajic anew: how many bits an LTR has beside STR frames.
 
-    python tools/fit_bit_allocation.py CLIP-OR-FOLDER...
+    python -m tools.fit_bit_allocation CLIP-OR-FOLDER...
 
 Of what is given, the paper's training clips are fitted (Table II), C3D files as markers, BVH and
 AMC files as the points of skeletons; of one name a C3D file and one skeleton, BVH before AMC. The
 gain of ``rca`` over ``rc``, with the published numbers and the fitted ones, is measured on clips
-that are not fitted: those of ``mcz bench --tables kwak``. Both are printed as they are found.
+that are not fitted: those of ``python -m tools.papers kwak``. Both are printed as they are found.
 """
 
 from __future__ import annotations
@@ -14,11 +14,19 @@ import sys
 from collections.abc import Iterator, Sequence
 
 from mcz.bench.cases import Case, find_cases
-from mcz.bench.kwak_clips import BVH_POINTS, MADE, MARKED, POINTS, Clip, find_clips, places_of
-from mcz.bench.kwak_fit import Fit, Point, curve_of, fit, points_of
-from mcz.bench.kwak_papers import PRINTED_FITS
 from mcz.bjontegaard import bd_rate, bd_sqnr
 from mcz.errors import MczError
+from tools.papers.kwak.clips import (
+    BVH_POINTS,
+    MADE,
+    MARKED,
+    POINTS,
+    Clip,
+    find_clips,
+    motion_in_positions,
+)
+from tools.papers.kwak.fit import Fit, Point, curve_of, fit, points_of
+from tools.papers.kwak.printed import PRINTED_FITS
 
 TRAINING = (
     *("01_01", "05_02", "14_09", "16_02", "17_06", "47_01", "49_01", "64_03", "85_01", "94_15"),
@@ -45,7 +53,7 @@ def training_clips(cases: Sequence[Case], kind: str) -> Iterator[Clip]:
 
 def _n_points(clip: Clip) -> int:
     try:
-        return places_of(clip).skeleton.n_joints
+        return motion_in_positions(clip).skeleton.n_joints
     except MczError:
         return 0
 
@@ -54,7 +62,7 @@ def fitted(clips: Sequence[Clip]) -> Fit | None:
     """Prints what each clip gives."""
     points: list[Point] = []
     for clip in clips:
-        found = points_of(places_of(clip))
+        found = points_of(motion_in_positions(clip))
         points += found
         alphas = " ".join(f"{point.alpha:g}" for point in found)
         print(f"  {clip.name}: {len(found)} points, alpha {alphas}", flush=True)
@@ -66,7 +74,7 @@ def fitted(clips: Sequence[Clip]) -> Fit | None:
 def gains(clips: Sequence[Clip], kind: str, found: Fit) -> None:
     """Print what RCA gains over RC on clips that were not fitted."""
     for clip in clips:
-        motion = places_of(clip)
+        motion = motion_in_positions(clip)
         reference = curve_of(motion, {"preset": "rc"})
         for label, (a, b) in (("published", PRINTED_FITS[kind]), ("fitted", (found.a, found.b))):
             curve = curve_of(motion, {"preset": "rca", "a": a, "b": b})

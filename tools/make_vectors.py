@@ -21,142 +21,23 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))  # so that this file can be run as a script
 
 from mcz.container.payloads import FORMAT_MAJOR, FORMAT_MINOR  # noqa: E402 - needs the path
-from tools.vectors import (  # noqa: E402 - needs the path
-    bad_bounds,
-    bad_c3d,
-    bad_chunks,
-    bad_clips,
-    bad_codecs,
-    bad_cut,
-    bad_data,
-    bad_found,
-    bad_gaps,
-    bad_index,
-    bad_khan,
-    bad_lossless,
-    bad_lsdt,
-    bad_lsdt_models,
-    bad_lsdt_streams,
-    bad_mrdwt,
-    bad_notes,
-    bad_numbers,
-    bad_online,
-    bad_online_streams,
-    bad_online_units,
-    bad_qbc,
-    bad_rules,
-    bad_rules_codecs,
-    bad_rules_points,
-    bad_rules_sources,
-    bad_shared,
-    bad_sources,
-    random_files,
-    sources,
-    sources_c3d,
-    sources_c3d_gaps,
-    sources_gaps,
-    sources_lossy,
-    sources_styles,
-    sources_text,
-    uncommon,
-    valid_common,
-    valid_container,
-    valid_cut,
-    valid_filtered,
-    valid_gaps,
-    valid_khan,
-    valid_kin,
-    valid_lossless,
-    valid_lossless_clips,
-    valid_lsdt,
-    valid_lsdt_clips,
-    valid_lsdt_windows,
-    valid_mrdwt,
-    valid_mrdwt_clips,
-    valid_notes,
-    valid_numbers,
-    valid_online,
-    valid_online_clips,
-    valid_qbc,
-    valid_raw,
-    valid_rules,
-    valid_rules_codecs,
-    valid_rules_points,
-)
-from tools.vectors.craft import OK, REFUSED, Vector  # noqa: E402
-from tools.vectors.facts import codecs_of, formats_of, since  # noqa: E402
+from tools.vectors import invalid, uncommon, valid  # noqa: E402 - needs the path
+from tools.vectors.build.files import OK, REFUSED, Vector  # noqa: E402
+from tools.vectors.contents import codecs_of, formats_of, since  # noqa: E402
 from tools.vectors.faults import Fault, faults  # noqa: E402
 from tools.vectors.requirements import requirements  # noqa: E402
 
 CONFORMANCE = ROOT / "conformance"
-MODULES = (
-    valid_container,
-    valid_numbers,
-    valid_notes,
-    valid_raw,
-    valid_rules,
-    valid_rules_codecs,
-    valid_lossless,
-    valid_lossless_clips,
-    valid_mrdwt,
-    valid_mrdwt_clips,
-    valid_qbc,
-    valid_khan,
-    valid_lsdt,
-    valid_lsdt_clips,
-    valid_lsdt_windows,
-    valid_online,
-    valid_online_clips,
-    valid_cut,
-    valid_filtered,
-    valid_common,
-    valid_kin,
-    valid_rules_points,
-    valid_gaps,
-    sources,
-    sources_c3d,
-    sources_text,
-    sources_styles,
-    sources_gaps,
-    sources_lossy,
-    sources_c3d_gaps,
-    random_files,
-    uncommon,
-    bad_chunks,
-    bad_index,
-    bad_shared,
-    bad_clips,
-    bad_data,
-    bad_found,
-    bad_cut,
-    bad_notes,
-    bad_numbers,
-    bad_lossless,
-    bad_mrdwt,
-    bad_qbc,
-    bad_khan,
-    bad_lsdt,
-    bad_lsdt_models,
-    bad_lsdt_streams,
-    bad_online,
-    bad_online_units,
-    bad_online_streams,
-    bad_sources,
-    bad_c3d,
-    bad_bounds,
-    bad_codecs,
-    bad_rules,
-    bad_rules_codecs,
-    bad_rules_sources,
-    bad_rules_points,
-    bad_gaps,
-)
+GROUPS = (valid, uncommon, invalid)
 FORMAT_VERSION = f"{FORMAT_MAJOR}.{FORMAT_MINOR}"
 
 
 def vectors() -> list[Vector]:
-    """Every vector, by group and then in the order of the modules."""
-    found = [vector for module in MODULES for vector in module.vectors()]
+    """Every vector, by group and name."""
+    found = []
+    for group in GROUPS:
+        made = [vector for module in group.MODULES for vector in module.vectors()]
+        found += sorted(made, key=lambda vector: vector.name)
     names = [vector.name for vector in found]
     assert len(names) == len(set(names)), sorted(n for n in names if names.count(n) > 1)
     return found

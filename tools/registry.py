@@ -70,7 +70,7 @@ def registry(text: str) -> dict[str, Any]:
         "bases": _keyed(
             rows_after(text, "Some models are well known."), "name", "annex", "id", "meaning"
         ),
-        "wavelets": _keyed(rows_after(text, "### Wavelets\n"), "id", "name", "taps", "lo", "hi"),
+        "wavelets": _keyed(rows_after(text, "## Wavelets\n"), "id", "name", "taps", "lo", "hi"),
         "annexes": _keyed(rows_after(text, "**Annexes**"), "file", "sha256", "meaning"),
     }
 

@@ -1,9 +1,11 @@
-"""Write the field tables of SPEC.md from the schemas, or check that they agree.
+"""Write what a program makes of SPEC.md, or check it: field tables, contents, a traced stream.
 
     python tools/spec_tables.py [--check]
 
-A table follows a line ``<!-- table: NAME -->``; NAME is that of a construct Struct or of a tuple
-of (name, type, meaning) rows in one of ``MODULES``.
+A table follows a line ``<!-- table: NAME -->``; NAME is that of a construct Struct, or of a tuple
+of (name, type, meaning) rows that a loop reads by, in one of ``MODULES``. Structures that are read
+by hand have tables without such a line. The contents list the headings behind them.
+The lines of the traced stream are those of ``tools/spec_trace.py``.
 """
 
 from __future__ import annotations
@@ -17,29 +19,23 @@ from typing import Any
 
 import construct
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # so that it runs as a script
+
 from mcz import numbers, schema
 from mcz.container import payloads
+from tools import spec_trace
 
 MODULES = (
     "mcz.container.payloads",
-    "mcz.container.segments",
-    "mcz.container.packets",
     "mcz.container.directory",
-    "mcz.codecs.raw",
-    "mcz.codecs.lossless",
-    "mcz.codecs._wavelet_codec",
-    "mcz.codecs._wavelet_streams",
-    "mcz.codecs.qbc",
-    "mcz.codecs._qbc_streams",
-    "mcz.codecs.pca",
-    "mcz.codecs._pca_streams",
-    "mcz.codecs._bases",
-    "mcz.codecs._space",
-    "mcz.codecs._prefix_streams",
-    "mcz.codecs._windows",
-    "mcz.codecs.lsdt_frame",
-    "mcz.codecs._online_coder",
-    "mcz.codecs._online_units",
+    "mcz.codecs.wavelet.shared",
+    "mcz.codecs.curves.qbc",
+    "mcz.codecs.pca.pca",
+    "mcz.codecs.space",
+    "mcz.codecs.spatial.prefix_streams",
+    "mcz.codecs.spatial.windows",
+    "mcz.codecs.spatial.lsdt_frame",
+    "mcz.codecs.online.coder",
     "mcz.formats.layout",
     "mcz.formats.notes",
     "mcz.formats.c3d_layout",
@@ -56,6 +52,9 @@ NAMED = {
 }
 SPEC = Path(__file__).parent.parent / "SPEC.md"
 MARK = re.compile(r"(<!-- table: (\S+) -->\n)((?:\|.*\n)*)")
+CONTENTS = re.compile(r"(<!-- contents -->\n)(.*?)(<!-- end of contents -->\n)(.*)", re.DOTALL)
+TRACE = re.compile(r"(<!-- trace -->\n```\n).*?(```\n)", re.DOTALL)
+HEADING = re.compile(r"^(#{1,3}) (.+)$", re.MULTILINE)
 
 
 def structures() -> dict[str, Any]:
@@ -119,10 +118,29 @@ def table(structure: Any) -> str:
     return "\n".join(lines) + "\n"
 
 
+def contents(text: str) -> str:
+    """A list of links to the headings of ``text``: parts, sections, and what these have."""
+    lines = []
+    for marks, heading in HEADING.findall(re.sub(r"(?ms)^```.*?^```$", "", text)):
+        if len(marks) == 1:
+            lines += ["", f"**[{heading}](#{anchor(heading)})**", ""]
+        else:
+            indent = "  " * (len(marks) - 2)
+            lines.append(f"{indent}- [{heading}](#{anchor(heading)})")
+    return "\n".join(lines).strip() + "\n"
+
+
+def anchor(heading: str) -> str:
+    """What links to a heading: as GitHub and most others name it."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
 def generated(text: str) -> str:
-    """``text`` with every marked table made anew."""
+    """``text`` with every marked table, the traced stream and the contents made anew."""
     known = structures()
-    return MARK.sub(lambda match: match[1] + table(known[match[2]]), text)
+    text = MARK.sub(lambda match: match[1] + table(known[match[2]]), text)
+    text = TRACE.sub(lambda match: match[1] + spec_trace.traced() + match[2], text)
+    return CONTENTS.sub(lambda match: f"{match[1]}{contents(match[4])}{match[3]}{match[4]}", text)
 
 
 def main() -> int:
@@ -130,7 +148,7 @@ def main() -> int:
     fresh = generated(text)
     if "--check" in sys.argv[1:]:
         if fresh != text:
-            print("SPEC.md: a field table differs from its schema; run tools/spec_tables.py")
+            print("SPEC.md: a table, the contents or the trace is old; run tools/spec_tables.py")
         return int(fresh != text)
     SPEC.write_text(fresh)
     return 0

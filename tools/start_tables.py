@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.coding import kernels
+from mcz.coding import mixing
 
 PER_LINE = 48
 
@@ -23,18 +23,18 @@ class Kept(np.ndarray):
 def untrained(state: np.ndarray) -> np.ndarray:
     """``state`` without knowledge: even weights, even probabilities, counts of 0."""
     state = state.copy()
-    state[kernels.WEIGHTS : kernels.MODELS] = 26214
-    state[kernels.MODELS :: 2] = 32768
-    state[kernels.MODELS + 1 :: 2] = 0
+    state[mixing.WEIGHTS : mixing.MODELS] = 26214
+    state[mixing.MODELS :: 2] = 32768
+    state[mixing.MODELS + 1 :: 2] = 0
     return state
 
 
 def table(state: np.ndarray, n_mixers: int, max_count: int) -> dict[str, object]:
     """The fields that ``mcz.coding.start.start_state`` reads."""
-    probabilities = np.clip(state[kernels.MODELS :: 2] >> 8, 0, 255)
-    counts = np.minimum(state[kernels.MODELS + 1 :: 2], max_count)
+    probabilities = np.clip(state[mixing.MODELS :: 2] >> 8, 0, 255)
+    counts = np.minimum(state[mixing.MODELS + 1 :: 2], max_count)
     return {
-        "weights": state[kernels.WEIGHTS : kernels.WEIGHTS + 3 * n_mixers].tolist(),
+        "weights": state[mixing.WEIGHTS : mixing.WEIGHTS + 3 * n_mixers].tolist(),
         "probabilities": _lines(probabilities),
         "counts": _lines(counts),
     }

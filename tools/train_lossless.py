@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import mcz
-from mcz.codecs import lossless
+from mcz.codecs.lossless import lossless
 from tools.start_tables import Kept, table, untrained
 
 MAX_COUNT = 20

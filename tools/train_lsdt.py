@@ -8,7 +8,7 @@ The recipe is ``mcz.training.SHIPPED``, tried from several starts, of which the 
 coordinate is kept; ``mcz train`` takes any other. With --bvh the clips are converted first, and the
 points are the 38 of CMU's BVH files. With three virtual markers a joint beside the
 points it is ``VIRTUAL``: mirrored axes are no axes, and one start of so many points is near enough.
-The clips were those of ``mcz.bench.hou2016_training.TRAINING_CLIPS``, in that order. BLAS differs
+The clips were ``TRAINING_CLIPS`` of tools/papers/hou2016/training.py, in that order. BLAS differs
 between machines in the last digits, which may turn an entry: what is normative is the file, by its
 hash.
 """
@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 
 import mcz
-from mcz.codecs._bases import build_bases, falling_digits, rounded
+from mcz.codecs.basis_models import build_bases, falling_digits, rounded
 from mcz.training import SHIPPED, Recipe, Trained, training_set
 
 TRIES = (("dct", 20), ("haar", 20), ("dct", 40), ("haar", 40), ("dct", 80))

@@ -20,29 +20,29 @@ from typing import Any
 import numpy as np
 
 import mcz
-from mcz.codecs import (
-    _frame_kernels,
-    _online_coder,
-    _pca_kernels,
-    _pca_streams,
-    _qbc_kernels,
-    _qbc_streams,
-    _wavelet_streams,
-    _window_kernels,
-    _window_streams,
+from mcz.codecs.contract import Codec
+from mcz.codecs.curves import kernels as qbc_kernels
+from mcz.codecs.curves import qbc
+from mcz.codecs.curves import streams as qbc_streams
+from mcz.codecs.online import coder as online_coder
+from mcz.codecs.online import online
+from mcz.codecs.pca import kernels as pca_kernels
+from mcz.codecs.pca import pca
+from mcz.codecs.pca import streams as pca_streams
+from mcz.codecs.spatial import (
     lsdt_clip,
     lsdt_frame,
-    mrdwt,
-    online,
-    pca,
-    qbc,
+    lsdt_frame_kernels,
+    window_kernels,
+    window_streams,
 )
-from mcz.codecs.base import Codec
+from mcz.codecs.wavelet import mrdwt
+from mcz.codecs.wavelet import streams as wavelet_streams
 from mcz.coding import residuals
 from mcz.container.writer import Writer
-from mcz.files.memory import MemorySource
-from mcz.files.positions import as_codec_wants
 from mcz.motion import Motion
+from mcz.writing.positions import as_codec_wants
+from mcz.writing.signal_source import MemorySource
 from tools.start_tables import Kept, table, untrained
 
 SEGMENT_BYTES = 2**26
@@ -61,9 +61,9 @@ class Plan:
 
 PLANS = {
     "wavelet": Plan(
-        _wavelet_streams,
+        wavelet_streams,
         mrdwt.CODEC,
-        (residuals.N_MIXERS,) * _wavelet_streams.N_SETS,
+        (residuals.N_MIXERS,) * wavelet_streams.N_SETS,
         24,
         (
             {"T_g": 0.05},
@@ -77,9 +77,9 @@ PLANS = {
         ),
     ),
     "qbc": Plan(
-        _qbc_streams,
+        qbc_streams,
         qbc.CODEC,
-        (residuals.N_MIXERS, _qbc_kernels.N_DETAIL_MIXERS),
+        (residuals.N_MIXERS, qbc_kernels.N_DETAIL_MIXERS),
         24,
         (
             {"d2_lmt": 0.1},
@@ -92,9 +92,9 @@ PLANS = {
         ),
     ),
     "pca": Plan(
-        _pca_streams,
+        pca_streams,
         pca.CODEC,
-        (_pca_kernels.N_SETS * residuals.N_MIXERS,),
+        (pca_kernels.N_SETS * residuals.N_MIXERS,),
         24,
         (
             {"q": 30},
@@ -108,9 +108,9 @@ PLANS = {
         ),
     ),
     "window": Plan(
-        _window_streams,
+        window_streams,
         lsdt_clip.CODEC,
-        (_window_kernels.N_SETS * residuals.N_MIXERS,),
+        (window_kernels.N_SETS * residuals.N_MIXERS,),
         60,  # of the few bits of a window
         (
             {"step": 0.02},
@@ -125,7 +125,7 @@ PLANS = {
     "frame": Plan(
         lsdt_frame,
         lsdt_frame.CODEC,
-        (_frame_kernels.N_SETS * residuals.N_MIXERS,),
+        (lsdt_frame_kernels.N_SETS * residuals.N_MIXERS,),
         24,
         (
             {"step": 0.02},
@@ -138,7 +138,7 @@ PLANS = {
         ),
     ),
     "online": Plan(
-        _online_coder,
+        online_coder,
         online.CODEC,
         (3 * residuals.N_MIXERS,) * 2 + (0,) * 2,
         20,  # of the few bits of a group

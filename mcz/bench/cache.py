@@ -8,6 +8,7 @@ import json
 import os
 import sys
 import tempfile
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,7 @@ from typing import Any
 import mcz
 
 # Of this part; of cli/ no measured figure depends on any file.
-MEASURING = (
-    *("cases.py", "curves.py", "deflated.py", "hou2016_training.py", "ladder.py", "measure.py"),
-    *("peers.py", "spatial.py", "tasks.py", "ways_back.py"),
-    *("kwak_clips.py", "kwak_coder.py", "kwak_losses.py", "kwak_measure.py", "kwak_work.py"),
-)
+MEASURING = ("cases.py", "ladder.py", "measure.py", "peers.py", "tasks.py")
 
 
 def default_folder() -> Path:
@@ -47,14 +44,21 @@ def code_digest() -> str:
 
 
 class Cache:
-    """Results as JSON files named by the hash of their key; without a folder nothing is kept."""
+    """Results as JSON files named by the hash of their key; without a folder nothing is kept.
 
-    def __init__(self, folder: Path | None) -> None:
+    ``code`` are files that results depend on beside those of the package.
+    """
+
+    def __init__(self, folder: Path | None, code: Iterable[Path] = ()) -> None:
         self.folder = folder
+        digest = hashlib.sha256()
+        for path in sorted(code):
+            digest.update(path.name.encode() + path.read_bytes())
+        self._code = digest.hexdigest()
 
     def _path(self, key: str) -> Path:
         assert self.folder is not None
-        name = hashlib.sha256(f"{code_digest()} {key}".encode()).hexdigest()
+        name = hashlib.sha256(f"{code_digest()} {self._code} {key}".encode()).hexdigest()
         return self.folder / name[:2] / f"{name}.json"
 
     def get(self, key: str) -> Any:

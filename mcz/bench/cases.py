@@ -11,7 +11,7 @@ from typing import Any
 
 import mcz
 from mcz.codecs import CODECS, by_name
-from mcz.codecs.base import Codec
+from mcz.codecs.contract import Codec
 from mcz.errors import MczError, OptionError
 from mcz.motion import Motion
 
@@ -124,27 +124,18 @@ def _value(text: str) -> Any:
     return text
 
 
-def find_cases(
-    paths: Sequence[str], unit: str | None, names: Sequence[str] | None = None
-) -> list[Case]:
-    """The cases that files and folders stand for; of folders only ``names``, where these are given.
+def find_cases(paths: Sequence[str], unit: str | None) -> list[Case]:
+    """The cases that files and folders stand for, each once.
 
-    Of a folder everything below it counts; of several files of one name the first is taken, .amc
-    before .bvh before .c3d. Raises OptionError where nothing is found.
+    Of a folder everything below it counts, .amc before .bvh before .c3d. Raises OptionError where
+    nothing is found.
     """
     cases: list[Case] = []
     for path in map(Path, paths):
-        if not path.is_dir():
-            cases.append(Case(str(path), unit))
-            continue
-        files = [f for suffix in SUFFIXES for f in sorted(path.rglob(f"*{suffix}"))]
-        if names is None:
-            cases += [Case(str(file), unit) for file in files]
-            continue
-        firsts: dict[str, Path] = {}
-        for file in files:
-            firsts.setdefault(file.stem, file)
-        cases += [Case(str(firsts[name]), unit) for name in names if name in firsts]
+        files = [path]
+        if path.is_dir():
+            files = [f for suffix in SUFFIXES for f in sorted(path.rglob(f"*{suffix}"))]
+        cases += [Case(str(file), unit) for file in files]
     if not cases:
         raise OptionError(f"no clip in {', '.join(paths) or 'nothing'}")
     return list(dict.fromkeys(cases))

@@ -13,17 +13,17 @@ from typing import Any
 import mcz
 from mcz.bench.cases import Case, Loaded, Variant, load
 from mcz.codecs import by_name
-from mcz.codecs.base import Codec, Request, Span, model_finder
+from mcz.codecs.contract import Codec, Request, Span, model_finder
 from mcz.container.limits import BASE
 from mcz.container.writer import Writer
-from mcz.files.encoding import write_clip
-from mcz.files.memory import MemorySource
-from mcz.files.positions import as_codec_wants
-from mcz.files.report import clip_ratios
-from mcz.files.sizes import clip_sizes
-from mcz.files.sources import read_source
 from mcz.formats import format_of
 from mcz.motion import Motion
+from mcz.reading.report import clip_ratios
+from mcz.reading.sizes import clip_sizes
+from mcz.reading.source_files import read_source
+from mcz.writing.clip_writer import write_clip
+from mcz.writing.positions import as_codec_wants
+from mcz.writing.signal_source import MemorySource
 
 Record = dict[str, Any]
 
@@ -186,34 +186,3 @@ def _parse(case: Case, loaded: Loaded) -> Motion:
     source_format = format_of(path)
     skeleton = loaded.motion.skeleton if source_format.wants_skeleton else None
     return read_source(path, source_format, skeleton, loaded.data)
-
-
-def resolutions(case: Case, variant: Variant, params: Mapping[str, Any], joint: str) -> Record:
-    """MSE of a joint's first channel, and bytes read, with the finest details left out."""
-    import numpy as np
-
-    from mcz.angles import unwrap
-
-    motion = load(case).motion
-    skeleton = motion.skeleton
-    column = skeleton.columns(skeleton.find(joint))[0]
-    wanted = unwrap(motion.values, skeleton)[:, column]
-    data = write_file(motion, variant.codec, variant.options(params))
-    rows = []
-    with mcz.open(data) as file:
-        n_resolutions = file.only_clip().signals[0].counts.n_resolutions
-    for resolution in range(n_resolutions):
-        values, of_joint = _read_counted(data, resolution, [joint])
-        _, of_all = _read_counted(data, resolution, None)
-        error = float(np.mean((values[:, 0] - wanted) ** 2))
-        row = {"resolution": resolution, "mse": error}
-        rows.append(row | {"bytes_read_joint": of_joint, "bytes_read_all": of_all})
-    return {"file_bytes": len(data), "rows": rows}
-
-
-def _read_counted(data: bytes, resolution: int, joints: list[str] | None) -> tuple[Any, int]:
-    """Values, and the bytes that were read for them."""
-    with mcz.open(data) as file:
-        before = file.container.source.n_bytes
-        values = file.only_clip().read(joints=joints, resolution=resolution)
-        return values, file.container.source.n_bytes - before

@@ -91,13 +91,3 @@ def setting(params: dict[str, Any]) -> str:
     return " ".join(
         f"{k}={v:.4g}" if isinstance(v, float) else f"{k}={v}" for k, v in params.items()
     )
-
-
-def verdict(held: Sequence[bool]) -> str:
-    """
-    >>> verdict([True, True]), verdict([False]), verdict([True, False, True]), verdict([])
-    ('yes', 'no', 'on 2 of 3', '-')
-    """
-    if not held:
-        return "-"
-    return {len(held): "yes", 0: "no"}.get(sum(held), f"on {sum(held)} of {len(held)}")

@@ -1,21 +1,22 @@
 """Work as tasks that run in processes of their own; results come from the cache where it has them.
 
-A task is a function's name and plain arguments, so that it travels between processes and makes a
-key. Speeds and memory are measured one task at a time, with nothing else of ours running.
+A task names its kind and has plain arguments, so that it travels between processes and makes a
+key. What a kind does says a table that the runner is given: ``KINDS``, or one that others build
+upon it. Speeds and memory are measured one task at a time, with nothing else of ours running.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any
 
-from mcz.bench import curves, deflated, kwak_work, ladder, measure, peers, spatial, ways_back
+from mcz.bench import ladder, measure, peers
 from mcz.bench.cache import Cache
 from mcz.bench.cases import Case, Variant, load, why
 from mcz.codecs import by_name
@@ -31,7 +32,7 @@ NONE = Variant("")  # of tasks that are about no codec
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """``kind`` names a row of ``KINDS``; ``arguments`` are those behind case and variant."""
+    """``kind`` is a row of the runner's table; ``arguments`` are those behind case and variant."""
 
     kind: str
     case: Case
@@ -51,19 +52,6 @@ def _point(task: Task) -> Any:
     return measure.point(task.case, task.variant, dict(task.arguments))
 
 
-def _at(task: Task) -> Any:
-    return ladder.at_figure(task.case, task.variant, *task.arguments)
-
-
-def _deflated(task: Task) -> Any:
-    return {"bytes": deflated.deflated_bytes(task.case, task.variant, *task.arguments)}
-
-
-def _resolutions(task: Task) -> Any:
-    joint, *params = task.arguments
-    return measure.resolutions(task.case, task.variant, dict(params), joint)
-
-
 def _speeds(task: Task) -> Any:
     return measure.speeds(task.case, task.variant, dict(task.arguments))
 
@@ -72,63 +60,29 @@ def _peers(task: Task) -> Any:
     return peers.measure(load(task.case))
 
 
-def _curve(task: Task) -> Any:
-    return curves.curve(task.case, task.variant, *task.arguments)
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """How a task is done; ``alone``: with nothing else of ours running beside it.
+
+    ``work`` is a function of a module, for it travels to other processes by its name.
+    """
+
+    work: Callable[[Task], Any]
+    alone: bool = False
 
 
-def _bases(task: Task) -> Any:
-    return curves.bases(*task.arguments)
-
-
-def _convergence(task: Task) -> Any:
-    return spatial.measured_convergence(*task.arguments)
-
-
-def _spatial(task: Task) -> Any:
-    return spatial.measured_distortions(*task.arguments)
-
-
-def _speeds_beside(task: Task) -> Any:
-    given = [(Variant(codec, params), setting) for codec, params, setting in task.arguments]
-    return curves.speeds_beside(task.case, given)
-
-
-def _way_back(task: Task) -> Any:
-    return ways_back.way_back(task.case, *task.arguments)
-
-
-def _kwak(task: Task) -> Any:
-    return kwak_work.perform(task.case, task.variant, *task.arguments)
-
-
-def _kwak_speeds(task: Task) -> Any:
-    return kwak_work.speeds(task.case, *task.arguments)
-
-
-KINDS = {
-    "sweep": _sweep,  # n_points
-    "point": _point,  # pairs of parameter and value
-    "deflated": _deflated,  # threshold
-    "at": _at,  # metric, wanted, where to begin
-    "resolutions": _resolutions,  # joint, pairs of parameter and value
-    "speeds": _speeds,  # pairs of parameter and value
-    "peers": _peers,  # names of the installed ones
-    "curve": _curve,  # bases as text, if any
-    "bases": _bases,  # clips, pairs of a recipe
-    "convergence": _convergence,  # clips, iterations, every so many frames
-    "spatial": _spatial,  # clips, pairs of name and bases as text
-    "speeds_beside": _speeds_beside,  # triples of codec, its parameters, setting
-    "way_back": _way_back,  # step in cm, whether with virtual markers
-    "kwak": _kwak,  # what, form of the clip, what it says
-    "kwak_speeds": _kwak_speeds,  # form of the clip, triples of codec, its parameters, more
+KINDS: Mapping[str, Kind] = {
+    "sweep": Kind(_sweep),  # n_points
+    "point": Kind(_point),  # pairs of parameter and value
+    "speeds": Kind(_speeds, alone=True),  # pairs of parameter and value
+    "peers": Kind(_peers, alone=True),  # names of the installed ones
 }
-ALONE = ("speeds", "peers", "speeds_beside", "kwak_speeds")
 
 
-def perform(task: Task) -> Any:
+def perform(task: Task, kind: Kind) -> Any:
     """The result of a task; ``{"error": ...}`` where the clip or a parameter is refused."""
     try:
-        return KINDS[task.kind](task)
+        return kind.work(task)
     except MczError as error:
         return {"error": why(error)}
 
@@ -166,16 +120,24 @@ def _one_thread() -> Iterator[None]:
 
 
 class Runner:
-    """Runs tasks in ``jobs`` processes; one of them means this one, speeds apart."""
+    """Runs tasks of ``kinds`` in ``jobs`` processes; one of them means this one, speeds apart."""
 
-    def __init__(self, jobs: int, cache: Cache, progress: Progress | None = None) -> None:
-        self.jobs, self.cache = jobs, cache
+    def __init__(
+        self,
+        jobs: int,
+        cache: Cache,
+        kinds: Mapping[str, Kind] = KINDS,
+        progress: Progress | None = None,
+    ) -> None:
+        self.jobs, self.cache, self.kinds = jobs, cache, kinds
         self.progress = progress or (lambda done, total, what: None)
         self.n_cached = self.n_run = 0
 
     def run(self, tasks: Iterable[Task]) -> dict[Task, Any]:
         """Results by task, those that share a clip one after the other."""
-        wanted = sorted(dict.fromkeys(tasks), key=lambda task: (task.kind in ALONE, task.case.path))
+        wanted = sorted(
+            dict.fromkeys(tasks), key=lambda task: (self.kinds[task.kind].alone, task.case.path)
+        )
         results: dict[Task, Any] = {}
         missing = []
         for task in wanted:
@@ -186,7 +148,7 @@ class Runner:
                 results[task] = found
         self.n_cached += len(results)
         self.n_run += len(missing)
-        alone = [task for task in missing if task.kind in ALONE]
+        alone = [task for task in missing if self.kinds[task.kind].alone]
         for part, jobs in ((missing[: len(missing) - len(alone)], self.jobs), (alone, 1)):
             self._run_part(part, jobs, results, len(wanted))
         return results
@@ -196,14 +158,15 @@ class Runner:
     ) -> None:
         if not tasks:
             return
-        if jobs == 1 and tasks[0].kind not in ALONE:
+        alone = self.kinds[tasks[0].kind].alone
+        if jobs == 1 and not alone:
             for task in tasks:
                 self.progress(len(results), total, task.label)
-                self._keep(task, perform(task), results)
+                self._keep(task, perform(task, self.kinds[task.kind]), results)
             return
         # New processes, not copies of this one: their memory is their own, and their threads.
         with ExitStack() as stack:
-            if tasks[0].kind in ALONE:
+            if alone:
                 stack.enter_context(_one_thread())
             pool = stack.enter_context(ProcessPoolExecutor(jobs, mp_context=get_context("spawn")))
             self._collect(pool, tasks, jobs, results, total)
@@ -221,7 +184,7 @@ class Runner:
         while waiting or running:
             while waiting and len(running) < jobs:
                 task = waiting.pop()
-                running[pool.submit(perform, task)] = task
+                running[pool.submit(perform, task, self.kinds[task.kind])] = task
             done, _ = wait(running, timeout=0.5, return_when=FIRST_COMPLETED)
             for future in done:
                 self._keep(running.pop(future), future.result(), results)

@@ -1,1 +1,1 @@
-"""The command line: one command a file; arguments in, ``mcz.files.file`` out."""
+"""The command line: one command a file; arguments in, ``mcz.reading.file`` out."""

@@ -1,4 +1,4 @@
-"""``mcz bench``: every codec on the same clips, and the papers' tables with ours beside."""
+"""``mcz bench``: every codec on the same clips."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mcz.cli.progress import Progress
 if TYPE_CHECKING:
     from mcz.bench.run import Outcome
 
-TABLES = ("khan2014", "khan2016", "hou2016", "kwak", "all")
+PAPERS = "python -m tools.papers"
 
 
 @click.command(short_help="Compare codecs: size, error, speed, memory.")
@@ -29,13 +29,10 @@ TABLES = ("khan2014", "khan2016", "hou2016", "kwak", "all")
     metavar="A,B",
     help="Codecs, each with its presets; qbc:khan2014 or qbc:delta=40 is that alone. Default: all.",
 )
-@click.option(
-    "--tables", "papers", type=click.Choice(TABLES), help="A paper's tables, instead of the sweep."
-)
-@click.option("--sweep", "with_sweep", is_flag=True, help="The sweep beside --tables.")
+@click.option("--tables", "paper", hidden=True)  # where the papers' tables are is said
 @click.option("--peers", is_flag=True, help="General compressors too, those that are installed.")
 @click.option(
-    "--speeds/--no-speeds", default=True, help="Measure speed and memory in the sweep. Default: do."
+    "--speeds/--no-speeds", default=True, help="Measure speed and memory too. Default: do."
 )
 @click.option("--unit", type=click.Choice(UNITS), help="Length unit of files that say none.")
 @click.option(
@@ -52,8 +49,7 @@ TABLES = ("khan2014", "khan2016", "hou2016", "kwak", "all")
 def command(
     clips: tuple[str, ...],
     codecs: str | None,
-    papers: str | None,
-    with_sweep: bool,
+    paper: str | None,
     peers: bool,
     speeds: bool,
     unit: str | None,
@@ -68,20 +64,18 @@ def command(
 
     Prints sizes by three numerators, errors of channels and positions, what codecs reach at equal
     error and at equal size, Bjontegaard deltas, speed as a ratio to parsing the text, and memory.
-    With --tables only the clips of that paper are taken, of hou2016 also those that bases are
-    learned from, of kwak also other C3D files of 1,000 frames and more. Results are kept in the
-    user's cache folder, by what they depend on; speeds are measured one at a time.
+    Results are kept in the user's cache folder, by what they depend on; speeds are measured one at
+    a time.
     """
     from mcz.bench.cache import Cache, default_folder
-    from mcz.bench.run import PAPERS, bench
+    from mcz.bench.run import bench
     from mcz.bench.tasks import Runner
 
+    if paper is not None:
+        raise Failure(f"the papers' tables are in the source tree: {PAPERS} {paper}", Exit.USAGE)
     for path in clips:
         if not Path(path).is_dir():
             existing(path)
-    if not clips and papers:
-        raise Failure(f"--tables {papers} needs the clips of the paper", Exit.USAGE)
-    chosen = tuple(PAPERS) if papers == "all" else (papers,) if papers else ()
     with TemporaryDirectory() as folder, Progress() as progress, ExitStack() as stack:
         clips = clips or (_sample(folder),)
         stack.enter_context(about(clips[0], *clips))
@@ -91,23 +85,26 @@ def command(
             clips,
             runner,
             codecs=[name for name in (codecs or "").split(",") if name],
-            papers=chosen,
-            with_sweep=with_sweep or not chosen,
             with_peers=peers,
             speeds=speeds,
             unit=unit,
         )
+    show(outcome, out, as_json=as_json)
+    return Exit.FINE
+
+
+def show(outcome: Outcome, out: Path | None, *, as_json: bool) -> None:
+    """Print what was found, and write the files of a report where ``out`` is given."""
     document = outcome.document() | {"files": _write(outcome, out) if out else []}
     if as_json:
         print_json(document)
-        return Exit.FINE
+        return
     for line in _lines(outcome):
         click.echo(printable(line))
     for note in outcome.notes:
         say(note)
     for path in document["files"]:
         click.echo(printable(path))
-    return Exit.FINE
 
 
 def _sample(folder: str) -> str:
@@ -128,14 +125,14 @@ def _lines(outcome: Outcome) -> Iterator[str]:
 
 def _write(outcome: Outcome, folder: Path) -> list[str]:
     """Write the files of a report; return their paths."""
-    from mcz.bench import panels, plots
+    from mcz.bench import plots
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
         drawn: list[Path] = []
         if plots.can_draw():
-            drawn = [*plots.draw(outcome.clips, folder), *panels.draw(outcome.panels, folder)]
-        elif outcome.clips or outcome.panels:
+            drawn = [path for figures in outcome.figures for path in figures(folder)]
+        elif outcome.figures:
             outcome.notes.append(plots.MISSING)
         text = "\n".join(outcome.markdown([path.name for path in drawn]))
         report, results = folder / "report.md", folder / "results.json"

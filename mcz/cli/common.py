@@ -20,11 +20,11 @@ import click
 from mcz.errors import AccessError, ExistsError, MczError, OptionError
 
 if TYPE_CHECKING:
-    from mcz.files.file import File
+    from mcz.reading.file import File
 
 
 class Exit(IntEnum):
-    """Exit codes of ``mcz`` and ``mcz-info``; README and ``mcz --help`` list them."""
+    """Exit codes of ``mcz`` and ``mcz-info``; docs/scripts.md and ``mcz --help`` list them."""
 
     FINE = 0
     BAD_INPUT = 1  # a file is missing, unreadable, refused or not what it should be
@@ -213,7 +213,7 @@ def check_new(path: Path, force: bool) -> None:
 
 def write_output(path: Path, data: bytes, force: bool) -> None:
     """Write ``data`` under its name in one step, never over an existing file without ``force``."""
-    from mcz.files.targets import replacing
+    from mcz.writing.atomic import replacing
 
     try:
         with about(str(path)), replacing(path, force=force) as stream:

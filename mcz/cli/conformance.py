@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from mcz.errors import LimitError, MczError, UnsupportedError
 
 if TYPE_CHECKING:
-    from mcz.files.clip import Clip
-    from mcz.files.file import File
-    from mcz.files.signal_info import SignalInfo
+    from mcz.reading.clip import Clip
+    from mcz.reading.file import File
+    from mcz.reading.signal_info import SignalInfo
 
 OPTIONS = ("--clip", "--frames", "--joints", "--resolution", "--post-filter", "--serve")
 MAX_LINE = 2**20
@@ -31,22 +31,23 @@ Part = tuple[dict[str, Any], bytes]  # a row of the listing, and its bytes
 
 def main(arguments: list[str] | None = None) -> int:
     """Answer one request; return the exit code."""
-    given = _parser().parse_args(arguments)
+    words = sys.argv[1:] if arguments is None else arguments
+    given = _parser().parse_args(words)
     if given.capabilities:
         print(json.dumps({"options": OPTIONS}))  # noqa: T201
         return 0
     if given.serve:
         return serve(sys.stdin.buffer, sys.stdout.buffer)
-    code, output = answer(sys.stdin.buffer.read(), given)
+    code, output = answer(sys.stdin.buffer.read(), words)
     sys.stdout.buffer.write(output)
     sys.stdout.buffer.flush()
     return code
 
 
-def answer(data: bytes, given: argparse.Namespace) -> tuple[int, bytes]:
+def answer(data: bytes, arguments: Sequence[str]) -> tuple[int, bytes]:
     """Exit code and output of one request about the file ``data``."""
     try:
-        return 0, b"".join(respond(data, given))
+        return 0, b"".join(respond(data, _parser().parse_args(list(arguments))))
     except UnsupportedError as error:
         return _refuse(3, error), b""
     except MczError as error:
@@ -58,7 +59,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> int:
     while line := requests.readline():
         request = json.loads(line)
         data = requests.read(request["bytes"])
-        code, output = answer(data, _parser().parse_args(request["arguments"]))
+        code, output = answer(data, request["arguments"])
         answers.write(json.dumps({"exit": code, "bytes": len(output)}).encode() + b"\n" + output)
         answers.flush()
     return 0
@@ -97,6 +98,7 @@ def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
     from mcz.container.scan import scan
     from mcz.container.source import open_source
 
+    # HEAD-01, STRICT-03
     scan(open_source(data), whole=True)  # INDX may be of no use where something is unsupported
     with mcz.open(data) as file:
         listing = "sources" if given.source else "arrays"
@@ -122,8 +124,8 @@ def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
             try:
                 yield from _signal_arrays(clip, signal, given)
             except UnsupportedError as error:
-                lacking = lacking or error
-                _read_segments(file, signal)
+                lacking = lacking or error  # STRICT-05
+                clip.check_segments(signal)  # STRICT-05
     if lacking is not None:  # and nothing else is wrong, which would count for more
         raise lacking
 
@@ -139,17 +141,11 @@ def _signal_arrays(clip: Clip, signal: SignalInfo, given: argparse.Namespace) ->
         yield _part(clip.name, signal.name, "mask", mask)
 
 
-def _read_segments(file: File, signal: SignalInfo) -> None:
-    """The tables of segments that nothing decodes have to be right all the same."""
-    for row in signal.rows:
-        file.container.streams(row, signal.counts, None)
-
-
 def _values(
     clip: Clip, given: argparse.Namespace, resolution: int, signal: int
 ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-    if given.post_filter and not signal:
-        from mcz.files.filtering import filtered_part
+    if given.post_filter and not signal:  # FILT-01
+        from mcz.reading.post_filtering import filtered_part
 
         return filtered_part(clip, given.frames, given.joints, resolution)
     return clip.read_masked(given.frames, given.joints, resolution, signal=signal)
@@ -175,14 +171,14 @@ def _part(clip: str, signal: str, array: str, values: NDArray[Any]) -> Part:
 
 def _sources(file: File) -> Iterator[Part]:
     """Every file that is held under a name: of clips, attached, and further names."""
-    from mcz.files.archive import named_files
+    from mcz.editing.archive import named_files
 
     lacking: UnsupportedError | None = None
     for path, restore in named_files(file):
         try:
             data = restore()
         except UnsupportedError as error:
-            lacking = lacking or error
+            lacking = lacking or error  # STRICT-05
             continue
         yield {"path": path, "bytes": len(data)}, data
     if lacking is not None:

@@ -26,10 +26,10 @@ from mcz.cli.options import decoded_option, force_option, json_option
 from mcz.cli.parts import Filtered, Part, Preview
 
 if TYPE_CHECKING:
-    from mcz.files.clip import Clip
-    from mcz.files.conversion import Fit
-    from mcz.files.file import File
+    from mcz.conversion import Fit
     from mcz.motion import Motion
+    from mcz.reading.clip import Clip
+    from mcz.reading.file import File
 
 Output = tuple[str, str, bytes]  # kind, file name, content
 CONVERSIONS = ("bvh", "amc", "c3d")
@@ -89,7 +89,7 @@ class _Wanted(NamedTuple):
     "--post-filter",
     "filtered",
     is_flag=True,
-    help="Filter the noise of a coarse codec out of the places of markers.",
+    help="Filter the noise of a coarse codec out of the positions of markers.",
 )
 @click.option(
     "--to",
@@ -223,7 +223,7 @@ def _check_moves(clip: Clip) -> None:
 
 def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
     """The motion of the clip's base skeleton whose points lie where those of ``motion`` do."""
-    from mcz.files.conversion import from_positions
+    from mcz.conversion import from_positions
 
     base = clip.base_skeleton
     if base is None:
@@ -239,7 +239,7 @@ def _converted(
     motion: Motion, target: str, rate: Fraction | None, with_skeleton: bool
 ) -> list[Output]:
     """The motion as a plain file of another format, with its ASF where an AMC is to have one."""
-    from mcz.files.conversion import converted_files
+    from mcz.conversion import converted_files
 
     files = converted_files(motion, target, rate, with_skeleton)
     kinds = {"asf": "skeleton"}
@@ -298,8 +298,8 @@ def _deliver(
     if output is not None:
         folder = Path(output) if Path(output).is_dir() else Path(output).parent
     rows = []
-    for place, (kind, name, data) in enumerate(outputs):
-        named = output is not None and not Path(output).is_dir() and place == 0
+    for number, (kind, name, data) in enumerate(outputs):
+        named = output is not None and not Path(output).is_dir() and number == 0
         path = Path(str(output)) if named else folder / plain_name(name)
         write_output(path, data, force)
         rows.append({"path": str(path), "kind": kind, "bytes": len(data)})

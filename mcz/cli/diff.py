@@ -25,8 +25,8 @@ from mcz.cli.figures import figure_lines
 from mcz.cli.options import UNITS, decoded_option, json_option
 
 if TYPE_CHECKING:
-    from mcz.files.file import File
     from mcz.motion import Motion
+    from mcz.reading.file import File
 
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
 Cut = tuple[int, int | None] | None
@@ -124,8 +124,8 @@ class _Side:
     def load(self, name: str | None, frames: Cut) -> _Loaded:
         """The motion called ``name``, or the only one, cut to ``frames``."""
         import mcz
-        from mcz.files.report import clip_ratios
-        from mcz.files.sources import with_facts
+        from mcz.reading.report import clip_ratios
+        from mcz.reading.source_files import with_facts
 
         with about(self.path):
             if self.file is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,6 +22,9 @@ from mcz.cli.common import (
 )
 from mcz.cli.options import chosen, encoding_options, force_option, json_option
 from mcz.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from mcz.writing.written import Written
 
 
 @click.command(short_help="A .bvh, .amc, .c3d or .asf file to .mcz.")
@@ -80,7 +83,7 @@ def _encode_piped(
     **options: Any,
 ) -> Exit:
     from mcz.cli.piped import encode_lines, stored
-    from mcz.files.arriving import codes_live
+    from mcz.live.text_writer import codes_live
 
     if options["codec"] is not None and codes_live(options["codec"]):
         if as_json:
@@ -102,7 +105,6 @@ def _encode_file(
     **options: Any,
 ) -> Exit:
     import mcz
-    from mcz.files.report import decoded_bytes, info
 
     target = output or str(Path(source).with_suffix(".mcz"))
     unread = output == "-" or _is_special(target)
@@ -110,7 +112,7 @@ def _encode_file(
         raise Failure(f"-o {target} leaves no room for --json", Exit.USAGE)
     piped = io.BytesIO()
     with about(source, target), Progress() as progress:
-        mcz.encode(
+        written = mcz.encode(
             source,
             piped if output == "-" else target,
             skeleton=skeleton,
@@ -120,18 +122,24 @@ def _encode_file(
         )
     if output == "-":
         binary_output().write(piped.getvalue())
-    if unread:
-        return Exit.FINE
-    with opened(target) as file:
-        document = info(file)
-        needed, allowed = decoded_bytes(file), file.container.max_decoded
+    if not unread:
+        _tell(target, written, Path(source).stat().st_size, as_json)
+    return Exit.FINE
+
+
+def _tell(target: str, written: Written, source_size: int, as_json: bool) -> None:
+    from mcz.container.limits import output_limit
+
+    needed, allowed = max(written.decoded_bytes, source_size), output_limit(written.size)
     if needed > allowed:
         say(f"{target}: reading it takes --max-decoded {needed}, the default is {allowed}")
-    if as_json:
-        print_json({"output": target, **document})
-    else:
-        click.echo(summary(target, document, Path(source).stat().st_size))
-    return Exit.FINE
+    if not as_json:
+        click.echo(summary(target, written, source_size))
+        return
+    from mcz.reading.report import info
+
+    with opened(target) as file:
+        print_json({"output": target, **info(file)})
 
 
 def _is_special(target: str) -> bool:
@@ -140,14 +148,14 @@ def _is_special(target: str) -> bool:
     return "://" not in target and path.exists() and not (path.is_file() or path.is_dir())
 
 
-def summary(target: str, document: dict[str, Any], source_size: int) -> str:
+def summary(target: str, written: Written, source_size: int) -> str:
     """One line about a file just written."""
     held = [
-        f"{plural(clip['n_frames'], 'frame')} of {plural(clip['n_channels'], 'channel')}"
-        for clip in document["clips"]
+        f"{plural(clip.n_frames, 'frame')} of {plural(clip.n_channels, 'channel')}"
+        for clip in written.clips
     ]
-    held += ["a skeleton" for _ in document["skeletons"] if not document["clips"]]
-    held += ["verbatim" for _ in document["attachments"]]
-    size = document["file_bytes"]
-    ratio = f", {source_size / size:.2f} : 1" if source_size else ""
-    return printable(f"{target}: {', '.join(held)}; {source_size:,} -> {size:,} bytes{ratio}")
+    held += ["a skeleton"] * (0 if written.clips else written.n_skeletons)
+    held += ["verbatim"] * written.n_attachments
+    ratio = f", {source_size / written.size:.2f} : 1" if source_size else ""
+    sizes = f"{source_size:,} -> {written.size:,} bytes{ratio}"
+    return printable(f"{target}: {', '.join(held)}; {sizes}")

@@ -1,4 +1,4 @@
-"""CSV and NPZ: the two exports of ``mcz decode --to``; README, "Exports", describes them."""
+"""CSV and NPZ: the two exports of ``mcz decode --to``; docs/scripts.md describes them."""
 
 from __future__ import annotations
 

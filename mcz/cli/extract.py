@@ -23,7 +23,7 @@ from mcz.cli.options import decoded_option, force_option, json_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from mcz.files.extraction import ExtractedClip, Extraction
+    from mcz.editing.extraction import ExtractedClip, Extraction
 
 
 @click.command(short_help="A part of an .mcz, cut out of its stored bytes.")

@@ -1,11 +1,11 @@
-"""What is said of a skeleton that was fitted to places: as JSON, and in words."""
+"""What is said of a skeleton that was fitted to positions: as JSON, and in words."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mcz.files.conversion import Fit
+    from mcz.conversion import Fit
 
 
 def facts_of(fit: Fit) -> dict[str, Any]:

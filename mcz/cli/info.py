@@ -50,17 +50,17 @@ def command(
     file: str, as_json: bool, show_layout: bool, check: bool, max_decoded: int | None
 ) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz."""
-    from mcz.files import report
+    from mcz.reading import report
 
     if check:
         return _validate(file, max_decoded, as_json)
     with opened(file, max_decoded=max_decoded) as held:
         if show_layout:
-            places = report.layout(held)
+            parts = report.layout(held)
         else:
             document = report.info(held)
     if show_layout:
-        _print_layout(places, as_json)
+        _print_layout(parts, as_json)
     elif as_json:
         print_json(document)
     else:
@@ -69,7 +69,7 @@ def command(
 
 
 def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
-    from mcz.files import report
+    from mcz.reading import report
 
     size = 0
     try:
@@ -96,11 +96,11 @@ def _say_problems(file: str, size: int, problems: list[Any], as_json: bool) -> E
     return Exit.NOT_VERIFIED if problems else Exit.FINE
 
 
-def _print_layout(places: list[tuple[int, int, str]], as_json: bool) -> None:
+def _print_layout(parts: list[tuple[int, int, str]], as_json: bool) -> None:
     if as_json:
-        print_json([{"offset": at, "bytes": n, "meaning": text} for at, n, text in places])
+        print_json([{"offset": at, "bytes": n, "meaning": text} for at, n, text in parts])
         return
-    rows = [[f"{at}", f"{n}", printable(text)] for at, n, text in places]
+    rows = [[f"{at}", f"{n}", printable(text)] for at, n, text in parts]
     click.echo(table([["offset", "bytes", "meaning"], *rows], "rrl"))
 
 
@@ -154,8 +154,8 @@ def _tree(joints: list[dict[str, Any]]) -> Iterator[str]:
         if len(below) > DEEPEST:
             own, below = f"{below} ... ", below[:DEEPEST]
         yield f"{own}{joints[index]['name']}  {' '.join(joints[index]['channels'])}".rstrip()
-        for place, child in enumerate(reversed(children.get(index, []))):
-            last = place == 0
+        for number, child in enumerate(reversed(children.get(index, []))):
+            last = number == 0
             stack.append(
                 (child, below + ("└─ " if last else "├─ "), below + ("   " if last else "│  "))
             )

@@ -12,7 +12,7 @@ import click
 from mcz.cli.common import Exit, plural, print_json, printable, say
 
 if TYPE_CHECKING:
-    from mcz.files.archive import Outcome, Report
+    from mcz.editing.archive import Outcome, Report
 
 
 TOLD = ("skipped", "verbatim", "salvaged", "dropped")  # results whose reason is said

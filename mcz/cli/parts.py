@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from mcz.cli.export import Table
-    from mcz.files.clip import Clip
     from mcz.motion import Motion
+    from mcz.reading.clip import Clip
 
 Masked = tuple[NDArray[Any], NDArray[np.bool_] | None]
 
@@ -38,7 +38,7 @@ class Part:
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
         """The channels of ``joints``, which are called ``names``."""
         from mcz.cli.export import Table
-        from mcz.files.decimation import decimated_rows
+        from mcz.reading.decimation import decimated_rows
 
         clip = self.clip
         values, mask = self._rows(joints)
@@ -59,21 +59,21 @@ class Filtered(Part):
     """The same, with the post filter."""
 
     def source_bytes(self) -> bytes:
-        from mcz.files.filtering import filtered_source
+        from mcz.reading.post_filtering import filtered_source
 
         return filtered_source(
             self.clip, self.frames, self.resolution, decimate=self.decimate, rate=self.rate
         )
 
     def motion(self) -> Motion:
-        from mcz.files.filtering import filtered_motion
+        from mcz.reading.post_filtering import filtered_motion
 
         return filtered_motion(
             self.clip, self.frames, self.resolution, decimate=self.decimate, rate=self.rate
         )
 
     def _rows(self, joints: Sequence[int | str] | None) -> Masked:
-        from mcz.files.filtering import filtered_part
+        from mcz.reading.post_filtering import filtered_part
 
         return filtered_part(self.clip, self.frames, joints, self.resolution, rate=self.rate)
 
@@ -82,15 +82,14 @@ class Preview(Part):
     """The frames of a clip that can be read without decoding the rest."""
 
     def motion(self) -> Motion:
-        from mcz.files.preview import preview_motion
+        from mcz.reading.preview_motion import preview_motion
 
         return preview_motion(self.clip)
 
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
         from mcz.cli.export import Table
-        from mcz.files.preview import preview
 
-        found = preview(self.clip, joints)
+        found = self.clip.previewed(joints)
         numbers, rate = self.clip.frame_numbers[found.frames], self.clip.frame_rate
         return Table(
             names,

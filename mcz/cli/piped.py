@@ -36,7 +36,7 @@ def standard_input() -> BinaryIO:
 @contextmanager
 def stored(format_name: str | None) -> Iterator[str]:
     """The path of a file, for as long as the block runs, that holds all of standard input."""
-    from mcz.files.arriving import format_name_of
+    from mcz.live.text_writer import format_name_of
 
     data = standard_input().read()
     with about(NAME):
@@ -52,7 +52,8 @@ def encode_lines(
     target: str | None, force: bool, format_name: str | None, skeleton: str | None, **options: Any
 ) -> None:
     """Encode standard input frame by frame to ``target``, - or None being standard output."""
-    from mcz.files.arriving import encode_live
+    from mcz.live.text_writer import encode_live
+    from mcz.writing.entry import Terms
 
     for name in ("verbatim", "archive"):
         if options.pop(name):
@@ -61,7 +62,8 @@ def encode_lines(
     name = format_name or ("bvh" if skeleton is None else "amc")
     others = () if target in (None, "-") else (str(target),)
     with about(NAME, *others), live_output(target, force) as sink:
-        report = encode_live(iter(stream.readline, b""), sink, name, skeleton=skeleton, **options)
+        terms = Terms(skeleton=skeleton, **options)
+        report = encode_live(iter(stream.readline, b""), sink, name, terms)
     for remark in report.remarks:
         say(f"{NAME}: {remark}")
     if target not in (None, "-"):

@@ -25,7 +25,7 @@ from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from mcz.files.clip import Clip
+    from mcz.reading.clip import Clip
 
 
 @click.command(short_help="Other values for one joint of an .mcz.")

@@ -18,9 +18,9 @@ from mcz.cli.piped import NAME, standard_input
 from mcz.cli.rows import NUMBER, STATE
 
 if TYPE_CHECKING:
-    from mcz.files.concealing import LiveFrame, Lost
-    from mcz.files.followed import LiveClip
-    from mcz.files.streams import LiveReader
+    from mcz.live.clip_state import LiveClip
+    from mcz.live.concealment import LiveFrame, Lost
+    from mcz.live.generators import LiveReader
 
 
 @click.command(short_help="A live stream to rows of numbers.")
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     "--post-filter",
     "post_filter",
     is_flag=True,
-    help="Smooth places as coarse coding needs it; rows come 12 frames late.",
+    help="Smooth positions as coarse coding needs it; rows come 12 frames late.",
 )
 @click.option(
     "--rate",
@@ -74,7 +74,7 @@ def command(
         raise Failure("--states has no place in binary rows", Exit.USAGE)
     if rate is not None and not post_filter:
         raise Failure("--rate needs --post-filter", Exit.USAGE)
-    from mcz.files.streams import stream_decode
+    from mcz.live.generators import stream_decode
 
     where = connect or (NAME if file == "-" else file)
     with about(where), _stream(file, connect) as stream:

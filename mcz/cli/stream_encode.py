@@ -25,7 +25,7 @@ from mcz.cli.piped import NAME, live_output, standard_input
 from mcz.cli.rows import Rows, skeleton_in
 
 if TYPE_CHECKING:
-    from mcz.files.live import LiveWriter
+    from mcz.live.writer import LiveWriter
 
 Entry = Callable[[], int | None]
 
@@ -112,15 +112,15 @@ def _encode(
     *,
     rate: Fraction | None,
     unit: str | None,
-    codec: str,
-    params: dict[str, Any],
-    name: str,
-    repeat: int,
+    **live: Any,
 ) -> str:
-    """Write the stream; returns what it holds in words. ``tell`` is told where one can join."""
-    from mcz.files.live import LiveWriter
-    from mcz.files.sources import in_unit
-    from mcz.files.streams import markers
+    """Write the stream; returns what it holds in words. ``tell`` is told where one can join.
+
+    ``live``: further arguments of ``LiveWriter``.
+    """
+    from mcz.live.generators import markers
+    from mcz.live.writer import LiveWriter
+    from mcz.units import in_unit
 
     known = None if skeleton is None else skeleton_in(skeleton)
     n_channels = None if known is None else known.n_channels
@@ -128,9 +128,7 @@ def _encode(
     if known is None:
         known = markers(rows.names or [])
     rows.expect(known.n_channels)
-    writer = LiveWriter(
-        sink, in_unit(known, unit), codec, params, frame_rate=rate, name=name, repeat=repeat
-    )
+    writer = LiveWriter(sink, in_unit(known, unit), frame_rate=rate, **live)
     if tell is not None:
         tell(lambda: writer.entry)
     with writer:

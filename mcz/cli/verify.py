@@ -14,7 +14,7 @@ from mcz.cli.progress import Progress
 from mcz.errors import FormatError, LimitError, UnsupportedError
 
 if TYPE_CHECKING:
-    from mcz.files.file import File
+    from mcz.reading.file import File
 
 
 @click.command(short_help="Prove that sources come back identical.")
@@ -58,7 +58,7 @@ def is_unsound(failure: Failure) -> bool:
 
 
 def _parts(held: File, progress: Progress) -> Iterator[dict[str, Any]]:
-    from mcz.files import report
+    from mcz.reading import report
 
     total = 1 + len(held.clips) + len(held.attachments)
     problems = report.structure_problems(held)

@@ -14,60 +14,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.base import (
+from mcz.codecs.contract import (
     Codec,
     Encoded,
     Fetch,
     Layout,
-    Parameter,
     Request,
-    Segment,
     SignalSource,
     Span,
-    gather,
-    integer,
     refuse_extras,
 )
+from mcz.codecs.parameters import Parameter, integer
+from mcz.codecs.segments import Sizing, gather, guessing
 from mcz.errors import FormatError
 
-TARGET_BYTES = 60_000  # of a segment: under the 64 KiB that DATA should have, table included
 MAX_ROWS = 2**20
+SIZING = Sizing(target=60_000, value_bytes=4, aim=97, most_rows=MAX_ROWS)
 
-# Each channel of a stream, as SPEC.md's table has it: (name, type, meaning).
-RAW_FIELDS = (
-    ("least", "8 bytes", "least ordinal, two's complement: low u32, then high u32"),
-    ("width", "u8", "bytes of each offset, 0 to 8"),
-    ("offsets", "width bytes each", "ordinal - least of every row, modulo 2^64"),
-)
 HEAD_SIZE = 9
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
-    return Encoded(header=b"", segments=_segments(source, params["segment_frames"]))
 
+    def code(first: int, stop: int) -> tuple[bytes, ...]:
+        ordinals = source.ordinals(first, stop)
+        return tuple(_build(ordinals[:, list(group)]) for group in source.layout.groups)
 
-def _segments(source: SignalSource, fixed: int) -> Iterator[Segment]:
-    layout = source.layout
-    ends = sorted({*source.breaks, layout.n_frames})
-    guess = fixed or max(
-        1, TARGET_BYTES // (4 * layout.samples_per_frame * max(1, layout.n_channels))
-    )
-    most = min(layout.most_frames, max(1, MAX_ROWS // layout.samples_per_frame))
-    first = 0
-    while first < layout.n_frames:
-        end = next(e for e in ends if e > first)
-        n_frames = min(guess, end - first, most)
-        ordinals = source.ordinals(first, first + n_frames)
-        streams = tuple(_build(ordinals[:, list(group)]) for group in layout.groups)
-        size = sum(map(len, streams))
-        if size > TARGET_BYTES and n_frames > 1 and not fixed:
-            guess = max(1, n_frames * TARGET_BYTES * 97 // (size * 100))
-            continue
-        yield Segment(first, n_frames, streams)
-        first += n_frames
-        if not fixed and size:
-            guess = max(1, min(4 * n_frames, n_frames * TARGET_BYTES * 97 // (size * 100)))
+    return Encoded(header=b"", segments=guessing(source, params["segment_frames"], SIZING, code))
 
 
 def _build(ordinals: NDArray[np.int64]) -> bytes:
@@ -118,7 +92,7 @@ def _parse(stream: bytes, n_rows: int, n_channels: int) -> NDArray[np.int64]:
             raise FormatError(f"raw: the stream ends in the head of channel {channel}")
         least, width = int.from_bytes(head[:8], "little"), head[8]
         at += HEAD_SIZE
-        if width > 8:
+        if width > 8:  # RAW-02
             raise FormatError(f"raw: channel {channel} has offsets of {width} bytes")
         size = width * n_rows
         if at + size > len(stream):
@@ -127,9 +101,9 @@ def _parse(stream: bytes, n_rows: int, n_channels: int) -> NDArray[np.int64]:
             )
         offsets = np.zeros((n_rows, 8), "u1")
         offsets[:, :width] = np.frombuffer(stream, "u1", size, at).reshape(n_rows, width)
-        columns.append((offsets.view("<u8")[:, 0] + np.uint64(least)).view(np.int64))
+        columns.append((offsets.view("<u8")[:, 0] + np.uint64(least)).view(np.int64))  # RAW-03
         at += size
-    if at != len(stream):
+    if at != len(stream):  # RAW-04
         raise FormatError(f"raw: {len(stream) - at} bytes follow the last channel")
     return np.stack(columns, axis=1) if columns else np.empty((n_rows, 0), np.int64)
 

@@ -1,12 +1,12 @@
 """Compiled: bits in bytes, the highest of each byte first. SPEC.md, "Bits", is normative.
 
-One function serves encoder and decoder, as in ``kernels``: a coder is an array of two, the place in
+One function serves encoder and decoder, as in ``mixing``: a coder is an array of two, the index in
 bits and whether it encodes. Imported on first use only.
 """
 
 from __future__ import annotations
 
-from mcz.coding.kernels import Bytes, Ints
+from mcz.coding.mixing import Bytes, Ints
 from mcz.jit import inner
 
 AT, WRITING = 0, 1
@@ -22,15 +22,15 @@ def plain(coder: Ints, data: Bytes, value: int, n_bits: int) -> int:
     coder[AT] = at + n_bits
     out = 0
     for shift in range(n_bits - 1, -1, -1):
-        place = at >> 3
-        mask = 128 >> (at & 7)
+        index = at >> 3
+        mask = 128 >> (at & 7)  # BITS-01
         at += 1
         bit = 0
         if coder[WRITING]:
             bit = value >> shift & 1
-            if bit and place < len(data):
-                data[place] |= mask
-        elif place < len(data) and data[place] & mask:
+            if bit and index < len(data):
+                data[index] |= mask
+        elif index < len(data) and data[index] & mask:
             bit = 1
-        out = out << 1 | bit
+        out = out << 1 | bit  # BITS-01
     return out

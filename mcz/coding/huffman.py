@@ -15,9 +15,9 @@ from mcz.errors import FormatError
 
 Ints = NDArray[np.int64]
 
-MAX_LENGTH = 15
+MAX_LENGTH = 15  # SPACE-13
 DIRECT = 16  # integers below it are classes of their own
-N_CLASSES = 90  # up to 2^41
+N_CLASSES = 90  # up to 2^41 (SPACE-14)
 
 
 def class_of(value: int) -> tuple[int, int]:
@@ -69,7 +69,7 @@ def codes_of(lengths: Sequence[int], where: str) -> Ints:
     if any(length > MAX_LENGTH for length in used):
         raise FormatError(f"{where}: a code of {max(used)} bits, at most {MAX_LENGTH}")
     room = sum(1 << (MAX_LENGTH - length) for length in used)
-    if used not in ([], [1]) and room != 1 << MAX_LENGTH:
+    if used not in ([], [1]) and room != 1 << MAX_LENGTH:  # PREFIX-04, PREFIX-05
         raise FormatError(f"{where}: code lengths that make no whole code")
     codes = np.zeros(len(lengths), np.int64)
     code = 0

@@ -17,11 +17,12 @@ Ints = NDArray[np.int64]
 NODES = (
     *(22, 36, 60, 98, 162, 267, 439, 720, 1179, 1921, 3108, 4971, 7812, 11955, 17625, 24743),
     *(32768,),
+    # RANGE-05
     *(40793, 47911, 53581, 57724, 60565, 62428, 63615, 64357, 64816, 65097, 65269, 65374),
     *(65438, 65476, 65500, 65514),
 )
 LIMIT = 2047  # of a stretched probability
-COUNT_LIMIT = 250  # from here on a probability no longer learns more slowly
+COUNT_LIMIT = 250  # from here on a probability no longer learns more slowly (RANGE-05)
 
 
 @cache
@@ -38,7 +39,7 @@ def squash_table() -> Ints:
 def stretch_table() -> Ints:
     """stretch at index p >> 4: the least x in -2047 to 2047 whose squash is >= 16 (p >> 4) + 8."""
     reachable = squash_table()[1:]  # x from -2047
-    wanted = 16 * np.arange(4096) + 8
+    wanted = 16 * np.arange(4096) + 8  # RANGE-05
     found: Ints = np.searchsorted(reachable, wanted) - LIMIT
     return np.minimum(found, LIMIT)
 

@@ -6,7 +6,7 @@ scales and the neighbors of an integer are, and has its own contexts. Imported o
 
 from __future__ import annotations
 
-from mcz.coding.kernels import Bytes, Ints, mixed, number
+from mcz.coding.mixing import Bytes, Ints, mixed, number
 from mcz.jit import inner
 
 # First context of each kind of bit, and its mixer; "more" has twelve, by how far the length is.
@@ -32,7 +32,7 @@ def bits(value: int) -> int:
 def quarters(value: int) -> int:
     """About 4 log2(value), value >= 1, at most 111."""
     n = bits(value)
-    return min(4 * (n - 1) + ((value << 2) >> (n - 1) & 3), 111)
+    return min(4 * (n - 1) + ((value << 2) >> (n - 1) & 3), 111)  # RESID-01
 
 
 @inner
@@ -50,12 +50,12 @@ def side_of(value: int) -> int:
 def code_first(state: Ints, data: Bytes, value: int) -> int:
     """Code a number of which nothing is known: its length, its bits, its sign."""
     length = number(state, data, bits(abs(value)), LENGTH_BITS)
-    if length > 41:
+    if length > 41:  # QBC-19
         return FAULT
     if length == 0:
         return 0
-    found = 1 << (length - 1) | number(state, data, abs(value), length - 1)
-    return -found if number(state, data, 1 if value < 0 else 0, 1) else found
+    found = 1 << (length - 1) | number(state, data, abs(value), length - 1)  # QBC-17
+    return -found if number(state, data, 1 if value < 0 else 0, 1) else found  # QBC-17
 
 
 @inner
@@ -77,7 +77,7 @@ def code_residual(
     kf, ks = quarters(scales[0] + 1), quarters(scales[1] + 1)
     size = abs(residual)
     length = code_length(state, data, bits(size), kf, ks, near, first)
-    if length < 0 or length > 53:
+    if length < 0 or length > 53:  # RESID-03
         return FAULT
     if length == 0:
         return 0
@@ -105,6 +105,7 @@ def code_length(
             at = base - 1
             while at > 0:
                 less = 1 if length < at else 0
+                # RESID-01
                 a, b = contexts + C_LESS + min(base - at, 15), contexts + C_LESS + 16 + cf
                 c = contexts + C_LESS + 48 + cs
                 if not mixed(state, data, less, mixers + M_LESS, a, b, c):
@@ -112,10 +113,10 @@ def code_length(
                 at -= 1
             return at
     at = base
-    while at <= 60:
+    while at <= 60:  # RESID-02
         f, s = clamp(at - bf + 4, 0, 23), clamp(at - bs + 4, 0, 23)
         a, b = contexts + C_MORE + 24 * cf + f, contexts + C_MORE + 768 + 24 * cs + s
-        c = contexts + C_MORE + 1536 + 2 * (24 * near + f) + (1 if bf > bs else 0)
+        c = contexts + C_MORE + 1536 + 2 * (24 * near + f) + (1 if bf > bs else 0)  # RESID-01
         more = 1 if length > at else 0
         if not mixed(state, data, more, mixers + M_MORE + min(f, 11), a, b, c):
             return at
@@ -145,12 +146,12 @@ def code_size(
     found = 1
     if length > 1:
         at = contexts + C_SECOND
-        a, b = at + 4 * f + qf, at + 64 + 4 * s + qs
+        a, b = at + 4 * f + qf, at + 64 + 4 * s + qs  # RESID-01
         bit = size >> (length - 2) & 1
         found = 2 + mixed(state, data, bit, mixers + M_SECOND, a, b, at + 128 + e)
     if length > 2:
         at = contexts + C_THIRD + (found & 1)
-        a, b = at + 8 * f + 2 * qf, at + 128 + 8 * s + 2 * qs
+        a, b = at + 8 * f + 2 * qf, at + 128 + 8 * s + 2 * qs  # RESID-01
         bit = size >> (length - 3) & 1
         found = 2 * found + mixed(state, data, bit, mixers + M_THIRD, a, b, at + 256 + 2 * e)
     if length > 3:

@@ -1,31 +1,41 @@
-"""The state in which a coder begins a stream, from a start table of one of SPEC.md's annexes."""
+"""The states in which coders begin a stream, from the start tables of SPEC.md's annexes."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.annexes import annex_bytes
 from mcz.coding.logistic import rate_table, squash_table, stretch_table
 
 
+@cache
+def start_states(name: str) -> tuple[NDArray[np.int64], ...]:
+    """The states of the annex ``NAME_start.json``, one a set; nobody writes to them."""
+    document = json.loads(annex_bytes(f"{name}_start.json"))
+    return tuple(start_state(table) for table in document.get("sets", [document]))
+
+
 def start_state(table: Mapping[str, Any]) -> NDArray[np.int64]:
-    """``state`` of ``coding.kernels`` with the ``weights``, ``probabilities`` and ``counts`` given.
+    """``state`` of ``coding.mixing`` with the ``weights``, ``probabilities`` and ``counts`` given.
 
     The last two are lines of hexadecimal digits, one byte a context.
     """
-    from mcz.coding import kernels
+    from mcz.coding import mixing
 
     probabilities = np.frombuffer(bytes.fromhex("".join(table["probabilities"])), "u1")
     counts = np.frombuffer(bytes.fromhex("".join(table["counts"])), "u1")
-    state = np.zeros(kernels.MODELS + 2 * len(probabilities), np.int64)
-    state[kernels.SQUASH : kernels.SQUASH + 4096] = squash_table()
-    state[kernels.STRETCH : kernels.STRETCH + 4096] = stretch_table()
+    state = np.zeros(mixing.MODELS + 2 * len(probabilities), np.int64)
+    state[mixing.SQUASH : mixing.SQUASH + 4096] = squash_table()
+    state[mixing.STRETCH : mixing.STRETCH + 4096] = stretch_table()
     rates = rate_table()
-    state[kernels.RATES : kernels.RATES + len(rates)] = rates
-    state[kernels.WEIGHTS : kernels.WEIGHTS + len(table["weights"])] = table["weights"]
-    state[kernels.MODELS :: 2] = probabilities.astype(np.int64) * 256 + 128
-    state[kernels.MODELS + 1 :: 2] = counts
+    state[mixing.RATES : mixing.RATES + len(rates)] = rates
+    state[mixing.WEIGHTS : mixing.WEIGHTS + len(table["weights"])] = table["weights"]
+    state[mixing.MODELS :: 2] = probabilities.astype(np.int64) * 256 + 128  # LOSS-22
+    state[mixing.MODELS + 1 :: 2] = counts
     return state

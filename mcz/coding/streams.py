@@ -21,9 +21,9 @@ Loop = Callable[[Ints, NDArray[np.uint8]], bool]
 
 @cache
 def _coder() -> Any:
-    from mcz.coding import kernels
+    from mcz.coding import mixing
 
-    return kernels
+    return mixing
 
 
 def bare_state() -> Ints:
@@ -54,7 +54,7 @@ def uncode(stream: bytes, start: Ints, loop: Loop, what: str, *, whole: bool) ->
     _coder().start(state, data, 0)
     if not loop(state, data):
         raise FormatError(f"{what} is out of range")
-    if whole and _coder().coded_size(state) != len(data):
+    if whole and _coder().coded_size(state) != len(data):  # RANGE-04
         raise FormatError(f"{what}: a stream of {len(data)} bytes takes another number")
 
 

@@ -28,7 +28,7 @@ SAFE_TO_COPY = 2  # a rewriter that does not know the type keeps the chunk
 KNOWN_FLAGS = ANCILLARY | SAFE_TO_COPY
 
 REPEAT = b"REPT"  # flags: ANCILLARY alone
-FLAGS_OF = {b"QUAL": ANCILLARY | SAFE_TO_COPY, REPEAT: ANCILLARY}
+FLAGS_OF = {b"QUAL": ANCILLARY | SAFE_TO_COPY, REPEAT: ANCILLARY}  # CHUNK-16, CHUNK-17
 REPEATED = (b"HEAD", b"SKEL", b"MODL", b"CLIP")  # the chunks that a REPT holds again
 
 _CANDIDATE = re.compile(rb"(?=[A-Za-z]{4}[\x00-\x03]\x00)")  # looks like the start of a header
@@ -86,18 +86,18 @@ def parse_header(data: bytes, offset: int) -> Chunk:
     if len(data) < HEADER.size:
         raise TruncatedError(f"a chunk header at {offset} ends after {len(data)} of 16 bytes")
     kind, flags, reserved, check, length = HEADER.unpack(data[: HEADER.size])
-    if check != zlib.crc32(data[:6] + data[8:16]) & 0xFFFF:
+    if check != zlib.crc32(data[:6] + data[8:16]) & 0xFFFF:  # CHUNK-02
         raise ChecksumError(
             f"header_check of the chunk at {offset} is {check:#06x}, which is wrong"
         )
-    if not (kind.isalpha() and kind.isascii()):
+    if not (kind.isalpha() and kind.isascii()):  # CHUNK-08
         raise FormatError(f"chunk type {kind!r} at {offset} is not four ASCII letters")
-    if reserved or flags & ~KNOWN_FLAGS:
+    if reserved or flags & ~KNOWN_FLAGS:  # CHUNK-09
         raise FormatError(
             f"chunk {kind.decode()} at {offset}: flags {flags:#x}, reserved {reserved}"
         )
     if length == OPEN_LENGTH:
-        if kind != b"DATA":
+        if kind != b"DATA":  # CHUNK-10
             raise FormatError(f"chunk {kind.decode()} at {offset} is open; only DATA may be")
         return Chunk(kind, flags, offset, None)
     if length > MAX_COUNT:
@@ -110,7 +110,7 @@ def read_chunk(source: ByteSource, offset: int) -> Chunk:
     if offset + HEADER.size > source.size:
         raise TruncatedError(f"the file ends at {source.size}, in a chunk header at {offset}")
     chunk = parse_header(source.read(offset, HEADER.size), offset)
-    if chunk.length is not None and chunk.offset + chunk.size > source.size:
+    if chunk.length is not None and chunk.offset + chunk.size > source.size:  # CHUNK-05
         raise TruncatedError(
             f"chunk {chunk.label} ends at {chunk.offset + chunk.size}, the file at {source.size}"
         )
@@ -135,7 +135,7 @@ def check_chunk(data: bytes, chunk: Chunk) -> bytes:
         raise FormatError(f"chunk {chunk.label} is not what the index says")
     (stored,) = CRC.unpack(data[-CRC.size :])
     computed = zlib.crc32(memoryview(data)[: -CRC.size])
-    if stored != computed:
+    if stored != computed:  # CHUNK-03
         raise ChecksumError(
             f"crc of chunk {chunk.label} is {computed:#010x}, stored is {stored:#010x}"
         )
@@ -169,17 +169,17 @@ def parse_foot(data: bytes, offset: int) -> Foot | None:
 
     Raises ChecksumError where the magic is right and the crc wrong, FormatError for a bad field.
     """
-    if len(data) != FOOT.size or data[24:] != END_MAGIC:
+    if len(data) != FOOT.size or data[24:] != END_MAGIC:  # FOOT-03
         return None
     flags, crc, index_offset, index_length, _ = FOOT.unpack(data)
-    if crc != zlib.crc32(data[:4] + data[8:]):
+    if crc != zlib.crc32(data[:4] + data[8:]):  # FOOT-02
         raise ChecksumError(f"crc of FOOT at {offset} is {crc:#010x}, which is wrong")
-    if flags:
+    if flags:  # FOOT-01
         raise FormatError(f"FOOT at {offset}: flags {flags:#x}, of which none is defined")
     if index_length and (
         index_offset > MAX_COUNT
         or index_length > MAX_COUNT
-        or index_offset + index_length != offset
+        or index_offset + index_length != offset  # GRAM-01
     ):
         raise FormatError(f"FOOT at {offset}: index of {index_length} bytes at {index_offset}")
     if not index_length and index_offset:
@@ -189,7 +189,7 @@ def parse_foot(data: bytes, offset: int) -> Foot | None:
 
 def check_signature(source: ByteSource) -> None:
     data = source.read(0, min(len(SIGNATURE), source.size))
-    if data != SIGNATURE[: len(data)]:
+    if data != SIGNATURE[: len(data)]:  # CHUNK-01
         raise FormatError(f"not an MCZ file: it begins with {data!r}")
     if len(data) < len(SIGNATURE):
         raise TruncatedError(f"the file ends at {len(data)}, in its signature")

@@ -22,7 +22,7 @@ PACKETS = {SEGMENT: 128, FRAME: 64, NUMBERED: 32}
 
 # Each segment in the "segments" field of an indexed clip: (name, type, meaning).
 INDEXED_SEGMENT_FIELDS = (
-    ("gap", "varint", "bytes between the end of the chunk or packet before and this payload"),
+    ("gap", "varint", "bytes from the end of CLIP, or of the payload before, to this payload"),
     ("size", "varint", "bytes of the payload"),
     ("signal", "varint", "index of the signal"),
     ("n_frames", "varint", "frames"),
@@ -81,9 +81,9 @@ def signal_rows(clip: Any, where: str) -> tuple[SignalRow, ...]:
 
 def _signal_row(fields: Any, clip: Any, where: str) -> SignalRow:
     cut = fields.skip, fields.spare
-    if clip.flags & payloads.OPEN_CLIP and any(cut):
+    if clip.flags & payloads.OPEN_CLIP and any(cut):  # CLIP-19
         raise FormatError(f"{where}: n_frames is open, but a signal has skip and spare {cut}")
-    if sum(cut) + clip.n_frames > MAX_COUNT:
+    if sum(cut) + clip.n_frames > MAX_COUNT:  # CLIP-20
         raise FormatError(f"{where}: skip and spare {cut} of {clip.n_frames} frames")
     n_channels = sum(run.n_channels for run in fields.grids)
     codec = fields.codec, fields.codec_version
@@ -130,14 +130,14 @@ def parse_head(payload: bytes) -> Profile:
     """The profile of the file; raises UnsupportedError where it needs a newer reader."""
     head = parse(payloads.HEAD, payload, "HEAD")
     ours = payloads.FORMAT_MAJOR, payloads.FORMAT_MINOR
-    needed = head.needs_major, head.needs_minor
-    if not payloads.LEAST_NEEDED <= needed <= ours:
+    needed = head.needs_major, head.needs_minor  # HEAD-04
+    if not payloads.LEAST_NEEDED <= needed <= ours:  # HEAD-01, HEAD-02, HEAD-03
         raise UnsupportedError(
             f"HEAD: the file needs format {needed[0]}.{needed[1]}, "
             f"this reader knows {ours[0]}.{ours[1]}"
         )
     if head.profile not in PROFILES:
-        raise UnsupportedError(f"HEAD: profile {head.profile} is unknown")
+        raise UnsupportedError(f"HEAD: profile {head.profile} is unknown")  # CONV-16
     return PROFILES[head.profile]
 
 
@@ -225,10 +225,10 @@ def parse_index(payload: bytes, limit: int) -> Directory:
     fields = parse(payloads.INDEX, inflate(outer.data, outer.size, "INDX"), "INDX")
     directory = Directory(head=fields.head)
     for row in fields.shared:
-        place = row.type, row.id
-        if place in directory.shared:
+        key = row.type, row.id
+        if key in directory.shared:
             raise FormatError(f"INDX: two entries of {row.type!r} have the id {row.id.hex()}")
-        directory.shared[place] = Chunk(row.type, 0, row.offset, row.length)
+        directory.shared[key] = Chunk(row.type, 0, row.offset, row.length)
     for row in fields.attachments:
         parts = [Chunk(b"ATTA", 0, part.offset, part.length) for part in row.parts]
         if not parts:
@@ -255,6 +255,7 @@ def _parse_clip(row: Any) -> ClipRow:
     )
     if not signals:
         raise FormatError(f"INDX: clip {row.name!r} has no signal")
+    # INDX-01
     segments = list(_parse_segments(row.segments, clip.offset + clip.size, len(signals), row.name))
     end = segments[-1].stop if segments else clip.offset + clip.size
     cend = Chunk(b"CEND", 0, end + row.cend_gap, row.cend_length)

@@ -33,20 +33,30 @@ class Profile:
         return {"joints": self.joints, "channels": self.channels}
 
 
-BASE = Profile(0, "base", 16_384, 4_096, 64 * MIB, 64 * MIB, 2**31, 64 * 1024, 64 * MIB)
+BASE = Profile(
+    0,
+    "base",
+    channels=16_384,  # LIMIT-01, LIMIT-03
+    joints=4_096,  # LIMIT-01, LIMIT-04
+    segment_bytes=64 * MIB,  # LIMIT-05
+    model_bytes=64 * MIB,  # LIMIT-06
+    chunk_bytes=2**31,  # LIMIT-07
+    packet_bytes=64 * 1024,  # LIMIT-08
+    text_bytes=64 * MIB,  # LIMIT-09
+)
 ARCHIVE = Profile(1, "archive", 2**20, 2**18, 2**34, 2**31, 2**40, MIB, 2**31)
 PROFILES = {profile.id: profile for profile in (BASE, ARCHIVE)}
 
 
 def check(what: str, value: int, limit: int) -> None:
     """Raise LimitError where ``value`` exceeds ``limit``."""
-    if value > limit:
+    if value > limit:  # LIMIT-02
         raise LimitError(f"{what}: {value} is over the limit of {limit}")
 
 
 def check_decoded(what: str, value: int, limit: int) -> None:
     """Raise LimitError where ``value`` bytes exceed what the caller lets one file decode to."""
-    if value > limit:
+    if value > limit:  # LIMIT-02
         raise LimitError(
             f"{what}: {value} bytes are over the limit of {limit} decoded bytes; "
             "max_decoded (--max-decoded) raises it"
@@ -55,12 +65,12 @@ def check_decoded(what: str, value: int, limit: int) -> None:
 
 def index_limit(file_bytes: int) -> int:
     """The bytes that an index may inflate to: a row is hardly longer than what it lists."""
-    return max(64 * 1024, 2 * file_bytes)
+    return max(64 * 1024, 2 * file_bytes)  # LIMIT-13
 
 
 def output_limit(file_bytes: int) -> int:
     """The bytes that a reader decodes from one file unless its caller allows more."""
-    return max(64 * MIB, 4096 * file_bytes)
+    return max(64 * MIB, 4096 * file_bytes)  # LIMIT-10
 
 
 class Search:

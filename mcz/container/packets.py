@@ -20,15 +20,6 @@ FRESH = 0x80  # the packet needs none before it
 CHECK_SIZE = 2  # bytes of head_check, and of body_check
 MOST_NUMBER = 8  # bytes of a sequence number
 
-PACKET_FIELDS = (
-    ("kind", "u8", "bits 0-3: 0 end, 1 segment, 2 frame, 3 numbered frame; bit 7: fresh; others 0"),
-    ("sequence", "varint", "number of the packet in its chunk, from 0"),
-    ("length", "varint", "bytes of the body"),
-    ("head_check", "u16", "low 16 bits of the CRC-32 of the three fields before"),
-    ("body", "bytes", "kind 1: a segment, as in a closed DATA; 2 and 3: its one stream"),
-    ("body_check", "u16", "low 16 bits of a CRC-32: of the body; kind 3: of body and frame number"),
-)
-
 
 @dataclass(frozen=True, slots=True)
 class Packet:
@@ -53,7 +44,7 @@ def body_check(body: bytes, number: int | None = None) -> bytes:
 
 def check_number(packet: Packet, number: int) -> None:
     """Raise ChecksumError for a packet of kind 3 that is not frame ``number``, or is damaged."""
-    if packet.check not in (None, body_check(packet.body, number)):
+    if packet.check not in (None, body_check(packet.body, number)):  # INDX-03, PACK-15
         raise ChecksumError(
             f"body_check of packet {packet.sequence} is not that of frame {number}, which is due"
         )
@@ -102,12 +93,12 @@ def read_packets(read: Callable[[int], bytes], limit: int) -> Iterator[Packet]:
     to pass ``check_number``.
     """
     sequence = 0
-    while True:
+    while True:  # PACK-01
         packet = read_packet(read, limit)
-        if packet.sequence != sequence:
+        if packet.sequence != sequence:  # PACK-02
             raise FormatError(f"packet {packet.sequence} where {sequence} is due")
         if packet.kind == END:
-            if packet.body:
+            if packet.body:  # PACK-05, PACK-07
                 raise FormatError(f"end packet with {len(packet.body)} bytes")
             return
         yield packet
@@ -123,16 +114,16 @@ def read_packet(read: Callable[[int], bytes], limit: int) -> Packet:
         return head[-1]
 
     values = [take_varint(iter(seen, None), "packet") for _ in range(2)]
-    if read(2) != _check16(bytes(head)):
+    if read(2) != _check16(bytes(head)):  # PACK-03
         raise ChecksumError(f"head_check of packet {values[0]} is wrong")
     kind = head[0] & 0x0F
-    if kind > NUMBERED or head[0] & 0x70:
+    if kind > NUMBERED or head[0] & 0x70:  # PACK-08, PACK-09
         raise FormatError(f"packet {values[0]}: kind {head[0]:#04x}")
     check(f"packet {values[0]}", values[1], limit)
     body = read(values[1])
     stored, fresh = read(CHECK_SIZE), bool(head[0] & FRESH)
     if kind == NUMBERED:
         return Packet(kind, values[0], body, fresh, stored)
-    if stored != body_check(body):
+    if stored != body_check(body):  # PACK-04, PACK-06
         raise ChecksumError(f"body_check of packet {values[0]} is wrong")
     return Packet(kind, values[0], body, fresh)

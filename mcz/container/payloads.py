@@ -1,5 +1,7 @@
 """The payload schemas of the chunks. SPEC.md has one table for each; a test compares them.
 
+Not that of DATA, which is bulk and read by hand: ``segments.py``; ``packets.py`` where it is open.
+
 Open structures end in ``extension``, which readers ignore and rewriting keeps.
 """
 
@@ -26,7 +28,7 @@ FORMAT_MAJOR, FORMAT_MINOR = 0, 9
 LEAST_NEEDED = 0, 2  # 0.1 had another CLIP and INDX
 
 POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)
-AT_MOST_ONE = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)
+AT_MOST_ONE = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)  # CONV-07
 
 
 def optional(item: Construct) -> Construct:
@@ -36,7 +38,7 @@ def optional(item: Construct) -> Construct:
 
 def flags(*names: str) -> ExprValidator:
     """One byte of flags, bit 0 first; the bits without a name are reserved and must be 0."""
-    return ExprValidator(Int8ul, lambda obj, ctx: obj < 1 << len(names))
+    return ExprValidator(Int8ul, lambda obj, ctx: obj < 1 << len(names))  # CONV-14
 
 
 ID = Bytes(16)
@@ -68,7 +70,7 @@ JOINT = Struct(
     / IfThenElse(this.flags & HAS_OFFSET, VECTOR, Pass)
     * "3 binary64, parent's origin to own; zero where absent",
     "axis"
-    / IfThenElse(this.flags & HAS_AXIS, VECTOR, Pass)
+    / IfThenElse(this.flags & HAS_AXIS, VECTOR, Pass)  # CONV-17
     * "3 binary64, Euler angles of the local axes; zero where absent",
     "axis_order"
     / IfThenElse(this.flags & HAS_AXIS, OneOf(Int8ul, range(6)), Pass)
@@ -99,7 +101,7 @@ SKEL = Struct(
 STORED, DEFLATED = 0, 1
 SRCE = Struct(
     "format" / Int8ul * "source format id",
-    "encoding" / OneOf(Int8ul, (STORED, DEFLATED)) * "0 stored, 1 raw deflate",
+    "encoding" / OneOf(Int8ul, (STORED, DEFLATED)) * "0 stored, 1 raw deflate",  # CONV-15
     "size" / UVARINT * "bytes of the template",
     "data" / GreedyBytes * "the template, encoded",
 )
@@ -138,7 +140,7 @@ CLIP_SOURCE = Struct(
 )
 
 GRID_RUN = Struct(
-    "n_channels" / POSITIVE * "channels in a row that share the grid, at least 1",
+    "n_channels" / POSITIVE * "channels in a row that share the grid, at least 1",  # CLIP-06
     "grid" / GRID * "number grid",
 )
 
@@ -157,7 +159,7 @@ SIGNAL = Struct(
     "channels"
     / IfThenElse(this.flags & OWN_CHANNELS, counted(CHANNEL), Pass)
     * "the signal's own channels",
-    "samples_per_frame" / POSITIVE * "rows a frame, at least 1",
+    "samples_per_frame" / POSITIVE * "rows a frame, at least 1",  # CLIP-12
     "skip" / UVARINT * "stored frames before the first that is shown",
     "spare" / UVARINT * "stored frames after the last that is shown",
     "grids" / counted(GRID_RUN) * "number grids, in column order",
@@ -178,7 +180,7 @@ CLIP = Struct(
     "skeleton" / ID * "id of the SKEL chunk",
     "n_frames" / UVARINT * "frames; 0 while open",
     "rate_numerator" / UVARINT * "frame rate, numerator; 0: unknown",
-    "rate_denominator" / POSITIVE * "frame rate, denominator, at least 1",
+    "rate_denominator" / POSITIVE * "frame rate, denominator, at least 1",  # CLIP-14
     "metadata" / counted(METADATA) * "pairs of key and value",
     "source" / optional(CLIP_SOURCE) * "0 or 1: how to restore the source file",
     "signals" / counted(SIGNAL) * "the signals, at least 1, the motion first",

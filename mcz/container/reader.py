@@ -51,10 +51,12 @@ from mcz.container.segments import (
     frame_table,
     parse_table,
 )
+from mcz.container.skeletons import parse_skeleton
 from mcz.container.source import ByteSource
 from mcz.container.strict import decoded
 from mcz.container.writer import payload_id
 from mcz.errors import ChecksumError, FormatError, TruncatedError
+from mcz.motion import Skeleton
 from mcz.schema import MAX_COUNT, parse
 
 TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
@@ -91,7 +93,7 @@ class Container:
         if not foot.index_length:
             return scan(self.source).directory
         self.index = foot
-        head = None if self.source.remote else self._head()
+        head = None if self.source.remote else self._head()  # HEAD-01
         directory = self._index(foot, tail)
         directory.end = self.source.size
         if head not in (None, directory.head):
@@ -113,8 +115,8 @@ class Container:
         if at >= len(SIGNATURE):
             foot = parse_foot(tail[-FOOT.size :], at)
         if foot is None:
-            check_signature(self.source)
-            scan(self.source)  # finds the place and the last FOOT, and raises
+            check_signature(self.source)  # STRICT-01
+            scan(self.source)  # finds where, and the last FOOT, and raises
             raise TruncatedError(f"the file ends at {self.source.size} without a FOOT")
         return foot
 
@@ -136,6 +138,7 @@ class Container:
     def payload(self, chunk: Chunk) -> bytes:
         """The checked payload of ``chunk``."""
         assert chunk.length is not None
+        # CHUNK-04, LIMIT-07
         check(f"chunk {chunk.label}: bytes", chunk.length, self.profile.chunk_bytes)
         return check_chunk(self.source.read(chunk.offset, chunk.size), chunk)
 
@@ -149,10 +152,15 @@ class Container:
             raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
         return parse(schema, payload, chunk.label, self.profile.counts)
 
+    def skeleton(self, id_: bytes) -> Skeleton:
+        """The skeleton in the SKEL with this id, its own source file not read."""
+        fields = self.shared(b"SKEL", id_, payloads.SKEL)
+        return parse_skeleton(fields, self.profile, f"SKEL {id_.hex()}")
+
     def template(self, id_: bytes, format_id: int) -> bytes:
         """The template in the SRCE with this id."""
         fields = self.shared(b"SRCE", id_, payloads.SRCE)
-        if fields.format != format_id:
+        if fields.format != format_id:  # CLIP-03, SKEL-04
             raise FormatError(f"SRCE {id_.hex()} is of format {fields.format}, not {format_id}")
         check(f"SRCE {id_.hex()}: bytes", fields.size, self.profile.text_bytes)
         check_decoded(f"SRCE {id_.hex()}", fields.size, self.max_decoded)
@@ -163,9 +171,9 @@ class Container:
         fields = parse(payloads.CLIP, self.payload(row.clip), row.clip.label)
         signals = signal_rows(fields, row.clip.label)
         rate = fields.rate_numerator, fields.rate_denominator
-        n_frames = fields.n_frames
+        n_frames = fields.n_frames  # CLIP-17
         if fields.flags & payloads.OPEN_CLIP:
-            if n_frames:
+            if n_frames:  # CLIP-16
                 raise FormatError(f"clip {row.name!r} is open, but has {n_frames} frames")
             n_frames = row.n_frames
         found = (fields.name, fields.skeleton, n_frames, *rate, signals)
@@ -191,18 +199,19 @@ class Container:
         for number, chunk in enumerate(row.parts):
             fields = parse(payloads.ATTA, self.payload(chunk), chunk.label)
             expected = (row.name, number, len(row.parts), row.size)
+            # ATTA-01, ATTA-02
             if (fields.name, fields.part, fields.n_parts, fields.size) != expected:
                 raise FormatError(f"chunk {chunk.label}: not part {number} of {row.name!r}")
-            if digest not in (b"", fields.sha256):
+            if digest not in (b"", fields.sha256):  # ATTA-02
                 raise FormatError(f"chunk {chunk.label}: another hash than in the part before")
-            if fields.part_size > left:
+            if fields.part_size > left:  # ATTA-03
                 raise FormatError(
                     f"chunk {chunk.label}: more than the {row.size} bytes of the file"
                 )
             parts.append(decoded(fields.data, fields.encoding, fields.part_size, chunk.label))
-            left, digest = left - fields.part_size, fields.sha256
+            left, digest = left - fields.part_size, fields.sha256  # ATTA-03
         data = b"".join(parts)
-        if left or hashlib.sha256(data).digest() != digest:
+        if left or hashlib.sha256(data).digest() != digest:  # ATTA-04, ATTA-05
             raise ChecksumError(
                 f"attachment {row.name!r}: {len(data)} bytes, hash or size is wrong"
             )
@@ -277,10 +286,11 @@ class Container:
         data = self.source.read(row.offset - before, before + row.size + CHECK_SIZE)
         body = data[before:-CHECK_SIZE]
         number = row.header.first if row.packet == NUMBERED else None
-        if data[-CHECK_SIZE:] != body_check(body, number):
+        if data[-CHECK_SIZE:] != body_check(body, number):  # INDX-03, PACK-04, PACK-15
             said = "wrong" if number is None else f"not that of frame {number}"
             raise ChecksumError(f"body_check of the packet at {row.offset} is {said}")
         fresh = bool(row.header.flags & FRESH)
+        # INDX-02
         if row.packet in SHORT and not is_head(data[:before], row.packet, fresh, row.size):
             raise FormatError(f"the packet at {row.offset} is not what the index says")
         return body
@@ -296,7 +306,7 @@ def _check_table(table: StreamTable, row: SegmentRow) -> None:
     header: SegmentHeader = table.header
     if header != row.header:
         raise FormatError(f"segment at {row.offset} is {header}, but the index says {row.header}")
-    if table.payload_size != row.size:
+    if table.payload_size != row.size:  # DATA-01
         raise FormatError(
             f"segment at {row.offset}: its streams end at {table.payload_size} of {row.size} bytes"
         )

@@ -90,7 +90,7 @@ class Walker:
                 raise
             self._note(error)
         at: int | None = len(SIGNATURE)
-        while at is not None and at != self._whole_until():
+        while at is not None and at != self._whole_until():  # GRAM-09
             begin = at
             try:
                 for end in self.steps(begin):
@@ -99,13 +99,13 @@ class Walker:
                 if not self.salvage:
                     error.offset = begin
                     raise
-                self._note(error)
-                at = self._skip(begin, at)
+                self._note(error)  # SALV-03
+                at = self._skip(begin, at)  # SALV-01, SALV-02, SALV-04
         self._finish()
 
     def _whole_until(self) -> int | None:
         """The end of the file once a FOOT has closed it, else None."""
-        closed = self.found.directory.end == self.source.size and self.clip is None
+        closed = self.found.directory.end == self.source.size and self.clip is None  # STRICT-01
         return self.source.size if closed else None
 
     def steps(self, at: int) -> Iterator[int]:
@@ -117,11 +117,11 @@ class Walker:
             yield self._foot(at)
             return
         chunk = self.chunk = read_chunk(self.source, at)
-        if self.index is not None:
+        if self.index is not None:  # GRAM-01
             raise FormatError(f"INDX is followed by {chunk.label}, not by a FOOT")
         if not (self.found.directory.head or self.salvage) and chunk.type != b"HEAD":
             raise FormatError(f"the first chunk is {chunk.label}, not HEAD")
-        if chunk.length is None and not chunk.flags:
+        if chunk.length is None and not chunk.flags:  # CHUNK-10, PACK-10
             end = chunk.payload_offset
             for end in self._packets(chunk):
                 yield end
@@ -148,16 +148,16 @@ class Walker:
         }
         handler = handlers.get(chunk.type)
         if handler is not None:
-            if chunk.flags:
+            if chunk.flags:  # CHUNK-15
                 raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x} on a critical type")
             handler(chunk)
         elif chunk.flags != FLAGS_OF.get(chunk.type, chunk.flags):
             due = FLAGS_OF[chunk.type]
             raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, it has {due}")
-        elif chunk.flags & ANCILLARY:
+        elif chunk.flags & ANCILLARY:  # CHUNK-12
             self._ancillary(chunk)
         else:
-            raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")
+            raise UnsupportedError(f"chunk {chunk.label} is critical and unknown")  # CHUNK-11
 
     def _is_repeated(self, chunk: Chunk) -> bool:
         """Whether it lies in a REPT whose own header is damaged: the clip that is open goes on."""
@@ -174,7 +174,7 @@ class Walker:
         return read_payload(self.source, chunk, self.profile.chunk_bytes)
 
     def _head(self, chunk: Chunk) -> None:
-        if self.found.directory.head:
+        if self.found.directory.head:  # GRAM-01
             raise FormatError(f"a second HEAD at {chunk.offset}")
         payload = self._payload(chunk)
         self.profile = parse_head(payload)
@@ -186,11 +186,12 @@ class Walker:
         id_ = payload_id(payload)
         if self.strict:
             self._check_shared(chunk, id_, payload)
-        self.found.directory.shared.setdefault((chunk.type, id_), chunk)
+        self.found.directory.shared.setdefault((chunk.type, id_), chunk)  # GRAM-05
 
     def _check_shared(self, chunk: Chunk, id_: bytes, payload: bytes) -> None:
         if chunk.type == b"SKEL":
             directory = self.found.directory
+            # ALIA-01
             if strict.check_skeleton(payload, chunk.label, directory, self.templates, self.profile):
                 self.sourced.add((payloads.OF_SKELETON, id_))
         elif chunk.type == b"SRCE":
@@ -198,6 +199,7 @@ class Walker:
         else:
             parse(payloads.MODL, payload, chunk.label)
             self.model_bytes += len(payload)
+            # LIMIT-06
             check(f"chunk {chunk.label}: all models", self.model_bytes, self.profile.model_bytes)
 
     def _attachment(self, chunk: Chunk) -> None:
@@ -206,15 +208,16 @@ class Walker:
         rows = self.found.directory.attachments
         if self.strict:
             strict.check_path(fields.name, chunk.label)
+        # ATTA-01, GRAM-07
         row = rows.get(fields.name) or AttachmentRow(fields.name, fields.size, [])
         follows = row.parts and row.parts[-1].offset + row.parts[-1].size == chunk.offset
         if (
-            fields.part != len(row.parts)
-            or fields.size != row.size
-            or (fields.part and not follows)
+            fields.part != len(row.parts)  # ATTA-01
+            or fields.size != row.size  # ATTA-02
+            or (fields.part and not follows)  # ATTA-01
         ):
             raise FormatError(f"chunk {chunk.label}: part {fields.part} is out of order")
-        if fields.part >= fields.n_parts:
+        if fields.part >= fields.n_parts:  # ATTA-01
             raise FormatError(f"chunk {chunk.label}: part {fields.part} of {fields.n_parts}")
         row.parts.append(chunk)
         rows[fields.name] = row
@@ -223,7 +226,7 @@ class Walker:
     def _alias(self, chunk: Chunk) -> None:
         self._outside(chunk)
         fields = parse(payloads.ALIA, self._payload(chunk), chunk.label)
-        if fields.name in self.found.directory.aliases:
+        if fields.name in self.found.directory.aliases:  # GRAM-08
             raise FormatError(f"chunk {chunk.label}: a second alias {fields.name!r}")
         if self.strict:
             strict.check_path(fields.name, chunk.label)
@@ -232,7 +235,7 @@ class Walker:
 
     def _check_target(self, chunk: Chunk, fields: Any) -> None:
         """Whether what an alias stands for is there before it, and can be restored."""
-        if (fields.of, bytes(fields.target)) not in self.sourced:
+        if (fields.of, bytes(fields.target)) not in self.sourced:  # GRAM-04
             raise FormatError(
                 f"chunk {chunk.label}: nothing before it with a source is {fields.target!r}"
             )
@@ -241,13 +244,13 @@ class Walker:
         self._outside(chunk)
         self.clip, self.first = None, []
         fields = parse(payloads.CLIP, self._payload(chunk), chunk.label)
-        if not fields.name or fields.name in self.found.directory.clips:
+        if not fields.name or fields.name in self.found.directory.clips:  # CLIP-01, GRAM-06
             raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
-        if not fields.signals:
+        if not fields.signals:  # CLIP-05
             raise FormatError(f"chunk {chunk.label}: a clip without a signal")
         if self.strict and strict.check_clip(
             fields, chunk.label, self.found.directory, self.templates
-        ):
+        ):  # ALIA-02
             self.sourced.add((payloads.OF_CLIP, fields.name.encode()))
         signals = signal_rows(fields, chunk.label)
         rate = fields.rate_numerator, fields.rate_denominator
@@ -265,7 +268,7 @@ class Walker:
 
     def _packets(self, chunk: Chunk) -> Iterator[int]:
         """Take in the packets of an open DATA; yields where each one ends."""
-        if self.clip is None:
+        if self.clip is None:  # PACK-10
             raise FormatError(f"chunk {chunk.label} is outside a clip")
         read = Forward(self.source, chunk.payload_offset)
         told = False  # a segment of signal 0 has said which frame it is
@@ -280,12 +283,12 @@ class Walker:
     def _header_of(self, packet: Packet, start: int, told: bool) -> SegmentHeader:
         """What a packet says of its segment; ``told``: one before it said which frame is due."""
         if packet.kind in SHORT:
-            if not told:
+            if not told:  # PACK-14
                 raise FormatError(f"packet at {start}: none before it in its DATA tells its frame")
             check_number(packet, self.first[0])
-            return SegmentHeader(0, self.first[0], 1, flags=FRESH if packet.fresh else 0)
+            return SegmentHeader(0, self.first[0], 1, flags=FRESH if packet.fresh else 0)  # PACK-12
         header, _ = parse_header(packet.body)
-        if packet.fresh != bool(header.flags & FRESH):
+        if packet.fresh != bool(header.flags & FRESH):  # PACK-11
             raise FormatError(f"packet at {start}: it and its segment differ in starting fresh")
         return header
 
@@ -294,13 +297,13 @@ class Walker:
         if self.clip is None:
             raise FormatError(f"DATA at {offset - HEADER.size} is outside a clip")
         if header.signal >= len(self.first):
-            raise FormatError(f"DATA at {offset - HEADER.size}: signal {header.signal}")
+            raise FormatError(f"DATA at {offset - HEADER.size}: signal {header.signal}")  # DATA-06
         due = self.first[header.signal]
-        if header.first != due and not (self.salvage and header.first > due):
+        if header.first != due and not (self.salvage and header.first > due):  # DATA-08
             raise FormatError(
                 f"DATA at {offset - HEADER.size}: first frame {header.first}, {due} is due"
             )
-        self.first[header.signal] = header.stop
+        self.first[header.signal] = header.stop  # DATA-08
         self.clip.segments.append(row)
 
     def _end_clip(self, chunk: Chunk) -> None:
@@ -339,17 +342,17 @@ class Walker:
     def _index(self, chunk: Chunk) -> None:
         self._outside(chunk)
         payload = self._payload(chunk)
-        if self.strict:
+        if self.strict:  # STRICT-04
             limit = index_limit(self.source.size)
-            strict.check_index(payload, chunk, self.found.directory, limit)
+            strict.check_index(payload, chunk, self.found.directory, limit)  # INDX-02, STRICT-04
         self.index = chunk
 
     def _ancillary(self, chunk: Chunk) -> None:
         if self.whole:
             payload = self._payload(chunk)
             if self.strict and chunk.type == b"QUAL":
-                parse(payloads.QUAL, payload, chunk.label)
-            if self.salvage and chunk.type == REPEAT and self.clip is None:
+                parse(payloads.QUAL, payload, chunk.label)  # QUAL-02
+            if self.salvage and chunk.type == REPEAT and self.clip is None:  # REPT-03
                 for inner in chunks_in(payload, chunk.payload_offset):
                     if inner.type != b"HEAD" or not self.found.directory.head:
                         self._take(inner)
@@ -361,7 +364,7 @@ class Walker:
         self._outside(Chunk(b"FOOT", 0, at, 0))
         foot = parse_foot(self.source.read(at, FOOT.size), at)
         index = (self.index.offset, self.index.size) if self.index else (0, 0)
-        if foot is None or (foot.index_offset, foot.index_length) != index:
+        if foot is None or (foot.index_offset, foot.index_length) != index:  # FOOT-04
             raise FormatError(f"FOOT at {at} points to {foot}, the index is at {index}")
         if not (self.found.directory.head or self.salvage):
             raise FormatError(f"FOOT at {at} comes before HEAD")
@@ -372,9 +375,9 @@ class Walker:
 
     def _outside(self, chunk: Chunk) -> None:
         if self.clip is not None:
-            if not self.salvage:
+            if not self.salvage:  # GRAM-01
                 raise FormatError(f"chunk {chunk.label} is inside the clip {self.clip.name!r}")
-            self._close_clip()
+            self._close_clip()  # GRAM-01
 
     def _note(self, error: FormatError) -> None:
         self.found.damage.append(str(error))

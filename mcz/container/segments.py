@@ -16,19 +16,6 @@ from mcz.schema import MAX_COUNT, read_varint, varint
 FRESH, FRAME_NOTES, GROUP_NOTES, MASKS = 1, 2, 4, 8
 KNOWN_FLAGS = 15
 
-# The fields before the table, as SPEC.md's table has them: (name, type, meaning).
-SEGMENT_HEADER_FIELDS = (
-    ("signal", "varint", "index of the signal in CLIP"),
-    ("first_frame", "varint", "first frame of the segment"),
-    ("n_frames", "varint", "frames of the segment, at least 1"),
-    ("lead", "varint", "frames before first_frame that the segment also bears upon"),
-    ("tail", "varint", "frames after its last that the segment also bears upon"),
-    ("flags", "u8", "bit 0: starts fresh; 1: frame notes; 2: group notes; 3: masks"),
-    ("present", "bitmap", "one bit a stream, bit 0 of byte 0 first: 1 where it is not empty"),
-    ("lengths", "varint each", "bytes of each stream that is not empty, at least 1"),
-    ("table_crc", "u32", "CRC-32 of the payload up to here"),
-)
-
 
 @dataclass(frozen=True, slots=True)
 class StreamCounts:
@@ -83,12 +70,12 @@ class StreamTable:
     def group_notes(self, group: int) -> int | None:
         if not self.header.flags & GROUP_NOTES:
             return None
-        return bool(self.header.flags & FRAME_NOTES) + group
+        return bool(self.header.flags & FRAME_NOTES) + group  # DATA-03
 
     def mask(self, group: int) -> int | None:
         if not self.header.flags & MASKS:
             return None
-        return self._codec_start() - self.counts.n_groups + group
+        return self._codec_start() - self.counts.n_groups + group  # DATA-03
 
     def codec(self, resolution: int, group: int) -> int:
         """Index of the codec's stream; resolution 0 is the coarsest here, as stored."""
@@ -133,9 +120,9 @@ def parse_header(data: bytes) -> tuple[SegmentHeader, int]:
         raise FormatError(
             f"segment flags {flags:#x}, of which {flags & ~KNOWN_FLAGS:#x} is reserved"
         )
-    if fields[2] == 0:
+    if fields[2] == 0:  # DATA-07
         raise FormatError("a segment of no frames")
-    if fields[1] + fields[2] + fields[4] > MAX_COUNT or fields[3] > fields[1]:
+    if fields[1] + fields[2] + fields[4] > MAX_COUNT or fields[3] > fields[1]:  # CONV-18, DATA-10
         raise FormatError(f"a segment of frames {fields[1]} + {fields[2]}, support {fields[3:]}")
     signal, first, n_frames, lead, tail = fields
     return SegmentHeader(signal, first, n_frames, lead, tail, flags), at + 1
@@ -152,7 +139,7 @@ def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
     if at + bitmap_size > len(data):
         raise TruncatedError(f"a stream table ends at {len(data)}, in its bitmap")
     bitmap = int.from_bytes(data[at : at + bitmap_size], "little")
-    if bitmap >> n_streams:
+    if bitmap >> n_streams:  # DATA-05
         raise FormatError(f"stream bitmap has bits beyond its {n_streams} streams")
     at += bitmap_size
     lengths = []
@@ -160,13 +147,13 @@ def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
         length = 0
         if bitmap >> index & 1:
             length, at = read_varint(data, at)
-            if length == 0:
+            if length == 0:  # DATA-04
                 raise FormatError(f"stream {index} is marked as present and has no bytes")
         lengths.append(length)
     if at + 4 > len(data):
         raise TruncatedError(f"a stream table ends at {len(data)}")
     (stored,) = struct.unpack_from("<I", data, at)
-    if stored != zlib.crc32(data[:at]):
+    if stored != zlib.crc32(data[:at]):  # CHUNK-06, DATA-02
         raise ChecksumError(f"table_crc of a segment is {stored:#010x}, which is wrong")
     offsets, offset = [], at + 4
     for length in lengths:
@@ -177,7 +164,7 @@ def parse_table(data: bytes, counts: StreamCounts) -> StreamTable:
 
 def frame_table(header: SegmentHeader, counts: StreamCounts, size: int) -> StreamTable:
     """The table that a packet of kind 2 or 3 has not: its body of ``size`` bytes is one stream."""
-    if (counts.n_groups, counts.n_resolutions) != (1, 1):
+    if (counts.n_groups, counts.n_resolutions) != (1, 1):  # PACK-13
         raise FormatError(
             f"frame {header.first} is a packet without a table, of a signal with {counts.n_groups} "
             f"groups and {counts.n_resolutions} resolutions"

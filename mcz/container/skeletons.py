@@ -69,7 +69,7 @@ def parse_channels(rows: Any, where: str) -> tuple[Channel, ...]:
     channels = []
     for row in rows:
         known = 0 < row.kind <= len(CHANNEL_KINDS)
-        kind = CHANNEL_KINDS[row.kind - 1] if known else ""
+        kind = CHANNEL_KINDS[row.kind - 1] if known else ""  # SKEL-07
         unknown = f"kind-{row.kind}" if row.kind and not known else ""
         channels.append(Channel(kind, row.name or unknown, row.unit))
     return tuple(channels)

@@ -24,7 +24,7 @@ OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset({2, 3, 4})  # the registry's 
 def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
     """The ``size`` bytes that SRCE and ATTA hold as ``data``."""
     if encoding == payloads.STORED:
-        if len(data) != size:
+        if len(data) != size:  # ATTA-03, SRCE-01
             raise FormatError(f"{where}: {len(data)} bytes stored, {size} stated")
         return bytes(data)
     return inflate(data, size, where)
@@ -33,8 +33,9 @@ def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
 def is_plain_path(name: str) -> bool:
     """Whether ``name`` is a relative path that stays below its folder, on every system."""
     parts = name.split("/")
+    # PATH-01, PATH-02, PATH-03, PATH-04
     odd = any(part in ("", ".", "..") for part in parts) or "\\" in name or "\0" in name
-    return not (odd or PurePosixPath(name).is_absolute() or ":" in parts[0])
+    return not (odd or PurePosixPath(name).is_absolute() or ":" in parts[0])  # PATH-05
 
 
 def check_path(name: str, where: str) -> None:
@@ -49,7 +50,7 @@ def check_skeleton(
     fields = parse(payloads.SKEL, payload, where, profile.counts)
     parse_skeleton(fields, profile, where)
     for base in fields.base:
-        _refer(directory, b"SKEL", base, where)
+        _refer(directory, b"SKEL", base, where)  # SKEL-02
     for source in fields.source:
         _check_source(source, where, directory, templates, OF_CLIPS)
     return bool(fields.source)
@@ -68,22 +69,22 @@ def _check_source(
 ) -> None:
     """``others``: the formats that are known to be of the other sort."""
     id_ = bytes(source.template)
-    _refer(directory, b"SRCE", id_, where)
-    if templates.get(id_, source.format) != source.format:
+    _refer(directory, b"SRCE", id_, where)  # GRAM-03
+    if templates.get(id_, source.format) != source.format:  # CLIP-03, SKEL-04
         raise FormatError(f"{where}: source format {source.format}, its SRCE has {templates[id_]}")
-    if source.format in others:
+    if source.format in others:  # CLIP-04, SKEL-03
         raise FormatError(f"{where}: source format {source.format} is of the other sort of source")
 
 
 def check_clip(fields: Any, where: str, directory: Directory, templates: Templates) -> bool:
     """Check what CLIP refers to and names; return whether it has a source file."""
-    _refer(directory, b"SKEL", fields.skeleton, where)
+    _refer(directory, b"SKEL", fields.skeleton, where)  # GRAM-02
     for source in fields.source:
         _check_source(source, where, directory, templates, OF_SKELETONS)
         if source.path:
             check_path(source.path, where)
     keys = [pair.key for pair in fields.metadata]
-    if len(keys) != len(set(keys)):
+    if len(keys) != len(set(keys)):  # CLIP-02, CLIP-21
         raise FormatError(f"{where}: a key of the metadata occurs twice: {sorted(keys)}")
     return bool(fields.source)
 
@@ -100,12 +101,12 @@ def check_index(payload: bytes, chunk: Chunk, directory: Directory, limit: int) 
         raise FormatError(f"chunk {chunk.label}: its copy of HEAD differs from HEAD")
     for what in ("shared", "attachments", "aliases", "clips"):
         ours, theirs = getattr(directory, what), getattr(listed, what)
-        if list(ours) != list(theirs):
+        if list(ours) != list(theirs):  # INDX-04, INDX-05
             raise FormatError(
                 f"chunk {chunk.label}: it lists other {what} than there are, or in another order"
             )
         for key, row in ours.items():
-            if row != theirs[key]:
+            if row != theirs[key]:  # INDX-05
                 raise FormatError(
                     f"chunk {chunk.label}: {_name(key)} is {_short(row)}, "
                     f"but INDX says {_short(theirs[key])}"

@@ -93,7 +93,7 @@ class Writer:
         self.offset += len(data)
 
     def chunk(self, kind: bytes, payload: bytes, flags: int = 0) -> Chunk:
-        """Write one closed chunk and return its place."""
+        """Write one closed chunk and return where it lies."""
         check(f"chunk {kind.decode()}: bytes", len(payload), self.profile.chunk_bytes)
         chunk = Chunk(kind, flags, self.offset, len(payload))
         self._write(build_chunk(kind, payload, flags))

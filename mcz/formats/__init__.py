@@ -8,13 +8,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from mcz.errors import FormatError, SourceError, UnsupportedError
-from mcz.formats import amc, asf, bvh, c3d
-from mcz.formats.arriving import Arriving
 from mcz.formats.find import find_asf
+from mcz.formats.line_by_line import Arriving
 from mcz.formats.notes import join_notes
 from mcz.motion import FrameNotes
 
@@ -44,31 +44,40 @@ class Format:
     arrive: Callable[..., Arriving] | None = None
 
 
+def _of(module: str, name: str) -> Callable[..., Any]:
+    """The function of a format's module, which is imported when it is called."""
+
+    def call(*arguments: Any) -> Any:
+        return getattr(import_module(f"{__name__}.{module}"), name)(*arguments)
+
+    return call
+
+
 FORMATS: dict[str, Format] = {
     f.name: f
     for f in (
-        Format("asf", 1, (".asf",), asf.read, asf.write, is_skeleton=True),
+        Format("asf", 1, (".asf",), _of("asf", "read"), _of("asf", "write"), is_skeleton=True),
         Format(
             "amc",
             2,
             (".amc",),
-            amc.read,
-            amc.write,
+            _of("amc", "read"),
+            _of("amc", "write"),
             join_notes,
             wants_skeleton=True,
-            arrive=amc.arrive,
+            arrive=_of("amc", "arrive"),
         ),
         Format(
             "bvh",
             3,
             (".bvh",),
-            bvh.read,
-            bvh.write,
+            _of("bvh", "read"),
+            _of("bvh", "write"),
             join_notes,
             states_rate=True,
-            arrive=bvh.arrive,
+            arrive=_of("bvh", "arrive"),
         ),
-        Format("c3d", 4, (".c3d",), c3d.read, c3d.write, states_rate=True),
+        Format("c3d", 4, (".c3d",), _of("c3d", "read"), _of("c3d", "write"), states_rate=True),
     )
 }
 
@@ -92,7 +101,7 @@ def sniffed(data: bytes) -> str | None:
         return "c3d"
     if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", data):
         return "asf"
-    return "amc" if amc.is_amc(data) else None
+    return "amc" if _of("amc", "is_amc")(data) else None
 
 
 def format_by_id(format_id: int, *, of_skeleton: bool = False) -> Format:
@@ -102,8 +111,8 @@ def format_by_id(format_id: int, *, of_skeleton: bool = False) -> Format:
     """
     for source_format in FORMATS.values():
         if source_format.id == format_id:
-            if source_format.is_skeleton != of_skeleton:
+            if source_format.is_skeleton != of_skeleton:  # CLIP-04, SKEL-03
                 sort = "skeletons" if of_skeleton else "clips"
                 raise FormatError(f"source format {source_format.name} is not one of {sort}")
             return source_format
-    raise UnsupportedError(f"source format {format_id} is unknown")
+    raise UnsupportedError(f"source format {format_id} is unknown")  # CONV-16

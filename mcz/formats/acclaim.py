@@ -112,7 +112,8 @@ def _number(words: list[str]) -> float:
         number = float(words[0])
     except (ValueError, IndexError):
         number = float("nan")
-    if not isfinite(number) or "_" in words[0]:
+    # float also takes 1_0, digits of other scripts, and blanks of Unicode around them.
+    if not isfinite(number) or "_" in words[0] or not words[0].isascii():
         raise SourceError(f"{' '.join(words)[:40]!r}, where a number was expected")
     return number
 

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError, SourceError
-from mcz.formats.arriving import Arriving, Frame, Lines
 from mcz.formats.bones import fit, flat, match_names
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
+from mcz.formats.line_by_line import Arriving, Frame, Lines
 from mcz.formats.notes import RowNotes
 from mcz.formats.restore import restore
 from mcz.formats.rows import Rows, Token, line_of, read_rows, tail_end
 from mcz.formats.signals import read_signal
-from mcz.formats.sources import source_of, text_encoding
+from mcz.formats.text_source import source_of, text_encoding
 from mcz.motion import Motion, Skeleton, Source
 
 _BLANK = rb"[\x00-\x09\x0b-\x20]"

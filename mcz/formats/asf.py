@@ -11,7 +11,7 @@ from math import sqrt
 
 from mcz.errors import FormatError, MotionError, SourceError
 from mcz.formats.acclaim import INCH_UNIT_CM, INCH_UNITS, WORDS, dof_channel, read_text
-from mcz.formats.sources import text_encoding
+from mcz.formats.text_source import text_encoding
 from mcz.motion import ORIGIN, Channel, Joint, Skeleton, Source, Vector
 
 

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError, SourceError
-from mcz.formats.arriving import Arriving, Frame, Lines
 from mcz.formats.hierarchy import read_hierarchy, write_hierarchy
 from mcz.formats.layout import Layout, Pattern, runs_of
+from mcz.formats.line_by_line import Arriving, Frame, Lines
 from mcz.formats.rates import frame_rate, frame_time
 from mcz.formats.restore import restore
 from mcz.formats.rows import Token, line_of, read_rows, tail_end
 from mcz.formats.signals import read_signal
-from mcz.formats.sources import source_of, text_encoding
+from mcz.formats.text_source import source_of, text_encoding
 from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton, Source
 
 _FRAMES = re.compile(rb"\s*Frames\s*:\s*([^\s]+)", re.IGNORECASE)

@@ -37,22 +37,23 @@ class Kind(IntEnum):
         return 4 if self in (Kind.COUNT_FLOAT, Kind.FIRST_LONG, Kind.LAST_LONG) else 2
 
 
-_WORD = ExprValidator(UVARINT, lambda obj, ctx: obj <= COUNTED)
+_WORD = ExprValidator(UVARINT, lambda obj, ctx: obj <= COUNTED)  # C3D-05
 
 C3D_FIELD = Struct(
     "at" / UVARINT * "offset in head, not before the end of the field before",
-    "kind" / OneOf(Int8ul, tuple(Kind)) * "what the field says",
+    "kind" / OneOf(Int8ul, tuple(Kind)) * "what the field says",  # C3D-09
 )
 C3D_TEMPLATE = Struct(
-    "processor" / OneOf(Int8ul, (INTEL, DEC, SGI)) * "84 Intel, 85 DEC, 86 SGI",
-    "word" / OneOf(Int8ul, (2, 4)) * "bytes of a word of the data: 2 integers, 4 floats",
+    "processor" / OneOf(Int8ul, (INTEL, DEC, SGI)) * "84 Intel, 85 DEC, 86 SGI",  # C3D-01
+    "word" / OneOf(Int8ul, (2, 4)) * "bytes of a word of the data: 2 integers, 4 floats",  # C3D-02
     "points" / _WORD * "points",
     "channels" / _WORD * "analog channels",
     "subframes" / ExprValidator(_WORD, lambda obj, ctx: obj >= 1) * "analog samples a frame",
     "unsigned"
-    / ExprValidator(Int8ul, lambda obj, ctx: obj <= 1)
+    / ExprValidator(Int8ul, lambda obj, ctx: obj <= 1)  # C3D-03
     * "1: analog words are 0 to 65535; 0: they have a sign, or word is 4",
     "rotations" / _WORD * "rotations; 0 where word is 2",
+    # C3D-06
     "ratio" / ExprValidator(_WORD, lambda obj, ctx: obj >= 1) * "samples a frame of a rotation",
     "head" / SIZED * "the file up to the data section, fields filled with zeros",
     "fields" / counted(C3D_FIELD) * "the fields of head, in order",
@@ -131,23 +132,24 @@ def parse_layout(template: bytes, detail: bytes) -> Layout:
     """The layout of a clip; raises FormatError on bad bytes."""
     shared = parse(C3D_TEMPLATE, template, "source template")
     own = parse(C3D_DETAIL, detail, "source detail")
-    if own.zeros > MAX_ZEROS:
+    if own.zeros > MAX_ZEROS:  # C3D-13
         raise LimitError(f"source detail: {own.zeros} zeros, limit {MAX_ZEROS}")
-    if shared.word == 4 and shared.unsigned:
+    if shared.word == 4 and shared.unsigned:  # C3D-04
         raise FormatError("source template: unsigned floats")
+    # C3D-07, C3D-08
     if (shared.rotations and shared.word != 4) or (shared.gap and not shared.rotations):
         raise FormatError("source template: rotations of integers, or a gap without rotations")
     head, fields = bytearray(shared.head), []
     end = taken = 0
     for entry in shared.fields:
         kind = Kind(entry.kind)
-        if not end <= entry.at <= len(head) - kind.size:
+        if not end <= entry.at <= len(head) - kind.size:  # C3D-10, C3D-11
             raise FormatError(f"source template: a field at {entry.at}, {end} or more expected")
         end = entry.at + kind.size
         head[entry.at : end] = own["values"][taken : taken + kind.size]
         taken += kind.size
         fields.append((entry.at, kind))
-    if taken != len(own["values"]) or len(head) != len(shared.head):
+    if taken != len(own["values"]) or len(head) != len(shared.head):  # C3D-12
         raise FormatError(f"source detail: {len(own['values'])} bytes of fields, not {taken}")
     return Layout(
         Order(shared.processor),

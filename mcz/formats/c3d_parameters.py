@@ -35,7 +35,7 @@ class Order:
     @property
     def prefix(self) -> str:
         """For numpy and struct."""
-        return ">" if self.processor == SGI else "<"
+        return ">" if self.processor == SGI else "<"  # C3D-15
 
     @property
     def grid(self) -> Grid:

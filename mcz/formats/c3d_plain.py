@@ -72,7 +72,7 @@ def _scale(points: Signal, others: Iterable[Signal]) -> float | None:
     if len(grids) != 1 or points.grid_changes or points.grids[0].kind != GridKind.SCALED:
         return None
     scale = points.grids[0].scale
-    ordinals, exact = points.place()
+    ordinals, exact = points.to_ordinals()
     low, high = ordinals.min(initial=0), ordinals.max(initial=0)
     if not exact.all() or low < -0x8000 or high > 0x7FFF or scale != np.float32(scale):
         return None

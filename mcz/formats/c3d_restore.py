@@ -36,7 +36,7 @@ def restore(motion: Motion, source: Source) -> bytes:
     if layout.n_rotations:
         signal = _signal(motion, "rotations", layout.n_rotations * ROTATION_WORDS, layout.ratio)
         rotations = _words(signal, layout).tobytes()
-    if motion.n_frames == layout.n_frames:
+    if motion.n_frames == layout.n_frames:  # C3D-15
         behind = layout.gap + rotations + layout.tail
     else:
         if (layout.head[:1] or b"\0")[0] * BLOCK > len(layout.head):
@@ -71,7 +71,7 @@ def _padding(size: int) -> bytes:
 
 def field_bytes(order: Order, kind: Kind, first: int, n_frames: int, rotations_at: int) -> bytes:
     """The bytes of a field where ``n_frames`` frames from number ``first`` on are there."""
-    last = first + n_frames - 1
+    last = first + n_frames - 1  # C3D-15
     match kind:
         case Kind.COUNT_FLOAT:
             return order.build_real(n_frames)
@@ -120,7 +120,7 @@ def _signal(motion: Motion, name: str, n_channels: int, per_frame: int) -> Signa
 
 
 def _checked(signal: Signal, n_channels: int, per_frame: int) -> Signal:
-    if (signal.n_channels, signal.samples_per_frame) != (n_channels, per_frame):
+    if (signal.n_channels, signal.samples_per_frame) != (n_channels, per_frame):  # C3D-14
         raise FormatError(
             f"source template: {n_channels} channels of {per_frame} samples a frame, but signal "
             f"{signal.name!r} has {signal.n_channels} of {signal.samples_per_frame}"
@@ -172,12 +172,12 @@ def _words(signal: Signal, layout: Layout, unsigned: bool = False) -> NDArray[An
     grids = (*signal.grids, *(grid for _, _, grid in signal.grid_changes))
     kinds = {grid.kind for grid in grids}
     wanted = INTEGERS if layout.word == 2 else (layout.order.grid.kind,)
-    if not kinds <= set(wanted):
+    if not kinds <= set(wanted):  # C3D-14
         names = " or ".join(kind.name for kind in wanted)
         raise FormatError(f"source template: signal {signal.name!r} is not on a grid {names}")
     integral = signal.values.dtype == np.int64
-    ordinals = signal.values if integral else signal.place()[0]
+    ordinals = signal.values if integral else signal.to_ordinals()[0]  # C3D-15
     if layout.word == 4:
         return layout.order.grid.bits(ordinals).astype(f"{layout.order.prefix}u4")
-    low, high = (0, 0xFFFF) if unsigned else (-0x8000, 0x7FFF)
+    low, high = (0, 0xFFFF) if unsigned else (-0x8000, 0x7FFF)  # C3D-15
     return (np.clip(ordinals, low, high) & 0xFFFF).astype(f"{layout.order.prefix}u2")

@@ -43,7 +43,7 @@ class Cells:
 
     def texts(self) -> Bytes:
         texts = np.concatenate([*self._pieces, np.zeros(1, np.uint8)])
-        texts.flags.writeable = False  # one array type, so that numba compiles once
+        texts.flags.writeable = False  # nobody writes to it
         return texts
 
     def set(self, rows: Ints, columns: Ints, texts: Sequence[bytes]) -> None:
@@ -65,14 +65,14 @@ class Cells:
         for first in range(0, len(ordinals), step):
             block = slice(first, first + step)
             part = ordinals[block]
-            places: Ints | slice = slice(None)
+            inverse: Ints | slice = slice(None)
             unique: Ints = part.ravel()
             if grid.kind in SLOW:  # what is the same is printed once
-                unique, places = np.unique(part, return_inverse=True)
+                unique, inverse = np.unique(part, return_inverse=True)
             texts = grid.texts(unique)
             shape = starts[block, columns].shape
-            starts[block, columns] = (texts.offsets[:-1] + self._total)[places].reshape(shape)
-            sizes[block, columns] = np.diff(texts.offsets)[places].reshape(shape)
+            starts[block, columns] = (texts.offsets[:-1] + self._total)[inverse].reshape(shape)
+            sizes[block, columns] = np.diff(texts.offsets)[inverse].reshape(shape)
             self._append(texts.buffer)
 
     def _print(
@@ -80,7 +80,7 @@ class Cells:
     ) -> None:
         """Print values by the nearest number of their grid, by repr where they lie beyond it."""
         if not grid.is_text:
-            grid = SHORTEST
+            grid = SHORTEST  # GRID-07
         values = values.astype(np.float64, copy=False)
         ordinals, exact = grid.ordinals(values)
         self._add(grid, ordinals, rows, columns)
@@ -100,15 +100,15 @@ class Cells:
             return
         rows, columns = exceptions.rows, exceptions.channels
         shape = np.array(signal.values.shape)[:, None]
-        places = np.stack([rows, columns])
+        cells = np.stack([rows, columns])
         stops = np.cumsum([len(text) + 1 for text in exceptions.texts])
         starts = np.concatenate([[0], stops[:-1]])
         tokens = scan(b" ".join((*exceptions.texts, b"")), starts, stops - 1)
-        if (places < 0).any() or (places >= shape).any() or tokens.bad().any():
+        if (cells < 0).any() or (cells >= shape).any() or tokens.bad().any():
             raise FormatError("an exception is no number, or lies outside of the signal")
         now, then = signal.values[rows, columns].astype(np.float64), tokens.values()
         same = (now.view(np.int64) == then.view(np.int64)) | (np.isnan(now) & np.isnan(then))
-        kept = np.flatnonzero(same)
+        kept = np.flatnonzero(same)  # AMC-06
         self.set(rows[kept], columns[kept], [exceptions.texts[k] for k in kept])
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from construct import ExprValidator, Struct
@@ -20,15 +20,16 @@ from mcz.schema import SIZED, SVARINT, UVARINT, build, counted, parse
 
 FRAME_NUMBER = -1  # the column of the frame number
 MAX_PATTERNS = 1024
-MAX_GAPS = 2**20  # of a template, and of a detail
+MAX_GAPS = 2**20  # of a template, and of a detail (SRC-07)
 MAX_RUNS = 2**18  # of a template, and of a detail
-MAX_WIDTH = 255
+MAX_WIDTH = 255  # SRC-12
 MAX_ROW_GAPS = 2**20  # bytes of the gaps and the tail of one frame
 
 Ints = NDArray[np.int64]
 
+# SRC-12
 _WIDTH = ExprValidator(SVARINT, lambda obj, ctx: -MAX_WIDTH <= obj <= MAX_WIDTH and obj != -1)
-_BIT = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)
+_BIT = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)  # SRC-13
 
 RUN = Struct(
     "gap" / UVARINT * "number of the gap that precedes every token of the run",
@@ -41,6 +42,7 @@ PATTERN = Struct(
     "tail" / UVARINT * "number of the gap that ends the frame",
 )
 TEMPLATE = Struct(
+    # SRC-03
     "header" / counted(SIZED, 2) * "text before the frames; the frame count stands between 2 parts",
     "gaps" / counted(SIZED, MAX_GAPS) * "gaps, numbered from 0",
     "patterns"
@@ -69,6 +71,17 @@ class Run:
     width: int = 0
 
 
+class Items(NamedTuple):
+    """A pattern as parallel arrays, one entry an item: where its gap lies in ``gaps``, its column
+    (-1: the frame number), its width. The last gap is the tail."""
+
+    gaps: NDArray[np.uint8]
+    gap_start: Ints
+    gap_stop: Ints
+    columns: Ints
+    widths: Ints
+
+
 @dataclass(frozen=True, slots=True)
 class Pattern:
     runs: tuple[Run, ...]
@@ -79,14 +92,14 @@ class Pattern:
         """Bytes of all gaps and the tail."""
         return sum(run.n_columns * len(run.gap) for run in self.runs) + len(self.tail)
 
-    def arrays(self) -> tuple[NDArray[np.uint8], Ints, Ints, Ints, Ints]:
-        """Gaps, start and stop of each item's gap and of the tail, columns, widths."""
+    def arrays(self) -> Items:
+        """The pattern as compiled loops have it."""
         repeats = [run.n_columns for run in self.runs]
         sizes = np.array([*(len(run.gap) for run in self.runs), len(self.tail)], dtype=np.int64)
         stops = np.cumsum(sizes)
         per_item = np.repeat(np.arange(len(sizes)), [*repeats, 1])
         ranges = [np.arange(run.column, run.column + run.n_columns) for run in self.runs]
-        return (
+        return Items(
             np.frombuffer(b"".join(run.gap for run in self.runs) + self.tail, np.uint8),
             (stops - sizes)[per_item],
             stops[per_item],
@@ -164,16 +177,16 @@ def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
     """The layout of a clip of ``n_channels`` channels; raises FormatError on bad bytes."""
     shared = parse(TEMPLATE, template, "source template", {"runs": MAX_RUNS})
     own = parse(DETAIL, detail, "source detail", {"runs": MAX_RUNS})
-    if len(shared.header) not in (1, 2) or len(shared.patterns) > 1:
+    if len(shared.header) not in (1, 2) or len(shared.patterns) > 1:  # SRC-03, SRC-04
         raise FormatError(
             f"source template: {len(shared.header)} parts of a header (1 or 2), "
             f"{len(shared.patterns)} patterns (0 or 1)"
         )
-    if len(own.patterns) >= MAX_PATTERNS:
+    if len(own.patterns) >= MAX_PATTERNS:  # SRC-06
         raise LimitError(f"source detail: {len(own.patterns)} patterns, limit {MAX_PATTERNS - 1}")
-    if own.patterns and not shared.patterns:
+    if own.patterns and not shared.patterns:  # SRC-05
         raise FormatError("source detail: patterns, though the template has none")
-    if (own.rows and not own.count) or (own.ending and not own.ends):
+    if (own.rows and not own.count) or (own.ending and not own.ends):  # SRC-14, SRC-15
         raise FormatError("source detail: rows without count, or ending though ends is 0")
     gaps = [*shared.gaps, *own.gaps]
     patterns = [
@@ -186,20 +199,20 @@ def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
 
 def _pattern(fields: Any, gaps: Sequence[bytes], n_channels: int, where: str) -> Pattern:
     """PATTERN with its gaps in place, checked: no column twice, none beyond the channels."""
-    if any(run.gap >= len(gaps) for run in fields.runs) or fields.tail >= len(gaps):
+    if any(run.gap >= len(gaps) for run in fields.runs) or fields.tail >= len(gaps):  # SRC-08
         raise FormatError(f"{where}: a gap beyond the last, {len(gaps) - 1}")
     spans = sorted((run.column, run.n_columns) for run in fields.runs)
     free = 0
     for column, n_columns in spans:
-        if column < free or n_columns < 1 or (column == 0 and n_columns > 1):
+        if column < free or n_columns < 1 or (column == 0 and n_columns > 1):  # SRC-09, SRC-10
             raise FormatError(
                 f"{where}: {n_columns} columns from {column}, expected {free} or more"
             )
         free = column + n_columns
-    if free > n_channels + 1:
+    if free > n_channels + 1:  # SRC-11
         raise FormatError(f"{where}: channel {free - 2}, but there are {n_channels}")
     runs = [Run(gaps[r.gap], r.column - 1, r.n_columns, r.width) for r in fields.runs]
     pattern = Pattern(tuple(runs), gaps[fields.tail])
-    if pattern.gap_size > MAX_ROW_GAPS:
+    if pattern.gap_size > MAX_ROW_GAPS:  # SRC-16
         raise LimitError(f"{where}: {pattern.gap_size} bytes of gaps a row, limit {MAX_ROW_GAPS}")
     return pattern

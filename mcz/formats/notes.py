@@ -98,7 +98,7 @@ def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
         rows = _rows([entry.row for entry in fields.texts], stop - start, where)
         texts += [(start + row, e.text) for row, e in zip(rows, fields.texts, strict=True)]
     wrong = [text for _, text in texts if not FRAME_NUMBER_TEXT.fullmatch(text)]
-    if wrong:
+    if wrong:  # AMC-05
         raise FormatError(f"source notes: {wrong[0][:40]!r} is not a frame number")
     return RowNotes(patterns, tuple(texts))
 
@@ -106,6 +106,7 @@ def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
 def _fill_patterns(patterns: Ints, runs: Sequence[Any], where: str) -> None:
     row = 0
     for run in runs:
+        # AMC-01, AMC-02
         if run.n_rows < 1 or run.n_rows > len(patterns) - row or run.pattern >= MAX_PATTERNS:
             raise FormatError(f"{where}: pattern {run.pattern} for {run.n_rows} rows from {row} on")
         patterns[row : row + run.n_rows] = run.pattern
@@ -114,6 +115,6 @@ def _fill_patterns(patterns: Ints, runs: Sequence[Any], where: str) -> None:
 
 def _rows(distances: Sequence[int], n_rows: int, where: str) -> list[int]:
     """The rows from their distances, checked: each later than the one before, and below n_rows."""
-    if 0 in distances[1:] or (distances and sum(distances) >= n_rows):
+    if 0 in distances[1:] or (distances and sum(distances) >= n_rows):  # AMC-04
         raise FormatError(f"{where}: rows {distances[:8]} of {n_rows}")
     return list(accumulate(distances))

@@ -36,7 +36,7 @@ def restore(motion: Motion, source: Source) -> bytes:
     layout = parse_layout(source.template, source.detail, signal.n_channels)
     runs = _pattern_runs(layout, source.notes, signal.n_rows)
     numbered = any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
-    if numbered and signal.samples_per_frame != 1:
+    if numbered and signal.samples_per_frame != 1:  # AMC-08
         raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
     numbers = motion.frame_numbers
     if numbers is None:
@@ -47,14 +47,16 @@ def restore(motion: Motion, source: Source) -> bytes:
     cells = Cells(signal, numbers if numbered else None)
     if numbered and isinstance(source.notes, RowNotes):
         odd = (entry for entry in source.notes.texts if entry[0] < signal.n_rows)
-        texts = [(row, text) for row, text in odd if int(text) == numbers[row]]
+        texts = [(row, text) for row, text in odd if int(text) == numbers[row]]  # AMC-06
         rows = np.array([row for row, _ in texts], dtype=np.int64)
         cells.set(rows, np.full_like(rows, -1), [text for _, text in texts])
     body = _body(cells, runs, limit)
+    # AMC-06
     count = layout.count if layout.count and layout.rows == signal.n_rows else b"%d" % signal.n_rows
     header = count.join(layout.header) if len(layout.header) > 1 else layout.header[0]
     if layout.ending is None:
         return header + body
+    # AMC-06
     return header + body[: len(body) - (len(runs[-1][0].tail) if runs else 0)] + layout.ending
 
 
@@ -67,7 +69,7 @@ def _pattern_runs(
         numbers[: len(notes.patterns)] = notes.patterns[:n_rows]
     if not n_rows:
         return []
-    if numbers.max() >= len(layout.patterns):
+    if numbers.max() >= len(layout.patterns):  # AMC-03
         raise FormatError(f"source notes: pattern {numbers.max()} of {len(layout.patterns)}")
     edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), n_rows]
     return [(layout.patterns[numbers[a]], a, b) for a, b in pairwise(edges)]
@@ -75,22 +77,21 @@ def _pattern_runs(
 
 def _body(cells: Cells, runs: list[tuple[Pattern, int, int]], limit: int) -> bytes:
     """The text of all rows; its size is known before any of it is written."""
-    from mcz.formats import _kernels
+    from mcz.formats import text_kernels
 
     texts = cells.texts()
     arrays = {id(pattern): pattern.arrays() for pattern, _, _ in runs}
     size = 0
     for pattern, a, b in runs:
-        _, _, _, columns, widths = arrays[id(pattern)]
-        size += _kernels.measure_rows(
-            columns, widths, pattern.gap_size, texts, cells.start[a:b], cells.size[a:b]
+        size += text_kernels.measure_rows(
+            arrays[id(pattern)], pattern.gap_size, texts, cells.start[a:b], cells.size[a:b]
         )
-    if size > limit:
+    if size > limit:  # AMC-07, LIMIT-12
         raise LimitError(f"source template: a text of {size} bytes, limit {limit}")
     out = np.empty(size, np.uint8)
     at = 0
     for pattern, a, b in runs:
-        at = _kernels.fill_rows(
-            out, at, *arrays[id(pattern)], texts, cells.start[a:b], cells.size[a:b]
+        at = text_kernels.fill_rows(
+            out, at, arrays[id(pattern)], texts, cells.start[a:b], cells.size[a:b]
         )
     return out.tobytes()

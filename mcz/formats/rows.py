@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-from mcz.formats.layout import FRAME_NUMBER, MAX_PATTERNS, MAX_ROW_GAPS, Pattern, runs_of
+from mcz.formats.layout import FRAME_NUMBER, MAX_PATTERNS, MAX_ROW_GAPS, Items, Pattern, runs_of
 from mcz.formats.notes import FRAME_NUMBER_TEXT, RowNotes
 from mcz.formats.padding import find_widths, padding
 
@@ -96,16 +96,14 @@ class _Reader:
     numbers: Ints = field(init=False)
     row: int = 0
     patterns: list[Pattern] = field(default_factory=list)
-    arrays: list[tuple[NDArray[np.uint8], Ints, Ints, Ints, Ints]] = field(
-        default_factory=list
-    )  # of each pattern
+    arrays: list[Items] = field(default_factory=list)  # of each pattern
     ids: dict[object, int] = field(default_factory=dict)  # of items and tail, and of items alone
     used: list[tuple[int, int]] = field(default_factory=list)  # (first row, pattern) of each run
     number_texts: list[tuple[int, bytes]] = field(default_factory=list)
     samples: list[tuple[int, list[Token], int]] = field(default_factory=list)
 
     def read(self, at: int) -> Rows:
-        from mcz.formats import _kernels
+        from mcz.formats import text_kernels
 
         text = np.frombuffer(self.data, np.uint8)
         begin, last_end = at, at
@@ -118,8 +116,8 @@ class _Reader:
             number = self.used[-1][1]
             first, at = self.row, end
             while True:
-                self.row, at = _kernels.match_rows(
-                    text, at, *self.arrays[number], self.row, self.start, self.stop, self.numbers
+                self.row, at = text_kernels.match_rows(
+                    text, at, self.arrays[number], self.row, self.start, self.stop, self.numbers
                 )
                 if self.row < len(self.numbers):
                     break

@@ -55,8 +55,8 @@ class Link:
 class Pose:
     """Some frames, F of them, resolved to joint transforms.
 
-    Of each joint ``origins`` has its place, (3, F) or (3, 1) where that is constant; ``axes`` its
-    local axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin
+    Of each joint ``origins`` has its position, (3, F) or (3, 1) where that is constant; ``axes``
+    its local axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin
     along the parent's local axes before the parent's scale, (3, F) or (3, 1); ``spins`` what each
     of its ``turns`` turns about in the world, (3, F) or (3, 1), four for a quaternion.
     """
@@ -210,7 +210,7 @@ class Chain:
         return scaled
 
     def tail(self, joint: int, k: int, columns: Floats, pose: Pose) -> Floats:
-        """The place of a tail of ``joint`` in the world, (3, F) or (3, 1)."""
+        """The position of a tail of ``joint`` in the world, (3, F) or (3, 1)."""
         link = self.links[joint]
         vector = self.lengthened(link, link.tails[k][:, None], columns)
         return pose.origins[joint] + along(pose.axes[joint], self.scaled(link, vector, columns))

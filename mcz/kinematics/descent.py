@@ -30,7 +30,7 @@ def refine(
 ) -> tuple[Floats, Floats]:
     """Values (n_channels, F) from which no step leads nearer, and the sums of squares there, (F,).
 
-    Least is the sum over targets of |place - seen|^2 where ``known`` is 1, plus ``weight``,
+    Least is the sum over targets of |position - seen|^2 where ``known`` is 1, plus ``weight``,
     (n_channels, 1), times the squares of the steps, in ``targets.units``, from ``prior``.
     """
     result, errors = columns.copy(), np.empty(columns.shape[1])
@@ -82,8 +82,8 @@ class _Descent:
     def _costs(self, columns: Floats, frames: Ints) -> tuple[Floats, Floats]:
         """What is to become least, and the share of the targets in it, (F,) each."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            places = self.targets.places(columns, self.targets.chain.pose(columns))
-            missed = (places - self.seen[:, :, frames]) * self.known[:, None, frames]
+            positions = self.targets.positions(columns, self.targets.chain.pose(columns))
+            missed = (positions - self.seen[:, :, frames]) * self.known[:, None, frames]
             errors = (missed * missed).sum(axis=(0, 1))
         away = self._away(columns, frames)
         costs = errors + (self.weight[self.free] * away * away).sum(axis=0)
@@ -99,10 +99,10 @@ class _Descent:
         targets = self.targets
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             pose = targets.chain.pose(columns)
-            places = targets.places(columns, pose)
+            positions = targets.positions(columns, pose)
             known = self.known[:, None, frames]
-            slopes = targets.jacobian(columns, pose, places)[self.free] * known
-            missed = (self.seen[:, :, frames] - places) * known
+            slopes = targets.jacobian(columns, pose, positions)[self.free] * known
+            missed = (self.seen[:, :, frames] - positions) * known
         n_frames = len(frames)
         matrix = np.ascontiguousarray(
             slopes.reshape(len(self.free), -1, n_frames).transpose(2, 0, 1)

@@ -26,14 +26,14 @@ SWEEPS = 12
 
 @dataclass(frozen=True, slots=True)
 class Fastened:
-    """What a joint carries: numbers of targets, their weights, their places along its axes (n, 3).
+    """What a joint carries: numbers of targets, their weights, positions along its axes (n, 3).
 
     ``origin`` is the target at the joint's own origin, -1 where there is none.
     """
 
     numbers: list[int]
     weights: Floats
-    places: Floats
+    positions: Floats
     origin: int
     to_rest: float
 
@@ -45,18 +45,18 @@ class Guess:
         self.targets, self.chain = targets, targets.chain
         neutral = targets.neutral(1)
         pose = self.chain.pose(neutral)
-        places = targets.places(neutral, pose)[:, :, 0]
+        positions = targets.positions(neutral, pose)[:, :, 0]
         self.fastened = [
-            self._fastened(joint, pose, places) for joint in range(len(self.chain.links))
+            self._fastened(joint, pose, positions) for joint in range(len(self.chain.links))
         ]
 
-    def _fastened(self, joint: int, pose: Pose, places: Floats) -> Fastened:
+    def _fastened(self, joint: int, pose: Pose, positions: Floats) -> Fastened:
         """The targets that turn with the joint, and farther ones where those are on a line."""
         origin = pose.origins[joint][:, 0]
         axes = pose.axes[joint][:, :, 0]
         below = [int(number) for number in self.targets.below[joint]]
         steps = {number: self._steps(joint, number) for number in below}
-        numbers, spread = self._chosen(joint, steps, places - origin)
+        numbers, spread = self._chosen(joint, steps, positions - origin)
         own = [n for n, t in enumerate(self.targets.list) if t.joint == joint and t.axis < 0]
         at_origin = [n for n in own if self.targets.list[n].tail < 0]
         if not at_origin:
@@ -66,7 +66,7 @@ class Guess:
             np.array(
                 [1.0 if steps[number] == steps[numbers[0]] else FARTHER for number in numbers]
             ),
-            (places[numbers] - origin).reshape(-1, 3) @ axes,
+            (positions[numbers] - origin).reshape(-1, 3) @ axes,
             at_origin[0] if at_origin else -1,
             TO_REST if spread else LINE_TO_REST,
         )
@@ -120,7 +120,7 @@ class Guess:
         ]
 
     def columns(self, seen: Floats, known: Floats) -> Floats:
-        """Values (n_channels, F) for places seen, (n_targets, 3, F), where ``known`` is 1, not 0.
+        """Values (n_channels, F) for positions seen, (n_targets, 3, F), where ``known`` is 1.
 
         A joint of which nothing is known holds the angles of the frame before.
         """
@@ -167,7 +167,7 @@ class Guess:
     ) -> Floats:
         """Sum of w b a', (3, 3, F): b as seen and a at rest, from the origin or from the mean."""
         held = self.fastened[joint]
-        a = np.broadcast_to(held.places[:, :, None], (*held.places.shape, weights.shape[1]))
+        a = np.broadcast_to(held.positions[:, :, None], (*held.positions.shape, weights.shape[1]))
         b = seen[held.numbers]
         if held.origin >= 0:
             own = known[held.origin] > 0
@@ -201,7 +201,7 @@ class Guess:
         elif held.numbers:
             trial = Pose(list(pose.origins), list(pose.axes), list(pose.arms), list(pose.spins))
             self.chain.add(trial, link, hung, columns)
-            arms = np.einsum("ijf,nj->nif", trial.axes[-1], held.places)
+            arms = np.einsum("ijf,nj->nif", trial.axes[-1], held.positions)
             weights = known[held.numbers] * held.weights[:, None]
             total, there = weights.sum(axis=0), weights.sum(axis=0) > 0
             steps = weights[:, None] * (seen[held.numbers] - arms)

@@ -6,6 +6,7 @@ guess from the roots down (``guess.py``), a descent from there (``descent.py``),
 that ended far off, or stand out from those beside them, and, where distances remain, a last one
 that lets values that those hardly decide follow the frames around. A frame costs the same however
 many there are; of what is large only a block of frames is in memory.
+What is chosen in it stands in mcz/kinematics/README.md.
 """
 
 from __future__ import annotations
@@ -41,11 +42,11 @@ LOOSER = 1.5  # times what all the freedom of the channels may have taken off th
 
 
 def solve_ik(skeleton: Skeleton, points: Floats, markers: Floats | None = None) -> Floats:
-    """Values (n_frames, n_channels) in source units that bring the points of a skeleton to places.
+    """Values (n_frames, n_channels) in source units that bring points to these positions.
 
-    ``points`` are the places of its points, (n_frames, n_points, 3) in its length unit, as
+    ``points`` are the positions of its points, (n_frames, n_points, 3) in its length unit, as
     ``positions_of`` gives them, ``markers`` those of its virtual markers if they are known. NaN
-    is a place that is not known. Plain scalars, and what else moves nothing, are 0.
+    is a position that is not known. Plain scalars, and what else moves nothing, are 0.
 
     Raises MotionError where the shapes do not match the skeleton, and where it has no kinematics;
     OptionError for virtual markers without a length unit.
@@ -169,8 +170,8 @@ class _Solution:
     def _steady(self) -> None:
         """Where distances remain, as of noise, values stay nearer to those of the frames around.
 
-        The remaining distances say how much a place is to be believed, and what people do says how
-        far angles stray from their mean over some frames.
+        The remaining distances say how much a position is to be believed, and what people do says
+        how far angles stray from their mean over some frames.
         """
         n_free = np.count_nonzero(self.targets.units)
         freedoms = 3 * self.known.sum() - n_free * self.known.shape[1]
@@ -198,20 +199,20 @@ def _between(jumps: Ints, n_frames: int) -> NDArray[np.bool_]:
 
 
 def _seen(targets: Targets, points: Floats, markers: Floats | None) -> tuple[Floats, Floats]:
-    """Places (n_targets, 3, F), 0 where not known, and 1 where they are, else 0, (n_targets, F)."""
+    """Positions (n_targets, 3, F), 0 where unknown, and 1 where known, else 0, (n_targets, F)."""
     skeleton = targets.skeleton
     n_markers = 0 if markers is None else 3 * skeleton.n_joints
     wanted = {"points": (points, len(targets) - n_markers), "virtual markers": (markers, n_markers)}
-    for what, (places, count) in wanted.items():
-        if places is not None and (places.ndim != 3 or places.shape[1:] != (count, 3)):
+    for what, (positions, count) in wanted.items():
+        if positions is not None and (positions.ndim != 3 or positions.shape[1:] != (count, 3)):
             raise MotionError(
-                f"skeleton {skeleton.name!r} has {count} {what}, and their places are of shape "
-                f"{places.shape}, not (n_frames, {count}, 3)"
+                f"skeleton {skeleton.name!r} has {count} {what}, and their positions are of shape "
+                f"{positions.shape}, not (n_frames, {count}, 3)"
             )
     if markers is not None and len(markers) != len(points):
         raise MotionError(f"{len(points)} frames of points, {len(markers)} of virtual markers")
-    places = points if markers is None else np.concatenate([points, markers], axis=1)
-    seen = np.array(np.moveaxis(places, 0, 2), np.float64, order="C")
+    positions = points if markers is None else np.concatenate([points, markers], axis=1)
+    seen = np.array(np.moveaxis(positions, 0, 2), np.float64, order="C")
     finite: NDArray[np.bool_] = np.isfinite(seen)
     known = np.logical_and.reduce(finite, axis=1)
     return np.where(known[:, None], seen, 0.0), known.astype(np.float64)

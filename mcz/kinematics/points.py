@@ -1,4 +1,4 @@
-"""Points: which ones a skeleton has, their names, and their places over time."""
+"""Points: which ones a skeleton has, their names, and their positions over time."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def positions(motion: Motion) -> Floats:
 
 def positions_of(skeleton: Skeleton, values: Floats) -> Floats:
     """As ``positions``, from values (n_frames, n_channels) in source units."""
-    return _Places(skeleton, values, points=True).points
+    return _Positions(skeleton, values, points=True).points
 
 
 def virtual_markers_of(skeleton: Skeleton, values: Floats) -> Floats:
@@ -36,16 +36,16 @@ def virtual_markers_of(skeleton: Skeleton, values: Floats) -> Floats:
     float64 (n_frames, 3 n_joints, 3) in length units. A joint's point is the first of its points.
     Raises OptionError where the length unit is unknown, otherwise as ``positions``.
     """
-    return _Places(skeleton, values, markers=True).markers
+    return _Positions(skeleton, values, markers=True).markers
 
 
 def points_and_markers_of(skeleton: Skeleton, values: Floats) -> tuple[Floats, Floats]:
     """``positions_of`` and ``virtual_markers_of`` from one pass over the joints."""
-    places = _Places(skeleton, values, points=True, markers=True)
-    return places.points, places.markers
+    positions = _Positions(skeleton, values, points=True, markers=True)
+    return positions.points, positions.markers
 
 
-class _Places:
+class _Positions:
     """Points (n_frames, n_points, 3) and virtual markers (n_frames, 3 n_joints, 3), as wanted."""
 
     def __init__(
@@ -67,7 +67,7 @@ class _Places:
             first = self._firsts.get(joint) == tail
             if not (first or points.shape[1]):
                 continue
-            point = place(chain, joint, tail, columns, pose)
+            point = point_position(chain, joint, tail, columns, pose)
             if points.shape[1]:
                 points[:, number] = point.T
             if first:
@@ -90,7 +90,7 @@ def _forget(points: Floats) -> None:
     points[~np.isfinite(points).all(axis=-1)] = np.nan
 
 
-def place(chain: Chain, joint: int, tail: int, columns: Floats, pose: Pose) -> Floats:
+def point_position(chain: Chain, joint: int, tail: int, columns: Floats, pose: Pose) -> Floats:
     """Where a point is, (3, F) or (3, 1); ``tail`` -1 is the joint's origin."""
     return pose.origins[joint] if tail < 0 else chain.tail(joint, tail, columns, pose)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mcz.errors import OptionError
 from mcz.kinematics.chain import Chain, Floats, Link, Pose, along
-from mcz.kinematics.points import place, points_of
+from mcz.kinematics.points import point_position, points_of
 from mcz.motion import Skeleton
 
 
@@ -60,7 +60,10 @@ class _Block:
         self.moments = [np.zeros((3, 3, n_frames)) for _ in range(n_joints)]
         for joint in reversed(range(n_joints)):
             for tail in points[joint]:
-                p = place(chain, joint, tail, columns, pose) - pose.origins[self.roots[joint]]
+                p = (
+                    point_position(chain, joint, tail, columns, pose)
+                    - pose.origins[self.roots[joint]]
+                )
                 self.sums[joint] += p
                 self.moments[joint] += p[:, None] * p[None]
             parent = chain.links[joint].parent

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mcz.kinematics.chain import Chain, Floats
 from mcz.kinematics.points import marker_distance, points_and_markers_of, points_of, positions_of
+from mcz.kinematics.single_kernels import Joints, Points, position_points
 from mcz.motion import Skeleton
 
-__all__ = ["FramePlaces"]
+__all__ = ["FramePositions"]
 
 
-class FramePlaces:
-    """Places of the points of ``skeleton``, and of its virtual markers where they are wanted.
+class FramePositions:
+    """Positions of the points of ``skeleton``, and of its virtual markers where they are wanted.
 
     Called with the channels of a frame, (n_channels,), it gives (n_places, 3) in length units, NaN
-    where a place is not known: the same as ``positions_of`` and ``virtual_markers_of`` to 1e-9.
+    where a position is not known: the same as ``positions_of`` and ``virtual_markers_of`` to 1e-9.
     Raises as they do.
     """
 
@@ -38,13 +37,11 @@ class FramePlaces:
     def __call__(self, values: Floats) -> Floats:
         if self._tables is None:
             return self._one_of_many(values)
-        from mcz.kinematics._frame_kernels import place_points
-
         n_points, n_joints = len(self._numbers), self._skeleton.n_joints
         out = np.empty((n_points + (3 * n_joints if self._marked else 0), 3))
         origins, axes = np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))
         filled = out[:n_points], origins, axes
-        place_points(*(values, *self._tables, *filled))
+        position_points(values, *self._tables, *filled)
         if self._marked:
             points = out[self._firsts][:, None]
             markers = points + self._distance * np.swapaxes(axes, 1, 2)
@@ -72,8 +69,8 @@ def _is_elaborate(chain: Chain) -> bool:
     )
 
 
-def _tables(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Any, ...]:
-    """What the compiled loop needs between the values and its output."""
+def _tables(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Joints, Points]:
+    """What the compiled loop knows of a skeleton."""
     links = chain.links
     n_joints = len(links)
     most = max((len(link.turns) for link in links), default=0)
@@ -89,7 +86,7 @@ def _tables(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Any, 
             changes[joint] = link.change[:, :, 0]
         if link.parent_back is not None:
             backs[joint] = link.parent_back
-    return (
+    joints = Joints(
         np.array([link.parent for link in links], np.int64),
         changes,
         np.array([link.offset for link in links]).reshape(n_joints, 3),
@@ -97,7 +94,6 @@ def _tables(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Any, 
         np.array([link.replaces for link in links], np.int64),
         moves,
         turns,
-        np.array(points, np.int64),
-        np.array(tails).reshape(len(points), 3),
         float(chain.radians),
     )
+    return joints, Points(np.array(points, np.int64), np.array(tails).reshape(len(points), 3))

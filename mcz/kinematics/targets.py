@@ -1,6 +1,6 @@
 """What inverse kinematics aims at: points and virtual markers, and how channels move them.
 
-A target is a place fastened to a joint: a point, or a virtual marker beside the joint's first
+A target is a position fastened to a joint: a point, or a virtual marker beside the joint's first
 point. Arrays of a block of frames have the frames last.
 """
 
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.kinematics.chain import Chain, Floats, Link, Pose, along
-from mcz.kinematics.points import marker_distance, place, points_of, reach
+from mcz.kinematics.points import marker_distance, point_position, points_of, reach
 from mcz.motion import Skeleton
 
 TYPICAL_LEVER = 0.125  # of the reach: to turn by one radian counts as to move by so much
@@ -21,7 +21,7 @@ TYPICAL_LEVER = 0.125  # of the reach: to turn by one radian counts as to move b
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A place of ``joint``: its tail of that number or, -1, its origin; ``axis`` of a marker."""
+    """A position of ``joint``: its tail of that number or, -1, its origin; ``axis`` of a marker."""
 
     joint: int
     tail: int
@@ -29,7 +29,7 @@ class Target:
 
 
 class Targets:
-    """The targets of a skeleton in the order of their places: points, then virtual markers.
+    """The targets of a skeleton in the order of their positions: points, then virtual markers.
 
     ``units``, (n_channels,): the source units of each channel that count as one length unit, in
     which all steps are measured; 0 of channels that move nothing.
@@ -83,24 +83,24 @@ class Targets:
             columns[list(link.quaternion[:1])] = 1.0
         return columns
 
-    def places(self, columns: Floats, pose: Pose) -> Floats:
+    def positions(self, columns: Floats, pose: Pose) -> Floats:
         """Where the targets are, (n_targets, 3, F)."""
-        places = np.empty((len(self.list), 3, columns.shape[1]))
+        positions = np.empty((len(self.list), 3, columns.shape[1]))
         for number, target in enumerate(self.list):
-            places[number] = place(self.chain, target.joint, target.tail, columns, pose)
+            positions[number] = point_position(self.chain, target.joint, target.tail, columns, pose)
             if target.axis >= 0:
-                places[number] += self.distance * pose.axes[target.joint][:, target.axis]
-        return places
+                positions[number] += self.distance * pose.axes[target.joint][:, target.axis]
+        return positions
 
-    def jacobian(self, columns: Floats, pose: Pose, places: Floats) -> Floats:
-        """d places / d channels for a step of one of ``units``, (n_channels, n_targets, 3, F)."""
-        made = np.zeros((self.skeleton.n_channels, *places.shape))
+    def jacobian(self, columns: Floats, pose: Pose, positions: Floats) -> Floats:
+        """d positions / d channels for a step of ``units``, (n_channels, n_targets, 3, F)."""
+        made = np.zeros((self.skeleton.n_channels, *positions.shape))
         for joint, link in enumerate(self.chain.links):
             numbers = self.below[joint]
             if not len(numbers):
                 continue
             if link.turns:
-                arms = places[numbers] - pose.origins[joint]
+                arms = positions[numbers] - pose.origins[joint]
                 for column, spin in self._spins(link, pose.spins[joint]):
                     made[column, numbers] = _cross(spin / self.lever, arms)
             for column, step in self._moves(link, columns, pose):

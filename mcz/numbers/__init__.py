@@ -1,7 +1,7 @@
 """Number grids: what a number of a source file is, as an integer.
 
 A *grid* is a countable set of numbers together with one way of printing each of them.
-The *ordinal* of a number is its place on the grid: an integer that grows with the number.
+The *ordinal* of a number is its rank among those of the grid: an integer that grows with it.
 Codecs work on ordinals, formats print them, and ``values`` turns them into binary64.
 SPEC.md, "Number grids", is normative.
 

@@ -36,17 +36,17 @@ def candidates(tokens: Tokens) -> Iterator[Candidate]:
         return
     shape, mantissa, power = shape[known], mantissa[known], power[known]
     plain = shape & loops.EXPONENT == 0
-    places = np.minimum(shape >> loops.FRACTION_DIGITS, 63)
+    decimals = np.minimum(shape >> loops.FRACTION_DIGITS, 63)
     significant = shape >> loops.SIGNIFICANT & 31
-    sign, tail, exponent = _styles(mantissa, power, shape, places)
+    sign, tail, exponent = _styles(mantissa, power, shape, decimals)
 
     if plain.any():
-        fixed = int(np.bincount(places[plain]).argmax())
+        fixed = int(np.bincount(decimals[plain]).argmax())
         point = GridFlag.POINT if fixed == 0 and tail == GridFlag.POINT else 0
         style = sign & ~GridFlag.NO_ZERO | point if fixed == 0 else sign
         if fixed <= 22:
             yield _bits(fixed), (GridKind.FIXED, fixed, style)
-        for digits in _ends(places[plain]):
+        for digits in _ends(decimals[plain]):
             if 1 <= digits <= 22:
                 yield _bits(digits) + 1, (GridKind.TRIMMED, digits, sign | tail)
     flags = sign | tail | exponent
@@ -71,7 +71,7 @@ def _ends(counts: Ints) -> list[int]:
     return sorted({int(counts.max()), int(np.sort(counts)[(len(counts) * 99 - 1) // 100])})
 
 
-def _styles(mantissa: Ints, power: Ints, shape: Ints, places: Ints) -> tuple[int, int, int]:
+def _styles(mantissa: Ints, power: Ints, shape: Ints, decimals: Ints) -> tuple[int, int, int]:
     """Flags of the sign and the leading zero, of integral numbers, of the exponent: majorities."""
     loops = kernels()
 
@@ -83,8 +83,8 @@ def _styles(mantissa: Ints, power: Ints, shape: Ints, places: Ints) -> tuple[int
     if many(plain & (shape & loops.NO_INTEGER != 0), shape & loops.ZERO_INTEGER):
         sign |= GridFlag.NO_ZERO
     point = shape & loops.POINT != 0
-    bare = plain & (places == 0)
-    dot_zero = plain & (places == 1) & (mantissa % 10 == 0)
+    bare = plain & (decimals == 0)
+    dot_zero = plain & (decimals == 1) & (mantissa % 10 == 0)
     tail = 0
     if many(bare & point, bare & ~point) and many(bare & point, dot_zero):
         tail = int(GridFlag.POINT)

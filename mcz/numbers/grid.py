@@ -68,7 +68,7 @@ class Grid:
         ordinals = np.ascontiguousarray(ordinals, np.int64)
         limit = self.limit
         low = -1 - limit if self.signed_magnitude else -limit
-        if ordinals.size and not (low <= ordinals.min() and ordinals.max() <= limit):
+        if ordinals.size and not (low <= ordinals.min() and ordinals.max() <= limit):  # GRID-05
             wrong = ordinals.max() if ordinals.max() > limit else ordinals.min()
             raise FormatError(f"{wrong} is not an ordinal of {self}: {low} to {limit}")
         return ordinals ^ (ordinals >> 63) if self.signed_magnitude else np.abs(ordinals)
@@ -80,7 +80,7 @@ class Grid:
         values: Floats
         match self.kind:
             case GridKind.FIXED | GridKind.TRIMMED:
-                values = np.divide(magnitudes, TENS[self.digits])
+                values = np.divide(magnitudes, TENS[self.digits])  # GRID-08
             case GridKind.GENERAL:
                 values = nearest(*general_split(magnitudes, self.digits))
             case GridKind.TEXT64 | GridKind.BINARY64:
@@ -96,7 +96,7 @@ class Grid:
         negative = ordinals < 0
         if self.kind == GridKind.VAX_F:
             values = np.where(negative & (values == 0), NAN, values)
-        np.negative(values, where=negative & (values == values), out=values)
+        np.negative(values, where=negative & (values == values), out=values)  # GRID-09
         return values
 
     def ordinals(self, values: Floats) -> tuple[Ints, Bools]:
@@ -204,6 +204,7 @@ class Grid:
 class _GridAdapter(Adapter):
     def _decode(self, obj: Container, context: Any, path: str) -> Grid:
         try:
+            # GRID-01
             return Grid(obj.kind, obj.digits, obj.flags, 1.0 if obj.scale is None else obj.scale)
         except (ValueError, OptionError) as error:
             raise FormatError(f"{path}: {error}") from None

@@ -6,7 +6,7 @@ A token is described by a row of three int64, from which its text can be told ex
 1. the number after its ``e``, 0 without one, clamped to +-``HUGE``
 2. shape: the bits below, and ``SIGNIFICANT``, ``EXPONENT_DIGITS``, ``FRACTION_DIGITS`` above them
 
-Everything is int64, because numba turns a mixture of int64 and uint64 into float64.
+Everything is int64, the one kind of integer that compiled loops have.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ SIGNIFICANT = 12  # shift; 5 bits: digits from the first to the last nonzero one
 EXPONENT_DIGITS = 17  # shift; 8 bits
 FRACTION_DIGITS = 25  # shift; 16 bits
 
-# Bits of a grid's flags, as in mcz.numbers.GridFlag (numba wants plain integers).
+# Bits of a grid's flags, as in mcz.numbers.GridFlag (loops know plain integers).
 _POINT_ZERO, _POINT_ONLY, _NO_ZERO, _PLUS, _EXP3, _EXP1, _UPPER = 1, 2, 4, 8, 16, 32, 64
 
 
@@ -105,7 +105,7 @@ def _exponent(text: NDArray[np.uint8], at: int, end: int) -> tuple[int, int]:
         power = min(power * 10 + int(text[at]) - 48, HUGE)
         digits += 1
         at += 1
-    if digits == 0 or at < end:
+    if digits == 0 or at < end:  # TEXT-05
         shape |= BAD
     return (-power if negative else power), shape | min(digits, 255) << EXPONENT_DIGITS
 
@@ -175,7 +175,9 @@ def _general(mantissa: int, power: int, digits: int) -> int:
         return 0
     if abs(power) > 307:
         return -1
-    block: int = 10 ** (digits - 1)
+    block = 1
+    for _ in range(digits - 1):
+        block *= 10
     while mantissa >= block * 10:
         mantissa //= 10
     while mantissa < block:
@@ -260,14 +262,14 @@ def write(
         scientific = mantissa != 0 and (power < low or power >= high)
         if scientific:
             fraction = count - 1
-        if negative[i] or flags & _PLUS:
+        if negative[i] or flags & _PLUS:  # TEXT-01
             out[at] = 45 if negative[i] else 43
             at += 1
         at = _digits(mantissa, count, fraction, flags, out, at)
         if scientific:
             at = _power(power, flags, out, at)
         elif fraction <= 0:
-            if flags & (_POINT_ZERO | _POINT_ONLY):
+            if flags & (_POINT_ZERO | _POINT_ONLY):  # TEXT-01
                 out[at] = 46
                 at += 1
             if flags & _POINT_ZERO:
@@ -283,23 +285,23 @@ def _digits(
     """Print ``mantissa * 10^-fraction`` without sign or exponent; return where it ends."""
     integers = count - fraction
     if integers < 1:
-        integers = 0 if flags & _NO_ZERO and fraction > 0 else 1
+        integers = 0 if flags & _NO_ZERO and fraction > 0 else 1  # TEXT-01
     end = at + integers + (fraction + 1 if fraction > 0 else 0)
-    place = end - 1
+    index = end - 1
     for _ in range(fraction):
-        out[place] = 48 + mantissa % 10
+        out[index] = 48 + mantissa % 10
         mantissa //= 10
-        place -= 1
+        index -= 1
     if fraction > 0:
-        out[place] = 46
-        place -= 1
-    while place >= at:
-        if end - 1 - place < -fraction:
-            out[place] = 48
+        out[index] = 46
+        index -= 1
+    while index >= at:
+        if end - 1 - index < -fraction:
+            out[index] = 48
         else:
-            out[place] = 48 + mantissa % 10
+            out[index] = 48 + mantissa % 10
             mantissa //= 10
-        place -= 1
+        index -= 1
     return end
 
 
@@ -309,9 +311,10 @@ def _power(power: int, flags: int, out: NDArray[np.uint8], at: int) -> int:
     out[at] = 69 if flags & _UPPER else 101
     out[at + 1] = 45 if power < 0 else 43
     power = abs(power)
+    # TEXT-01
     width = 3 if flags & _EXP3 or power >= 100 else 1 if flags & _EXP1 and power < 10 else 2
     end = at + 2 + width
-    for place in range(end - 1, at + 1, -1):
-        out[place] = 48 + power % 10
+    for index in range(end - 1, at + 1, -1):
+        out[index] = 48 + power % 10
         power //= 10
     return end

@@ -25,7 +25,7 @@ def general_split(magnitudes: Ints, digits: int) -> tuple[Ints, Ints]:
     power, mantissa = np.divmod(magnitudes - 1, 9 * block)
     zero = magnitudes == 0
     mantissa = np.where(zero, 0, mantissa + block)
-    return mantissa, np.where(zero, 0, power + (MIN_POWER + 1 - digits))
+    return mantissa, np.where(zero, 0, power + (MIN_POWER + 1 - digits))  # GRID-09
 
 
 def general_magnitudes(values: Floats, digits: int) -> Ints:
@@ -33,6 +33,7 @@ def general_magnitudes(values: Floats, digits: int) -> Ints:
     zero = values == 0
     values = np.where(zero, 1.0, values)
     power = np.floor(np.log10(values)).astype(np.int64)
+    # GRID-11
     power -= values < _POWERS[power - _LEAST_POWER]  # just below a power, the logarithm is its own
     shift = digits - 1 - power
     odd = np.abs(shift) > EXACT_POWER
@@ -57,7 +58,7 @@ def scaled_magnitudes(values: Floats, factor: float, divide: bool, limit: int) -
     """
     with np.errstate(over="ignore"):
         scaled = values / factor if divide else values * factor
-    return np.rint(np.minimum(scaled, float(limit))).astype(np.int64)
+    return np.rint(np.minimum(scaled, float(limit))).astype(np.int64)  # GRID-11
 
 
 def binary32_values(magnitudes: Ints) -> Floats:
@@ -80,7 +81,7 @@ def vax_values(magnitudes: Ints) -> Floats:
     exponent = magnitudes >> 23
     fraction = (magnitudes & 0x7FFFFF) | 0x800000
     values = np.ldexp(fraction.astype(np.float64), (exponent - 129 - 23).astype(np.int32))
-    return np.where(exponent == 0, 0.0, values)
+    return np.where(exponent == 0, 0.0, values)  # GRID-09
 
 
 def vax_magnitudes(values: Floats) -> Ints:

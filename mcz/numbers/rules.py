@@ -69,14 +69,16 @@ _LIMITS = {
 def fault(kind: GridKind, digits: int, flags: int, scale: float) -> str | None:
     """What is wrong with a grid, or None."""
     allowed, style = _ALLOWED.get(kind, ((0,), 0))
-    if digits not in allowed:
+    if digits not in allowed:  # GRID-02
         return f"{digits} digits"
-    if flags & ~style or any(flags & both == both for both in _CLASHES):
+    if flags & ~style or any(flags & both == both for both in _CLASHES):  # GRID-03, GRID-06
         return f"flags {flags}"
-    if kind == GridKind.TEXT64 and digits >= FIXED_TEXT and flags:
+    if kind == GridKind.TEXT64 and digits >= FIXED_TEXT and flags:  # GRID-03
         return f"flags {flags} with {digits} digits"
+    # GRID-03
     if kind == GridKind.FIXED and flags & (GridFlag.NO_ZERO if digits == 0 else GridFlag.POINT):
         return f"flags {flags} with {digits} digits"
+    # GRID-04
     if not (MIN_SCALE <= scale <= MAX_SCALE if kind == GridKind.SCALED else scale == 1.0):
         return f"scale {scale}"
     return None

@@ -20,14 +20,14 @@ def _exponents(kind: GridKind, digits: int) -> tuple[int, int, int]:
         case GridKind.FIXED | GridKind.TRIMMED:
             return 0, -_UNLIMITED, _UNLIMITED
         case GridKind.GENERAL:
-            return digits, -4, digits
+            return digits, -4, digits  # TEXT-01
         case GridKind.TEXT32:
             return 9, -4, 16
     if digits >= FIXED_TEXT:
         return 0, -_UNLIMITED, _UNLIMITED
     if digits >= 16:
         return digits, -4, digits
-    return (17, -6, 21) if digits == _JAVASCRIPT else (17, -4, 16)
+    return (17, -6, 21) if digits == _JAVASCRIPT else (17, -4, 16)  # TEXT-01
 
 
 def match(tokens: Tokens, kind: GridKind, digits: int, flags: int) -> tuple[Ints, Bools, int]:
@@ -76,7 +76,7 @@ def token_ordinals32(tokens: Tokens) -> Ints:
 def texts(kind: GridKind, digits: int, flags: int, magnitudes: Ints, negative: Bools) -> Texts:
     """Print the numbers of these magnitudes; they have been checked against the limit."""
     general, low, high = _exponents(kind, digits)
-    if kind == GridKind.TEXT64 and digits >= FIXED_TEXT:
+    if kind == GridKind.TEXT64 and digits >= FIXED_TEXT:  # TEXT-01
         return _joined(magnitudes.view(np.float64), negative, digits - FIXED_TEXT)
     if general == 0:
         mantissas, fractions = magnitudes, np.full(len(magnitudes), digits)
@@ -107,9 +107,10 @@ def float_digits(kind: GridKind, digits: int, magnitudes: Ints) -> tuple[Ints, I
 
 def text32_values(magnitudes: Ints) -> Floats:
     """The binary64 nearest to the shortest text of a binary32, not that binary32 itself."""
-    words, places = np.unique(magnitudes.astype(np.uint32), return_inverse=True)
+    words, inverse = np.unique(magnitudes.astype(np.uint32), return_inverse=True)
+    # GRID-09
     values = np.array([float(str(value)) for value in words.view(np.float32)], np.float64)
-    return values[places].reshape(magnitudes.shape)
+    return values[inverse].reshape(magnitudes.shape)
 
 
 def _joined(values: NDArray[np.float64], negative: Bools, decimals: int) -> Texts:

@@ -25,12 +25,12 @@ NAN = np.int64(0x7FF8000000000000).view(np.float64)  # the one NaN that values h
 EXACT_POWER = 22  # 10^22 is the last power of ten that a binary64 holds exactly
 TENS = np.array([float(f"1e{power}") for power in range(EXACT_POWER + 1)])
 
-_NAN_TEXT = re.compile(rb"[-+]?(nan(\(\w*\))?|\d\.#(q?nan|snan|ind)\d*)", re.IGNORECASE)
-_INF_TEXT = re.compile(rb"[-+]?(inf(inity)?|\d\.#inf\d*)", re.IGNORECASE)
+_NAN_TEXT = re.compile(rb"[-+]?(nan(\(\w*\))?|\d\.#(q?nan|snan|ind)\d*)", re.IGNORECASE)  # TEXT-04
+_INF_TEXT = re.compile(rb"[-+]?(inf(inity)?|\d\.#inf\d*)", re.IGNORECASE)  # TEXT-04
 
 
 def kernels() -> Any:
-    """The compiled loops; numba is imported here, on first use."""
+    """The compiled loops, imported on first use."""
     return importlib.import_module("mcz.numbers.kernels")
 
 
@@ -93,8 +93,8 @@ class Tokens:
         """The texts of all tokens, copied out of the buffer."""
         sizes = self.stop - self.start
         offsets = np.concatenate(([0], np.cumsum(sizes)))
-        places = np.arange(offsets[-1]) + np.repeat(self.start - offsets[:-1], sizes)
-        return Texts(self.text[places], offsets)
+        indices = np.arange(offsets[-1]) + np.repeat(self.start - offsets[:-1], sizes)
+        return Texts(self.text[indices], offsets)
 
     def bad(self) -> Bools:
         """Which tokens are no numbers at all; nan and inf are numbers here."""
@@ -112,8 +112,8 @@ class Tokens:
                 f"offset {self.start[first]}: {self.token(first)[:40]!r} is not a number"
             )
         out, slow = scale(mantissa, power - (shape >> loops.FRACTION_DIGITS))
-        slow |= (odd & loops.LONG) != 0
-        np.negative(out, where=(shape & loops.MINUS) != 0, out=out)
+        slow |= (odd & loops.LONG) != 0  # TEXT-03
+        np.negative(out, where=(shape & loops.MINUS) != 0, out=out)  # TEXT-03
         special = (odd & loops.SPECIAL) != 0
         if special.any():
             out[special] = [_value(text) for text in self[special].texts().tolist()]
@@ -130,7 +130,7 @@ def scan(
 ) -> Tokens:
     """Describe the tokens ``text[start[i]:stop[i]]`` of a buffer; a view of it is kept."""
     whole = text.view() if isinstance(text, np.ndarray) else np.frombuffer(text, np.uint8)
-    whole.flags.writeable = False  # one array type, so that numba compiles once
+    whole.flags.writeable = False  # nobody writes to it
     start = np.ascontiguousarray(start, np.int64)
     stop = np.ascontiguousarray(stop, np.int64)
     if len(start) != len(stop) or (
@@ -170,7 +170,7 @@ def _value(text: bytes, fallback: float | None = None) -> float:
     if _NAN_TEXT.fullmatch(text):
         return float(NAN)
     if _INF_TEXT.fullmatch(text):
-        return float("-inf" if text[:1] == b"-" else "inf")
+        return float("-inf" if text[:1] == b"-" else "inf")  # TEXT-04
     return float(text) if fallback is None else fallback
 
 

@@ -39,13 +39,13 @@ def dct_matrix(n: int) -> Floats:
 def _quarter(n: int) -> Floats:
     """cos(m pi / (2 n)) for m = 0 to n."""
     m = np.arange(n + 1)
-    x = (np.minimum(m, n - m) * HALF_PI) / n
+    x = (np.minimum(m, n - m) * HALF_PI) / n  # COS-01
     square = x * x
     cosine, sine = np.ones(n + 1), np.ones(n + 1)
     for i in range(9, 0, -1):
         cosine = 1.0 - square * cosine / ((2 * i - 1) * (2 * i))
         sine = 1.0 - square * sine / ((2 * i) * (2 * i + 1))
-    found: Floats = np.where(2 * m <= n, cosine, x * sine)
+    found: Floats = np.where(2 * m <= n, cosine, x * sine)  # COS-01
     return found
 
 
@@ -54,4 +54,4 @@ def _root(value: float) -> float:
     root = 1.0
     for _ in range(NEWTON_STEPS):
         root = (root + value / root) / 2.0
-    return root
+    return root  # COS-01

@@ -21,14 +21,14 @@ Ranges = list[tuple[int, int]]
 
 @cache
 def _kernels() -> Any:
-    from mcz.transforms import _dwt_kernels
+    from mcz.transforms import dwt_kernels
 
-    return _dwt_kernels
+    return dwt_kernels
 
 
 def own_range(first: int, stop: int, level: int, lengths: Sequence[int]) -> tuple[int, int]:
     """The coefficients of ``level`` that belong to the segment first <= frame < stop."""
-    last = stop == lengths[0]
+    last = stop == lengths[0]  # MRDWT-14
     return first >> level, lengths[level] if last else stop >> level
 
 
@@ -60,9 +60,8 @@ def analyze(
         last = own_range(first, at + len(window), level, lengths)[1]
         begin = 0 if have == 0 else (have + wavelet.n_taps - 1) // 2
         own = slice(start - begin, end - begin)
-        approx, detail = _kernels().analyze(
-            signal, have, lengths[level - 1], begin, last, low, high
-        )
+        approx, detail = np.zeros((2, last - begin, signal.shape[1]))
+        _kernels().analyze(approx, detail, signal, have, lengths[level - 1], begin, low, high)
         details.append(detail[own])
         have, signal = begin, approx
     return [signal[own], *reversed(details)]
@@ -83,7 +82,8 @@ def synthesize(
     signal = bands[0]
     for level in range(levels, 0, -1):
         detail = bands[levels + 1 - level]
-        signal = _kernels().synthesize(
-            signal, detail, firsts[level - 1], *ranges[level - 1], lo, hi
-        )
+        begin, end = ranges[level - 1]
+        finer = np.zeros((end - begin, signal.shape[1]))
+        _kernels().synthesize(finer, signal, detail, firsts[level - 1], begin, lo, hi)
+        signal = finer
     return np.array(signal, order="C")

@@ -73,7 +73,7 @@ def learn_basis(
     where there is no frame or a value is not finite, and for a sparsity, a number or a start that
     does not fit.
     """
-    from mcz.transforms._lsdt_kernels import truncate
+    from mcz.transforms.lsdt_kernels import truncate
 
     rows = _checked_frames(frames)
     n_points = rows.shape[1]

@@ -1,4 +1,4 @@
-"""The motion-adaptive post filter: smoother places for a reader who can wait for 12 rows.
+"""The motion-adaptive post filter: smoother positions for a reader who can wait for 12 rows.
 
 C.-H. Kwak, I. V. Bajić, "Online MoCap data coding with bit allocation, rate control, and
 motion-adaptive post-processing", section IV. Each coordinate of a point goes through one of three
@@ -89,7 +89,7 @@ def filter_rows(rows: Floats, rate: float, unit_cm: float) -> Floats:
 
 def _filter_middle(rows: Floats, past: Floats, bank: Floats, low: float, high: float) -> Floats:
     """All but the first and the last 12 of ``rows``, filtered; ``past`` is carried on."""
-    from mcz.transforms._post_filter_kernels import filter_middle
+    from mcz.transforms.post_filter_kernels import filter_middle
 
     out = np.empty((len(rows) - 2 * DELAY, rows.shape[1]))
     filter_middle(rows, past, bank, low, high, out)
@@ -101,7 +101,7 @@ def _settings(rate: float, unit_cm: float) -> tuple[Floats, float, float]:
     if not (math.isfinite(unit_cm) and unit_cm > 0):
         raise OptionError(f"post filter: a length unit of {unit_cm!r} cm")
     bank = np.ascontiguousarray(filter_taps(rate).T / SCALE)
-    low, high = (threshold / unit_cm for threshold in THRESHOLDS_CM)
+    low, high = (threshold / unit_cm for threshold in THRESHOLDS_CM)  # FILT-08
     return bank, low, high
 
 
@@ -119,8 +119,8 @@ def filter_taps(rate: float) -> NDArray[np.int64]:
         side = _windowed(min(cutoff / rate, 0.5))
         total = side[0]
         for value in side[1:]:
-            total = total + 2.0 * value
-        row[1:] = [math.floor(value / total * SCALE + 0.5) for value in side[1:]]
+            total = total + 2.0 * value  # FILT-07
+        row[1:] = [math.floor(value / total * SCALE + 0.5) for value in side[1:]]  # FILT-07
         row[0] = SCALE - 2 * row[1:].sum()
     taps.setflags(write=False)
     return taps

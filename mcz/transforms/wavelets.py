@@ -25,9 +25,9 @@ class Wavelet:
 
     def __post_init__(self) -> None:
         n_taps = len(self.lo)
-        if n_taps != len(self.hi) or n_taps % 2 or not 2 <= n_taps <= MAX_TAPS:
+        if n_taps != len(self.hi) or n_taps % 2 or not 2 <= n_taps <= MAX_TAPS:  # MRDWT-06
             raise FormatError(f"wavelet: filters of {n_taps} and {len(self.hi)} taps")
-        if not all(abs(tap) <= MAX_TAP for tap in (*self.lo, *self.hi)):
+        if not all(abs(tap) <= MAX_TAP for tap in (*self.lo, *self.hi)):  # MRDWT-07
             raise FormatError(f"wavelet: a tap beyond {MAX_TAP}")
 
     @property
@@ -60,24 +60,25 @@ class Wavelet:
 
 def _orthogonal(lo: tuple[float, ...]) -> Wavelet:
     signs = [1.0, -1.0] * (len(lo) // 2)
+    # WAVE-01
     return Wavelet(lo, tuple(s * tap for s, tap in zip(signs, reversed(lo), strict=True)))
 
 
 # Synthesis filters ``lo``; ``hi`` is the same backwards, every second tap with the other sign.
 _ORTHOGONAL: dict[str, tuple[float, ...]] = {
     "haar": (
-        0.7071067811865476,
+        0.7071067811865476,  # WAVE-01
         0.7071067811865476,
     ),
     "db2": (
         0.48296291314453416,
         0.8365163037378079,
-        0.2241438680420134,
+        0.2241438680420134,  # WAVE-01
         -0.12940952255126037,
     ),
     "db3": (
         0.33267055295008263,
-        0.8068915093110925,
+        0.8068915093110925,  # WAVE-01
         0.45987750211849154,
         -0.13501102001025458,
         -0.08544127388202666,
@@ -85,7 +86,7 @@ _ORTHOGONAL: dict[str, tuple[float, ...]] = {
     ),
     "db4": (
         0.2303778133088965,
-        0.7148465705529157,
+        0.7148465705529157,  # WAVE-01
         0.6308807679298589,
         -0.027983769416859854,
         -0.18703481171909309,
@@ -158,7 +159,7 @@ _ORTHOGONAL: dict[str, tuple[float, ...]] = {
         -0.012603967262037833,
         -0.09921954357684722,
         0.29785779560527736,
-        0.8037387518059161,
+        0.8037387518059161,  # WAVE-01
         0.49761866763201545,
         -0.02963552764599851,
         -0.07576571478927333,
@@ -172,7 +173,7 @@ _BIOR_4_4 = Wavelet(
         -0.06453888262869706,
         -0.04068941760916406,
         0.41809227322161724,
-        0.7884856164055829,
+        0.7884856164055829,  # WAVE-01
         0.41809227322161724,
         -0.04068941760916406,
         -0.06453888262869706,

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+import io
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import redirect_stderr
 from functools import cache
 from typing import Any
 
 from conformance import run
 
-CRASH = "crash"
+CRASH = ": crash: "
 
 
-def faults(vector: dict[str, Any]) -> list[str]:
-    """What is wrong with the answers about ``vector``, as the runner would say it."""
+def fault(vector: dict[str, Any]) -> str | None:
+    """What is first wrong with the answers about ``vector``, as the runner would say it."""
     from mcz.cli import conformance
 
-    found = []
     for request in run.requests(vector, conformance.OPTIONS):
         code, output = answer(request.path.read_bytes(), request.arguments)
         answered = code in (0, 1, 3)
-        fault = run.judge(request, code, output) if answered else f"{CRASH}: {output.decode()}"
-        if fault:
-            found.append(f"{' '.join(request.arguments)}: {fault}")
-    return found
+        said = run.judge(request, code, output) if answered else None
+        if not answered or said:
+            what = f": {said}" if answered else f"{CRASH}{output.decode()}"
+            return f"{' '.join(request.arguments)}{what}"
+    return None
 
 
 def answer(data: bytes, arguments: Sequence[str]) -> tuple[int, bytes]:
@@ -32,15 +34,10 @@ def answer(data: bytes, arguments: Sequence[str]) -> tuple[int, bytes]:
     A name or module that is not there is a slip in the break, and is raised.
     """
     from mcz.cli import conformance
-    from mcz.errors import MczError, UnsupportedError
 
     try:
-        given = conformance._parser().parse_args(list(arguments))
-        return 0, b"".join(conformance.respond(data, given))
-    except UnsupportedError:
-        return 3, b""
-    except MczError:
-        return 1, b""
+        with redirect_stderr(io.StringIO()):  # the reasons of refusals
+            return conformance.answer(data, arguments)
     except (ImportError, NameError):
         raise
     except Exception:
@@ -53,13 +50,17 @@ def vectors() -> dict[str, dict[str, Any]]:
     return {row["file"].removesuffix(".mcz"): row for row in run.load_manifest()}
 
 
-def by_name(names: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """The vectors of these names, or whose names begin so; raises KeyError where there is none."""
-    for wanted in names:
-        if wanted in vectors():
-            yield vectors()[wanted]
-            continue
-        found = [row for name, row in vectors().items() if name.startswith(wanted)]
-        if not found:
-            raise KeyError(f"no vector is called {wanted}")
-        yield from found
+@cache
+def of_rules() -> dict[str, list[str]]:
+    """The vectors that the manifest names for each rule, to be refused and small ones first."""
+    found: dict[str, list[str]] = {}
+    for name, row in vectors().items():
+        for rule in row["requirements"]:
+            found.setdefault(rule, []).append(name)
+    for names in found.values():
+        names.sort(key=lambda name: (not name.startswith("invalid/"), _size(name)))
+    return found
+
+
+def _size(name: str) -> int:
+    return (run.VECTORS / str(vectors()[name]["file"])).stat().st_size

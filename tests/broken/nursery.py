@@ -1,48 +1,74 @@
-"""A process that has all imports but those of mcz, and answers each name of a break by a child.
+"""A process that has all imports, and answers each request by a child that it breaks.
 
-A line of standard input names a break; a line of JSON says which of its vectors the decoder that is
-so broken fails, and how. Forking costs a tenth of a process of its own.
+A line of standard input is [rule, variant, [vector, ...], seconds]; without a rule nothing is
+broken, and a decoder that takes more seconds of the processor shows nothing. A line of JSON says
+which of the vectors was the first that the broken decoder fails, and how: {vector, fault, crashes};
+null where none was. Forking costs a hundredth of a process of its own.
 """
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
+import resource
 import signal
 import sys
+from types import FrameType
 
-from tests.broken import answers, install
-from tests.broken.table import BREAKS
+from tests.broken import answers, install, marks, variants
 
-SECONDS = 120  # of a child; one that hangs fails the test, and is not to hold up the others
+MEMORY = 2**32  # of a child
+
+
+class HangError(BaseException):
+    """No answer in time, which shows nothing."""
 
 
 def main() -> None:
-    import construct  # noqa: F401
-    import numba  # noqa: F401
-    import numpy  # noqa: F401
+    from mcz.cli import conformance  # noqa: F401
 
+    for module in sorted({place.module for row in marks.places().values() for place in row}):
+        importlib.import_module(module)
+        variants.whole(module)
     answers.vectors()
+    functions = install.live()
+    signal.signal(signal.SIGPROF, _hang)
     for line in sys.stdin:
+        sys.stdout.flush()
         pid = os.fork()
         if pid == 0:
-            signal.alarm(SECONDS)
-            _catch(line.strip())
-            sys.stdout.flush()
+            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+            rule, variant, vectors, seconds = json.loads(line)
+            signal.setitimer(signal.ITIMER_PROF, seconds)
+            print(json.dumps(_catch(functions, rule, variant, vectors)), flush=True)
             os._exit(0)
         status = os.waitpid(pid, 0)[1]
         if status:
-            print(json.dumps(f"the child ended with status {status}"), flush=True)
+            print(json.dumps({"slip": f"the child ended with status {status}"}), flush=True)
 
 
-def _catch(name: str) -> None:
+def _hang(number: int, frame: FrameType | None) -> None:
+    raise HangError
+
+
+def _catch(
+    functions: install.Live, rule: str, name: str, vectors: list[str]
+) -> dict[str, object] | None:
     try:
-        install(BREAKS[name])
-        rows = answers.by_name(BREAKS[name].vectors)
-        found: object = {row["file"]: answers.faults(row) for row in rows}
+        codes = variants.codes(rule, name) if rule else {}
+        if codes and not install.swap(codes, functions):
+            install.install(codes)
+        crash = None
+        for vector in vectors:
+            fault = answers.fault(answers.vectors()[vector])
+            if fault and answers.CRASH not in fault:
+                return {"vector": vector, "fault": fault, "crashes": False}
+            if fault and not crash:
+                crash = {"vector": vector, "fault": fault, "crashes": True}
+        return crash
     except BaseException as error:
-        found = f"{type(error).__name__}: {error}"
-    print(json.dumps(found))
+        return {"slip": f"{type(error).__name__}: {error}"}
 
 
 if __name__ == "__main__":

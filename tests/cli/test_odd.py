@@ -23,8 +23,8 @@ from mcz.cli.main import cli
 from mcz.codecs import by_name
 from mcz.container.writer import Writer
 from mcz.errors import AccessError, ExistsError
-from mcz.files.encoding import write_clip
 from mcz.motion import Signal
+from mcz.writing.clip_writer import write_clip
 from tests.motions import smooth
 
 BVH = (
@@ -117,7 +117,7 @@ def test_sigterm_leaves_nothing_behind(tmp_path: Path) -> None:
     program = (
         "import sys, time, click\n"
         "from mcz.cli.common import run\n"
-        "from mcz.files.targets import replacing\n"
+        "from mcz.writing.atomic import replacing\n"
         "@click.command()\n"
         "def command():\n"
         "    with replacing('out.mcz', force=False) as stream:\n"
@@ -242,7 +242,8 @@ def still(n_frames: int) -> mcz.Motion:
 @pytest.fixture
 def small_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     """A default limit of 1 MB, so that little needs to be decoded to pass it."""
-    monkeypatch.setattr("mcz.container.reader.output_limit", lambda size: 10**6)
+    for module in ("limits", "reader"):
+        monkeypatch.setattr(f"mcz.container.{module}.output_limit", lambda size: 10**6)
 
 
 @pytest.mark.usefixtures("small_limit")

@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 
 import mcz
-from mcz.container.following import Follower
-from mcz.files.arriving import encode_live
-from mcz.files.following import live_frames
+from mcz.container.walk_arriving import ArrivingWalker
 from mcz.formats import FORMATS, sniffed
+from mcz.live.strict_reader import live_frames
+from mcz.live.text_writer import encode_live
+from mcz.writing.entry import Terms
 
 ROOT = Path(mcz.__file__).parent.parent
 HEADER = (
@@ -259,14 +260,16 @@ def test_bad_amc(asf: Path, data: bytes, match: str) -> None:
         FORMATS["amc"].arrive(lines(data))
 
 
+def in_channels(asf: Path) -> Terms:
+    return Terms("lsdt-frame", {"step": 0.01, "domain": "channels"}, skeleton=asf)
+
+
 def test_bones_that_are_missing_are_invalid(asf: Path) -> None:
     data = b":DEGREES\n1\nroot 1 2 3 4 5 6\nknee 7\n2\nroot 1 2 3 4 5 6\n4\nknee 8\n"
     whole = FORMATS["amc"].read(data, "x", mcz.read_skeleton(asf))
     np.testing.assert_array_equal(arrived("amc", data, mcz.read_skeleton(asf)), whole.values)
     out = io.BytesIO()
-    report = encode_live(
-        lines(data), out, "amc", "lsdt-frame", {"step": 0.01, "domain": "channels"}, skeleton=asf
-    )
+    report = encode_live(lines(data), out, "amc", in_channels(asf))
     assert report.remarks == ("frame 4 comes where 3 is due; the clip counts on",)
     with mcz.open(out.getvalue()) as file:
         found = file.clips["live"].read()
@@ -277,9 +280,7 @@ def test_bones_that_are_missing_are_invalid(asf: Path) -> None:
 def test_other_channels_than_the_asf(asf: Path) -> None:
     data = b":RADIANS\n5\nroot 1 2 3 4 5 6\nknee 7 8 9\n6\nroot 1 2 3 4 5 6\nknee 7 8 9\n"
     out = io.BytesIO()
-    encode_live(
-        lines(data), out, "amc", "lsdt-frame", {"step": 0.01, "domain": "channels"}, skeleton=asf
-    )
+    encode_live(lines(data), out, "amc", in_channels(asf))
     with mcz.open(out.getvalue()) as file:
         clip = file.clips["live"]
         assert clip.skeleton.n_channels == 9
@@ -297,7 +298,7 @@ def test_real_clips_live(data: Path) -> None:
     text = b"".join(amc.read_bytes().splitlines(keepends=True)[: 3 + 30 * 50])
     motion = FORMATS["amc"].read(text, "17_10", mcz.read_skeleton(asf))
     out = io.BytesIO()
-    encode_live(lines(text), out, "amc", "lsdt-frame", {"step": 0.05}, skeleton=asf)
+    encode_live(lines(text), out, "amc", Terms("lsdt-frame", {"step": 0.05}, skeleton=asf))
     with mcz.open(out.getvalue()) as file:
         found = file.clips["live"].read().reshape(motion.n_frames, -1, 3)
     distances = np.sqrt(((found - mcz.positions(motion)) ** 2).sum(axis=2))
@@ -317,8 +318,10 @@ def test_formats_are_known_by_their_looks(asf: Path) -> None:
 
 def test_nothing_is_kept_that_was_used() -> None:
     out = io.BytesIO()
-    encode_live(lines(HEADER + b"".join(LINES) * 500), out, "bvh", "lsdt-frame", {"step": 0.01})
-    follower = Follower(io.BytesIO(out.getvalue()))
+    encode_live(
+        lines(HEADER + b"".join(LINES) * 500), out, "bvh", Terms("lsdt-frame", {"step": 0.01})
+    )
+    follower = ArrivingWalker(io.BytesIO(out.getvalue()))
     for arrival in follower.arrivals():
         if arrival.segment is not None:
             assert follower.clip is not None

@@ -19,7 +19,7 @@ import mcz
 from mcz.cli import common, tcp
 from mcz.cli.main import cli
 from mcz.cli.rows import Rows
-from mcz.files.following import live_frames
+from mcz.live.strict_reader import live_frames
 
 ROOT = Path(mcz.__file__).parent.parent
 NAMES = b"a,b\n"

@@ -13,10 +13,12 @@ import numpy as np
 
 import mcz
 from mcz.codecs import by_name
-from mcz.codecs.base import Encoded, Layout, Request, Segment, Span, model_finder
-from mcz.files.memory import MemorySource
-from mcz.files.sizes import clip_sizes
+from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span, model_finder
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.numbers import Grid, GridKind
+from mcz.reading.sizes import clip_sizes
+from mcz.writing.signal_source import MemorySource
+from tests.motions import smooth
 
 Array = np.ndarray
 
@@ -71,6 +73,22 @@ def markers(n_frames: int, n_markers: int = 4, seed: int = 0, unit_cm: float = 0
     signal = Signal(places.reshape(n_frames, 3 * n_markers))
     skeleton = Skeleton(joints, unit_cm=unit_cm)
     return Motion(skeleton, (signal,), frame_rate=Fraction(120), name="markers")
+
+
+def rough(n_frames: int, seed: int) -> Motion:
+    """Noise, spikes, steps, turns, constants and gaps beside the sines."""
+    generator = np.random.default_rng(seed)
+    motion = smooth(n_frames)
+    values = np.array(motion.signals[0].values)
+    values[:, 0] = generator.normal(size=n_frames) * 1e4
+    values[:, 1] += (generator.random(n_frames) < 0.05) * 1e6
+    values[:, 2] = np.cumsum(generator.integers(-9, 10, n_frames))
+    values[:, 3] = (np.arange(n_frames) * 17.0 + 180) % 360 - 180
+    values[:, 4] = 12.5
+    values[:, 5] = -0.0
+    mask = generator.random(values.shape) < np.linspace(0, 2, 10)
+    grids = (Grid(GridKind.BINARY64),) * 10
+    return replace(motion, signals=(Signal(np.where(mask, values, np.nan), grids, mask=mask),))
 
 
 def saved(codec: str, motion: Motion, **params: object) -> bytes:

@@ -12,16 +12,15 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import _awt_choice as choice
-from mcz.codecs._wavelet_codec import WAVELET_HEADER, transform_of
-from mcz.codecs.awt import CODEC
-from mcz.codecs.base import SignalSource
-from mcz.files.memory import MemorySource
+from mcz.codecs.contract import SignalSource
+from mcz.codecs.wavelet import awt_choices as choice
+from mcz.codecs.wavelet.awt import CODEC
+from mcz.codecs.wavelet.shared import WAVELET_HEADER, transform_of
 from mcz.metrics import compare
 from mcz.motion import Motion
 from mcz.schema import parse
 from mcz.transforms import wavelets
-from tests import plain_wavelets
+from mcz.writing.signal_source import MemorySource
 from tests.codecs.lossy import Direct, amc, bytes_of, saved, wandering
 from tests.motions import smooth
 
@@ -176,21 +175,6 @@ def test_long_clips_are_analyzed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(choice, "BLOCK_FRAMES", 100)
     for a, b in zip(whole, choice.coefficients_of("awt", source, transform), strict=True):
         np.testing.assert_array_equal(a, b)
-
-
-def test_a_plain_decoder_of_codec_2_reads_it() -> None:
-    for settings in ({"preset": "khan2014", "a_w": 10}, {"segment_frames": 16}):
-        coded = Direct("awt", smooth(50), **settings)
-        rows = plain_wavelets.decode(
-            coded.header,
-            coded.layout.n_channels,
-            coded.layout.n_frames,
-            coded.layout.n_resolutions,
-            [(s.first, s.n_frames, s.streams) for s in coded.segments],
-            0,
-            50,
-        )
-        assert np.array(rows, "<f8").tobytes() == coded.read().astype("<f8").tobytes()
 
 
 # The published figures

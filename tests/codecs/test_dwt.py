@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs._wavelet_codec import WAVELET_HEADER
+from mcz.codecs.wavelet.shared import WAVELET_HEADER
 from mcz.metrics import compare
 from mcz.motion import POSITION_KINDS
 from mcz.schema import parse
 from mcz.transforms import wavelets
-from tests import plain_wavelets
 from tests.codecs.lossy import Direct, amc, bytes_of, clip_of, decoded, saved, wandering
 from tests.motions import smooth
 
@@ -73,20 +72,6 @@ def test_it_is_mrdwt_with_a_flat_threshold() -> None:
         other = Direct("mrdwt", motion, T_g=0.7, threshold_rule="flat", **settings)
         assert own.segments == other.segments and own.header == other.header
         assert own.read().tobytes() == other.read().tobytes()
-
-
-def test_a_plain_decoder_of_codec_2_reads_it() -> None:
-    coded = Direct("dwt", smooth(50), preset="khan2014", t_w=1)
-    rows = plain_wavelets.decode(
-        coded.header,
-        coded.layout.n_channels,
-        coded.layout.n_frames,
-        coded.layout.n_resolutions,
-        [(s.first, s.n_frames, s.streams) for s in coded.segments],
-        0,
-        50,
-    )
-    assert np.array(rows, "<f8").tobytes() == coded.read().astype("<f8").tobytes()
 
 
 def test_presets() -> None:

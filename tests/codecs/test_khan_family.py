@@ -15,7 +15,9 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import CODECS, awt, by_name, dwt, pca
+from mcz.codecs import CODECS, by_name
+from mcz.codecs.pca import pca
+from mcz.codecs.wavelet import awt, dwt
 from mcz.metrics import compare
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
 from tests.codecs.lossy import Direct, bones, clip_of, decoded, gapped, saved, wandering

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import lossless
-from mcz.codecs._lossless_units import find_unit, of_multiples
-from mcz.codecs.base import Layout, Request, Span
+from mcz.codecs.contract import Layout, Request, Span
+from mcz.codecs.lossless import lossless
+from mcz.codecs.lossless.units import find_unit, of_multiples
 from mcz.coding.logistic import NODES, squash_table, stretch_table
 from mcz.errors import FormatError
 from mcz.formats import FORMATS
@@ -204,6 +204,7 @@ def test_logistic_tables() -> None:
 
 @pytest.mark.parametrize("name", ["walk.bvh", "walk.amc"])
 @given(data=st.data())
+@settings(max_examples=25)  # a whole clip each
 def test_one_ordinal_changes_exactly_one_number(
     name: str, samples: Path, data: st.DataObject
 ) -> None:

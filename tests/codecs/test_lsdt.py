@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import _bases, _space_choice, by_name
-from mcz.codecs.base import Layout, Model, Request, Span, id_of
-from mcz.codecs.lsdt_frame import CODEC as FRAME
+from mcz.codecs import basis_models, by_name, space_choices
+from mcz.codecs.contract import Layout, Model, Request, Span, id_of
+from mcz.codecs.spatial.lsdt_frame import CODEC as FRAME
 from mcz.kinematics import point_names
 from mcz.motion import Motion, Signal
 from tests.codecs.lossy import (
@@ -31,7 +31,7 @@ from tests.codecs.lossy import (
 )
 
 CODECS = ["lsdt-frame", "lsdt-clip"]
-CODERS = st.sampled_from(["adaptive", "prefix"])
+CODERS = st.sampled_from(["mixed", "prefix"])
 THRESHOLD = 0.6
 ROUNDED = 1.05  # what a basis of 7 binary digits may add to an error, and more
 
@@ -49,7 +49,7 @@ ROUNDED = 1.05  # what a basis of 7 binary digits may add to an error, and more
     st.one_of(st.none(), st.integers(1, 60)),
 )
 @example("lsdt-frame", 1, 1, 0.0, "prefix", "learned", None)
-@example("lsdt-clip", 2, 1, 0.0, "adaptive", "learned", 1)
+@example("lsdt-clip", 2, 1, 0.0, "mixed", "learned", 1)
 def test_a_coefficient_loses_at_most_the_threshold(
     codec, n_frames, n_markers, power, coder, basis, segment_frames
 ) -> None:
@@ -91,14 +91,14 @@ def test_a_finer_step_costs_more_and_errs_less(codec) -> None:
 
 
 @pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+@pytest.mark.parametrize("coder", ["mixed", "prefix"])
 def test_a_still_clip_is_small(codec, coder) -> None:
     """600 frames of 12 channels: a few bits a frame."""
     motion = clip_of(np.tile(np.arange(12.0), (600, 1)), ["tx", "ty", "tz"] * 4)
     data = saved(codec, motion, step=0.01, coder=coder, domain="channels")
     found = decoded(codec, motion, step=0.01, coder=coder, domain="channels")
     assert np.abs(found - motion.values).max() < 1
-    assert bytes_of(data) < (1200 if coder == "adaptive" else 3000)
+    assert bytes_of(data) < (1200 if coder == "mixed" else 3000)
 
 
 @pytest.mark.parametrize("codec", CODECS)
@@ -133,7 +133,7 @@ def test_gaps_stay_and_what_lies_beneath_is_not_coded(codec) -> None:
 
 
 @pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+@pytest.mark.parametrize("coder", ["mixed", "prefix"])
 @pytest.mark.parametrize(("n_frames", "n_markers"), [(0, 2), (1, 1), (2, 3), (5, 0), (0, 0)])
 def test_small_clips(codec, coder, n_frames, n_markers) -> None:
     motion = markers(n_frames, n_markers)
@@ -173,7 +173,7 @@ def test_a_basis_that_is_not_there_or_does_not_fit(tmp_path: Path) -> None:
     with pytest.raises(mcz.AccessError):
         saved("lsdt-clip", markers(10), basis=str(tmp_path / "no.bases"))
     other = tmp_path / "five.bases"
-    other.write_bytes(_bases.build_bases([np.eye(5)] * 3))
+    other.write_bytes(basis_models.build_bases([np.eye(5)] * 3))
     with pytest.raises(mcz.OptionError, match="do not fit"):
         saved("lsdt-clip", markers(10, 4), basis=str(other))
     other.write_bytes(other.read_bytes()[:20])
@@ -198,7 +198,7 @@ def test_a_part_is_what_it_is_in_the_whole(codec, segment_frames, coder, data) -
 def test_a_window_decodes_without_the_others() -> None:
     coded = Direct("lsdt-clip", markers(100, 3), step=0.2, window=20)
     whole, data = coded.read(), coded.stream(0, 0, 0)
-    from mcz.codecs._window_streams import windows_of
+    from mcz.codecs.spatial.window_streams import windows_of
     from mcz.schema import varint
 
     parts = list(windows_of(data, 5, "test"))
@@ -243,7 +243,7 @@ def test_a_basis_is_in_the_file_and_a_decoder_without_it_refuses() -> None:
 
 
 def test_an_archive_has_the_well_known_models_too() -> None:
-    data = _bases.known_models()["cmu31"].data
+    data = basis_models.known_models()["cmu31"].data
     for archive in (False, True):
         out = io.BytesIO()
         mcz.write(markers(20, 31), out, codec="lsdt-clip", basis="known", archive=archive)
@@ -254,8 +254,8 @@ def test_a_model_of_another_kind_or_shape_is_refused() -> None:
     coded = Direct("lsdt-clip", markers(60, 5), basis="learned")
     for model, words in (
         (Model(2, b"?"), "kind 2"),
-        (_bases.model_of([np.eye(5)] * 2), "2 bases, 3 are due"),
-        (_bases.model_of([np.eye(4)] * 3), "4 entries for 5 points"),
+        (basis_models.model_of([np.eye(5)] * 2), "2 bases, 3 are due"),
+        (basis_models.model_of([np.eye(4)] * 3), "4 entries for 5 points"),
         (Model(1, b"\x00"), "0 bases"),
     ):
         given_ = replace(coded.layout, find_model=lambda _, m=model: m)
@@ -265,11 +265,11 @@ def test_a_model_of_another_kind_or_shape_is_refused() -> None:
 
 def test_clips_of_a_file_share_a_basis(tmp_path: Path) -> None:
     path = tmp_path / "b.bases"
-    path.write_bytes(_bases.build_bases([np.eye(4)] * 3))
+    path.write_bytes(basis_models.build_bases([np.eye(4)] * 3))
     motions = [replace(markers(50, 4, seed), name=f"c{seed}") for seed in range(3)]
     from mcz.codecs import by_name
     from mcz.container.writer import Writer
-    from mcz.files.tuning import write_tuned
+    from mcz.writing.tuning import write_tuned
 
     with open(tmp_path / "all.mcz", "wb") as stream:
         writer = Writer(stream)
@@ -287,8 +287,8 @@ def test_clips_of_a_file_share_a_basis(tmp_path: Path) -> None:
 def test_bases_survive(n_vectors, more, shift, seed) -> None:
     vectors = np.random.default_rng(seed).normal(size=(n_vectors, n_vectors + more - 1))
     vectors = np.clip(vectors, -0.9, 0.9)
-    first, second = _bases.rounded(vectors, shift), _bases.rounded(np.eye(3), 7)
-    found = _bases.parse_bases(_bases.build_bases([first, second]))
+    first, second = basis_models.rounded(vectors, shift), basis_models.rounded(np.eye(3), 7)
+    found = basis_models.parse_bases(basis_models.build_bases([first, second]))
     np.testing.assert_array_equal(found[0].entries, first.entries)
     np.testing.assert_array_equal(found[0].shifts, first.shifts)
     np.testing.assert_array_equal(found[1].vectors, np.eye(3))
@@ -297,34 +297,34 @@ def test_bases_survive(n_vectors, more, shift, seed) -> None:
 
 def test_no_cut_of_a_model_is_the_model() -> None:
     """What is left of a range coder's bytes may spell other entries: ids tell models apart."""
-    data = _bases.build_bases([np.linalg.qr(np.random.default_rng(0).normal(size=(5, 5)))[0]])
-    (meant,) = _bases.parse_bases(data)
+    data = basis_models.build_bases([np.linalg.qr(np.random.default_rng(0).normal(size=(5, 5)))[0]])
+    (meant,) = basis_models.parse_bases(data)
     for size in range(len(data)):
         try:
-            (found,) = _bases.parse_bases(data[:size])
+            (found,) = basis_models.parse_bases(data[:size])
         except mcz.FormatError:
             continue
         assert (found.entries != meant.entries).any()
     with pytest.raises(mcz.FormatError):
-        _bases.parse_bases(data + b"\x00")
+        basis_models.parse_bases(data + b"\x00")
 
 
 def test_too_many_points_are_refused() -> None:
     for head in (b"\x00", b"\x11", b"\x01\x81\x10\x01", b"\x01\x01\x02", b"\x02" + b"\x80\x10" * 2):
         with pytest.raises(mcz.FormatError):
-            _bases.parse_bases(head + bytes(3000))
+            basis_models.parse_bases(head + bytes(3000))
     with pytest.raises(mcz.MotionError):
-        _bases.build_bases([np.zeros((1, 2049))])
+        basis_models.build_bases([np.zeros((1, 2049))])
     with pytest.raises(mcz.MotionError, match="exceeds"):
-        _bases.build_bases([np.full((1, 1), 2.0)], shift=40)
+        basis_models.build_bases([np.full((1, 1), 2.0)], shift=40)
 
 
 def test_well_known_bases_are_nearly_orthogonal() -> None:
     """Rounding to few digits must not let errors grow."""
-    models = _bases.known_models()
+    models = basis_models.known_models()
     assert models
     for model in models.values():
-        for basis in _bases.parse_bases(model.data):
+        for basis in basis_models.parse_bases(model.data):
             assert basis.entries.shape[0] == basis.entries.shape[1]
             assert np.linalg.cond(basis.vectors) < 1.25
 
@@ -439,7 +439,7 @@ def test_segments_that_bear_upon_others_are_refused(codec, span) -> None:
 
 
 @pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+@pytest.mark.parametrize("coder", ["mixed", "prefix"])
 def test_every_cut_and_bit_of_a_header_or_stream(codec, coder) -> None:
     """Values, or one of our errors; what is cut never gives the same values."""
     coded = Direct(codec, markers(12, 2), step=0.5, coder=coder, basis="cosines")
@@ -495,7 +495,7 @@ def test_the_well_known_basis_beats_cosines(data: Path) -> None:
 
 def test_channels_have_weights_and_places_have_none() -> None:
     skeleton = wandering(5, ["rx", "tx"]).skeleton
-    assert not _space_choice.is_places(skeleton)
-    assert _space_choice.is_places(markers(1, 3).skeleton)
+    assert not space_choices.are_positions(skeleton)
+    assert space_choices.are_positions(markers(1, 3).skeleton)
     motion: Motion = markers(5, 0)
-    assert not _space_choice.is_places(motion.skeleton)
+    assert not space_choices.are_positions(motion.skeleton)

@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import CODECS, _bases, mdtt, pca_rdo
-from mcz.codecs._space import APART, COURSES, LEARNED, MEAN, WEIGHTED
-from mcz.codecs._windows import WINDOWS_HEADER
-from mcz.codecs.base import Model, Span, id_of
-from mcz.files.sizes import clip_sizes
+from mcz.codecs import CODECS, basis_models
+from mcz.codecs.contract import Model, Span, id_of
+from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
+from mcz.codecs.spatial import mdtt, pca_rdo
+from mcz.codecs.spatial.windows import WINDOWS_HEADER
 from mcz.kinematics import point_names
 from mcz.motion import Joint, Motion, Signal, Skeleton
+from mcz.reading.sizes import clip_sizes
 from mcz.schema import build, parse
 from tests.codecs.lossy import (
     Direct,
@@ -34,7 +35,7 @@ from tests.codecs.lossy import (
 )
 
 NAMES = ["mdtt", "pca-rdo"]
-CODERS = st.sampled_from(["adaptive", "prefix"])
+CODERS = st.sampled_from(["mixed", "prefix"])
 KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx", "length"]), min_size=1, max_size=5)
 ALL = {"rank": 2048, "frequencies": 2048}  # nothing is cut
 BOUND = 0.8  # of a step: the threshold, and what rounding the bases may add
@@ -50,7 +51,7 @@ def root_mean_square(values: np.ndarray) -> float:
 
 def test_the_table_of_codecs_has_them() -> None:
     assert [CODECS[9], CODECS[10]] == [mdtt.CODEC, pca_rdo.CODEC]
-    assert all(CODECS[i].places and CODECS[i].domain == "values" for i in (9, 10))
+    assert all(CODECS[i].positions and CODECS[i].domain == "values" for i in (9, 10))
 
 
 # Bounds
@@ -65,7 +66,7 @@ def test_the_table_of_codecs_has_them() -> None:
     st.integers(1, 40),
 )
 @example("pca-rdo", 1, 1, 0.0, "prefix", 1)
-@example("mdtt", 2, 1, 0.0, "adaptive", 1)
+@example("mdtt", 2, 1, 0.0, "mixed", 1)
 def test_without_cuts_a_coefficient_loses_at_most_the_threshold(
     codec, n_frames, n_markers, power, coder, window
 ) -> None:
@@ -133,7 +134,7 @@ def test_ranks_are_those_of_the_motion() -> None:
     motion = markers(600, 20)
     motion = replace(motion, signals=(Signal(values.reshape(600, 60)),))
     coded = Direct("mdtt", motion, step=0.01)
-    bases = _bases.parse_bases(coded.models[0][0].data)
+    bases = basis_models.parse_bases(coded.models[0][0].data)
     assert [len(basis.entries) for basis in bases] == [2, 2, 2]
     assert root_mean_square(coded.read() - values.reshape(600, 60)) < 0.02
 
@@ -189,7 +190,7 @@ def test_gaps_stay_and_what_lies_beneath_is_not_coded(codec) -> None:
 
 
 @pytest.mark.parametrize("codec", NAMES)
-@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+@pytest.mark.parametrize("coder", ["mixed", "prefix"])
 @pytest.mark.parametrize(
     ("n_frames", "n_markers"), [(0, 2), (1, 1), (2, 3), (5, 0), (0, 0), (121, 2), (241, 1)]
 )
@@ -348,7 +349,7 @@ def test_a_decoder_without_the_model_refuses(codec) -> None:
 )
 def test_models_of_another_shape_are_refused(codec, bases, words) -> None:
     coded = Direct(codec, markers(60, 5), window=20, frequencies=3)
-    model = _bases.model_of([np.eye(*shape) for shape in bases])
+    model = basis_models.model_of([np.eye(*shape) for shape in bases])
     given_ = replace(coded.layout, find_model=lambda _: model)
     with pytest.raises(mcz.FormatError, match=words):
         coded.read(changes={"layout": given_})
@@ -374,7 +375,7 @@ def test_segments_that_bear_upon_others_are_refused(codec, span) -> None:
 
 
 @pytest.mark.parametrize("codec", NAMES)
-@pytest.mark.parametrize("coder", ["adaptive", "prefix"])
+@pytest.mark.parametrize("coder", ["mixed", "prefix"])
 def test_every_cut_and_bit_of_header_stream_and_model(codec, coder) -> None:
     """Values, or one of our errors; what is cut never gives the same values."""
     coded = Direct(codec, markers(12, 2), step=0.5, coder=coder)

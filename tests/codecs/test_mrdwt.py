@@ -18,18 +18,18 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import _wavelet_streams as streams
-from mcz.codecs import by_name, mrdwt
-from mcz.codecs._wavelet_codec import WAVELET_HEADER
-from mcz.codecs._wavelet_quantizer import code_of, ratio_of
-from mcz.codecs.base import Encoded, Layout, Request, Segment, Span
-from mcz.files.memory import MemorySource
-from mcz.files.sizes import clip_sizes
+from mcz.codecs import by_name
+from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span
+from mcz.codecs.steps import code_of, ratio_of
+from mcz.codecs.wavelet import mrdwt, streams
+from mcz.codecs.wavelet.shared import WAVELET_HEADER
 from mcz.metrics import compare
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, joint_columns
+from mcz.reading.sizes import clip_sizes
 from mcz.schema import build, parse
 from mcz.transforms import wavelets
 from mcz.transforms.dwt import own_range
+from mcz.writing.signal_source import MemorySource
 from tests.formats.c3d_files import INTEL, SGI, made
 from tests.motions import smooth
 from tests.repair import flipped, flips, joined, parts_of, replaced, use
@@ -747,7 +747,7 @@ def test_default_levels_fit_the_clip() -> None:
 
 def test_thresholds_by_depth() -> None:
     """Eq. 2 of Khan 2016: sqrt(log2(d + 2)), d the share of the greatest depth."""
-    from mcz.codecs._wavelet_quantizer import weights_of
+    from mcz.codecs.weights import weights_of
 
     found = weights_of(bones(["rx"] * 5), np.zeros((1, 5)), "depth", unit_aware=False)
     np.testing.assert_allclose(found, [math.sqrt(math.log2(d / 4 + 2)) for d in range(5)])
@@ -1038,7 +1038,7 @@ SIZE_OF_17_10 = 2_214_137
 
 
 def amc(data: Path, name: str) -> Motion:
-    from mcz.files.file import read
+    from mcz.reading.read import read
 
     subject = name.split("_", maxsplit=1)[0]
     asf = data / "cmu" / "asf" / f"{subject}.asf"

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import by_name
-from mcz.codecs._online_plan import gaussian, laplacian, rates
-from mcz.codecs._online_units import INTRA, LTR, STR, Unit, build_units, parse_units
-from mcz.codecs.base import Layout, Request, Span
+from mcz.codecs.contract import Layout, Request, Span, model_finder
+from mcz.codecs.online.choices import gaussian, laplacian, rates
+from mcz.codecs.online.units import INTRA, LTR, STR, Unit, build_units, parse_units
 from mcz.errors import LostFrameError
+from mcz.writing.signal_source import MemorySource
 from tests.codecs.lossy import Direct, amc, bytes_of, decoded, gapped, markers, saved
 
 ONLINE = by_name("online")
@@ -231,7 +232,7 @@ def test_a_rate_that_was_too_low_is_forgotten() -> None:
     errors = []
     for at, row in enumerate(motion.values):
         if at in (300, 500):
-            encoder.change({"bitrate": 0.001 if at == 300 else 20.0})
+            encoder.change(parsed({"bitrate": 0.001 if at == 300 else 20.0}))
         errors.append(np.abs(decoder.push(*encoder.push(row)) - row).mean())
     assert np.mean(errors[780:]) < 2 * np.mean(errors[100:300]) + 1
 
@@ -289,13 +290,21 @@ def test_frame_by_frame_gives_the_values_of_the_whole(
         np.testing.assert_array_equal(again, found[start:])
 
 
+def parsed(params):
+    """Parameters as an encoder is given them."""
+    options = ONLINE.options(params)
+    return {name: options[name] for name in params}
+
+
 def live_pair(motion, **params):
-    layout = Direct("online", motion, **params).layout
+    layout = MemorySource(motion, 0, ONLINE, 2**26).layout
     encoder = ONLINE.live(replace(layout, n_frames=0), ONLINE.options(params))
-    return encoder, ONLINE.follow(encoder.header, layout)
+    known = replace(layout, find_model=model_finder(encoder.models))
+    return encoder, ONLINE.follow(encoder.header, known)
 
 
 @given(st.sets(st.integers(0, 79), max_size=12), st.integers(1, 9), st.integers(0, 3))
+@settings(max_examples=30)  # of 80 frames each; test_online_losses.py has damage, too
 def test_what_is_decoded_after_a_loss_is_right(lost, gof, period) -> None:
     """A lost STR spoils its group, a lost LTR all up to the next intra coded one."""
     motion = markers(80, 2)
@@ -353,8 +362,8 @@ def test_parameters_change_at_the_border_of_a_group() -> None:
     sizes, kinds = [], []
     for at, row in enumerate(motion.values):
         if at == 15:
-            encoder.change({"step": 4.0})
-            encoder.change({"gof": 5, "intra_period": 1})
+            encoder.change(parsed({"step": 4.0}))
+            encoder.change(parsed({"gof": 5, "intra_period": 1}))
         packet = encoder.push(row)
         assert at >= 20 or packet == other.push(row)
         (unit,) = parse_units("online", packet[0], 1)
@@ -373,7 +382,7 @@ def test_parameters_change_at_the_border_of_a_group() -> None:
 def test_what_cannot_change_is_refused(options) -> None:
     encoder, _ = live_pair(markers(10, 2), step=0.5)
     with pytest.raises(mcz.OptionError):
-        encoder.change(options)
+        encoder.change(parsed(options))
 
 
 def test_a_frame_that_is_refused_live_leaves_no_trace() -> None:

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import _pca_streams as streams
-from mcz.codecs._pca_fit import components_of, principal
-from mcz.codecs._pca_streams import Components
-from mcz.codecs.base import Layout, Request, Span
-from mcz.codecs.pca import CODEC
+from mcz.codecs.contract import Layout, Request, Span
+from mcz.codecs.pca import streams
+from mcz.codecs.pca.choices import components_of, principal
+from mcz.codecs.pca.pca import CODEC
+from mcz.codecs.pca.streams import Components
 from mcz.metrics import compare
 from tests.codecs.lossy import Direct, amc, bytes_of, clip_of, decoded, saved, wandering
 from tests.motions import smooth

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs import _bases
-from mcz.codecs._space import COURSES
-from mcz.codecs._window_kernels import synthesize_courses
-from mcz.codecs._windows import WINDOWS_HEADER
-from mcz.codecs.base import id_of, model_finder
-from mcz.files.sizes import clip_sizes
+from mcz.codecs import basis_models
+from mcz.codecs.contract import id_of, model_finder
+from mcz.codecs.space import COURSES
+from mcz.codecs.spatial.window_kernels import synthesize_courses
+from mcz.codecs.spatial.windows import WINDOWS_HEADER
 from mcz.motion import Signal
+from mcz.reading.sizes import clip_sizes
 from mcz.schema import build, parse
 from mcz.transforms.dct import dct_matrix
 from tests.codecs.lossy import Direct, amc, bytes_of, decoded, markers, saved
@@ -25,8 +25,8 @@ from tests.codecs.lossy import Direct, amc, bytes_of, decoded, markers, saved
 NAME = "pca-rdo"
 
 
-def bases_of(coded: Direct) -> tuple[_bases.Basis, ...]:
-    return _bases.parse_bases(coded.models[0][0].data)
+def bases_of(coded: Direct) -> tuple[basis_models.Basis, ...]:
+    return basis_models.parse_bases(coded.models[0][0].data)
 
 
 def moving(courses: np.ndarray, n_markers: int = 20, seed: int = 3) -> mcz.Motion:
@@ -105,7 +105,7 @@ def test_places_far_away() -> None:
 
 
 def test_courses_that_take_too_long_are_refused() -> None:
-    model = _bases.model_of([np.eye(1, 6), np.eye(600, 2000), np.zeros((1, 6))], 1)
+    model = basis_models.model_of([np.eye(1, 6), np.eye(600, 2000), np.zeros((1, 6))], 1)
     coded = Direct(NAME, markers(9, 2))
     fields = parse(WINDOWS_HEADER, coded.header, "header")
     fields.window, fields.n_frequencies = 2000, 600

@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import _qbc_streams as streams
-from mcz.codecs import by_name, qbc
-from mcz.codecs._lossy import SCALED
-from mcz.codecs._qbc_plan import STEP_SHARE
-from mcz.files.memory import MemorySource
+from mcz.codecs import by_name
+from mcz.codecs.curves import qbc, streams
+from mcz.codecs.curves.choices import STEP_SHARE
+from mcz.codecs.parameters import SCALED
 from mcz.kinematics import reach
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import parse
+from mcz.writing.signal_source import MemorySource
 from tests.codecs import lossy
 from tests.codecs.lossy import Direct, bones, bytes_of, clip_of, gapped, wandering
 from tests.motions import smooth

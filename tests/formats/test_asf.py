@@ -86,6 +86,8 @@ def test_other_lengths_have_an_unknown_unit() -> None:
         (TEXT, "HIERARCHY\nROOT\n", "line 1: no :root or :bonedata"),
         ("length 2", "length two", "line 21: 'two'"),
         ("length 2", "length", "line 21: ''"),
+        ("length 2", "length \u0662", "line 21: '\u0662'"),
+        ("length 2", "length 2\u2028", "line 21: "),
         ("0.5 -1e-1 0", "0.5 -1e-1", "line 22: ''"),
         ("length 2", "length 1e309", "line 21: '1e309'"),
         ("zyx", "zyz", "line 14: axis order 'ZYZ'"),

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 import mcz
 from mcz.container.scan import scan
 from mcz.errors import LimitError, MczError, OptionError, UnsupportedError
-from mcz.files.clip import Clip
-from mcz.files.file import File
-from mcz.files.filtering import filtered_part
-from mcz.files.report import info, validate
-from mcz.files.signals import SignalReader
+from mcz.reading.clip import Clip
+from mcz.reading.file import File
+from mcz.reading.post_filtering import filtered_part
+from mcz.reading.report import info, validate
+from mcz.reading.signal_reader import SignalReader
 from tools.fuzz.guard import hold
 from tools.fuzz.repair import unhashed
 

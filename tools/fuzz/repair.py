@@ -43,10 +43,10 @@ from mcz.container.packets import (
 from mcz.container.scan import scan
 from mcz.container.segments import SegmentHeader, parse_header
 from mcz.container.source import Forward, open_source
+from mcz.container.value_hash import value_hash
 from mcz.container.writer import payload_id
 from mcz.errors import FormatError, MczError
-from mcz.files.clip import Clip
-from mcz.files.digest import value_hash
+from mcz.reading.clip import Clip
 from mcz.schema import build, deflate, inflate, parse, read_varint, varint
 
 SHARED = (b"SKEL", b"SRCE", b"MODL")  # chunks with an id

@@ -19,11 +19,9 @@ HANG = 150  # seconds of wall time after which libFuzzer ends the process, in a 
 
 def main() -> None:
     given = _parser().parse_args()
-    if given.plain:
-        os.environ["NUMBA_DISABLE_JIT"] = "1"
     # An index out of bounds then raises in compiled loops, too, instead of reading what is there.
-    os.environ["NUMBA_BOUNDSCHECK"] = "1"
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(given.cache))
+    os.environ["MCZ_LOOPS"] = "interpreted" if given.plain else "checked"
+    os.environ.setdefault("MCZ_CACHE_DIR", str(given.cache))
     import atheris
 
     _import_instrumented(atheris, plain=given.plain)

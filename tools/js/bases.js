@@ -4,7 +4,7 @@ import { annexBytes } from "./annex.js";
 import { ByteReader } from "./bytes.js";
 import { basisScale, table } from "./codecs/pca.js";
 import { RangeDecoder } from "./entropy.js";
-import { Residuals } from "./residuals.js";
+import { CONTEXTS, MIXERS, Residuals } from "./residuals.js";
 import { startModels } from "./start-models.js";
 
 const WHAT = "a model of bases"; // in messages
@@ -12,10 +12,6 @@ const MOST_BASES = 16;
 const MOST_POINTS = 2048;
 const MOST_DIGITS = 40;
 const MOST_ENTRIES = 2 ** 22;
-
-// Where residuals of the basis begin in the model of codec 4.
-const BASIS_CONTEXT = 2568;
-const BASIS_MIXER = 17;
 
 /** Models that a clip may name although the file does not have them: id -> annex file. */
 const WELL_KNOWN = new Map([
@@ -82,7 +78,7 @@ function decodeBases(data) {
   const shapes = readShapes(reader);
   const coder = new RangeDecoder(reader.rest());
   const model = startModels("pca_start.json")[0].copy();
-  const residuals = new Residuals(model, BASIS_CONTEXT, BASIS_MIXER);
+  const residuals = new Residuals(model, CONTEXTS, MIXERS);
   const bases = shapes.map((shape) => decodeBasis(coder, residuals, shape));
   coder.finish(WHAT);
   return bases;

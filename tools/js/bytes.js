@@ -71,7 +71,7 @@ export class ByteReader {
     return this.stop - this.at;
   }
 
-  /** Throws {@link Refused} with the name of the structure and the place. */
+  /** Throws {@link Refused} with the name of the structure and the byte. */
   refuse(message) {
     throw new Refused(`${this.what}, byte ${this.at}: ${message}`);
   }

@@ -85,11 +85,11 @@ function listArrays(clips) {
   const contents = [];
   for (const clip of clips) {
     for (const { name, nRows, nChannels, values, mask } of clip.signals) {
-      const place = { clip: clip.name, signal: name };
-      const shape = [number(nRows), number(nChannels)];
+      const names = { clip: clip.name, signal: name };
+      const shape = [nRows, nChannels];
       const dtype = values instanceof BigInt64Array ? "<i8" : "<f8";
       const add = (array, type, content) => {
-        arrays.push({ ...place, array, dtype: type, shape, bytes: content.length });
+        arrays.push({ ...names, array, dtype: type, shape, bytes: content.length });
         contents.push(content);
       };
       add("values", dtype, bytesOf(values));
@@ -102,11 +102,6 @@ function listArrays(clips) {
 function listSources(files) {
   const list = files.map(({ path, bytes }) => ({ path, bytes: bytes.length }));
   return [line({ sources: list }), ...files.map((file) => file.bytes)];
-}
-
-/** An integer beyond 2^53 is a string in the line. */
-function number(value) {
-  return value > 2 ** 53 ? String(value) : value;
 }
 
 function line(document) {

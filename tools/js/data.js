@@ -106,7 +106,7 @@ export function frameSegment(body, fresh, signal, limits) {
   return segment;
 }
 
-/** What a segment's place and size have to be. */
+/** What a segment's frames and size have to be. */
 function checkSegment(segment, signal, limits) {
   const { firstFrame, nFrames, nRows, lead, tail } = segment;
   const what = `segment at frame ${firstFrame} of ${signal.name}`;

@@ -13,14 +13,12 @@ export const VERSION = `${MAJOR}.${GREATEST_MINOR}`;
 
 /**
  * @param {Uint8Array} payload of HEAD
- * @returns {{major: number, minor: number, limits: object}} the version of the writer, and the
- *   limits of the profile
+ * @returns {object} the limits of the profile
  * @throws {Refused | Unsupported}
  */
 export function readHead(payload) {
   const reader = new ByteReader(payload, "HEAD");
-  const major = reader.u8();
-  const minor = reader.u8();
+  reader.take(2); // the version of the writer
   const needsMajor = reader.u8();
   const needsMinor = reader.u8();
   const profileId = reader.u8();
@@ -28,5 +26,5 @@ export function readHead(payload) {
   if (needsMajor !== MAJOR || needsMinor < LEAST_MINOR || needsMinor > GREATEST_MINOR) {
     throw new Unsupported(`a file that needs version ${needsMajor}.${needsMinor}`);
   }
-  return { major, minor, limits: profile(profileId) };
+  return profile(profileId);
 }

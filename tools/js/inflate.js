@@ -36,7 +36,7 @@ function bases(first, extra) {
  * may follow it, 16 * symbol + length; 0 of what is no code.
  */
 class Huffman {
-  constructor(lengths, inflater) {
+  constructor(lengths, inflater, whole = false) {
     const counts = new Uint16Array(MAX_BITS + 1);
     for (const length of lengths) counts[length]++;
     const used = lengths.length - counts[0];
@@ -47,8 +47,9 @@ class Huffman {
       if (free < 0) inflater.refuse("a code has too many symbols");
       if (length > 1) next[length] = 2 * (next[length - 1] + counts[length - 1]);
     }
-    // RFC 1951 lets a code of one symbol be incomplete, and one of none stand unused.
-    if (free > 0 && (used > 1 || counts[1] !== used)) inflater.refuse("a code is not whole");
+    // A code of one symbol may be incomplete, of one bit, and one of none stand unused.
+    const mayLack = !whole && used <= 1 && counts[1] === used;
+    if (free > 0 && !mayLack) inflater.refuse("a code is not whole");
     this.bits = used === 0 ? 0 : counts.findLastIndex((n, length) => length > 0 && n > 0);
     this.table = new Uint16Array(1 << this.bits);
     lengths.forEach((length, symbol) => {
@@ -149,7 +150,7 @@ class Inflater {
     if (nLiterals > 286 || nDistances > 30) this.refuse("too many symbols");
     const lengths = new Uint8Array(19);
     for (let i = 0; i < nLengths; i++) lengths[CODE_LENGTH_ORDER[i]] = this.bits(3);
-    const code = new Huffman(lengths, this);
+    const code = new Huffman(lengths, this, true);
     const all = new Uint8Array(nLiterals + nDistances);
     let i = 0;
     while (i < all.length) {
@@ -200,7 +201,7 @@ class Inflater {
       last = this.bits(1);
       const kind = this.bits(2);
       if (kind === 0) this.stored();
-      else if (kind === 1) this.block(...fixedCodes(this));
+      else if (kind === 1) this.block(...FIXED_CODES);
       else if (kind === 2) this.block(...this.codes());
       else this.refuse("a block of kind 3");
     }
@@ -213,11 +214,11 @@ class Inflater {
   }
 }
 
-function fixedCodes(inflater) {
-  const lengths = new Uint8Array(288).fill(8, 0, 144).fill(9, 144, 256).fill(7, 256, 280);
-  lengths.fill(8, 280);
-  return [new Huffman(lengths, inflater), new Huffman(new Uint8Array(32).fill(5), inflater)];
-}
+/** The codes of blocks of kind 1; both are whole, so nothing is refused. */
+const FIXED_CODES = [
+  Uint8Array.from({ length: 288 }, (_, i) => (i < 144 ? 8 : i < 256 ? 9 : i < 280 ? 7 : 8)),
+  new Uint8Array(32).fill(5),
+].map((lengths) => new Huffman(lengths, null));
 
 /**
  * Inflates a raw deflate stream.

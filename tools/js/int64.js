@@ -3,10 +3,6 @@
 
 const TWO_32 = 4294967296;
 
-/** Place of the low half of an integer in memory: 0 or 1. */
-const LOW = new Uint8Array(new Uint32Array([1]).buffer)[0] === 1 ? 0 : 1;
-const HIGH = 1 - LOW;
-
 /**
  * The halves of all integers of an array, in the same memory.
  *
@@ -19,22 +15,22 @@ export function halvesOf(array) {
 
 /** Low u32 of integer i. */
 export function lowHalf(halves, i) {
-  return halves[2 * i + LOW];
+  return halves[2 * i];
 }
 
 /** High half of integer i, signed. */
 export function highHalf(halves, i) {
-  return halves[2 * i + HIGH] | 0;
+  return halves[2 * i + 1] | 0;
 }
 
 /** Sets integer i; both halves are taken modulo 2^32. */
 export function setHalves(halves, i, low, high) {
-  halves[2 * i + LOW] = low;
-  halves[2 * i + HIGH] = high;
+  halves[2 * i] = low;
+  halves[2 * i + 1] = high;
 }
 
 /** Sets integer i to a number of at most 2^53 in size. */
 export function setInteger(halves, i, value) {
-  halves[2 * i + LOW] = value;
-  halves[2 * i + HIGH] = Math.floor(value / TWO_32);
+  halves[2 * i] = value;
+  halves[2 * i + 1] = Math.floor(value / TWO_32);
 }

@@ -103,7 +103,7 @@ export function hasKinematics({ joints, channels, angleUnit }) {
 }
 
 /**
- * The places of a skeleton in one frame, x, y and z of each.
+ * The positions of the points of a skeleton in one frame, x, y and z of each.
  *
  * @typedef {object} Pose
  * @property {number[][]} origins of each joint
@@ -145,7 +145,6 @@ export class Kinematics {
       scales: [0, 1, 2].map((k) => firstOf(SX + k)),
       lengths: size > 0 ? columns(LENGTH) : [],
       direction: size > 0 ? tail.map((x) => x / size) : ORIGIN,
-      quaternion: quaternion.includes(undefined) ? null : quaternion,
       rotations: this.rotations(joint, quaternion),
     };
   }
@@ -222,9 +221,9 @@ export class Kinematics {
 
 /** The offset of a joint with its position channels. */
 function moved({ offset, positions, positionsAdd }, value) {
-  return offset.map((place, k) => {
+  return offset.map((x, k) => {
     const columns = positions[k];
-    const start = columns.length > 0 && !positionsAdd ? 0 : place;
+    const start = columns.length > 0 && !positionsAdd ? 0 : x;
     return columns.reduce((at, column) => at + value(column), start);
   });
 }

@@ -137,7 +137,7 @@ function sourceOf(clip, signals, room) {
 
 /** The file that an alias is a copy of. */
 function contentOf({ of, target }, contents, room) {
-  if (of === ALIAS_OF.SKELETON) return restoreSkeleton(target.source, room.limit);
+  if (of === ALIAS_OF.SKELETON) return restoreSkeleton(target, room.limit);
   if (!contents.has(target)) throw new Unsupported("a copy of what could not be restored");
   return contents.get(target);
 }
@@ -185,17 +185,22 @@ function each(list, work) {
   return results;
 }
 
-/** The signals of a clip, decoded; of the frames and at the resolution that are asked for. */
-function decodeSignals(clip, { frames, resolution = 0 }, room) {
+/**
+ * The signals of a clip that are asked for, decoded; of the frames and at the resolution that are
+ * asked for, but the motion whole where it is to be filtered.
+ */
+function decodeSignals(clip, { frames, resolution = 0, joints, postFilter: filters }, room) {
   const [from, to] = frames ?? [0, clip.nFrames];
   if (!(isCount(from) && isCount(to) && from <= to && to <= clip.nFrames)) {
     throw new Refused(`frames ${from} to ${to} of ${clip.nFrames} of clip ${clip.name}`);
   }
   if (!isCount(resolution)) throw new Refused(`resolution ${resolution}`);
-  return each(clip.signals, (signal) => {
-    const spared = Math.min(resolution, signal.nResolutions - 1);
-    const dropped = signal.index === 0 ? resolution : spared;
-    return decodeSignal(clip, signal, { from, to, dropped, room });
+  const wanted = clip.signals.filter(({ ownChannels }) => !(joints && ownChannels));
+  return each(wanted, (signal) => {
+    const isMotion = signal.index === 0;
+    const dropped = isMotion ? resolution : Math.min(resolution, signal.nResolutions - 1);
+    const part = isMotion && filters ? { from: 0, to: clip.nFrames } : { from, to };
+    return decodeSignal(clip, signal, { ...part, dropped, room });
   });
 }
 
@@ -210,25 +215,21 @@ function decodeClip(clip, options, room) {
   const { name, frameRate, nFrames } = clip;
   if (!options.joints) return { name, frameRate, nFrames, signals: signals.map(arraysOf) };
   const columns = columnsOf(clip.skeleton, options.joints);
-  const ofJoints = signals
-    .filter((decoded) => !decoded.signal.ownChannels)
-    .map((decoded) => arraysOf(takeColumns(decoded, columns)));
+  const ofJoints = signals.map((decoded) => arraysOf(takeColumns(decoded, columns)));
   return { name, frameRate, nFrames, signals: ofJoints };
 }
 
-/** The whole clip with its motion filtered, then the frames that are asked for. */
-function filteredSignals(clip, { frames, ...options }, room) {
-  const signals = decodeSignals(clip, options, room);
-  const [motion] = signals;
+/** The whole motion filtered, then the frames that are asked for. */
+function filteredSignals(clip, options, room) {
   const { frameRate, skeleton } = clip;
-  const { joints, unitCm } = skeleton;
-  if (!canFilter({ joints, frameRate, unitCm, isMotion: !motion.signal.ownChannels })) {
+  if (clip.signals[0].ownChannels || !canFilter(skeleton, frameRate)) {
     throw new Refused(`clip ${clip.name} cannot be filtered`);
   }
+  const [motion, ...others] = decodeSignals(clip, options, room);
   const { samplesPerFrame } = motion.signal;
-  const rows = { frameRate, samplesPerFrame, unitCm, nChannels: motion.nChannels };
+  const rows = { frameRate, samplesPerFrame, unitCm: skeleton.unitCm, nChannels: motion.nChannels };
   motion.values = postFilter(rows, motion.values, motion.mask);
-  return frames ? signals.map((decoded) => takeRows(decoded, frames)) : signals;
+  return [options.frames ? takeRows(motion, options.frames) : motion, ...others];
 }
 
 function takeRows(decoded, [from, to]) {

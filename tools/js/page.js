@@ -191,7 +191,7 @@ function poseOf({ kinematics, signal, rowsPerFrame }, frame) {
   return kinematics.pose(row);
 }
 
-/** Middle and size of the places of a clip, and the lowest of each axis. */
+/** Middle and size of the positions of a clip, and the lowest of each axis. */
 function extentOf(clip) {
   const least = [Infinity, Infinity, Infinity];
   const most = [-Infinity, -Infinity, -Infinity];
@@ -212,7 +212,7 @@ function extentOf(clip) {
 
 // Drawing
 
-/** Places to places on the canvas: turned about the upward axis, then tilted. */
+/** Positions to points of the canvas: turned about the upward axis, then tilted. */
 function projection(width, height) {
   const { middle, size } = motion.extent;
   const up = AXES.indexOf(upChoice.value);
@@ -239,13 +239,13 @@ function draw() {
   const frame = Number(frameSlider.value);
   timeOutput.value = `${frame} / ${motion.nFrames}, ${(frame / motion.rate).toFixed(2)} s`;
   if (motion.kinematics === null || motion.nFrames === 0) return;
-  const place = projection(width, height);
+  const project = projection(width, height);
   const { color } = getComputedStyle(canvas);
-  drawGround(context, place, color);
-  drawPose(context, place, color, poseOf(motion, frame));
+  drawGround(context, project, color);
+  drawPose(context, project, color, poseOf(motion, frame));
 }
 
-function drawGround(context, place, color) {
+function drawGround(context, project, color) {
   const { middle, size, least } = motion.extent;
   const up = AXES.indexOf(upChoice.value);
   const [a, b] = [(up + 1) % 3, (up + 2) % 3];
@@ -261,7 +261,7 @@ function drawGround(context, place, color) {
         point[up] = least[up];
         point[along] += (end * size) / (2 * half);
         point[across] += (i * size) / (2 * half);
-        const [x, y] = place(point);
+        const [x, y] = project(point);
         if (end < 0) context.moveTo(x, y);
         else context.lineTo(x, y);
       }
@@ -271,12 +271,12 @@ function drawGround(context, place, color) {
   context.globalAlpha = 1;
 }
 
-function drawPose(context, place, color, { origins, tails, points }) {
+function drawPose(context, project, color, { origins, tails, points }) {
   const isThere = (point) => !Number.isNaN(point[0]);
   const line = (from, to) => {
     if (!isThere(from) || !isThere(to)) return;
-    context.moveTo(...place(from));
-    context.lineTo(...place(to));
+    context.moveTo(...project(from));
+    context.lineTo(...project(to));
   };
   context.strokeStyle = color;
   context.lineWidth = 2.5;
@@ -290,7 +290,7 @@ function drawPose(context, place, color, { origins, tails, points }) {
   context.fillStyle = "#d55";
   for (const point of points.filter(isThere)) {
     context.beginPath();
-    context.arc(...place(point), 3.5, 0, 2 * Math.PI);
+    context.arc(...project(point), 3.5, 0, 2 * Math.PI);
     context.fill();
   }
 }

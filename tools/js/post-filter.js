@@ -1,6 +1,6 @@
-// SPEC.md, "Post filter": low-pass filters for the places of a clip of markers.
+// SPEC.md, "Post filter": low-pass filters for the positions of markers.
 
-import { Refused } from "./errors.js";
+import { pointSet } from "./kinematics.js";
 
 const REACH = 12; // rows before and after the middle one
 const TAP_UNIT = 1073741824;
@@ -11,33 +11,15 @@ const CUTOFFS = [1, 3, 5]; // Hz
 const LOW_CM = 2;
 const HIGH_CM = 12;
 
-/** The channel kinds tx, ty and tz of the registry. */
-const POSITIONS = [1, 2, 3];
-
 /**
  * Whether a motion can be filtered: a clip of markers ("Kinematics", point set `markers`) whose
  * frame rate and length unit are known.
  *
- * @param {object} motion
- * @param {{ parent: number, tails: unknown[], channels: { kind: number }[] }[]} motion.joints of
- *   its skeleton; the parent of a root is -1
- * @param {{ numerator: number }} motion.frameRate
- * @param {number | null} motion.unitCm
- * @param {boolean} motion.isMotion whether the signal has the channels of the skeleton
+ * @param {import("./skel.js").Skeleton} skeleton whose channels are those of the motion
+ * @param {{ numerator: number }} frameRate
  */
-export function canFilter({ joints, frameRate, unitCm, isMotion }) {
-  return (
-    isMotion && joints.length > 0 && joints.every(isMarker) &&
-    frameRate.numerator > 0 && unitCm !== null
-  );
-}
-
-function isMarker({ parent, tails, channels }) {
-  const kinds = channels.map(({ kind }) => kind);
-  return (
-    parent < 0 && tails.length === 0 && kinds.length === POSITIONS.length &&
-    POSITIONS.every((kind) => kinds.includes(kind))
-  );
+export function canFilter(skeleton, frameRate) {
+  return pointSet(skeleton) === "markers" && frameRate.numerator > 0 && skeleton.unitCm !== null;
 }
 
 /** sin of t turns, t >= 0. */
@@ -72,7 +54,7 @@ export function taps(cutoff, rate) {
 }
 
 /**
- * Filters the motion of a clip.
+ * Filters the motion of a clip that {@link canFilter} allows.
  *
  * @param {object} motion
  * @param {{ numerator: number, denominator: number }} motion.frameRate
@@ -82,13 +64,9 @@ export function taps(cutoff, rate) {
  * @param {Float64Array} values all rows of the clip
  * @param {Uint8Array | null} mask 1 where a value is valid; null: all are
  * @returns {Float64Array} as many values
- * @throws {Refused} where the frame rate or the length unit is unknown
  */
 export function postFilter(motion, values, mask) {
   const { frameRate, samplesPerFrame, unitCm, nChannels } = motion;
-  if (!(frameRate.numerator > 0) || unitCm === null) {
-    throw new Refused("a motion without a frame rate or a length unit cannot be filtered");
-  }
   const rate = (frameRate.numerator / frameRate.denominator) * samplesPerFrame;
   const filters = CUTOFFS.map((cutoff) => taps(cutoff, rate));
   const thresholds = { low: LOW_CM / unitCm, high: HIGH_CM / unitCm };

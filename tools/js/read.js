@@ -105,7 +105,7 @@ class Walk {
   readHead() {
     const chunk = this.chunk();
     if (chunk.type !== "HEAD") this.refuse(`${chunk.type} where HEAD is due`);
-    this.file.limits = readHead(chunk.payload).limits;
+    this.file.limits = readHead(chunk.payload);
     this.head = chunk.payload;
     this.at = chunk.end;
   }

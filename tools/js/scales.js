@@ -3,11 +3,6 @@
 /** Largest magnitude of an integer of the codecs 2 to 11. */
 export const GREATEST = 2 ** 40;
 
-/** Powers of ten that a binary64 holds exactly, as the codecs divide by. */
-export const POWERS_OF_TEN = [
-  1, 10, 100, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
-];
-
 /** Where `decimals` is this, integers are multiples of a step. */
 export const SCALED = 255;
 

@@ -7,7 +7,7 @@ import { findCodec } from "./codecs.js";
 import { readGroupNotes, readMasks, takeStreams } from "./data.js";
 import { Refused } from "./errors.js";
 import { checkColumn, columnValues } from "./grids.js";
-import { Room, decodedBytes, profile, within } from "./limits.js";
+import { decodedBytes, profile, within } from "./limits.js";
 
 /** Bytes that are decoded beside what is wanted: the rest of the first and of the last segment. */
 const MOST_BESIDE = 2 * profile(0).segmentBytes;
@@ -37,6 +37,7 @@ const MOST_BESIDE = 2 * profile(0).segmentBytes;
  * @property {{row: number, column: number, text: Uint8Array, value: number}[]} exceptions of these
  *   rows; `row` is one of the decoded rows
  * @property {Uint8Array} frameNotes of the whole segment
+ * @property {object} segment with its streams
  */
 
 /**
@@ -44,8 +45,9 @@ const MOST_BESIDE = 2 * profile(0).segmentBytes;
  *
  * @param {import("./clip.js").Clip} clip as {@link readFile} has read it
  * @param {import("./clip.js").Signal} signal of it
- * @param {{from: number, to: number, dropped: number, room: Room}} request frames of the clip
- *   from <= f < to; how many of the finest details are left out; where they go
+ * @param {{from: number, to: number, dropped: number, room: import("./limits.js").Room}}
+ *   request frames of the clip from <= f < to; how many of the finest details are left out; where
+ *   they go
  * @returns {DecodedSignal}
  * @throws {Refused | Unsupported}
  */
@@ -111,19 +113,13 @@ function overlaps({ firstFrame, nFrames }, { from, to }) {
 /** What a codec is told of a signal. */
 function signalLayout(clip, signal) {
   return {
-    skeleton: clip.skeleton,
-    joints: clip.skeleton.joints,
     name: signal.name,
     channels: signal.channels,
     groups: groupsOf(signal),
     grids: gridsOf(signal),
     integer: signal.integer,
     nResolutions: signal.nResolutions,
-    nFrames: signal.due,
     samplesPerFrame: signal.samplesPerFrame,
-    frameRate: clip.frameRate,
-    isMotion: !signal.ownChannels,
-    unitCm: clip.skeleton.unitCm,
     findModel: (id) => clip.findModel(hex(id)),
   };
 }

@@ -127,11 +127,11 @@ class Tokens {
 
 /** The token of a value that need not be on its grid. */
 function textOfValue(grid, x) {
+  if (!hasText(grid)) return printed(WITHOUT_TEXT, x);
   if (!Number.isFinite(x)) return printed(BEYOND_GRID, x);
   const ordinal = ordinalOf(grid, x);
   const isGreatest = (ordinal < 0n ? grid.least : grid.greatest) === ordinal;
   if (isGreatest && valueOf(grid, ordinal) !== x) return printed(BEYOND_GRID, x);
-  if (!hasText(grid)) return printed(WITHOUT_TEXT, valueOf(grid, ordinal));
   return textOfOrdinal(grid, Number(ordinal & 0xffffffffn), Number(ordinal >> 32n));
 }
 

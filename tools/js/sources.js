@@ -5,6 +5,7 @@ import { Refused } from "./errors.js";
 import { within } from "./limits.js";
 import { sourceFormatName } from "./registry.js";
 import { sha256 } from "./sha256.js";
+import { checkAsf } from "./source-asf.js";
 import { restoreC3d } from "./source-c3d.js";
 import { restoreText } from "./source-text.js";
 
@@ -36,18 +37,20 @@ export function restoreClip({ clip, signals, numbers, sourceSha256, maxBytes }) 
 }
 
 /**
- * The own source file of a skeleton: its template.
+ * The own source file of a skeleton: its template, which has to describe that skeleton.
  *
- * @param {{template: {data: Uint8Array}, format: number, size: number, sha256: Uint8Array}} source
+ * @param {import("./skel.js").Skeleton} skeleton that has a source
  * @param {number} maxBytes limit of a restored file
  * @returns {Uint8Array}
  * @throws {Refused}
  */
-export function restoreSkeleton(source, maxBytes) {
+export function restoreSkeleton(skeleton, maxBytes) {
+  const { source } = skeleton;
   sourceFormatName(source.format);
   const { data } = source.template;
   within(data.length, maxBytes, "bytes of the source of a skeleton");
   checkFile(data, source.size, source.sha256, "the source of a skeleton");
+  checkAsf(data, skeleton);
   return data;
 }
 

@@ -19,6 +19,7 @@ import { Kinematics, hasKinematics } from "./kinematics.js";
 import { ordinalOf } from "./ordinals.js";
 import { PrefixCode } from "./prefix.js";
 import { Sha256, sha256 } from "./sha256.js";
+import { checkAsf } from "./source-asf.js";
 import { textOfOrdinal, tokenValue } from "./text.js";
 import { WAVELETS, bandLengths, neededRanges, synthesis } from "./wavelets.js";
 
@@ -540,4 +541,60 @@ test("kinematics: what is invalid", () => {
   assert.ok(!hasKinematics(skeletonOf(joints, { angleUnit: 0 })));
   assert.ok(!hasKinematics(skeletonOf([{ channels: "plain" }])));
   assert.ok(hasKinematics(skeletonOf([{}])));
+});
+
+test("ASF: the skeleton that a file describes", () => {
+  const bytes = (text) => Uint8Array.from(text, (c) => c.charCodeAt(0));
+  const text = [
+    "# K\xf6rper, in no UTF-8",
+    ":units",
+    "  angle RAD",
+    ":bonedata",
+    "  begin",
+    "  name foot",
+    "  direction 0 -1 0",
+    "  length 2.5",
+    "  dof L rx twist",
+    "  end",
+    "  begin",
+    "  name leg",
+    "  direction (1 0 0)",
+    "  length 4",
+    "  axis 0 0 20 zyx",
+    "  end",
+    ":hierarchy",
+    "  leg foot",
+    "  root leg",
+  ].join("\r");
+  const zero = [0, 0, 0];
+  const channel = (kind, name = "") => ({ kind, name, unit: "", joint: 0 });
+  const moving = [1, 2, 3, 4, 5, 6].map((kind) => channel(kind));
+  const joint = { positionsAdd: true, offset: zero, axis: zero, axisOrder: 0, channels: [] };
+  const joints = [
+    { ...joint, name: "root", parent: -1, tails: [], channels: moving },
+    { ...joint, name: "leg", parent: 0, axis: [0, 0, 20], axisOrder: 5, tails: [[4, 0, 0]] },
+    {
+      ...joint,
+      name: "foot",
+      parent: 1,
+      offset: [4, 0, 0],
+      tails: [[0, -2.5, 0]],
+      channels: [channel(10), channel(4), channel(200, "twist")],
+    },
+  ];
+  const skeleton = { name: "any", intrinsic: false, angleUnit: 2, upAxis: 0, joints };
+  checkAsf(bytes(text), skeleton);
+  for (const [old, now] of [
+    ["4", "4e0"],
+    ["leg foot", "leg foot foot"],
+    ["length 4", "length 4,0"],
+    ["RAD", "deg"],
+    ["zyx", "zyz"],
+    ["0 -1 0", "0 -1 1"],
+    [":bonedata", ":bones"],
+  ]) {
+    const check = () => checkAsf(bytes(text.replace(old, now)), skeleton);
+    if (now === "4e0") check();
+    else assert.throws(check, Refused, `${old} as ${now}`);
+  }
 });

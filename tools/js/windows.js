@@ -5,7 +5,7 @@ import { ByteReader } from "./bytes.js";
 import { cosines } from "./cosines.js";
 import { RangeDecoder, bits } from "./entropy.js";
 import { Refused } from "./errors.js";
-import { Residuals, side } from "./residuals.js";
+import { CONTEXTS, MIXERS, Residuals, side } from "./residuals.js";
 import { GREATEST } from "./scales.js";
 import { makeSpace, readCode, readSpace, sumOfRows } from "./space.js";
 import { sparseList } from "./sparse.js";
@@ -18,8 +18,8 @@ const MOST_PRODUCTS = 2 ** 30;
 export function coefficientResiduals(model) {
   return {
     lengths: new Residuals(model, 0, 0),
-    first: new Residuals(model, 2568, 17),
-    others: new Residuals(model, 5136, 34),
+    first: new Residuals(model, CONTEXTS, MIXERS),
+    others: new Residuals(model, 2 * CONTEXTS, 2 * MIXERS),
   };
 }
 
@@ -39,14 +39,6 @@ export function checkReach(name, { firstFrame, lead, tail }) {
   if (lead !== 0 || tail !== 0) {
     throw new Refused(`${name}: the segment of frame ${firstFrame} has a lead or tail`);
   }
-}
-
-/** Rows of the stored frames from <= f < to, as far as a run of segments has them. */
-export function roomFor(segments, from, to, nChannels) {
-  const last = segments[segments.length - 1];
-  const start = Math.max(from, segments[0].firstFrame);
-  const stop = Math.min(to, last.firstFrame + last.nFrames);
-  return new Float64Array((stop - start) * nChannels);
 }
 
 /**
@@ -132,8 +124,7 @@ export class WindowsDecoder {
    * @returns {Float64Array} all rows of the segments
    * @throws {Refused}
    */
-  decode(segments, { from = 0, to = Infinity } = {}) {
-    this.check(segments);
+  decode(segments, { from, to }) {
     const { nChannels, window } = this;
     const nRows = segments.reduce((sum, segment) => sum + segment.nRows, 0);
     const out = new Float64Array(nRows * nChannels);

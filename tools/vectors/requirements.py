@@ -1,8 +1,8 @@
 """Which vectors show which requirement of SPEC.md, by their ids, such as CHUNK-07.
 
-The manifest's ``requirements`` are made of the vectors that catch a broken rule (``tests.broken``)
-and of ``VECTORS``, what else shows it; ``ARGUED`` says of the rules that no vector can show why
-that is so.
+The manifest's ``requirements`` are made of requirements.txt, the vectors that a decoder without the
+rule fails (``tests.broken`` has such decoders), and of ``VECTORS``, what else shows it; ``ARGUED``
+says of the rules that no vector can show why that is so.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
+from pathlib import Path
 
-from tests.broken.table import BREAKS
 from tools.vectors import requirements_codecs, requirements_container, requirements_points
+
+CAUGHT = Path(__file__).with_suffix(".txt")
 
 # Globs of vector names without their suffix, "valid/*/frames-1"; * stands for / as well.
 VECTORS: dict[str, tuple[str, ...]] = {
@@ -30,6 +32,12 @@ ARGUED: dict[str, str] = {
 ID = re.compile(r"[A-Z][A-Z0-9]*(?:-[A-Z0-9]+)*-[0-9]{2,}")
 
 
+def caught() -> dict[str, list[str]]:
+    """The vectors that a decoder without a rule fails, by the rule."""
+    lines = CAUGHT.read_text("utf-8").partition("\n\n")[2].splitlines()
+    return {id_: names.split() for id_, names in (line.split(": ") for line in lines)}
+
+
 def requirements(names: Iterable[str]) -> dict[str, list[str]]:
     """The ids, sorted, that each of the vectors ``names`` shows.
 
@@ -38,8 +46,8 @@ def requirements(names: Iterable[str]) -> dict[str, list[str]]:
     """
     found: dict[str, list[str]] = {name: [] for name in names}
     table = {id_: list(globs) for id_, globs in VECTORS.items()}
-    for row in BREAKS.values():
-        table.setdefault(row.id, []).extend(row.vectors)
+    for id_, shown in caught().items():
+        table.setdefault(id_, []).extend(shown)
     for id_ in sorted({*table, *ARGUED}):
         if not ID.fullmatch(id_) or (id_ in table and id_ in ARGUED):
             raise ValueError(f"requirements: {id_!r} is no id, or is both shown and argued")

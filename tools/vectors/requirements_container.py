@@ -77,7 +77,10 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "GRID-05": ("invalid/numbers/ordinal-of-*",),
     "GRID-09": ("valid/numbers/*",),
     "GRID-11": ("valid/sources/*-lossy-*",),
-    "TEXT-01": ("valid/sources/bvh-style-*",),
+    "TEXT-01": (
+        "uncommon/container/grids-without-text-lossy",
+        "valid/sources/bvh-style-*",
+    ),
     "TEXT-05": ("invalid/notes/spelling-*",),
     "SRC-01": ("valid/sources/*", "valid/cut/source-*"),
     "SRC-03": ("invalid/sources/template-header", "invalid/sources/template-no-header"),

@@ -450,8 +450,8 @@ class BitDecoder {
       const magnitude = (k * channel.perClass + inClass) * 2 ** channel.drop;
       setInteger(this.halves, index, minus ? -1 - magnitude : magnitude);
     } else {
-      const place = BigInt(k) * BigInt(channel.perClass) + BigInt(inClass);
-      const magnitude = place << BigInt(channel.drop);
+      const scaled = BigInt(k) * BigInt(channel.perClass) + BigInt(inClass);
+      const magnitude = scaled << BigInt(channel.drop);
       this.ordinals[index] = minus ? -1n - magnitude : magnitude;
     }
   }

@@ -3,8 +3,10 @@
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, bits } from "../entropy.js";
 import { Refused } from "../errors.js";
+import { EXACT_POWERS } from "../grids.js";
 import { Residuals, side } from "../residuals.js";
-import { GREATEST, POWERS_OF_TEN, SCALED, firstScale, isStep, stepOf } from "../scales.js";
+import { GREATEST, SCALED, firstScale, isStep, stepOf } from "../scales.js";
+import { checkCuts } from "../segments.js";
 import { restart, startModels } from "../start-models.js";
 import { WAVELETS, bandLengths, neededRanges, synthesis } from "../wavelets.js";
 
@@ -93,21 +95,9 @@ class WaveletDecoder {
    * @throws {Refused}
    */
   check(segments) {
-    const span = 2 ** this.levels;
-    for (const { firstFrame, nFrames, lead, tail, fresh } of segments) {
-      const end = firstFrame + nFrames;
-      const place = `segment at frame ${firstFrame}`;
-      if (firstFrame % span !== 0) throw new Refused(`${place}: not a multiple of ${span}`);
-      if (end > this.codedFrames) throw new Refused(`${place}: ends behind coded_frames`);
-      if (end % span !== 0 && end !== this.codedFrames) {
-        throw new Refused(`${place}: its end ${end} is not a multiple of ${span}`);
-      }
-      if (lead !== Math.min(firstFrame, (this.taps - 2) * (span - 1))) {
-        throw new Refused(`${place}: a lead of ${lead}`);
-      }
-      if (tail !== 0) throw new Refused(`${place}: a tail of ${tail}`);
-      if (!fresh) throw new Refused(`${place}: does not start fresh`);
-    }
+    const unit = 2 ** this.levels;
+    const reach = (this.taps - 2) * (unit - 1);
+    checkCuts(segments, { unit, codedFrames: this.codedFrames, reach });
   }
 
   /**
@@ -121,20 +111,14 @@ class WaveletDecoder {
    * @returns {Float64Array} the rows that are wanted
    * @throws {Refused}
    */
-  decode(segments, { dropped = 0, from = 0, to = Infinity } = {}) {
-    if (segments.length === 0) return new Float64Array(0);
-    this.check(segments);
-    const begin = segments[0].firstFrame;
+  decode(segments, { dropped, from, to }) {
     const last = segments[segments.length - 1];
     const end = last.firstFrame + last.nFrames;
-    const start = Math.max(from, begin);
-    const stop = Math.min(to, end);
-    if (start >= stop) return new Float64Array(0);
-    const out = new Float64Array((stop - start) * this.nChannels);
+    const out = new Float64Array((to - from) * this.nChannels);
 
-    const needed = neededRanges(start, stop, this.taps, this.levels);
+    const needed = neededRanges(from, to, this.taps, this.levels);
     if (needed.ends[this.levels] > this.bandEnd(end, this.levels)) {
-      throw new Refused(`frames ${start} to ${stop - 1} need approximations that are not stored`);
+      throw new Refused(`frames ${from} to ${to - 1} need approximations that are not stored`);
     }
     const streams = new BandStreams(this, segments);
     const nDetails = Math.max(0, this.nResolutions - 1 - dropped);
@@ -194,7 +178,7 @@ class WaveletDecoder {
 class BandStreams {
   constructor(decoder, segments) {
     this.decimals = decoder.decimals;
-    this.divisor = POWERS_OF_TEN[decoder.decimals];
+    this.divisor = EXACT_POWERS[decoder.decimals];
     this.unit = decoder.unit;
     this.least = decoder.least;
     /** Place of detail i in the coarser band: (i + shift) div 2. */
@@ -208,13 +192,13 @@ class BandStreams {
     /** The integers of the band decoded last, and those of the next coarser one. */
     this.v = new Float64Array(room);
     this.coarser = new Float64Array(room);
-    /** A[k] and S[k] of the next coarser band; A stands one place further, behind a 0. */
+    /** A[k] and S[k] of the next coarser band; A stands one index further, behind a 0. */
     this.activity = new Float64Array(room + 2);
     this.sides = new Uint8Array(room);
   }
 
   begin(segment, channel) {
-    this.place = `segment at frame ${segment.firstFrame}, channel ${channel}`;
+    this.where = `segment at frame ${segment.firstFrame}, channel ${channel}`;
     this.step = null;
     this.count = 0;
   }
@@ -235,7 +219,7 @@ class BandStreams {
       return false;
     }
     const what = band === 0 ? "approximation" : `detail ${band}`;
-    this.what = `${this.place}, ${what}`;
+    this.what = `${this.where}, ${what}`;
     restart(this.model, this.starts[Math.min(band, 4)]);
     if (band === 0) this.approximation(stream, count);
     else this.detail(stream, band, count);

@@ -6,7 +6,7 @@ import { Refused } from "../errors.js";
 import { GREATEST } from "../scales.js";
 import { APART, FrameAdder, WEIGHTS, makeSpace, readSpace } from "../space.js";
 import { startModels } from "../start-models.js";
-import { checkLayout, checkReach, coefficientResiduals, roomFor } from "../windows.js";
+import { checkLayout, checkReach, coefficientResiduals } from "../windows.js";
 import { RowMemory } from "./lsdt-frame.js";
 
 export const id = 11;
@@ -100,13 +100,11 @@ class OnlineDecoder {
    * @returns {Float64Array} the rows that are wanted
    * @throws {Refused}
    */
-  decode(segments, { from = 0, to = Infinity } = {}) {
-    this.check(segments);
+  decode(segments, { from, to }) {
     const nChannels = this.space.weights.length;
-    const out = roomFor(segments, from, to, nChannels);
+    const out = new Float64Array((to - from) * nChannels);
     if (nChannels === 0) return out;
-    const begin = Math.max(from, segments[0].firstFrame);
-    const frames = new OnlineFrames(this.space, this.coder, out, begin);
+    const frames = new OnlineFrames(this.space, this.coder, out, from);
     for (const { firstFrame, nFrames, fresh, streams } of segments) {
       const what = `${name}: stream of frame ${firstFrame}`;
       const units = readUnits(streams[0][0], what, nFrames);

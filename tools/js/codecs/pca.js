@@ -3,8 +3,9 @@
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, bits } from "../entropy.js";
 import { Refused } from "../errors.js";
+import { EXACT_POWERS } from "../grids.js";
 import { CONTEXTS, MIXERS, Residuals, side } from "../residuals.js";
-import { GREATEST, POWERS_OF_TEN, SCALED, firstScale, stepOf } from "../scales.js";
+import { GREATEST, SCALED, firstScale, stepOf } from "../scales.js";
 import { restart, startModels } from "../start-models.js";
 import { predictedChange } from "./mrdwt.js";
 import { first } from "./qbc.js";
@@ -51,10 +52,10 @@ class ComponentDecoder {
    */
   check(segments) {
     for (const { firstFrame, lead, tail, fresh } of segments) {
-      const place = `segment at frame ${firstFrame}`;
-      if (lead !== 0) throw new Refused(`${place}: a lead of ${lead}`);
-      if (tail !== 0) throw new Refused(`${place}: a tail of ${tail}`);
-      if (!fresh) throw new Refused(`${place}: does not start fresh`);
+      const where = `segment at frame ${firstFrame}`;
+      if (lead !== 0) throw new Refused(`${where}: a lead of ${lead}`);
+      if (tail !== 0) throw new Refused(`${where}: a tail of ${tail}`);
+      if (!fresh) throw new Refused(`${where}: does not start fresh`);
     }
   }
 
@@ -66,7 +67,6 @@ class ComponentDecoder {
    * @throws {Refused}
    */
   decode(segments) {
-    this.check(segments);
     const rows = segments.reduce((sum, { nFrames }) => sum + nFrames, 0);
     const out = new Float64Array(rows * this.nChannels);
     if (this.nChannels === 0) return out;
@@ -184,7 +184,7 @@ function readHead(reader, decimals, nChannels, n) {
     mean = (m) => m * (step / 4);
     coefficient = (y) => y * step;
   } else {
-    const divisor = POWERS_OF_TEN[decimals];
+    const divisor = EXACT_POWERS[decimals];
     mean = (m) => m / divisor;
     coefficient = mean;
   }

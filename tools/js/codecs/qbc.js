@@ -3,8 +3,10 @@
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, bits, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
+import { EXACT_POWERS } from "../grids.js";
 import { CONTEXTS, MIXERS, Residuals, side } from "../residuals.js";
-import { GREATEST, POWERS_OF_TEN, SCALED, firstScale, isStep } from "../scales.js";
+import { GREATEST, SCALED, firstScale, isStep } from "../scales.js";
+import { checkCuts } from "../segments.js";
 import { restart, startModels } from "../start-models.js";
 
 export const id = 3;
@@ -65,7 +67,7 @@ class CurveDecoder {
     if (this.nResolutions < 1 || this.nResolutions > 2) {
       throw new Refused(`${this.nResolutions} resolutions of qbc`);
     }
-    this.divisor = POWERS_OF_TEN[this.decimals];
+    this.divisor = EXACT_POWERS[this.decimals];
     /** The step of each channel, where decimals is 255. */
     this.steps = Float64Array.from(layout.channels, ({ kind }) =>
       POSITIONS.has(kind) ? this.positionStep : this.step,
@@ -80,20 +82,7 @@ class CurveDecoder {
    */
   check(segments) {
     const { delta, codedFrames } = this;
-    for (const { firstFrame, nFrames, lead, tail, fresh } of segments) {
-      const end = firstFrame + nFrames;
-      const place = `segment at frame ${firstFrame}`;
-      if (firstFrame % delta !== 0) throw new Refused(`${place}: not a multiple of ${delta}`);
-      if (end > codedFrames) throw new Refused(`${place}: ends behind coded_frames`);
-      if (end % delta !== 0 && end !== codedFrames) {
-        throw new Refused(`${place}: its end ${end} is not a multiple of ${delta}`);
-      }
-      if (lead !== Math.min(firstFrame, delta - 1)) {
-        throw new Refused(`${place}: a lead of ${lead}`);
-      }
-      if (tail !== 0) throw new Refused(`${place}: a tail of ${tail}`);
-      if (!fresh) throw new Refused(`${place}: does not start fresh`);
-    }
+    checkCuts(segments, { unit: delta, codedFrames, reach: delta - 1 });
   }
 
   /**
@@ -107,32 +96,26 @@ class CurveDecoder {
    * @returns {Float64Array} the rows that are wanted
    * @throws {Refused}
    */
-  decode(segments, { dropped = 0, from = 0, to = Infinity } = {}) {
-    if (segments.length === 0) return new Float64Array(0);
-    this.check(segments);
-    const begin = segments[0].firstFrame;
+  decode(segments, { dropped, from, to }) {
     const last = segments[segments.length - 1];
     const end = last.firstFrame + last.nFrames;
-    const start = Math.max(from, begin);
-    const stop = Math.min(to, end);
-    if (start >= stop) return new Float64Array(0);
-    const out = new Float64Array((stop - start) * this.nChannels);
+    const out = new Float64Array((to - from) * this.nChannels);
 
     const hasLast = end === this.codedFrames;
     const lastMark = hasLast ? end - 1 : Math.floor((end - 1) / this.delta) * this.delta;
-    if (stop - 1 > lastMark) {
-      throw new Refused(`frames ${lastMark + 1} to ${stop - 1} need a mark that is not stored`);
+    if (to - 1 > lastMark) {
+      throw new Refused(`frames ${lastMark + 1} to ${to - 1} need a mark that is not stored`);
     }
     const withCurves = this.nResolutions - dropped > 1;
     const markFrames = segments.map((segment) => this.markFrames(segment));
     const marks = new MarkStreams();
     const curves = new CurveStreams();
     this.groups.forEach((columns, group) => {
-      const path = new Path(this, columns, out, start, stop);
-      const place = (i) => `segment at frame ${segments[i].firstFrame}, group ${group}`;
+      const path = new Path(this, columns, out, from, to);
+      const where = (i) => `segment at frame ${segments[i].firstFrame}, group ${group}`;
       const marksOf = (i) => {
         const stream = segments[i].streams[0][group];
-        return marks.decode(stream, `${place(i)}, marks`, columns.length, markFrames[i].length);
+        return marks.decode(stream, `${where(i)}, marks`, columns.length, markFrames[i].length);
       };
       let here = marksOf(0);
       for (let i = 0; i < segments.length; i++) {
@@ -143,7 +126,7 @@ class CurveDecoder {
         if (stream === null || stream.length === 0) {
           path.straight(here, next, frames);
         } else {
-          const what = `${place(i)}, curves`;
+          const what = `${where(i)}, curves`;
           const coder = curves.decode(stream, what, here, next, frames, path);
           // Without the mark behind, a reader stops before the last curve.
           if (!isLast || hasLast) coder.finish(what);

@@ -2,6 +2,7 @@
 
 import { ByteReader } from "../bytes.js";
 import { Refused } from "../errors.js";
+import { halvesOf } from "../int64.js";
 
 export const id = 0;
 export const name = "raw";
@@ -60,7 +61,7 @@ function decodeChannel(reader, nRows, ordinals, start, stride) {
   const width = reader.u8();
   if (width > MAX_WIDTH) reader.refuse(`offsets of ${width} bytes`);
   const offsets = reader.take(nRows * width);
-  const words = new Uint32Array(ordinals.buffer, ordinals.byteOffset, 2 * ordinals.length);
+  const words = halvesOf(ordinals);
   const nLow = Math.min(width, 4);
   let at = 0;
   let word = 2 * start;

@@ -1,0 +1,208 @@
+"""Bases in integers: the models of kind 1, and those that everybody has.
+
+SPEC.md, "Bases", is normative; the names below are its field names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.annexes import annex_bytes, annex_names
+from mcz.codecs.contract import Layout, Model, id_of
+from mcz.coding.start import start_states
+from mcz.coding.streams import code, uncode
+from mcz.errors import FormatError, MotionError, UnsupportedError
+from mcz.schema import read_varint, varint
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+BASES = 1  # the kind of model
+MAX_BASES = 16
+MAX_POINTS = 2048  # entries of a vector
+MAX_ENTRIES = 2**22  # of all bases of a model
+MAX_KEPT = 2**17  # entries of a model that is kept for the next clip
+MAX_SHIFT = 40
+MAX_ENTRY = 2**40
+FINE = 15  # binary digits of an entry, where nobody asks for less
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """Vectors as rows of integers, ``entries`` (n_vectors, n_points), times 2^-``shifts``."""
+
+    shifts: Ints
+    entries: Ints
+
+    @property
+    def vectors(self) -> Floats:
+        """(n_vectors, n_points), exact."""
+        found: Floats = np.ldexp(self.entries.astype(np.float64), -self.shifts[:, None])
+        return found
+
+
+def rounded(vectors: Floats, shift: int | Sequence[int] | Ints = FINE) -> Basis:
+    """``vectors``, as rows, in integers of ``shift`` binary digits, or of so many each."""
+    shifts = np.broadcast_to(np.asarray(shift, np.int64), len(vectors)).copy()
+    return Basis(shifts, np.rint(np.ldexp(vectors, shifts[:, None])).astype(np.int64))
+
+
+def falling_digits(n_vectors: int, most: int, least: int) -> Ints:
+    """Binary digits of each vector, fewer for later ones, which have next to no coefficients."""
+    fall = (most - least + 2) * np.arange(n_vectors) / max(1, n_vectors - 1)
+    return np.clip(np.rint(most - fall), least, None).astype(np.int64)
+
+
+def build_bases(bases: Sequence[Basis | Floats], shift: int = FINE) -> bytes:
+    """The data of a model of ``bases``; vectors that are no integers yet get ``shift`` digits.
+
+    Raises MotionError where there are too many, or an entry is too large.
+    """
+    parts = [basis if isinstance(basis, Basis) else rounded(basis, shift) for basis in bases]
+    size = sum(part.entries.size for part in parts)
+    widest = max((part.entries.shape[1] for part in parts), default=0)
+    if not 1 <= len(parts) <= MAX_BASES or size > MAX_ENTRIES or widest > MAX_POINTS:
+        raise MotionError(f"{len(parts)} bases of up to {widest} points and {size} entries in all")
+    if any(np.abs(part.entries).max(initial=0) > MAX_ENTRY for part in parts):
+        raise MotionError("an entry of a basis exceeds 2^40")
+    head = varint(len(parts))
+    for part in parts:
+        n_vectors, n_points = part.entries.shape
+        head += varint(n_points) + varint(n_vectors) + bytes(part.shifts.tolist())
+    tables = [part.entries.copy() for part in parts]
+    shifts = [part.shifts for part in parts]
+    return head + code(
+        start_states("pca")[0],
+        2 * size + 256,
+        lambda state, data: _loop(state, data, tables, shifts),
+        "an entry of a basis",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What a model says of a basis before its entries."""
+
+    shifts: Ints
+    n_points: int
+
+
+def parse_heads(data: bytes, where: str = "model") -> tuple[tuple[Head, ...], int]:
+    """What a model of kind 1 says of its bases, and where their entries begin."""
+    n_bases, at = read_varint(data, 0)
+    if not 1 <= n_bases <= MAX_BASES:  # BASES-02
+        raise FormatError(f"{where}: {n_bases} bases, not 1 to {MAX_BASES}")
+    heads: list[Head] = []
+    size = 0
+    for _ in range(n_bases):
+        n_points, at = read_varint(data, at)
+        n_vectors, at = read_varint(data, at)
+        size += n_points * n_vectors
+        # BASES-03, BASES-04, BASES-06
+        if not 1 <= n_vectors <= n_points <= MAX_POINTS or size > MAX_ENTRIES:
+            raise FormatError(f"{where}: a basis of {n_vectors} vectors of {n_points} entries")
+        digits = np.frombuffer(data[at : at + n_vectors], "u1").astype(np.int64)
+        at += n_vectors
+        if len(digits) < n_vectors or digits.max() > MAX_SHIFT:  # BASES-04, BASES-05
+            raise FormatError(f"{where}: the shifts of a basis end, or one exceeds {MAX_SHIFT}")
+        heads.append(Head(digits, n_points))
+    return tuple(heads), at
+
+
+def parse_bases(data: bytes, where: str = "model") -> tuple[Basis, ...]:
+    """The bases of a model of kind 1; raises FormatError on bad bytes."""
+    heads, at = parse_heads(data, where)
+    shifts = [head.shifts for head in heads]
+    tables = [np.zeros((len(head.shifts), head.n_points), np.int64) for head in heads]
+    uncode(
+        data[at:],
+        start_states("pca")[0],
+        lambda state, stream: _loop(state, stream, tables, shifts),
+        f"{where}: an entry of a basis",
+        whole=True,  # BASES-01
+    )
+    return tuple(Basis(digits, table) for digits, table in zip(shifts, tables, strict=True))
+
+
+def _loop(
+    state: Ints, data: NDArray[np.uint8], tables: Sequence[Ints], shifts: Sequence[Ints]
+) -> bool:
+    from mcz.codecs.table_kernels import code_table
+
+    for table, digits in zip(tables, shifts, strict=True):  # BASES-07
+        scales = (1 << digits) >> (table.shape[1].bit_length() // 2)  # BASES-07
+        if code_table(state, data, table, scales, 1):
+            return False
+    return True
+
+
+def model_of(bases: Sequence[Basis | Floats], shift: int = FINE) -> Model:
+    """``bases`` as a model; raises MotionError as ``build_bases`` does."""
+    return Model(BASES, build_bases(bases, shift))
+
+
+@cache
+def known_models() -> dict[str, Model]:
+    """The models of SPEC.md's annexes by name, which a file need not have."""
+    return {
+        name.removeprefix("bases_").removesuffix(".bin"): Model(BASES, annex_bytes(name))
+        for name in annex_names("bases_*.bin")
+    }
+
+
+@cache
+def _known_by_id() -> dict[bytes, Model]:
+    return {id_of(model): model for model in known_models().values()}
+
+
+def name_of(id_: bytes) -> str | None:
+    """What a well-known model is called, None for any other."""
+    return next((name for name, model in known_models().items() if id_of(model) == id_), None)
+
+
+def find_bases(
+    codec: str, layout: Layout, id_: bytes, check: Callable[[Sequence[Head]], None]
+) -> tuple[Basis, ...]:
+    """The bases of the model with this id, which is well known or in the file.
+
+    ``check`` refuses heads that are not due, before their entries take memory. Raises
+    UnsupportedError where there is no such model, FormatError where it is none of bases.
+    """
+    found = _known_by_id().get(id_)
+    if found is None and layout.find_model is not None:
+        found = layout.find_model(id_)
+    if found is None:
+        # BASES-09
+        raise UnsupportedError(f"{codec}: model {id_.hex()} is not in the file nor well known")
+    where = f"{codec}: model {id_.hex()}"
+    if found.kind != BASES:  # SPACE-08
+        raise FormatError(f"{where} is one of kind {found.kind} where bases are due")
+    heads, _ = parse_heads(found.data, where)
+    check(heads)
+    if sum(len(head.shifts) * head.n_points for head in heads) > MAX_KEPT:
+        return parse_bases(found.data, where)
+    return _parsed(found.data)
+
+
+@lru_cache(maxsize=8)
+def _parsed(data: bytes) -> tuple[Basis, ...]:
+    bases = parse_bases(data)
+    for basis in bases:
+        basis.entries.setflags(write=False)
+    return bases
+
+
+def read_bases(path: Path) -> Model:
+    """The model in a file that ``mcz train`` has written; raises FormatError."""
+    data = path.read_bytes()
+    try:
+        parse_bases(data)
+    except FormatError as error:
+        raise FormatError(f"{path}: no bases: {error}") from None
+    return Model(BASES, data)

@@ -1,0 +1,1 @@
+"""Curves through the channels of a joint: qbc."""

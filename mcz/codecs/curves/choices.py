@@ -1,0 +1,132 @@
+"""What an encoder of qbc decides before it codes the first segment.
+
+mcz/codecs/curves/README.md describes it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Layout
+from mcz.codecs.parameters import SCALED, chosen_of
+from mcz.codecs.segments import segment_frames_of
+from mcz.errors import MotionError, OptionError
+from mcz.kinematics import reach
+from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MAX_INDEX = 2**40
+LEAST_STEP = 2.0**-100
+LEAST_LEVER = 2.0**-30
+STEP_SHARE = 0.75  # of the distance that is allowed, a step, where no decimals are given
+FEWEST_MOST = 512  # frames between marks up to which the fewest breaks are looked for
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {"d2_lmt": 1.0, "delta": 40, "Q": None, "middle": "least-squares"},
+    "khan2014": {"d2_lmt": 4.0, "delta": 80, "Q": 2, "middle": "published"},
+}
+MIDDLES = ("published", "least-squares")  # the methods of _qbc_fit, in order of their numbers
+BREAKS = ("split", "fewest")
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What an encoder has decided before it codes the first segment."""
+
+    limit: float
+    delta: int
+    decimals: int | None
+    step: float
+    lever: float  # of a length unit, where steps are scaled: a position counts as value / lever
+    method: int
+    closed: bool  # the bound holds for decoded points, not for those before rounding
+    fewest: bool
+    segment_frames: int  # 0: the size decides
+
+    @property
+    def grid(self) -> tuple[float, float]:
+        return (0.0, self.step) if self.decimals is None else (10.0**self.decimals, 1.0)
+
+    def indices(self, points: Floats) -> Ints:
+        """Points as integers, halves away from zero."""
+        per, step = self.grid
+        with np.errstate(over="ignore"):
+            sizes = np.abs(points) * per if per else np.abs(points) / step
+        found = np.floor(sizes + 0.5)
+        if not (found <= MAX_INDEX).all():  # a fit of huge points may be no number
+            raise MotionError("qbc: a control point exceeds 2^40 quantizer steps")
+        return np.where(points < 0, -found, found).astype(np.int64)
+
+    def points(self, indices: Ints) -> Floats:
+        per, step = self.grid
+        return np.asarray(indices / per if per else indices * step, np.float64)
+
+
+def position_channels(layout: Layout) -> NDArray[np.bool_]:
+    """Which channels are lengths, and so have the position step."""
+    if layout.skeleton is None:
+        return np.zeros(layout.n_channels, np.bool_)
+    kinds = (channel.kind for channel in layout.skeleton.channels)
+    return np.array([kind in (*POSITION_KINDS, "length") for kind in kinds], np.bool_)
+
+
+def _lever(skeleton: Skeleton | None) -> float:
+    """How far the farthest point moves when a root turns by one angle unit; 1 without rotations."""
+    if skeleton is None or not any(c.kind in ROTATION_KINDS for c in skeleton.channels):
+        return 1.0
+    lever = reach(skeleton) * (math.pi / 180 if skeleton.angle_unit != "rad" else 1.0)
+    return lever if LEAST_LEVER <= lever <= 1 / LEAST_LEVER else 1.0
+
+
+def plan_of_options(params: Mapping[str, Any], layout: Layout) -> Plan:
+    """The plan for a clip; raises OptionError for parameters that do not fit."""
+    chosen, published = chosen_of(PRESETS, params), params["preset"] == "khan2014"
+    limit, decimals = chosen["d2_lmt"], chosen["Q"]
+    if decimals is None and not limit > 0:
+        raise OptionError("qbc: d2_lmt is 0 and no Q is given, so that there is no step")
+    fewest = params["breaks"] == "fewest"
+    if fewest and chosen["delta"] > FEWEST_MOST:
+        raise OptionError(f"qbc: breaks fewest need a delta of at most {FEWEST_MOST}")
+    step = STEP_SHARE * limit**0.5 if decimals is None else 1.0
+    lever = _lever(layout.skeleton) if decimals is None else 1.0
+    if step < LEAST_STEP or step * lever < LEAST_STEP:
+        raise OptionError(f"qbc: d2_lmt {limit} is too small for a step; Q says decimals")
+    return Plan(
+        limit,
+        chosen["delta"],
+        decimals,
+        step,
+        lever,
+        MIDDLES.index(chosen["middle"]),
+        not published,
+        fewest,
+        segment_frames_of(layout, params["segment_frames"], as_published=published),
+    )
+
+
+def plan_of_header(fields: Any, options: Mapping[str, Any]) -> Plan:
+    """What the encoder of a clip had decided, as far as its header and its options say."""
+    preset = PRESETS[options["preset"]]
+    scaled = fields.decimals == SCALED
+    limit = options["d2_lmt"]
+    if limit is None:
+        limit = (fields.step / STEP_SHARE) ** 2 if scaled else preset["d2_lmt"]
+    return Plan(
+        limit,
+        fields.delta,
+        None if scaled else fields.decimals,
+        fields.step if scaled else 1.0,
+        fields.position_step / fields.step if scaled else 1.0,
+        MIDDLES.index(options["middle"] or preset["middle"]),
+        options["preset"] != "khan2014",
+        options["breaks"] == "fewest" and fields.delta <= FEWEST_MOST,
+        0,
+    )

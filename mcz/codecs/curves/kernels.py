@@ -1,0 +1,192 @@
+"""Compiled: the control points of one joint in one segment, coded as residuals, and the curves.
+
+SPEC.md, "Codec 3: qbc", is normative and has the steps below in the same order. One function
+serves encoder and decoder. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.coding import residuals
+from mcz.coding.mixing import Bytes, Ints, mixed
+from mcz.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
+from mcz.jit import inner, kernel
+
+Floats = NDArray[np.float64]
+
+MAX_INDEX = 1 << 40  # of a control point
+
+# Residuals of a detail stream: lengths of curves, inner breaks, middle points; then one flag.
+LENGTHS = 0, 0
+BREAKS = residuals.N_CONTEXTS, residuals.N_MIXERS
+MIDDLES = 2 * residuals.N_CONTEXTS, 2 * residuals.N_MIXERS
+KINDS = BREAKS, MIDDLES  # QBC-14
+C_LAST, M_LAST = 3 * residuals.N_CONTEXTS, 3 * residuals.N_MIXERS
+N_DETAIL_MIXERS = M_LAST + 1
+
+FAST, SLOW, SIDE_1, SIDE_2, TRACK_SIZE = range(5)  # what is remembered of a channel
+
+
+@inner
+def code_point(
+    state: Ints,
+    data: Bytes,
+    point: Ints,
+    predicted: Ints,
+    tracks: Ints,
+    first: tuple[int, int],
+) -> int:
+    """Code the channels of one control point in place; 1 where that is impossible."""
+    near, other = 0, 3
+    for c in range(len(point)):
+        track = tracks[c]
+        sides = track[SIDE_1], track[SIDE_2], other
+        scales = track[FAST], track[SLOW]
+        error = code_residual(
+            state,
+            data,
+            point[c] - predicted[c],
+            0,
+            scales,
+            clamp(near + 3, 0, 7),
+            sides,
+            first,
+        )
+        if error == FAULT or abs(predicted[c] + error) > MAX_INDEX:  # QBC-21
+            return 1
+        point[c] = predicted[c] + error
+        size = abs(error) << 4
+        near = (near + bits(size) - bits(track[SLOW])) >> 1
+        track[FAST] += (size - track[FAST]) >> 1
+        track[SLOW] += (size - track[SLOW]) >> 4  # QBC-18
+        track[SIDE_2] = track[SIDE_1]
+        track[SIDE_1] = other = side_of(error)  # QBC-18
+    return 0
+
+
+@kernel
+def code_marks(state: Ints, data: Bytes, points: Ints, count: int, scale: int) -> int:
+    """Code points[:count], (n, channels), in place; return the index of a fault or -1."""
+    n_channels = points.shape[1]
+    tracks = np.zeros((n_channels, TRACK_SIZE), np.int64)
+    tracks[:, FAST] = tracks[:, SLOW] = scale << 4
+    for k in range(count):
+        if k:
+            fault = code_point(state, data, points[k], points[k - 1], tracks, LENGTHS)
+            if fault:
+                return k
+            continue
+        for c in range(n_channels):
+            points[0, c] = code_first(state, data, points[0, c])
+            if abs(points[0, c]) > MAX_INDEX:  # QBC-20
+                return 0
+    return -1
+
+
+@inner
+def towards(a: int, b: int, part: int, whole: int) -> int:
+    """The integer nearest to a + (b - a) part / whole, halves up."""
+    return int(a + (2 * (b - a) * part + whole) // (2 * whole))  # QBC-23
+
+
+@kernel
+def code_details(
+    state: Ints,
+    data: Bytes,
+    marks: Ints,
+    frames: Ints,
+    lengths: Ints,
+    ends: Ints,
+    mids: Ints,
+    scales: Ints,
+) -> int:
+    """Code the curves between marks in place; return how many there are, or -1 for a fault.
+
+    ``marks`` (k, channels) at ``frames`` (k,). ``lengths`` has the frames of each curve, ``ends``
+    the control point at its end, ``mids`` its middle point; curve after curve.
+    """
+    n_channels = marks.shape[1]
+    tracks = np.zeros((2, n_channels, TRACK_SIZE), np.int64)
+    for kind in range(2):
+        tracks[kind, :, FAST] = tracks[kind, :, SLOW] = scales[kind] << 4
+    predicted = np.zeros(n_channels, np.int64)
+    usual = 0  # curves between the marks before
+    curve = 0
+    for k in range(len(frames) - 1):
+        left = frames[k + 1] - frames[k]
+        start = marks[k]
+        n_here = 0
+        while left:
+            if curve >= len(lengths):
+                return -1
+            length = code_length(state, data, lengths[curve], left, n_here, usual)
+            if length < 1:
+                return -1
+            lengths[curve] = length
+            for kind in range(2):
+                point = ends[curve] if kind == 0 else mids[curve]
+                for c in range(n_channels):
+                    if kind == 0:
+                        predicted[c] = towards(start[c], marks[k + 1, c], length, left)
+                    else:
+                        predicted[c] = (start[c] + ends[curve, c]) >> 1
+                if (length == left) if kind == 0 else (length == 1):
+                    for c in range(n_channels):
+                        point[c] = predicted[c]
+                elif code_point(state, data, point, predicted, tracks[kind], KINDS[kind]):
+                    return -1
+            start = ends[curve]
+            left -= length
+            n_here += 1
+            curve += 1
+        usual = n_here  # QBC-23
+    return curve
+
+
+@inner
+def code_length(state: Ints, data: Bytes, length: int, left: int, n_here: int, usual: int) -> int:
+    """Code the frames of a curve, of which ``left`` are left up to the next mark; 0 for a fault."""
+    if left == 1:
+        return 1
+    a = C_LAST + min(bits(left), 15)
+    b, c = C_LAST + 16 + min(n_here, 7), C_LAST + 24 + clamp(usual - n_here, 0, 7)
+    if mixed(state, data, 1 if length == left else 0, M_LAST, a, b, c):
+        return left
+    half = left >> 1
+    error = code_residual(  # QBC-23
+        state, data, length - half, 0, (4 * left, left), min(n_here, 7), (0, 0, 3), LENGTHS
+    )
+    if error == FAULT or not 0 < half + error < left:  # QBC-24
+        return 0
+    return half + error
+
+
+@kernel
+def evaluate(
+    out: Floats,
+    first: int,
+    start: int,
+    starts: Floats,
+    mids: Floats,
+    ends: Floats,
+    lengths: Ints,
+) -> None:
+    """Write the frames of curves that begin at ``start`` into ``out``, whose row 0 is ``first``.
+
+    A curve gives its frames but the last, which is the first of the next.
+    """
+    at = start
+    for k in range(len(lengths)):
+        length = lengths[k]
+        for i in range(max(0, first - at), min(length, first + len(out) - at)):
+            t = i / length
+            u = 1.0 - t
+            a, b, c = u * u, 2.0 * t * u, t * t  # QBC-28
+            row = at + i - first
+            for channel in range(out.shape[1]):
+                out[row, channel] = (
+                    a * starts[k, channel] + b * mids[k, channel] + c * ends[k, channel]  # QBC-28
+                )
+        at += length

@@ -1,0 +1,75 @@
+"""Some groups of a signal alone, as an encoder reads them that codes them anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import SignalSource
+from mcz.motion import Joint, Skeleton
+from mcz.numbers import Grid
+
+
+class Part:
+    """The SignalSource of some groups of ``source``, numbered from 0, their channels side by side.
+
+    Of the skeleton only their channels are left. Where ``n_frames`` is more than ``source`` has,
+    as in a clip that was cut, the last frame is held.
+    """
+
+    def __init__(self, source: SignalSource, groups: Sequence[int], n_frames: int) -> None:
+        layout = source.layout
+        self._source, self._n_read = source, layout.n_frames
+        self._columns = [column for group in groups for column in layout.groups[group]]
+        ends = accumulate((len(layout.groups[group]) for group in groups), initial=0)
+        skeleton = layout.skeleton
+        self.layout = replace(
+            layout,
+            n_frames=n_frames,
+            groups=tuple(tuple(range(start, stop)) for start, stop in pairwise(ends)),
+            skeleton=None if skeleton is None else _cut(skeleton, set(self._columns)),
+            grids=tuple(layout.grids[column] for column in self._columns),
+        )
+        self.breaks = source.breaks
+
+    def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
+        return self._held(self._source.ordinals, start, stop)
+
+    def grids(self, frame: int) -> tuple[Grid, ...]:
+        grids = self._source.grids(frame)
+        return tuple(grids[column] for column in self._columns)
+
+    def values(self, start: int, stop: int) -> NDArray[np.float64]:
+        return self._held(self._source.values, start, stop)
+
+    def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
+        if self._source.valid(0, 0) is None:
+            return None
+        return self._held(self._source.valid, start, stop)
+
+    def _held(self, read: Callable[[int, int], Any], start: int, stop: int) -> NDArray[Any]:
+        """What ``read`` gives of these columns, the last frame again and again behind the end."""
+        end = self._n_read
+        found: NDArray[Any] = read(min(start, end), min(stop, end))[:, self._columns]
+        missing = stop - max(start, end)
+        if missing <= 0:
+            return found
+        last = read(end - 1, end)[:, self._columns]
+        return np.concatenate([found, *([last] * missing)])
+
+
+def _cut(skeleton: Skeleton, columns: set[int]) -> Skeleton:
+    """``skeleton`` with these channels alone."""
+
+    def kept(index: int, joint: Joint) -> Joint:
+        pairs = zip(skeleton.columns(index), joint.channels, strict=True)
+        return replace(joint, channels=tuple(c for column, c in pairs if column in columns))
+
+    return replace(
+        skeleton, joints=tuple(kept(i, joint) for i, joint in enumerate(skeleton.joints))
+    )

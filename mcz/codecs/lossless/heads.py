@@ -1,0 +1,140 @@
+"""The head of each channel of a stream of the codec ``lossless``, and what it says.
+
+SPEC.md, "Codec 1: lossless", is normative.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.lossless.choices import MAX_TAP, Lattice, base_and_digits, max_top
+from mcz.errors import FormatError
+from mcz.numbers import Grid
+from mcz.schema import read_varint
+
+Ints = NDArray[np.int64]
+
+CODED, CONSTANT, COPY = range(3)  # bits 0 and 1 of a channel's first byte
+MAX_DROP = 19
+MAX_SCALE = 172  # 2^43
+MAX_TAPS = 8
+OWN_FORM = 128  # in kind: form and drop are in the stream
+MULTIPLES = 32  # form: integers that are multiplied by a unit
+
+
+def read_heads(stream: bytes, grids: Sequence[Grid]) -> tuple[list[tuple[int, Any, bytes]], int]:
+    """Of each channel its kind, its plan and unit, ordinal or what it copies, and its head's bytes.
+
+    Also the offset after the heads.
+    """
+    heads: list[tuple[int, Any, bytes]] = []
+    at = 0
+    for channel, grid in enumerate(grids):
+        found: Any
+        start = at
+        kind, at = _byte(stream, at)
+        if kind & 3 == CODED:
+            plan, unit, at = _parse_coded(stream, at, kind, grid)
+            found = plan, unit
+        elif kind & 3 == CONSTANT:  # LOSS-02
+            found, at = _parse_constant(stream, at, kind)
+        elif kind == COPY:  # LOSS-03
+            group, at = read_varint(stream, at)
+            column, at = read_varint(stream, at)
+            found = group, column
+        else:
+            raise FormatError(f"lossless: channel {channel} is of kind {kind:#04x}")
+        heads.append((kind & 3, found, stream[start:at]))
+    return heads, at
+
+
+def _byte(stream: bytes, at: int) -> tuple[int, int]:
+    if at >= len(stream):
+        raise FormatError(f"lossless: the stream ends at {at}, in the head of a channel")
+    return stream[at], at + 1
+
+
+def _parse_constant(stream: bytes, at: int, kind: int) -> tuple[int, int]:
+    size = kind >> 2
+    if size > 8 or at + size > len(stream):  # LOSS-04, LOSS-06
+        raise FormatError(f"lossless: a constant of {size} bytes at {at}")
+    folded = int.from_bytes(stream[at : at + size], "little")
+    if size and stream[at + size - 1] == 0:  # LOSS-07
+        raise FormatError(f"lossless: a constant of {size} bytes, the last of which is 0")
+    return (folded >> 1) ^ -(folded & 1), at + size
+
+
+def _parse_coded(stream: bytes, at: int, kind: int, grid: Grid) -> tuple[Ints, float | None, int]:
+    """The plan of a coded channel, its unit if it has one, and the offset after its head."""
+    form, drop, unit = form_of_grid(grid), 0, None  # LOSS-15
+    if kind & OWN_FORM:
+        form, at = _byte(stream, at)
+        drop, at = _byte(stream, at)
+    if form == MULTIPLES:
+        unit, at = _parse_unit(stream, at)
+    shape = _shape(form, drop)
+    top = 0
+    if shape.base:
+        top, at = read_varint(stream, at)
+    scale, at = _byte(stream, at)
+    taps = []
+    for _ in range(kind >> 3 & 15):
+        folded, at = read_varint(stream, at)
+        taps.append((folded >> 1) ^ -(folded & 1))
+    if (
+        (shape.base and top > max_top(shape))  # LOSS-18
+        or len(taps) > MAX_TAPS  # LOSS-05
+        or any(abs(t) > MAX_TAP for t in taps)  # LOSS-19
+    ):
+        raise FormatError(f"lossless: greatest class {top}, taps {taps}")
+    if scale > MAX_SCALE:  # LOSS-20
+        raise FormatError(f"lossless: scale {scale}")
+    shape = Lattice(shape.base, shape.digits, drop, top)
+    return make_plan(shape, scale, kind >> 2 & 1, taps), unit, at
+
+
+def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
+    if at + 8 > len(stream):
+        raise FormatError(f"lossless: the stream ends at {len(stream)}, in a unit")
+    (unit,) = struct.unpack_from("<d", stream, at)
+    if not 2.0**-200 <= unit <= 2.0**80:  # LOSS-12
+        raise FormatError(f"lossless: a unit of {unit!r}")
+    return unit, at + 8
+
+
+def _shape(form: int, drop: int) -> Lattice:
+    if (form == 0 and drop <= MAX_DROP) or (form == MULTIPLES and drop == 0):  # LOSS-17
+        return Lattice(0, 0, drop)
+    if 1 <= form <= 15 and drop == 0:  # LOSS-16, LOSS-17
+        return Lattice(10, form)
+    if form in (64 + 24, 64 + 53) and drop <= form - 64 - 2:  # LOSS-16, LOSS-17
+        return Lattice(2, form - 64 - drop, drop)
+    raise FormatError(f"lossless: form {form}, drop {drop}")  # LOSS-16
+
+
+def form_of(shape: Lattice) -> int:
+    """The byte ``form``: 0 plain, digits of base 10, or 64 + digits of base 2, drop included."""
+    return {0: 0, 10: shape.digits, 2: 64 + shape.digits + shape.drop}[shape.base]
+
+
+def form_of_grid(grid: Grid) -> int:
+    base, digits = base_and_digits(grid)
+    return form_of(Lattice(base, digits))
+
+
+def scale_of(quarters: int) -> int:
+    """The scale that a byte stands for: about 2^(q / 4)."""
+    return 4 + (quarters & 3) << (quarters >> 2) >> 2
+
+
+def make_plan(shape: Lattice, scale: int, from_last: int, taps: Sequence[int]) -> Ints:
+    plan = np.zeros(7 + MAX_TAPS, np.int64)
+    fields = (shape.base, shape.digits, shape.drop, shape.top, scale_of(scale) << 4)
+    plan[:7] = *fields, from_last, len(taps)
+    plan[7 : 7 + len(taps)] = taps
+    return plan

@@ -1,0 +1,1 @@
+"""Groups of frames, coded as they come: online."""

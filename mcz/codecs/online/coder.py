@@ -1,0 +1,186 @@
+"""Units made of frames and frames of units, with all that is remembered from frame to frame.
+
+SPEC.md, "Codec 11: online", is normative; the names below are its field names.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from construct import Int8ul, OneOf, Struct
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Layout
+from mcz.codecs.online.units import GOLOMB, INTRA, LTR, MIXED, STR, Unit
+from mcz.codecs.space import APART, COURSES, MEAN, N_COORDINATES, SPACE, Space, space_of
+from mcz.coding.start import start_states
+from mcz.errors import FormatError, LostFrameError, MotionError
+from mcz.schema import parse
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NAME = "online"
+N_KINDS = 2  # start tables of a coder: for LTRs that are intra coded, and others
+AS_IS, REORDERED = 0, 1  # orders
+COEFFICIENT_BYTES = 40  # more than the bits of one take
+
+ONLINE_HEADER = Struct(
+    "space" / SPACE * "how a frame becomes coefficients",
+    "order"
+    / OneOf(Int8ul, (AS_IS, REORDERED))
+    * "points of a matrix: 0 as in Space; 1 x of all, then y, then z",
+    "coder" / OneOf(Int8ul, (MIXED, GOLOMB)) * "how coefficients become bits: 0 mixed, 1 Golomb",
+)
+
+
+@cache
+def _kernels() -> Any:
+    from mcz.codecs.online import kernels
+
+    return kernels
+
+
+@cache
+def _coding() -> Any:
+    from mcz.coding import mixing
+
+    return mixing
+
+
+def parse_header(header: bytes) -> Any:
+    """The fields of ONLINE_HEADER; raises FormatError."""
+    fields = parse(ONLINE_HEADER, header, f"{NAME} header")
+    if fields.space.flags & (MEAN | COURSES):  # ONLINE-04
+        raise FormatError(f"{NAME}: flags {fields.space.flags:#x}, it has no mean or courses")
+    if fields.order == REORDERED and fields.space.flags & APART:  # ONLINE-05
+        raise FormatError(f"{NAME}: x, y and z are apart and reordered")
+    return fields
+
+
+def _space(fields: Any, layout: Layout) -> Space:
+    space = space_of(NAME, fields.space, layout)
+    if fields.order == AS_IS:  # ONLINE-07
+        return space
+    if layout.n_channels % N_COORDINATES:  # ONLINE-06
+        raise FormatError(f"{NAME}: {layout.n_channels} channels are not three coordinates each")
+    columns = space.columns.reshape(-1, N_COORDINATES).T.reshape(1, -1)  # ONLINE-07
+    return replace(space, columns=np.ascontiguousarray(columns))  # ONLINE-07
+
+
+class Coder:
+    """Encoder or decoder of one signal; raises FormatError for a bad header."""
+
+    def __init__(self, header: bytes, layout: Layout) -> None:
+        fields = parse_header(header)
+        self.header, self.coder = header, int(fields.coder)
+        self.space = _space(fields, layout)
+        self.at = 0  # number of the frame that is due
+        self._ltr: int | None = None  # number of the last LTR, None where it is not known
+        self._whole = False  # the frame before is known
+        self._state = start_states("online")[N_KINDS * self.coder].copy()
+        self._values = np.zeros(len(self.space.weights))
+        self._reference = np.zeros(len(self.space.weights))
+        self._memory = np.zeros(_kernels().N_MEMORY, np.int64)
+        self._lengths = np.zeros(len(self.space.starts) - 1, np.int64)
+        self._tracks = np.zeros((self.space.n_rows, _kernels().TRACK_SIZE), np.int64)
+        self._analysis = np.zeros((0, 0))
+
+    def skip(self, n_frames: int) -> None:
+        """So many frames are not known."""
+        self.at += n_frames
+        self._whole = self._whole and not n_frames
+
+    def distance(self) -> int:
+        """How far the LTR before the frame that is due is away."""
+        assert self._ltr is not None
+        return self.at - self._ltr
+
+    def decode(self, unit: Unit) -> Floats:
+        """The frames of a unit, (frames, n_channels).
+
+        Raises LostFrameError where a frame that it needs is not known, FormatError on bad bytes; in
+        both cases its frames are not known then.
+        """
+        out = np.empty((unit.n_frames, len(self._values)))
+        before = self._reference.copy(), self._memory.copy()
+        try:
+            self._check(unit)
+            self._begin(unit.kind)
+            data = np.frombuffer(unit.data, np.uint8).copy()
+            _coding().start(self._state, data, 0)
+            fault = _kernels().decode_frames(*self._given(data, unit.kind, out))
+            if fault >= 0:
+                raise FormatError(f"{NAME}: frame {self.at + fault} is out of range")
+            if _coding().coded_size(self._state) != len(data):  # ONLINE-23
+                raise FormatError(
+                    f"{NAME}: the unit at frame {self.at}: its {len(data)} bytes are not what its "
+                    "bits take"
+                )
+        except FormatError:
+            self._reference[:], self._memory[:] = before
+            self.skip(unit.n_frames)
+            raise
+        self._took(unit.kind, unit.n_frames)
+        return out
+
+    def _check(self, unit: Unit) -> None:
+        """Refuse a unit that needs what is not known."""
+        if unit.kind == STR and not self._whole:  # ONLINE-26
+            raise LostFrameError(f"{NAME}: frame {self.at} needs the one before, which is lost")
+        # ONLINE-14, ONLINE-27
+        if unit.kind == LTR and (self._ltr is None or self.distance() != unit.distance):
+            raise LostFrameError(
+                f"{NAME}: frame {self.at} needs that {unit.distance} before, lost or no LTR"
+            )
+
+    def encode(self, kind: int, frames: Floats, n_group: int, threshold: float, plan: Any) -> Unit:
+        """A unit of frames, (frames, n_channels), of a group of ``n_group``; raises MotionError.
+
+        One frame that is refused changes nothing that matters to the next.
+        """
+        if not self._analysis.size:
+            self._analysis = np.ascontiguousarray(np.concatenate(self.space.analysis()))
+        self._begin(kind)
+        data = np.empty(len(frames) * (COEFFICIENT_BYTES * self.space.n_rows + 64), np.uint8)
+        _coding().start(self._state, data, 1)
+        before = plan.numbers.copy()
+        choice = _kernels().Choice(
+            self._analysis, threshold, n_group, plan.numbers, plan.laplace, plan.gauss
+        )
+        fault = _kernels().encode_frames(*self._given(data, kind, frames), choice)
+        if fault >= 0:
+            plan.numbers[:] = before
+            raise MotionError(
+                f"{NAME}: a coefficient of frame {self.at + fault} exceeds 2^40 quantizer steps"
+            )
+        coded = data[: _coding().finish(self._state, data)].tobytes()
+        if len(frames) == n_group:
+            plan.round_up(len(coded))
+        unit = Unit(kind, len(frames), coded, self.distance() if kind == LTR else 0)
+        self._took(kind, len(frames))
+        return unit
+
+    def _begin(self, kind: int) -> None:
+        """A group begins with nothing learned but the start table of its kind."""
+        if kind != STR:  # ONLINE-15
+            table = start_states("online")[N_KINDS * self.coder + (kind == LTR)]  # ONLINE-15
+            self._state = table.copy()
+
+    def _took(self, kind: int, n_frames: int) -> None:
+        if kind != STR:
+            self._ltr = self.at
+        self.at += n_frames
+        self._whole = True
+
+    def _given(self, data: NDArray[np.uint8], kind: int, frames: Floats) -> tuple[Any, ...]:
+        past = _kernels().Past(
+            self._values, self._reference, self._memory, self._lengths, self._tracks
+        )
+        return self._state, data, self.coder, kind, frames, past, self.space.transform()
+
+
+__all__ = ["GOLOMB", "INTRA", "LTR", "MIXED", "NAME", "ONLINE_HEADER", "STR", "Coder"]

@@ -1,0 +1,264 @@
+"""Codec 11, ``online``: groups of frames after long-term references, with a step for each frame.
+
+SPEC.md, "Codec 11: online", is normative; the names below are its field names.
+Source: C.-H. Kwak, I. V. Bajic, Online MoCap data coding with bit allocation, rate control, and
+motion-adaptive post-processing, sections II and III.
+
+Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
+states). No delay: a frame is coded before the next is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import (
+    Codec,
+    Encoded,
+    Fetch,
+    Layout,
+    Request,
+    Segment,
+    SignalSource,
+    Span,
+    model_finder,
+)
+from mcz.codecs.gaps import FrameReader, LiveRows
+from mcz.codecs.online.choices import plan_of, set_plan
+from mcz.codecs.online.coder import (
+    GOLOMB,
+    INTRA,
+    LTR,
+    MIXED,
+    NAME,
+    ONLINE_HEADER,
+    STR,
+    Coder,
+    parse_header,
+)
+from mcz.codecs.online.options import CHANGEABLE, PARAMETERS, choose, choose_live, settled
+from mcz.codecs.online.units import Unit, build_units, parse_units
+from mcz.codecs.parameters import Dial
+from mcz.codecs.segments import TARGET_BYTES
+from mcz.codecs.space import check, uses_of
+from mcz.codecs.space_choices import sample_of
+from mcz.errors import FormatError, OptionError
+from mcz.schema import build
+
+Floats = NDArray[np.float64]
+
+SEGMENT_FRAMES = 1200  # at least, but for the last
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, or is too large, OptionError for parameters
+    that contradict each other, or a rate where no frame rate is known.
+    """
+    chosen = settled(params)
+    choice, order = choose(sample_of(NAME, source), chosen)
+    layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
+    header = build(ONLINE_HEADER, _fields(choice.fields, order, chosen), f"{NAME} header")
+    writer = _Writer(header, layout, chosen)
+    return Encoded(header, _segments(source, writer), models=choice.models, known=choice.known)
+
+
+def _fields(space: Any, order: int, chosen: Mapping[str, Any]) -> dict[str, Any]:
+    coder = MIXED if chosen["coder"] == "mixed" else GOLOMB
+    return {"space": space, "order": order, "coder": coder}
+
+
+class _Writer:
+    """Which frames are LTRs, and which of these are intra coded; shared by file and live stream."""
+
+    def __init__(self, header: bytes, layout: Layout, chosen: Mapping[str, Any]) -> None:
+        self.chosen, self.layout = dict(chosen), layout
+        self.coder = Coder(header, layout)
+        self.plan = plan_of(chosen, layout, self.coder.space.step)
+        self.left = 0  # frames of the group that are still to come
+        self._size = 0  # of the group
+        self._groups = 0  # since the last intra coded one
+        self._waiting: dict[str, Any] | None = None  # parameters of the next group on
+
+    def kind(self) -> int:
+        """What the next frame is."""
+        if self.left:
+            return STR
+        period = self.chosen["intra_period"]
+        if self.coder.at == 0 or (period and self._groups >= period):
+            return INTRA
+        return LTR
+
+    def code(self, frames: Floats, n_group: int | None = None) -> Unit:
+        """The unit of frames of one group, which has ``n_group`` in all; raises MotionError."""
+        if not self.left and self._waiting is not None:
+            self.chosen, self._waiting = self._waiting, None
+            set_plan(self.plan, self.chosen, self.layout, self.coder.space.step)
+        kind = self.kind()
+        size = self._size if kind == STR else n_group or self.chosen["gof"]
+        unit = self.coder.encode(kind, frames, size, self.chosen["threshold"], self.plan)
+        if kind != STR:
+            self._groups = 1 if kind == INTRA else self._groups + 1
+            self.left = self._size = size
+        self.left -= len(frames)
+        return unit
+
+    def change(self, options: Mapping[str, Any]) -> None:
+        """Let parameters hold from the next group on."""
+        self._waiting = settled({**self.chosen, **(self._waiting or {}), **options})
+
+
+def _segments(source: SignalSource, writer: _Writer) -> Iterator[Segment]:
+    """Whole groups, and from an intra coded LTR on where there are such."""
+    layout = source.layout
+    if not layout.n_channels:
+        if layout.n_frames:
+            yield Segment(0, layout.n_frames, ())
+        return
+    reader = FrameReader(NAME, source)
+    least = writer.chosen["segment_frames"] or SEGMENT_FRAMES
+    units: list[Unit] = []
+    first = 0
+    while reader.at < layout.n_frames:
+        n_group = min(writer.chosen["gof"], layout.n_frames - reader.at)
+        n_frames = min(writer.left or n_group, layout.most_frames)
+        if units and _is_full(units, reader.at - first, least, n_frames, writer):
+            yield _segment(first, units)
+            units, first = [], reader.at
+        units.append(writer.code(reader.next(reader.at + n_frames), n_group))
+    if units:
+        yield _segment(first, units)
+
+
+def _is_full(
+    units: Sequence[Unit], n_frames: int, least: int, n_more: int, writer: _Writer
+) -> bool:
+    """Whether a segment ends before the next unit of ``n_more`` frames."""
+    if n_frames + n_more > writer.layout.most_frames:
+        return True
+    due = INTRA if writer.chosen["intra_period"] else LTR
+    large = n_frames >= least or sum(len(unit.data) for unit in units) > TARGET_BYTES
+    return large and writer.kind() >= due
+
+
+def _segment(first: int, units: Sequence[Unit]) -> Segment:
+    n_frames = sum(unit.n_frames for unit in units)
+    return Segment(first, n_frames, (build_units(units),), fresh=units[0].kind == INTRA)
+
+
+def decode(
+    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+) -> Floats:
+    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
+    check(NAME, layout, spans, fresh=False)
+    n_channels = layout.n_channels if request.groups else 0
+    out = np.zeros((request.stop - request.start, n_channels))
+    coder = Coder(header, layout)
+    if not n_channels:
+        return out
+    for first, unit in _needed(spans, request, fetch):
+        coder.skip(first - coder.at)
+        block = coder.decode(unit)
+        begin, stop = max(first, request.start), min(coder.at, request.stop)
+        if begin < stop:
+            out[begin - request.start : stop - request.start] = block[begin - first : stop - first]
+    return out
+
+
+def _needed(spans: Sequence[Span], request: Request, fetch: Fetch) -> list[tuple[int, Unit]]:
+    """The units with which the requested frames can be decoded, each with its first frame."""
+    fresh = [i for i, span in enumerate(spans) if span.fresh and span.first <= request.start]
+    found: list[tuple[int, Unit]] = []
+    for index in range(max(fresh, default=0), len(spans)):  # DATA-11
+        span = spans[index]
+        if span.first >= request.stop:
+            break
+        at = span.first
+        units = parse_units(NAME, fetch(index, 0, 0), span.n_frames)
+        if span.fresh != (units[0].kind == INTRA):  # ONLINE-13
+            raise FormatError(f"{NAME}: the segment at {at} begins with kind {units[0].kind}")
+        for unit in units:
+            if unit.kind == INTRA and at <= request.start:
+                found.clear()
+            if at < request.stop:
+                found.append((at, unit))
+            at += unit.n_frames
+    return found
+
+
+def uses(header: bytes) -> tuple[bytes, ...]:
+    """The models that a header names."""
+    return uses_of(parse_header(header).space)
+
+
+class _LiveEncoder:
+    """One frame a push, each a unit and a segment; fresh ones are intra coded."""
+
+    def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
+        chosen = settled(options)
+        choice, order = choose_live(layout, chosen)
+        self.header = build(ONLINE_HEADER, _fields(choice.fields, order, chosen), f"{NAME} header")
+        self.models = choice.models
+        found = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
+        self._writer = _Writer(self.header, found, chosen)
+        self._rows = LiveRows(NAME, layout)
+
+    def push(self, values: Floats, valid: NDArray[np.bool_] | None = None) -> tuple[bytes, bool]:
+        writer = self._writer
+        unit = writer.code(self._rows.row(values, valid, writer.coder.at))
+        self._rows.keep()
+        return build_units([unit]), unit.kind == INTRA
+
+    def change(self, options: Mapping[str, Any]) -> None:
+        fixed = sorted(set(options) - CHANGEABLE)
+        if fixed:
+            raise OptionError(
+                f"{NAME}: {fixed[0]} cannot change while frames come; "
+                f"{', '.join(sorted(CHANGEABLE))} can"
+            )
+        self._writer.change(options)
+
+
+class _LiveDecoder:
+    """The inverse of ``_LiveEncoder``."""
+
+    def __init__(self, header: bytes, layout: Layout) -> None:
+        self._coder = Coder(header, layout)
+
+    def push(self, stream: bytes, fresh: bool) -> Floats:
+        try:
+            (unit,) = parse_units(NAME, stream, 1)
+            if fresh != (unit.kind == INTRA):
+                raise FormatError(f"{NAME}: frame {self._coder.at} is of kind {unit.kind}")
+        except FormatError:
+            self._coder.skip(1)
+            raise
+        values: Floats = self._coder.decode(unit)[0]
+        return values
+
+    def skip(self, n_frames: int) -> None:
+        self._coder.skip(n_frames)
+
+
+CODEC = Codec(
+    id=11,
+    name=NAME,
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=decode,
+    grouping="all",
+    positions=True,
+    uses=uses,
+    live=_LiveEncoder,
+    follow=_LiveDecoder,
+    dial=Dial("step", 2.0**-60, 2.0**60),
+    parameters=PARAMETERS,
+)

@@ -1,0 +1,67 @@
+"""The stream of a segment of ``online``: units, each a group of frames or a part of one.
+
+SPEC.md, "Codec 11: online", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mcz.errors import FormatError
+from mcz.schema import read_varint, varint
+
+STR, LTR, INTRA = 0, 1, 2  # what a frame is predicted from: the last, the last LTR, nothing
+MIXED, GOLOMB = 0, 1  # coders
+MODES = ("mod", "rc", "rca", "steady")  # of an encoder's rate control
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Frames that are coded together; ``kind`` is that of the first, the others are STR.
+
+    ``distance``: so many frames before the first lies the LTR that it is predicted from, where it
+    is one itself.
+    """
+
+    kind: int
+    n_frames: int
+    data: bytes
+    distance: int = 0
+
+
+def build_units(units: Sequence[Unit]) -> bytes:
+    """The stream of a segment of these units."""
+    parts = []
+    for number, unit in enumerate(units, 1):
+        parts.append(varint(4 * unit.n_frames + unit.kind))
+        if unit.kind == LTR:
+            parts.append(varint(unit.distance))
+        if number < len(units):
+            parts.append(varint(len(unit.data)))
+        parts.append(unit.data)
+    return b"".join(parts)
+
+
+def parse_units(name: str, stream: bytes, n_frames: int) -> list[Unit]:
+    """The units of a segment of ``n_frames``; raises FormatError on bad bytes."""
+    units: list[Unit] = []
+    at, left = 0, n_frames
+    while left:  # ONLINE-08
+        what = f"{name}: unit {len(units)}"
+        head, at = read_varint(stream, at)
+        kind, size = head % 4, head // 4
+        if kind > INTRA or not 1 <= size <= left:  # ONLINE-09, ONLINE-10, ONLINE-11
+            raise FormatError(f"{what}: kind {kind}, {size} frames of {left}")
+        distance = 0
+        if kind == LTR:
+            distance, at = read_varint(stream, at)
+        left -= size
+        n_bytes = len(stream) - at
+        if left:
+            n_bytes, at = read_varint(stream, at)
+        if n_bytes > len(stream) - at:  # ONLINE-12
+            raise FormatError(f"{what}: {n_bytes} bytes of {len(stream) - at}")
+        units.append(Unit(kind, size, stream[at : at + n_bytes], distance))
+        at += n_bytes
+    return units

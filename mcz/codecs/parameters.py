@@ -1,0 +1,135 @@
+"""Parameters of codecs: what a caller may set, how its text is read, presets of several at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from mcz.errors import OptionError
+
+MAX_DECIMALS = 15
+SCALED = 255  # in place of decimals: there are steps
+
+Presets = Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter of a codec, as ``--param name=value`` gives it."""
+
+    name: str
+    default: Any
+    help: str
+    parse: Callable[[Any], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Dial:
+    """The one parameter that trades quality for size: the greater, the smaller the file.
+
+    ``rises``: the greater, the better the quality instead. ``whole``: it is an integer. A caller
+    who names a size or an error has it searched for between ``low`` and ``high``.
+    """
+
+    parameter: str
+    low: float
+    high: float
+    rises: bool = False
+    whole: bool = False
+
+
+def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
+    """A parser of integers from ``low`` to ``high``."""
+
+    def parse(text: Any) -> int:
+        try:
+            value = int(text)
+            if isinstance(text, bool) or (isinstance(text, float) and value != text):
+                raise ValueError
+        except (TypeError, ValueError, OverflowError):
+            raise OptionError(f"{name} is {text!r}, not an integer") from None
+        if not low <= value <= high:
+            raise OptionError(f"{name} is {value}, not from {low} to {high}")
+        return value
+
+    return parse
+
+
+def number(name: str, low: float, high: float) -> Callable[[Any], float]:
+    """A parser of numbers from ``low`` to ``high``."""
+
+    def parse(text: Any) -> float:
+        try:
+            if isinstance(text, bool):
+                raise ValueError
+            value = float(text)
+        except (TypeError, ValueError, OverflowError):
+            raise OptionError(f"{name} is {text!r}, not a number") from None
+        if not low <= value <= high:
+            raise OptionError(f"{name} is {value}, not from {low:g} to {high:g}")
+        return value
+
+    return parse
+
+
+def choice(
+    name: str, among: tuple[str, ...], formerly: Mapping[str, str] = MappingProxyType({})
+) -> Callable[[Any], str]:
+    """A parser of one word of several; ``formerly``: words of older files -> today's."""
+
+    def parse(text: Any) -> str:
+        if isinstance(text, str):
+            text = formerly.get(text, text)
+        if text not in among:
+            raise OptionError(f"{name} is {text!r}, not one of {', '.join(among)}")
+        return str(text)
+
+    return parse
+
+
+# What a caller may ask for instead of setting the dial of a codec; None: not asked for.
+TARGETS = (
+    Parameter(
+        "target_bytes",
+        None,
+        "at most so many bytes of payload, overhead and models",
+        integer("target_bytes", 1, 2**53 - 1),
+    ),
+    Parameter(
+        "kbps",
+        None,
+        "at most so many kilobits of payload a second",
+        number("kbps", 1e-9, 1e9),
+    ),
+    Parameter(
+        "mean_error_cm",
+        None,
+        "at most this mean position error",
+        number("mean_error_cm", 1e-9, 1e9),
+    ),
+    Parameter(
+        "max_error_cm",
+        None,
+        "at most this maximum position error",
+        number("max_error_cm", 1e-9, 1e9),
+    ),
+)
+
+
+def preset_parameter(presets: Presets) -> Parameter:
+    """The parameter that names one of ``presets``: default, or the published method's."""
+    (published,) = set(presets) - {"default"}
+    help_ = f"default, or {published} for the published method"
+    return Parameter("preset", "default", help_, choice("preset", tuple(presets)))
+
+
+def decimals_parameter(help_: str) -> Parameter:
+    return Parameter("Q", None, help_, integer("Q", 0, MAX_DECIMALS))
+
+
+def chosen_of(presets: Presets, params: Mapping[str, Any]) -> dict[str, Any]:
+    """What a preset has a say in, each value that was given in place of the preset's."""
+    values = presets[params["preset"]].items()
+    return {name: value if params[name] is None else params[name] for name, value in values}

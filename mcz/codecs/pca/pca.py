@@ -1,0 +1,162 @@
+"""Codec 4, ``pca``: principal components of the frames, coefficients predicted in time.
+
+SPEC.md, "Codec 4: pca", is normative; the names below are its field names.
+Source: M. A. Khan, An efficient algorithm for compression of motion capture signal using
+multidimensional quadratic Bezier curve break-and-fit method, 2014, section 4; the preset
+``khan2014`` has the errors that its tables print, the defaults improve upon it.
+
+Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
+states). A stream holds all channels of one segment, with a basis of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from construct import ExprValidator, Int8ul, Struct
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
+from mcz.codecs.gaps import SegmentReader
+from mcz.codecs.parameters import (
+    MAX_DECIMALS,
+    SCALED,
+    Dial,
+    Parameter,
+    chosen_of,
+    decimals_parameter,
+    integer,
+    preset_parameter,
+)
+from mcz.codecs.pca.choices import MEAN_STEPS, components_of
+from mcz.codecs.pca.streams import build_stream, parse_stream
+from mcz.codecs.segments import (
+    SEGMENT_FRAMES,
+    SEGMENT_FRAMES_PARAMETER,
+    Lengths,
+    halving,
+    segment_frames_of,
+)
+from mcz.codecs.steps import ratio_of
+from mcz.errors import FormatError
+from mcz.schema import build, parse
+
+Floats = NDArray[np.float64]
+
+LEAST_FRAMES = 256  # of a segment: in fewer the basis would cost more than it saves
+
+PCA_HEADER = Struct(
+    "decimals"
+    / ExprValidator(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED)  # PCA-05
+    * "decimals of means and coefficients, 0 to 15; 255: they are multiples of a step",
+)
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "khan2014": {"q": 13, "Q": 2},
+    "default": {"q": 20, "Q": None},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, or is too large.
+    """
+    published = params["preset"] == "khan2014"
+    chosen = chosen_of(PRESETS, params)
+    frames = segment_frames_of(source.layout, params["segment_frames"], as_published=published)
+    decimals = SCALED if chosen["Q"] is None else chosen["Q"]
+    header = build(PCA_HEADER, {"decimals": decimals}, "pca header")
+    return Encoded(header, _segments(source, chosen["q"], chosen["Q"], frames, published))
+
+
+def _segments(
+    source: SignalSource, q: int, decimals: int | None, segment_frames: int, published: bool
+) -> Iterator[Segment]:
+    layout = source.layout
+    frames = SegmentReader("pca", source)
+
+    def code(first: int, stop: int) -> tuple[bytes, ...]:
+        found = components_of(frames(first, stop), q, decimals, by_frame=published)
+        return (build_stream(found, scaled=decimals is None),) * len(layout.groups)
+
+    length = min(segment_frames or SEGMENT_FRAMES, layout.most_frames)
+    if segment_frames >= layout.n_frames:
+        length = layout.n_frames
+    lengths = Lengths(length, bool(segment_frames), least=LEAST_FRAMES)
+    for first, stop, streams in halving(layout.n_frames, lengths, code):
+        yield Segment(first, stop - first, streams)
+
+
+def decode(
+    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+) -> Floats:
+    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
+    fields = parse(PCA_HEADER, header, "pca header")
+    _check(layout, spans)
+    n_columns = sum(len(layout.groups[group]) for group in request.groups)
+    out = np.zeros((request.stop - request.start, n_columns))
+    if not n_columns:
+        return out
+    for index, span in enumerate(spans):
+        start, stop = max(span.first, request.start), min(span.stop, request.stop)
+        if start < stop:
+            block = _segment(fetch(index, 0, 0), fields.decimals, layout, span, stop - span.first)
+            out[start - request.start : stop - request.start] = block[start - span.first :]
+    return out
+
+
+def _check(layout: Layout, spans: Sequence[Span]) -> None:
+    if layout.samples_per_frame != 1 or layout.n_resolutions != 1:  # PCA-02
+        raise FormatError(
+            f"pca: {layout.samples_per_frame} samples a frame, {layout.n_resolutions} resolutions"
+        )
+    if len(layout.groups) > 1:  # PCA-01
+        raise FormatError(f"pca: {len(layout.groups)} groups, it has one")
+    for span in spans:
+        if (span.lead, span.tail, span.fresh) != (0, 0, True):  # PCA-03, PCA-04
+            raise FormatError(f"pca: the segment at {span.first} bears upon others")
+
+
+def _segment(stream: bytes, decimals: int, layout: Layout, span: Span, wanted: int) -> Floats:
+    """The first ``wanted`` frames of a segment."""
+    from mcz.codecs.pca import kernels
+
+    scaled = decimals == SCALED
+    found = parse_stream(stream, layout.n_channels, span.n_frames, wanted, scaled=scaled)
+    if scaled:
+        step = ratio_of(found.step)
+        means, rows = found.means * (step / MEAN_STEPS), found.coefficients * step  # PCA-15
+    else:
+        means, rows = found.means / 10.0**decimals, found.coefficients / 10.0**decimals  # PCA-16
+    basis = np.ldexp(found.basis.astype(np.float64), -found.shifts[:, None])
+    out = np.zeros((wanted, layout.n_channels))
+    kernels.evaluate(out, _plain(means), _plain(basis), _plain(rows))
+    return out
+
+
+def _plain(values: NDArray[Any]) -> Floats:
+    return np.ascontiguousarray(values, np.float64)
+
+
+CODEC = Codec(
+    id=4,
+    name="pca",
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=decode,
+    grouping="all",
+    dial=Dial("q", 1, 2**20, rises=True, whole=True),
+    parameters=(
+        preset_parameter(PRESETS),
+        Parameter("q", None, "components of a segment; default 20", integer("q", 1, 2**20)),
+        decimals_parameter(
+            "decimals of means and coefficients; default: a step that suits what is left out"
+        ),
+        SEGMENT_FRAMES_PARAMETER,
+    ),
+)

@@ -1,0 +1,133 @@
+"""The stream of one segment of principal components: means, basis, coefficients.
+
+SPEC.md, "Codec 4: pca", is normative; names are its field names.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.predictors import choose_predictor
+from mcz.coding.start import start_states
+from mcz.coding.streams import code, halves_of, scale_of, uncode
+from mcz.errors import FormatError, MotionError
+from mcz.schema import read_varint, varint
+
+Ints = NDArray[np.int64]
+
+MAX_INDEX = 2**40
+MAX_SHIFT = 40
+MAX_SCALE = 62
+
+
+@dataclass(frozen=True, slots=True)
+class Components:
+    """One segment in integers: means (channels,), basis (count, channels) and its shifts (count,),
+    coefficients (frames, count), and the step code, 0 where there is none.
+    """
+
+    step: int
+    means: Ints
+    shifts: Ints
+    basis: Ints
+    coefficients: Ints
+
+
+def build_stream(found: Components, *, scaled: bool) -> bytes:
+    """The stream of a segment; raises MotionError where an integer is too large."""
+    parts = (found.means, found.basis, found.coefficients)
+    if any(len(part) and np.abs(part).max(initial=0) > MAX_INDEX for part in parts):
+        raise MotionError("pca: a coefficient exceeds 2^40 quantizer steps")
+    if not found.means.any() and not len(found.basis):
+        return b""
+    mean_scale = halves_of(float(np.abs(found.means).mean()), MAX_SCALE)
+    several = len(found.coefficients) > 1  # a first coefficient is not predicted
+    forms = [choose_predictor(column) if several else (0, 0) for column in found.coefficients.T]
+    head = bytes((found.step,)) if scaled else b""
+    sides = bytes(found.shifts.tolist())
+    sides += bytes(min(halves, MAX_SCALE) | predictor << 6 for predictor, halves in forms)
+    head += bytes((mean_scale,)) + varint(len(found.basis)) + sides
+    count = found.means.size + found.basis.size + found.coefficients.size
+    return head + code(
+        start_states("pca")[0],
+        4 * count + 256,
+        lambda state, data: _loop(
+            state,
+            data,
+            found.means.copy(),
+            found.basis.copy(),
+            found.coefficients.copy(),
+            sides,
+            mean_scale,
+        ),
+        "pca: a coefficient",
+    )
+
+
+def parse_stream(
+    stream: bytes, n_channels: int, n_frames: int, wanted: int, *, scaled: bool
+) -> Components:
+    """The first ``wanted`` of ``n_frames`` frames; raises FormatError on bad bytes."""
+    means = np.zeros(n_channels, np.int64)
+    if not stream:
+        nothing = np.zeros(0, np.int64)
+        return Components(0, means, nothing, nothing.reshape(0, n_channels), nothing.reshape(0, 0))
+    at = 1 if scaled else 0
+    step, mean_scale = _byte(stream, 0) if scaled else 0, _byte(stream, at)
+    count, at = read_varint(stream, at + 1)
+    if count > min(n_channels, n_frames + 1):  # PCA-06
+        raise FormatError(f"pca: {count} components of {n_channels} channels, {n_frames} frames")
+    sides = stream[at : at + 2 * count]
+    if len(sides) < 2 * count:
+        raise FormatError(f"pca: a stream of {len(stream)} bytes ends in its head")
+    if max(sides[:count], default=0) > MAX_SHIFT or mean_scale > MAX_SCALE:  # PCA-07, PCA-08
+        raise FormatError(f"pca: a scale of {mean_scale} or a shift is out of range")
+    if any(form & 63 > MAX_SCALE for form in sides[count:]):  # PCA-07
+        raise FormatError("pca: the form of a component has the scale 63")
+    basis = np.zeros((count, n_channels), np.int64)
+    rows = np.zeros((wanted, count), np.int64)
+    uncode(
+        stream[at + 2 * count :],
+        start_states("pca")[0],  # PCA-09
+        lambda state, data: _loop(state, data, means, basis, rows, sides, mean_scale),
+        "pca: a mean, a basis or a coefficient",
+        whole=wanted == n_frames,  # PCA-14
+    )
+    shifts = np.frombuffer(sides[:count], "u1").astype(np.int64)
+    return Components(step, means, shifts, basis, rows)
+
+
+def _loop(
+    state: Ints,
+    data: NDArray[np.uint8],
+    means: Ints,
+    basis: Ints,
+    rows: Ints,
+    sides: bytes,
+    mean_scale: int,
+) -> bool:
+    """Code all of a segment; ``sides`` are its shifts and forms."""
+    from mcz.codecs.pca.kernels import code_coefficients
+    from mcz.codecs.table_kernels import code_table
+
+    count, n_channels = basis.shape
+    scales = np.array([scale_of(mean_scale)])
+    if code_table(state, data, means[None], scales, 0):
+        return False
+    # PCA-10
+    scales = np.array([(1 << b) >> (n_channels.bit_length() // 2) for b in sides[:count]], np.int64)
+    if code_table(state, data, basis, scales, 1):
+        return False
+    forms = sides[count:]
+    predictors = np.array([form >> 6 for form in forms], np.int64)
+    scales = np.array([scale_of(form & 63) for form in forms], np.int64)
+    return bool(code_coefficients(state, data, rows, predictors, scales) < 0)
+
+
+def _byte(stream: bytes, at: int) -> int:
+    if at >= len(stream):
+        raise FormatError(f"pca: a stream of {len(stream)} bytes ends in its head")
+    return stream[at]

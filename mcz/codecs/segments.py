@@ -1,0 +1,147 @@
+"""Segments: how long an encoder makes them, their frames, and rows put together from several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Layout, Request, Segment, SignalSource, Span
+from mcz.codecs.parameters import Parameter, integer
+from mcz.errors import MotionError
+from mcz.motion import Skeleton
+
+TARGET_BYTES = 62_000  # of a segment: under the 64 KiB that DATA should have, table included
+SEGMENT_FRAMES = 4096  # where that leaves it open
+
+SEGMENT_FRAMES_PARAMETER = Parameter(
+    "segment_frames",
+    None,
+    f"frames a segment; default: as many as make 64 KiB, at most {SEGMENT_FRAMES}",
+    integer("segment_frames", 1, 2**40),
+)
+
+
+def segment_frames_of(layout: Layout, given: int | None, *, as_published: bool = False) -> int:
+    """Frames a segment, 0: the size decides; published methods take the whole clip at once."""
+    if given is None:
+        return layout.n_frames if as_published else 0
+    return given
+
+
+Streams = tuple[bytes, ...]
+Code = Callable[[int, int], Streams]  # frames first <= f < stop -> the streams of their segment
+
+
+@dataclass(frozen=True, slots=True)
+class Lengths:
+    """How long segments are: ``length`` frames at first, half of that where they get too large.
+
+    A length is a multiple of ``unit`` and at least ``least``, but for that of the last segment.
+    ``fixed``: the size decides nothing.
+    """
+
+    length: int
+    fixed: bool
+    unit: int = 1
+    least: int = 1
+
+    def halved(self, length: int) -> int:
+        """Half of ``length``; ``length`` itself where that would be too short."""
+        shorter = max(self.unit, length // 2 // self.unit * self.unit)
+        return shorter if self.least <= shorter < length else length
+
+
+def halving(n_frames: int, lengths: Lengths, code: Code) -> Iterator[tuple[int, int, Streams]]:
+    """Segments first <= f < stop of a signal of ``n_frames``, and their streams."""
+    length, first = lengths.length, 0
+    while first < n_frames:
+        stop = min(first + length, n_frames)
+        streams = code(first, stop)
+        shorter = lengths.halved(length)
+        if not lengths.fixed and shorter < length and _size(streams) > TARGET_BYTES:
+            length = shorter
+            continue
+        yield first, stop, streams
+        first = stop
+
+
+@dataclass(frozen=True, slots=True)
+class Sizing:
+    """How a codec of ordinals guesses the frames that fill a segment.
+
+    ``target`` bytes at most; ``value_bytes`` a value, before anything is known; ``aim``: percent of
+    the target that a guess aims at; ``spare`` bytes are counted beside the streams; ``most_rows``.
+    """
+
+    target: int
+    value_bytes: int
+    aim: int
+    most_rows: int
+    spare: int = 0
+
+
+def guessing(source: SignalSource, fixed: int, sizing: Sizing, code: Code) -> Iterator[Segment]:
+    """Segments of ``fixed`` frames, or, where that is 0, of as many as their size allows.
+
+    One begins wherever the grids change.
+    """
+    layout = source.layout
+    per_frame = max(1, layout.n_channels) * layout.samples_per_frame
+    ends = sorted({*source.breaks, layout.n_frames})
+    most = min(layout.most_frames, max(1, sizing.most_rows // layout.samples_per_frame))
+    guess = fixed or max(1, sizing.target // (sizing.value_bytes * per_frame))
+    first = 0
+    while first < layout.n_frames:
+        end = next(e for e in ends if e > first)
+        n_frames = min(guess, end - first, most)
+        streams = code(first, first + n_frames)
+        size = _size(streams) + sizing.spare
+        fitting = n_frames * sizing.target * sizing.aim // (size * 100) if size else guess
+        if size > sizing.target and n_frames > 1 and not fixed:
+            guess = max(1, fitting)
+            continue
+        yield Segment(first, n_frames, streams)
+        first += n_frames
+        if not fixed and size:
+            guess = max(1, min(4 * n_frames, fitting))
+
+
+def _size(streams: Streams) -> int:
+    return sum(map(len, streams))
+
+
+def skeleton_of(name: str, layout: Layout) -> Skeleton:
+    """The skeleton of a signal that the codec ``name`` can code; raises MotionError."""
+    if layout.samples_per_frame != 1 or layout.skeleton is None:
+        raise MotionError(f"{name}: only signals of one sample a frame")
+    return layout.skeleton
+
+
+def gather(
+    layout: Layout,
+    spans: Sequence[Span],
+    request: Request,
+    decode_group: Callable[[int, int], NDArray[np.int64]],
+) -> NDArray[np.int64]:
+    """The requested rows and groups of a codec whose segments do not overlap.
+
+    ``decode_group(segment, group)`` gives all rows of one group in one segment.
+    """
+    per_frame = layout.samples_per_frame
+    n_channels = sum(len(layout.groups[group]) for group in request.groups)
+    out = np.empty(((request.stop - request.start) * per_frame, n_channels), np.int64)
+    for index, span in enumerate(spans):
+        start, stop = max(span.first, request.start), min(span.stop, request.stop)
+        if start >= stop:
+            continue
+        rows = slice((start - request.start) * per_frame, (stop - request.start) * per_frame)
+        cut = slice((start - span.first) * per_frame, (stop - span.first) * per_frame)
+        column = 0
+        for group in request.groups:
+            n = len(layout.groups[group])
+            out[rows, column : column + n] = decode_group(index, group)[cut]
+            column += n
+    return out

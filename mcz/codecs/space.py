@@ -1,0 +1,168 @@
+"""How a frame becomes coefficients in space, and back: what the codecs of Hou's family share.
+
+SPEC.md, "Space", is normative; the names below are its field names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from construct import Bytes, ExprValidator, Float64l, If, Int8ul, OneOf, Struct
+from numpy.typing import NDArray
+
+from mcz.codecs.basis_models import MAX_POINTS, Basis, Head, find_bases
+from mcz.codecs.contract import ID_SIZE, Layout, Span
+from mcz.codecs.steps import ratio_of
+from mcz.coding.space_kernels import Transform
+from mcz.errors import FormatError
+from mcz.schema import counted
+from mcz.transforms.dct import dct_matrix
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+APART, WEIGHTED, MEAN, COURSES = 1, 2, 4, 8  # flags
+COSINES, LEARNED = 0, 1  # basis
+LEAST_STEP, GREATEST_STEP = 2.0**-100, 2.0**100
+N_COORDINATES = 3
+
+Step = ExprValidator(Float64l, lambda obj, ctx: LEAST_STEP <= obj <= GREATEST_STEP)  # SPACE-09
+
+SPACE = Struct(
+    "flags"
+    / ExprValidator(Int8ul, lambda obj, ctx: obj < 16)
+    * "bit 0: x, y and z apart; 1: has weights; 2: the model has a mean; 3: it has courses",
+    "basis" / OneOf(Int8ul, (COSINES, LEARNED)) * "0 cosines, 1 the bases of a model",
+    "model"
+    / If(lambda ctx: ctx.basis == LEARNED or ctx.flags & (MEAN | COURSES), Bytes(ID_SIZE))
+    * "id of the MODL, of kind 1",
+    "step" / Step * "quantizer step, 2^-100 to 2^100",
+    "weights"
+    / If(lambda ctx: ctx.flags & WEIGHTED, counted(Int8ul, 2**14))
+    * "of each channel the code of its weight; only where bit 1 of flags is set",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """The matrices of a frame, and what its channels are multiplied by.
+
+    ``vectors`` (n_rows, n_points) has the rows of all matrices, one below the other, ``starts`` the
+    first of each and the end; ``columns`` (n_matrices, n_points) the channel of each point;
+    ``weights`` and ``mean`` (n_channels,). ``courses`` (n_courses, frames of a window) stand in for
+    the cosines in time, None where there are none.
+    """
+
+    step: float
+    vectors: Floats
+    starts: Ints
+    columns: Ints
+    weights: Floats
+    mean: Floats
+    courses: Floats | None = None
+
+    @property
+    def n_rows(self) -> int:
+        return len(self.vectors)
+
+    def transform(self) -> Transform:
+        """What compiled loops are given of it."""
+        return Transform(self.vectors, self.starts, self.columns, self.step, self.weights)
+
+    def analysis(self) -> list[Floats]:
+        """Of each matrix what makes coefficients of its points, (n_rows, n_points).
+
+        The inverse of what a decoder does, whose vectors are rounded.
+        """
+        parts = (self.vectors[a:b] for a, b in zip(self.starts, self.starts[1:], strict=False))
+        return [np.asarray(np.linalg.pinv(part.T), np.float64) for part in parts]
+
+
+def columns_of(n_channels: int, *, apart: bool) -> Ints:
+    """The channel of each point of each matrix, (n_matrices, n_points)."""
+    channels = np.arange(n_channels, dtype=np.int64)
+    if apart:
+        return np.ascontiguousarray(channels.reshape(-1, N_COORDINATES).T)  # SPACE-01
+    return channels[None]
+
+
+def space_of(name: str, fields: Any, layout: Layout) -> Space:
+    """The Space that the fields of SPACE say; raises FormatError or UnsupportedError."""
+    apart, n_channels = bool(fields.flags & APART), layout.n_channels
+    if apart and n_channels % N_COORDINATES:  # SPACE-02
+        raise FormatError(f"{name}: {n_channels} channels are not three coordinates each")
+    columns = columns_of(n_channels, apart=apart)
+    n_matrices, n_points = columns.shape
+    if n_points > MAX_POINTS:  # SPACE-03
+        raise FormatError(f"{name}: {n_points} points in a matrix, at most {MAX_POINTS}")
+    n_spatial = n_matrices if fields.basis == LEARNED else 0
+    rest: list[Basis] = []
+    if fields.model is not None:
+        check = partial(_check_heads, name, fields.flags, [n_points] * n_spatial, n_channels)
+        rest = list(find_bases(name, layout, bytes(fields.model), check))
+    spatial, rest = rest[:n_spatial], rest[n_spatial:]  # SPACE-05
+    courses = rest.pop(0).vectors if fields.flags & COURSES else None  # SPACE-06
+    mean = rest.pop(0).vectors[0] if fields.flags & MEAN else np.zeros(n_channels)
+    # SPACE-04
+    vectors = [basis.vectors for basis in spatial] or [dct_matrix(n_points)] * n_matrices
+    return Space(
+        float(fields.step),
+        np.ascontiguousarray(np.concatenate(vectors)),
+        np.cumsum([0, *map(len, vectors)]).astype(np.int64),
+        columns,
+        _weights(name, fields, n_channels),  # SPACE-10
+        mean,  # WIND-15
+        courses,
+    )
+
+
+def uses_of(fields: Any) -> tuple[bytes, ...]:
+    """The ids of the models that the fields of SPACE name."""
+    return () if fields.model is None else (bytes(fields.model),)
+
+
+def _check_heads(
+    name: str, flags: int, n_points: Sequence[int], n_channels: int, heads: Sequence[Head]
+) -> None:
+    """Refuse a model unless it has a basis of each of ``n_points``, then courses and a mean."""
+    n_due = len(n_points) + sum(bool(flags & flag) for flag in (COURSES, MEAN))
+    if len(heads) != n_due:  # BASES-02, SPACE-06
+        raise FormatError(f"{name}: a model of {len(heads)} bases, {n_due} are due")
+    for head, due in zip(heads, n_points, strict=False):
+        if head.n_points != due:  # SPACE-07
+            raise FormatError(f"{name}: vectors of {head.n_points} entries for {due} points")
+    # SPACE-06, SPACE-07
+    if flags & MEAN and (len(heads[-1].shifts), heads[-1].n_points) != (1, n_channels):
+        shape = len(heads[-1].shifts), heads[-1].n_points
+        raise FormatError(f"{name}: a mean of {shape} for {n_channels} channels")
+
+
+def _weights(name: str, fields: Any, n_channels: int) -> Floats:
+    if fields.weights is None:
+        return np.ones(n_channels)
+    if len(fields.weights) != n_channels:  # SPACE-11
+        raise FormatError(f"{name}: {len(fields.weights)} weights for {n_channels} channels")
+    return np.array([ratio_of(code) for code in fields.weights])  # SPACE-10
+
+
+def check(name: str, layout: Layout, spans: Sequence[Span], *, fresh: bool) -> None:
+    """Raise FormatError for a layout or segments that a codec of this family has not.
+
+    ``fresh``: all segments start so.
+    """
+    # FRAME-02, FRAME-03, ONLINE-02, ONLINE-03, WIND-02
+    if layout.samples_per_frame != 1 or layout.n_resolutions != 1:
+        raise FormatError(
+            f"{name}: {layout.samples_per_frame} samples a frame, {layout.n_resolutions} "
+            "resolutions"
+        )
+    if len(layout.groups) > 1:  # FRAME-01, ONLINE-01, WIND-01
+        raise FormatError(f"{name}: {len(layout.groups)} groups, it has one")
+    for span in spans:
+        # FRAME-03, ONLINE-03, WIND-03, WIND-04
+        if span.lead or span.tail or (fresh and not span.fresh):
+            raise FormatError(f"{name}: the segment at {span.first} bears upon others")

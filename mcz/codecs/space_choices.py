@@ -1,0 +1,357 @@
+"""How an encoder chooses bases, weights and a step; a decoder needs none of it.
+
+Source: Hou 2016; mcz/codecs/spatial/README.md describes it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.angles import Unwrapper
+from mcz.codecs.basis_models import (
+    MAX_POINTS,
+    Basis,
+    falling_digits,
+    known_models,
+    model_of,
+    parse_bases,
+    read_bases,
+    rounded,
+)
+from mcz.codecs.contract import Layout, Model, SignalSource, id_of
+from mcz.codecs.gaps import fill_gaps
+from mcz.codecs.parameters import Parameter, choice, integer, number
+from mcz.codecs.segments import skeleton_of
+from mcz.codecs.space import APART, COSINES, LEARNED, N_COORDINATES, WEIGHTED, columns_of
+from mcz.codecs.steps import code_of, ratio_of
+from mcz.codecs.weights import RULES, weights_of
+from mcz.errors import AccessError, MotionError, OptionError
+from mcz.motion import POSITION_KINDS, Skeleton
+from mcz.transforms.dct import dct_matrix
+
+Floats = NDArray[np.float64]
+
+DEFAULT_SHARE = 1 / 100  # of the spread of a clip's points: the step where none is given
+DEFAULT_DEGREES = 0.2  # of channels: the step for a rotation of average effect
+THRESHOLD = 0.6  # of a step: what is smaller becomes 0
+BLOCKS, BLOCK_FRAMES = 16, 240  # what an encoder looks at to choose
+SPARSITY, ITERATIONS = 12, 30  # of bases of the clip itself, from its principal components on
+MOST_DIGITS, LEAST_DIGITS = 7, 3  # binary, of the first and the last vectors of such bases
+LARGEST = 2.0**80
+LEAST, MOST = 2.0**-60, 2.0**60  # steps
+WHICH = ("auto", "known", "cosines", "learned")
+
+
+InTime = Callable[[Floats], Floats]
+
+
+def cosines(block: Floats) -> Floats:
+    """Coefficients in time of a block of frames, (frames, n_channels)."""
+    return dct_matrix(len(block)) @ block
+
+
+def changes(block: Floats) -> Floats:
+    """What each frame of a block adds to the one before."""
+    return np.asarray(np.diff(block, axis=0), np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What is chosen: the fields of SPACE, and the models that they name."""
+
+    fields: dict[str, Any]
+    models: tuple[Model, ...] = ()
+    known: tuple[Model, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Some blocks of frames, (frames, n_channels) each, without gaps, in units of weights."""
+
+    blocks: tuple[Floats, ...]
+    apart: bool
+    codes: tuple[int, ...] | None  # of the weights
+    n_frames: int  # of the whole signal
+
+    @property
+    def frames(self) -> Floats:
+        return np.concatenate(self.blocks)
+
+    def matrices(self, frames: Floats) -> list[Floats]:
+        """The points of each matrix, (frames, n_points)."""
+        return [frames[:, columns] for columns in columns_of(frames.shape[1], apart=self.apart)]
+
+
+def sample_of(name: str, source: SignalSource) -> Sample:
+    """What an encoder looks at; raises MotionError for a signal that the codec cannot code."""
+    layout = source.layout
+    skeleton = skeleton_of(name, layout)
+    apart = are_positions(skeleton)
+    if layout.n_channels // (N_COORDINATES if apart else 1) > MAX_POINTS:
+        raise MotionError(f"{name}: {layout.n_channels} channels, at most {MAX_POINTS} in a matrix")
+    size = min(layout.n_frames, BLOCK_FRAMES)
+    last = layout.n_frames - size
+    n_blocks = min(BLOCKS, max(1, layout.n_frames // BLOCK_FRAMES))
+    starts = sorted({round(last * k / max(1, n_blocks - 1)) for k in range(n_blocks)})
+    blocks = [_block(skeleton, source, start, start + size) for start in starts if size]
+    if any(np.abs(block).max(initial=0.0) > LARGEST for block in blocks):
+        raise MotionError(f"{name}: a coefficient exceeds 2^40 quantizer steps")
+    if not blocks:
+        blocks = [np.zeros((0, layout.n_channels))]
+    return _sample(skeleton, blocks, layout.n_frames)
+
+
+def _sample(skeleton: Skeleton, blocks: Sequence[Floats], n_frames: int) -> Sample:
+    """``blocks`` in units of weights, which positions do without."""
+    if are_positions(skeleton) or not skeleton.n_channels:
+        return Sample(tuple(blocks), are_positions(skeleton), None, n_frames)
+    weights = weights_of(skeleton, np.concatenate(blocks), RULES[0], unit_aware=True)
+    codes = tuple(code_of(float(weight)) for weight in weights)
+    scales = np.array([ratio_of(code) for code in codes])
+    return Sample(tuple(block / scales for block in blocks), False, codes, n_frames)
+
+
+def _block(skeleton: Skeleton, source: SignalSource, start: int, stop: int) -> Floats:
+    values = np.asarray(source.values(start, stop), np.float64)
+    valid = source.valid(start, stop)
+    valid = np.isfinite(values) if valid is None else valid & np.isfinite(values)
+    unwrapped = Unwrapper(skeleton)(np.where(valid, values, np.nan))
+    return fill_gaps(unwrapped, valid, np.full(values.shape[1], np.nan))
+
+
+def are_positions(skeleton: Skeleton) -> bool:
+    """Whether the channels are x, y and z of one point after the other."""
+    kinds = [channel.kind for channel in skeleton.channels]
+    return bool(kinds) and kinds == list(POSITION_KINDS) * (len(kinds) // N_COORDINATES)
+
+
+def default_step(sample: Sample) -> float:
+    """The step where none is given: a share of how far the points of a frame are spread."""
+    if not sample.apart:
+        return DEFAULT_DEGREES
+    parts = [part for part in sample.matrices(sample.frames) if part.size]
+    spread = math.sqrt(sum(float(np.mean(part.var(axis=1))) for part in parts))
+    return min(max(spread * DEFAULT_SHARE, LEAST), MOST) if 0 < spread < math.inf else 1.0
+
+
+def choose_space(name: str, sample: Sample, step: float, which: str, in_time: InTime) -> Choice:
+    """The bases that ``which`` names, or of several the one with which the least is to be written.
+
+    ``in_time`` is what the codec does over time before it goes on in space. Raises OptionError
+    where the one that is named does not fit.
+    """
+    fields: dict[str, Any] = {
+        "flags": (APART if sample.apart else 0) | (WEIGHTED if sample.codes else 0),
+        "basis": COSINES,
+        "model": None,
+        "step": step,
+        "weights": list(sample.codes) if sample.codes else None,
+    }
+    frames = sample.frames
+    if not frames.shape[1]:
+        return Choice(fields)
+    n_points = [part.shape[1] for part in sample.matrices(frames)]
+    candidates: list[tuple[Choice, list[Floats]]] = []
+    if which in ("auto", "cosines") or not len(frames):
+        candidates.append((Choice(fields), [dct_matrix(n) for n in n_points]))
+    known = [m for m in known_models().values() if _fits(m, n_points)] if which != "learned" else []
+    if which in ("auto", "known"):
+        candidates += [(_with(fields, known=model), _vectors(model)) for model in known]
+    if len(frames) and (which == "learned" or (which == "auto" and not known)):
+        model = learned(sample)
+        candidates.append((_with(fields, model=model), _vectors(model)))
+    if which not in WHICH:
+        model = _read(which)
+        if not _fits(model, n_points):
+            raise OptionError(f"{name}: the bases of {which} do not fit {n_points} points")
+        candidates.append((_with(fields, model=model), _vectors(model)))
+    if not candidates:
+        raise OptionError(f"{name}: there are no well-known bases of {n_points} points")
+    if len(candidates) == 1:
+        return candidates[0][0]
+    sizes = [_expected_bytes(sample, in_time, v, step, c.models) for c, v in candidates]
+    return candidates[sizes.index(min(sizes))][0]
+
+
+def live_choice(name: str, layout: Layout, step: float | None, which: str) -> Choice:
+    """The same before any frame is known: well-known bases where there are some, or cosines.
+
+    Raises OptionError where no step is given, or ``which`` asks for bases of the motion itself.
+    """
+    if step is None:
+        raise OptionError(f"{name}: the step has to be given, for no frame is known yet")
+    sample, which = live_sample(name, layout, which)
+    return choose_space(name, sample, step, which, changes)
+
+
+def live_sample(name: str, layout: Layout, which: str) -> tuple[Sample, str]:
+    """A sample of no motion, and which bases can be had without; raises OptionError for learned."""
+    if which == "learned":
+        raise OptionError(f"{name}: basis learned needs all frames; mcz train makes one beforehand")
+    skeleton = skeleton_of(name, layout)
+    n_points = layout.n_channels // (N_COORDINATES if are_positions(skeleton) else 1)
+    if n_points > MAX_POINTS:
+        raise MotionError(f"{name}: {n_points} points, at most {MAX_POINTS} in a matrix")
+    sample = _sample(skeleton, [np.zeros((1, layout.n_channels))], 0)
+    return sample, at_hand(sample) if which == "auto" else which
+
+
+def at_hand(sample: Sample) -> str:
+    """The bases that need no look at the motion: well-known ones where some fit, or cosines."""
+    n_points = [part.shape[1] for part in sample.matrices(sample.frames)]
+    fits = any(_fits(model, n_points) for model in known_models().values())
+    return "known" if fits else "cosines"
+
+
+def _with(fields: dict[str, Any], model: Model | None = None, known: Model | None = None) -> Choice:
+    used = model or known
+    assert used is not None
+    fields = fields | {"basis": LEARNED, "model": id_of(used)}
+    return Choice(fields, (model,) if model else (), (known,) if known else ())
+
+
+def _read(path: str) -> Model:
+    try:
+        return read_bases(Path(path))
+    except OSError as error:
+        raise AccessError(f"{path}: {error.strerror}") from None
+
+
+def _fits(model: Model, n_points: Sequence[int]) -> bool:
+    shapes = [basis.entries.shape for basis in parse_bases(model.data)]
+    return shapes == [(n, n) for n in n_points]
+
+
+def _vectors(model: Model) -> list[Floats]:
+    return [basis.vectors for basis in parse_bases(model.data)]
+
+
+def learned(sample: Sample) -> Model:
+    """Bases of the changes from frame to frame, made once for the same sample.
+
+    Of a single frame there are none, and it is taken itself.
+    """
+    steps = np.concatenate([changes(block) for block in sample.blocks])
+    if not len(steps):
+        steps = sample.frames
+    digest = hashlib.sha256(steps.tobytes()).digest()
+    return _learned(digest, _Held(steps), sample.apart)
+
+
+class _Held:
+    """Steps that leave it to the digest to tell them apart in the key of a cache."""
+
+    def __init__(self, steps: Floats) -> None:
+        self.steps = steps
+
+    def __hash__(self) -> int:
+        return 0
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Held)
+
+
+@lru_cache(maxsize=4)
+def _learned(_digest: bytes, held: _Held, apart: bool) -> Model:
+    from mcz.transforms.lsdt import learn_basis
+
+    bases: list[Basis | Floats] = []
+    for columns in columns_of(held.steps.shape[1], apart=apart):
+        points = held.steps[:, columns]
+        found = learn_basis(
+            points,
+            sparsity=min(SPARSITY, points.shape[1]),
+            iterations=ITERATIONS,
+            growth=0,
+            start=np.ascontiguousarray(np.linalg.eigh(points.T @ points)[1].T),
+        )
+        digits = falling_digits(len(found.basis), MOST_DIGITS, LEAST_DIGITS)
+        bases.append(rounded(found.basis, digits))
+    return model_of(bases)
+
+
+def _expected_bytes(
+    sample: Sample, in_time: InTime, vectors: Sequence[Floats], step: float, models: Sequence[Model]
+) -> float:
+    """About what the signal takes with these vectors, and the models that come with them."""
+    bits = 0.0
+    for block in sample.blocks:
+        for part, basis in zip(sample.matrices(in_time(block)), vectors, strict=True):
+            sizes = np.abs(part @ np.linalg.inv(basis)) / step
+            # Small ones count, too: changes add up until they are coded, and a basis that spreads
+            # them thinly must not pass for one that needs no coefficients.
+            bits += 1.5 * float(np.log2(1 + sizes).sum())
+            bits += 2.0 * float(np.minimum(1.0, sizes).sum())
+    looked_at = sum(map(len, sample.blocks))
+    whole = sample.n_frames / looked_at if looked_at else 0.0
+    return bits / 8 * whole + sum(len(model.data) for model in models)
+
+
+def _which(text: Any) -> str:
+    if not isinstance(text, (str, Path)):
+        raise OptionError(f"basis is {text!r}, neither {', '.join(WHICH)} nor a file's name")
+    return str(text)
+
+
+STEP = Parameter(
+    "step",
+    None,
+    "quantizer step, in length units of positions, in degrees of average effect of channels; "
+    "default: 1/100 of the points' spread, 0.2 degrees",
+    number("step", LEAST, MOST),
+)
+THRESHOLD_PARAMETER = Parameter(
+    "threshold",
+    None,
+    f"coefficients below so many steps become 0; default {THRESHOLD}",
+    number("threshold", 0.5, 2.0**20),
+)
+BASIS = Parameter(
+    "basis",
+    "auto",
+    f"{', '.join(WHICH)}, or a file that mcz train wrote",
+    _which,
+)
+CODER = Parameter(
+    "coder",
+    None,
+    "mixed, the default, or prefix: prefix codes after Huffman, as published",
+    choice("coder", ("mixed", "prefix"), {"adaptive": "mixed"}),
+)
+DOMAIN = Parameter(
+    "domain",
+    "positions",
+    "positions: the positions of the points are coded; channels: the channels as they are",
+    choice("domain", ("positions", "channels")),
+)
+
+
+def _flag(text: Any) -> bool:
+    words = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+    found = words.get(str(text).lower())
+    if found is None:
+        raise OptionError(f"virtual_markers is {text!r}, neither true nor false")
+    return found
+
+
+VIRTUAL_MARKERS = Parameter(
+    "virtual_markers",
+    False,
+    "with positions: three virtual markers a joint, too, so that its roll is kept",
+    _flag,
+)
+WINDOW = Parameter(
+    "window",
+    None,
+    "frames a window, which is the delay; default 240",
+    integer("window", 1, 2048),
+)

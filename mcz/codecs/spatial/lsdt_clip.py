@@ -1,0 +1,90 @@
+"""Codec 8, ``lsdt-clip``: windows of frames, cosines in time, a learned basis in space.
+
+SPEC.md, "Codec 8: lsdt-clip", is normative; the names below are its field names.
+Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Low-latency compression of mocap data using
+learned spatial decorrelation transform, 2016, section 3.2.
+
+Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
+states). A window decodes by itself; its length is the delay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from mcz.codecs.contract import Codec, Encoded, SignalSource
+from mcz.codecs.parameters import Dial, chosen_of, preset_parameter
+from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER
+from mcz.codecs.space_choices import (
+    BASIS,
+    CODER,
+    DOMAIN,
+    STEP,
+    THRESHOLD,
+    THRESHOLD_PARAMETER,
+    VIRTUAL_MARKERS,
+    WINDOW,
+    choose_space,
+    cosines,
+    default_step,
+    sample_of,
+)
+from mcz.codecs.spatial import windows
+from mcz.codecs.spatial.windows import Plan
+
+NAME = "lsdt-clip"
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {"window": 240, "threshold": THRESHOLD, "coder": "mixed"},
+    "hou2016": {"window": 240, "threshold": 0.5, "coder": "prefix"},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, or is too large.
+    """
+    chosen = chosen_of(PRESETS, params)
+    sample = sample_of(NAME, source)
+    step = params["step"] or default_step(sample)
+    space = choose_space(NAME, sample, step, params["basis"], cosines)
+    plan = Plan(
+        chosen["window"],
+        chosen["window"],
+        space.fields,
+        space.models,
+        space.known,
+        chosen["threshold"],
+        params["segment_frames"] or 0,
+        chosen["coder"] == "prefix",
+    )
+    return windows.encode(NAME, source, plan)
+
+
+CODEC = Codec(
+    id=8,
+    name=NAME,
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=partial(windows.decode, NAME),  # LCLIP-01
+    grouping="all",
+    positions=True,
+    uses=partial(windows.uses, NAME),
+    dial=Dial("step", 2.0**-60, 2.0**60),
+    parameters=(
+        preset_parameter(PRESETS),
+        STEP,
+        WINDOW,
+        THRESHOLD_PARAMETER,
+        BASIS,
+        CODER,
+        DOMAIN,
+        VIRTUAL_MARKERS,
+        SEGMENT_FRAMES_PARAMETER,
+    ),
+)

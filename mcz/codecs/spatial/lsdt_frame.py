@@ -1,0 +1,344 @@
+"""Codec 7, ``lsdt-frame``: what each frame adds to the one before, in a learned basis.
+
+SPEC.md, "Codec 7: lsdt-frame", is normative; the names below are its field names.
+Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Low-latency compression of mocap data using
+learned spatial decorrelation transform, 2016, section 3.1.
+
+Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
+states). No delay: a frame is coded before the next is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from construct import Struct
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import (
+    Codec,
+    Encoded,
+    Fetch,
+    Layout,
+    Request,
+    Segment,
+    SignalSource,
+    Span,
+    model_finder,
+)
+from mcz.codecs.gaps import FrameReader, LiveRows, SegmentReader
+from mcz.codecs.parameters import Dial, chosen_of, preset_parameter
+from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, Lengths, halving, segment_frames_of
+from mcz.codecs.space import COURSES, MEAN, SPACE, check, space_of, uses_of
+from mcz.codecs.space_choices import (
+    BASIS,
+    CODER,
+    DOMAIN,
+    STEP,
+    THRESHOLD,
+    THRESHOLD_PARAMETER,
+    VIRTUAL_MARKERS,
+    changes,
+    choose_space,
+    default_step,
+    live_choice,
+    sample_of,
+)
+from mcz.codecs.spatial.prefix_streams import (
+    CODE,
+    NO_CODES,
+    build_vectors,
+    codes_from,
+    fields_of,
+    parse_vectors,
+)
+from mcz.coding.start import start_states
+from mcz.coding.streams import code, uncode
+from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
+from mcz.schema import build, parse
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NAME = "lsdt-frame"
+BLOCK_FRAMES = 512  # coded at a time
+SEGMENT_FRAMES = 1200
+
+FRAME_HEADER = Struct(
+    "space" / SPACE * "how a frame becomes coefficients",
+    "code" / CODE * "how coefficients become bits",
+)
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {"threshold": THRESHOLD, "coder": "mixed"},
+    "hou2016": {"threshold": 0.5, "coder": "prefix"},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, or is too large.
+    """
+    chosen = chosen_of(PRESETS, params)
+    sample = sample_of(NAME, source)
+    step = params["step"] or default_step(sample)
+    choice = choose_space(NAME, sample, step, params["basis"], changes)
+    layout = replace(source.layout, find_model=model_finder((*choice.models, *choice.known)))
+    fields = {"space": choice.fields, "code": NO_CODES}
+    published = params["preset"] == "hou2016"
+    length = segment_frames_of(layout, params["segment_frames"], as_published=published)
+    coder = _Coder(build(FRAME_HEADER, fields, f"{NAME} header"), layout, chosen["threshold"])
+    if chosen["coder"] == "prefix" and layout.n_channels:
+        length = min(length or SEGMENT_FRAMES, layout.most_frames)  # each begins with large ones
+        fields["code"] = fields_of(_vectors(coder, source, length))
+        coder = _Coder(build(FRAME_HEADER, fields, f"{NAME} header"), layout, chosen["threshold"])
+    segments = _segments(source, coder, length)
+    return Encoded(coder.header, segments, models=choice.models, known=choice.known)
+
+
+def _vectors(coder: _Coder, source: SignalSource, length: int) -> Iterator[Ints]:
+    """The coefficients of segments of ``length`` frames, of each matrix (frames, n_vectors)."""
+    reader = FrameReader(NAME, source)
+    n_frames = source.layout.n_frames
+    for start in range(0, n_frames, length):
+        coder.restart()
+        indices = coder.quantize(reader.next(min(start + length, n_frames)))
+        yield from np.split(indices, coder.space.starts[1:-1], axis=1)
+
+
+def _segments(source: SignalSource, coder: _Coder, given: int) -> Iterator[Segment]:
+    """``given`` frames each, or, where that is 0, as many as make a DATA of the usual size."""
+    layout = source.layout
+    if not layout.n_channels:
+        if layout.n_frames:
+            yield Segment(0, layout.n_frames, ())
+        return
+    frames = SegmentReader(NAME, source)
+
+    def code(first: int, stop: int) -> tuple[bytes, ...]:
+        coder.restart()
+        return (coder.build(coder.quantize(frames(first, stop))),)
+
+    lengths = Lengths(min(given or SEGMENT_FRAMES, layout.most_frames), bool(given))
+    for first, stop, streams in halving(layout.n_frames, lengths, code):
+        yield Segment(first, stop - first, streams)
+
+
+def decode(
+    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+) -> Floats:
+    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
+    check(NAME, layout, spans, fresh=False)
+    n_channels = layout.n_channels if request.groups else 0
+    out = np.zeros((request.stop - request.start, n_channels))
+    coder = _Coder(header, layout)
+    if not n_channels:
+        return out
+    fresh = [i for i, span in enumerate(spans) if span.fresh and span.first <= request.start]
+    for index in range(max(fresh, default=0), len(spans)):
+        span = spans[index]
+        if span.first >= request.stop:
+            break
+        if span.fresh:  # FRAME-04
+            coder.restart()
+        elif not index or spans[index - 1].stop != span.first:
+            raise FormatError(
+                f"{NAME}: the segment before {span.first}, which it needs, is missing"
+            )
+        stop = min(span.stop, request.stop)
+        block = coder.decode(fetch(index, 0, 0), span.n_frames, stop - span.first)
+        begin = max(span.first, request.start)
+        if begin < stop:
+            out[begin - request.start : stop - request.start] = block[begin - span.first :]
+    return out
+
+
+def _header(header: bytes) -> Any:
+    """The fields of FRAME_HEADER; raises FormatError."""
+    fields = parse(FRAME_HEADER, header, f"{NAME} header")
+    if fields.space.flags & (MEAN | COURSES):  # FRAME-05
+        raise FormatError(f"{NAME}: flags {fields.space.flags:#x}, it has no mean or courses")
+    return fields
+
+
+def uses(header: bytes) -> tuple[bytes, ...]:
+    """The models that a header names."""
+    return uses_of(_header(header).space)
+
+
+@cache
+def _kernels() -> Any:
+    from mcz.codecs.spatial import lsdt_frame_kernels
+
+    return lsdt_frame_kernels
+
+
+class _Coder:
+    """Encoder or decoder with what it remembers of the frames before.
+
+    Raises FormatError for a bad header.
+    """
+
+    def __init__(self, header: bytes, layout: Layout, threshold: float = THRESHOLD) -> None:
+        fields = _header(header)
+        self.header, self.threshold = header, threshold
+        self.space = space_of(NAME, fields.space, layout)
+        self.codes = codes_from(fields.code, f"{NAME} header")
+        self._analysis = np.zeros((0, 0))
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all frames."""
+        space = self.space
+        self._models = start_states("frame")[0].copy()  # FRAME-07
+        self._values = np.zeros(len(space.weights))
+        self._lengths = np.zeros(len(space.starts) - 1, np.int64)
+        self._tracks = np.zeros((space.n_rows, _kernels().TRACK_SIZE), np.int64)
+        self._begins = 1
+
+    def decode(self, stream: bytes, n_frames: int, wanted: int) -> Floats:
+        """The first ``wanted`` frames of a segment; raises FormatError on bad bytes."""
+        indices = np.zeros((wanted, self.space.n_rows), np.int64)
+        self._parse(stream, indices, whole=wanted == n_frames)  # FRAME-10
+        out = np.empty((wanted, len(self._values)))
+        _kernels().add_frames(out, self._values, indices, self.space.transform())
+        return out
+
+    def quantize(self, frames: Floats) -> Ints:
+        """The coefficients of a segment, (frames, n_rows); raises MotionError."""
+        if not self._analysis.size:
+            self._analysis = np.ascontiguousarray(np.concatenate(self.space.analysis()))
+        indices = np.zeros((len(frames), self.space.n_rows), np.int64)
+        fault = _kernels().quantize_frames(
+            indices,
+            np.ascontiguousarray(frames),
+            self._values,
+            self.space.transform(),
+            self._analysis,
+            self.threshold,
+        )
+        if fault >= 0:
+            raise MotionError(
+                f"{NAME}: a coefficient of frame {fault} of a segment exceeds 2^40 quantizer steps "
+                f"of {self.space.step:g}"
+            )
+        return indices
+
+    def build(self, indices: Ints) -> bytes:
+        """The stream of a segment's coefficients."""
+        if self.codes is not None:
+            return build_vectors(indices, self.space.starts, self.codes)
+        before = self._lengths.copy(), self._tracks.copy()
+
+        def loop(state: Ints, data: NDArray[np.uint8]) -> bool:
+            self._lengths, self._tracks = before[0].copy(), before[1].copy()
+            return self._code(state, data, indices)
+
+        stream = code(self._models.copy(), indices.size + 256, loop, "a coefficient")
+        self._begins = 0
+        return stream
+
+    def _parse(self, stream: bytes, indices: Ints, *, whole: bool) -> None:
+        what = f"{NAME}: a coefficient"
+        if self.codes is not None:
+            # FRAME-06
+            parse_vectors(stream, indices, self.space.starts, self.codes, what, whole=whole)
+            return
+        uncode(
+            stream,
+            self._models,  # FRAME-07
+            lambda state, data: self._code(state, data, indices),
+            what,
+            whole=whole,
+        )
+        self._begins = 0
+
+    def _code(self, state: Ints, data: NDArray[np.uint8], indices: Ints) -> bool:
+        memory = self._lengths, self._tracks, self._begins
+        fault = _kernels().code_frames(state, data, indices, self.space.starts, *memory)
+        self._models[:] = state
+        return bool(fault < 0)
+
+
+class _LiveEncoder:
+    """One frame a push, each a segment that needs the one before, from time to time a fresh one."""
+
+    def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
+        chosen = chosen_of(PRESETS, options)
+        choice = live_choice(NAME, layout, options["step"], options["basis"])
+        if chosen["coder"] == "prefix":
+            raise OptionError(f"{NAME}: prefix codes need all frames, coder mixed does not")
+        fields = {"space": choice.fields, "code": NO_CODES}
+        self.header = build(FRAME_HEADER, fields, f"{NAME} header")
+        self.models = choice.models
+        found = replace(layout, find_model=model_finder((*choice.models, *choice.known)))
+        self._coder = _Coder(self.header, found, chosen["threshold"])
+        self._every = options["segment_frames"] or SEGMENT_FRAMES
+        self._at = 0
+        self._rows = LiveRows(NAME, layout)
+
+    def push(self, values: Floats, valid: NDArray[np.bool_] | None = None) -> tuple[bytes, bool]:
+        row = self._rows.row(values, valid, self._at)
+        fresh = self._at % self._every == 0
+        if fresh:
+            self._coder.restart()
+        stream = self._coder.build(self._coder.quantize(row))
+        self._rows.keep()
+        self._at += 1
+        return stream, fresh
+
+    def change(self, options: Mapping[str, Any]) -> None:
+        raise OptionError(f"{NAME}: {', '.join(options)} cannot change while frames come")
+
+
+class _LiveDecoder:
+    """The inverse of ``_LiveEncoder``."""
+
+    def __init__(self, header: bytes, layout: Layout) -> None:
+        self._coder = _Coder(header, layout)
+        self._broken = True  # until something fresh comes
+
+    def push(self, stream: bytes, fresh: bool) -> Floats:
+        if fresh:
+            self._coder.restart()
+        elif self._broken:
+            raise LostFrameError(f"{NAME}: a frame needs the one before, which did not come")
+        self._broken = True
+        values: Floats = self._coder.decode(stream, 1, 1)[0]
+        self._broken = False
+        return values
+
+    def skip(self, n_frames: int) -> None:
+        self._broken = self._broken or n_frames > 0
+
+
+CODEC = Codec(
+    id=7,
+    name=NAME,
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=decode,
+    grouping="all",
+    positions=True,
+    uses=uses,
+    live=_LiveEncoder,
+    follow=_LiveDecoder,
+    dial=Dial("step", 2.0**-60, 2.0**60),
+    parameters=(
+        preset_parameter(PRESETS),
+        STEP,
+        THRESHOLD_PARAMETER,
+        BASIS,
+        CODER,
+        DOMAIN,
+        VIRTUAL_MARKERS,
+        SEGMENT_FRAMES_PARAMETER,
+    ),
+)

@@ -1,0 +1,57 @@
+"""Codec 9, ``mdtt``: equal windows, cosines in time, the clip's own basis in space, of low rank.
+
+SPEC.md, "Codec 9: mdtt", is normative; the names below are its field names.
+Source: J. Hou, L.-P. Chau, N. Magnenat-Thalmann, Y. He, Human motion capture data tailored
+transform coding, 2015, as their paper of 2016 describes it in section 5.4.1.
+
+Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
+states). The bases are in the file, as a model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from mcz.codecs.contract import Codec, Encoded, SignalSource
+from mcz.codecs.parameters import Dial, chosen_of
+from mcz.codecs.space_choices import default_step, sample_of
+from mcz.codecs.spatial import windows
+from mcz.codecs.spatial.window_choices import THRESHOLD, asked_of, parameters_of, plan_of
+
+NAME = "mdtt"
+WINDOW = 240
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {"window": WINDOW, "threshold": THRESHOLD, "coder": "mixed"},
+    "hou2016": {"window": WINDOW, "threshold": 0.5, "coder": "prefix"},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, or is too large.
+    """
+    sample = sample_of(NAME, source)
+    step = params["step"] or default_step(sample)
+    asked = asked_of(params, chosen_of(PRESETS, params), step)
+    plan = plan_of(NAME, source, sample, asked, apart=sample.apart, mean=False, courses=False)
+    return windows.encode(NAME, source, plan)
+
+
+CODEC = Codec(
+    id=9,
+    name=NAME,
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=partial(windows.decode, NAME),
+    grouping="all",
+    positions=True,
+    uses=partial(windows.uses, NAME),
+    dial=Dial("step", 2.0**-60, 2.0**60),
+    parameters=parameters_of(PRESETS, WINDOW),
+)

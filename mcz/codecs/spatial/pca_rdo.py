@@ -1,0 +1,58 @@
+"""Codec 10, ``pca-rdo``: principal components of poses, and of their courses in windows.
+
+SPEC.md, "Codec 10: pca-rdo", is normative; the names below are its field names.
+Source: L. Vasa, G. Brunnett, Rate-distortion optimized compression of motion capture data, 2014, as
+Hou 2016 describes it in sections 2.1 and 5.4.2.
+
+Exactness: lossy; decoding is bit-exact (integers, then binary64 sums in the order that SPEC.md
+states). Mean, components and courses are in the file, as a model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from mcz.codecs.contract import Codec, Encoded, SignalSource
+from mcz.codecs.parameters import Dial, chosen_of
+from mcz.codecs.space import APART, COURSES, MEAN, WEIGHTED
+from mcz.codecs.space_choices import default_step, sample_of
+from mcz.codecs.spatial import windows
+from mcz.codecs.spatial.window_choices import THRESHOLD, asked_of, parameters_of, plan_of
+
+NAME = "pca-rdo"
+WINDOW = 120
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {"window": WINDOW, "threshold": THRESHOLD, "coder": "mixed"},
+    "hou2016": {"window": WINDOW, "threshold": 0.5, "coder": "prefix"},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, or is too large.
+    """
+    sample = sample_of(NAME, source)
+    step = params["step"] or default_step(sample)
+    asked = asked_of(params, chosen_of(PRESETS, params), step)
+    plan = plan_of(NAME, source, sample, asked, apart=False, mean=True, courses=True)
+    return windows.encode(NAME, source, plan)
+
+
+CODEC = Codec(
+    id=10,
+    name=NAME,
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=partial(windows.decode, NAME, flags=APART | WEIGHTED | MEAN | COURSES),  # RDO-01
+    grouping="all",
+    positions=True,
+    uses=partial(windows.uses, NAME),
+    dial=Dial("step", 2.0**-60, 2.0**60),
+    parameters=parameters_of(PRESETS, WINDOW),
+)

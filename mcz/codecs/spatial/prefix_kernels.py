@@ -1,0 +1,87 @@
+"""Compiled: vectors of few coefficients that are not zero, by two prefix codes.
+
+SPEC.md, "Sparse lists", is normative and has the steps below in the same order. One function
+serves encoder and decoder. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+from mcz.coding.bitio import WRITING, plain
+from mcz.coding.huffman import DIRECT, MAX_LENGTH
+from mcz.coding.mixing import Bytes, Ints
+from mcz.coding.residuals import bits
+from mcz.jit import inner, kernel
+
+MAX_INDEX = 1 << 40
+FAULT = -1
+
+# Rows of a table: of each symbol its code and length; of each length its first code, how many
+# there are, and where its symbols begin among all in order.
+CODES, LENGTHS, SYMBOLS, FIRSTS, COUNTS, ENTRIES, TABLE_ROWS = range(7)
+
+
+@kernel
+def code_vectors(
+    coder: Ints, data: Bytes, rows: Ints, starts: Ints, gaps: Ints, values: Ints
+) -> int:
+    """Code ``rows`` (n_rows, n) in place; return the row of a fault, or -1.
+
+    Each row has a vector from each of ``starts`` to the next, the last of which is n.
+    """
+    for r in range(len(rows)):
+        for m in range(len(starts) - 1):
+            if _code_vector(coder, data, rows[r, starts[m] : starts[m + 1]], gaps, values):
+                return r
+    return -1
+
+
+@inner
+def _code_vector(coder: Ints, data: Bytes, row: Ints, gaps: Ints, values: Ints) -> int:
+    n, count = len(row), 0
+    for value in row:
+        count += 1 if value != 0 else 0
+    count = plain(coder, data, count, bits(n))  # SPARSE-01
+    at = 0
+    for _ in range(count):
+        gap = 0
+        while at + gap < n and row[at + gap] == 0:
+            gap += 1
+        gap = _code_integer(coder, data, gap, gaps)
+        if gap < 0 or gap >= n - at:  # SPARSE-02
+            return 1
+        at += gap
+        size = _code_integer(coder, data, max(abs(row[at]) - 1, 0), values) + 1
+        if size < 1 or size > MAX_INDEX:  # SPARSE-03
+            return 1
+        negative = plain(coder, data, 1 if row[at] < 0 else 0, 1)
+        row[at] = -size if negative else size  # SPARSE-01
+        at += 1  # SPARSE-01
+    return 0
+
+
+@inner
+def _code_integer(coder: Ints, data: Bytes, value: int, table: Ints) -> int:
+    """Code the class of an integer, then the bits that the class leaves open; FAULT if none."""
+    symbol = value
+    if value >= DIRECT:
+        n = bits(value)
+        symbol = DIRECT + 2 * (n - 5) + (value >> (n - 2) & 1)
+    symbol = _code_symbol(coder, data, symbol, table)
+    if symbol < DIRECT:
+        return symbol
+    more = (symbol - DIRECT) // 2 + 3  # PREFIX-01
+    return (2 | symbol & 1) << more | plain(coder, data, value, more)  # PREFIX-01
+
+
+@inner
+def _code_symbol(coder: Ints, data: Bytes, symbol: int, table: Ints) -> int:
+    if coder[WRITING]:
+        plain(coder, data, table[CODES, symbol], table[LENGTHS, symbol])
+        return symbol
+    code = 0
+    for length in range(1, MAX_LENGTH + 1):
+        code = code << 1 | plain(coder, data, 0, 1)
+        number = code - table[FIRSTS, length]
+        if 0 <= number < table[COUNTS, length]:
+            return int(table[SYMBOLS, table[ENTRIES, length] + number])  # PREFIX-02
+    return FAULT  # PREFIX-03

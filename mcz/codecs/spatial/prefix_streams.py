@@ -1,0 +1,129 @@
+"""Prefix codes of a clip's sparse lists: in its header, and around the compiled loop.
+
+SPEC.md, "Sparse lists", is normative; the names below are its field names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from construct import ExprValidator, If, Int8ul, OneOf, Struct
+from numpy.typing import NDArray
+
+from mcz.coding.huffman import DIRECT, MAX_LENGTH, N_CLASSES, code_lengths, codes_of
+from mcz.errors import FormatError
+from mcz.schema import counted
+
+Ints = NDArray[np.int64]
+
+ADAPTIVE, PREFIX = 0, 1  # coder
+_LENGTHS = counted(ExprValidator(Int8ul, lambda n, ctx: n <= MAX_LENGTH), N_CLASSES)
+
+CODE = Struct(
+    "coder" / OneOf(Int8ul, (ADAPTIVE, PREFIX)) * "0 mixed, 1 prefix codes",
+    "gap_lengths"
+    / If(lambda ctx: ctx.coder == PREFIX, _LENGTHS)
+    * "lengths of the codes of a gap's classes, 0 to 15; only where coder is 1",
+    "value_lengths"
+    / If(lambda ctx: ctx.coder == PREFIX, _LENGTHS)
+    * "the same of the classes of a value",
+)
+NO_CODES: dict[str, Any] = {"coder": ADAPTIVE, "gap_lengths": None, "value_lengths": None}
+
+
+@dataclass(frozen=True, slots=True)
+class Codes:
+    """The two codes of a clip as the compiled loop has them."""
+
+    gaps: Ints
+    values: Ints
+
+
+@cache
+def _kernels() -> Any:
+    from mcz.codecs.spatial import prefix_kernels
+
+    return prefix_kernels
+
+
+def fields_of(blocks: Iterable[Ints]) -> dict[str, Any]:
+    """The fields of CODE with the best codes for these vectors, (n_vectors, n) each."""
+    gaps, values = np.zeros(N_CLASSES, np.int64), np.zeros(N_CLASSES, np.int64)
+    for rows in blocks:
+        vectors, columns = np.nonzero(rows)
+        before = np.concatenate([[-1], columns[:-1]])
+        before[np.concatenate([[True], np.diff(vectors) > 0])[: len(before)]] = -1
+        found = columns - before[: len(columns)] - 1
+        gaps += np.bincount(_classes(found), minlength=N_CLASSES)
+        values += np.bincount(_classes(np.abs(rows[vectors, columns]) - 1), minlength=N_CLASSES)
+    lengths = [list(np.trim_zeros(code_lengths(c.tolist()), "b")) for c in (gaps, values)]
+    return {"coder": PREFIX, "gap_lengths": lengths[0], "value_lengths": lengths[1]}
+
+
+def _classes(numbers: Ints) -> Ints:
+    """The class of each integer."""
+    n = np.frexp(numbers.astype(np.float64))[1].astype(np.int64)  # of 0 to 2^41, exact
+    wide = DIRECT + 2 * (n - 5) + (numbers >> np.maximum(n - 2, 0) & 1)
+    found: Ints = np.where(numbers < DIRECT, numbers, wide)
+    return found
+
+
+def codes_from(fields: Any, where: str) -> Codes | None:
+    """The codes that the fields of CODE say, None where there are none; raises FormatError."""
+    if fields.coder == ADAPTIVE:
+        return None
+    return Codes(_table(fields.gap_lengths, where), _table(fields.value_lengths, where))
+
+
+def _table(lengths: Sequence[int], where: str) -> Ints:
+    loops = _kernels()
+    table = np.zeros((loops.TABLE_ROWS, max(N_CLASSES, MAX_LENGTH + 1)), np.int64)
+    n = len(lengths)
+    table[loops.CODES, :n], table[loops.LENGTHS, :n] = codes_of(lengths, where), lengths
+    own = table[loops.LENGTHS, :n]
+    symbols = np.lexsort((np.arange(n), own))[np.count_nonzero(own == 0) :]
+    table[loops.SYMBOLS, : len(symbols)] = symbols
+    first = 0
+    for length in range(1, MAX_LENGTH + 1):
+        members = np.flatnonzero(own == length)
+        table[loops.ENTRIES, length], table[loops.COUNTS, length] = first, len(members)
+        if len(members):
+            table[loops.FIRSTS, length] = table[loops.CODES, members[0]]
+        first += len(members)
+    return table
+
+
+def build_vectors(rows: Ints, starts: Ints, codes: Codes) -> bytes:
+    """The bytes of ``rows`` (n_rows, n), whose classes all have a code.
+
+    Each row has a vector from each of ``starts`` to the next, the last of which is n.
+    """
+    size = rows.size + 64
+    while True:
+        data, coder = np.zeros(size, np.uint8), np.array([0, 1])
+        _kernels().code_vectors(coder, data, rows.copy(), starts, codes.gaps, codes.values)
+        used = -(-int(coder[0]) // 8)
+        if used <= size:
+            return data[:used].tobytes()
+        size = used
+
+
+def parse_vectors(
+    data: bytes, rows: Ints, starts: Ints, codes: Codes, where: str, *, whole: bool
+) -> None:
+    """Fill ``rows`` (n_rows, n), zero before, from ``data``; ``starts`` as in ``build_vectors``.
+
+    ``whole``: to its end, which its bits must need. Raises FormatError on bad bytes.
+    """
+    stream, coder = np.frombuffer(data, np.uint8).copy(), np.array([0, 0])
+    fault = _kernels().code_vectors(coder, stream, rows, starts, codes.gaps, codes.values)
+    used = int(coder[0])
+    if fault >= 0 or used > 8 * len(data):  # BITS-02
+        raise FormatError(f"{where} has no code, or is out of range")
+    # BITS-02, BITS-03
+    if whole and (-(-used // 8) != len(data) or (used % 8 and data[-1] << used % 8 & 255)):
+        raise FormatError(f"{where}: {len(data)} bytes for {used} bits, or bits behind the last")

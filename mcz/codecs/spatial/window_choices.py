@@ -1,0 +1,343 @@
+"""How an encoder fits bases to a whole clip, and how many of them are worth their bytes.
+
+Source: Hou 2016, sections 2 and 5.4; mcz/codecs/spatial/README.md describes it. Nothing here is the
+same to the last bit on every machine; what is decoded is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.basis_models import (
+    MAX_ENTRIES,
+    MAX_ENTRY,
+    MAX_POINTS,
+    MAX_SHIFT,
+    Basis,
+    model_of,
+    rounded,
+)
+from mcz.codecs.contract import Model, SignalSource, id_of
+from mcz.codecs.gaps import FrameReader
+from mcz.codecs.parameters import Parameter, Presets, integer, number, preset_parameter
+from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER
+from mcz.codecs.space import APART, COSINES, COURSES, LEARNED, MEAN, WEIGHTED, columns_of
+from mcz.codecs.space_choices import CODER, DOMAIN, STEP, VIRTUAL_MARKERS, Sample
+from mcz.codecs.spatial.windows import MAX_WINDOW, Plan
+from mcz.codecs.steps import ratio_of
+from mcz.errors import MotionError
+from mcz.transforms.dct import dct_matrix
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LARGEST = 2.0**60  # steps: a window with such a value has a coefficient beyond 2^40 steps
+BIT = math.log(2) / 4  # squared steps that a bit is worth: of fine steps log(2) / 6 would be
+THRESHOLD = 0.7  # of a step: what is smaller becomes 0
+PER_ONE, PER_OCTAVE = 2.0, 1.5  # about the bits of a coefficient that is not zero
+ENTRY, ENTRY_OCTAVE = 0.5, 1.2  # about those of an entry of a basis
+LESS_DIGITS = 1.0  # of a vector's entries than log2 of all its coefficients' size in steps
+MEAN_STEPS = 8  # a mean is right to so many parts of a step
+LONGEST = 1024  # frames: courses of longer windows are too many
+ROOM = MAX_ENTRIES - 2**15  # for vectors and courses, beside a mean
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """What a clip as a whole tells, whatever the step.
+
+    ``columns`` (n_matrices, n_points) are the channels of each matrix, ``vectors`` of each an
+    orthonormal basis (n_points, n_points), the vector with the greatest ``energies`` (n_points,),
+    sums over all frames, first. ``courses`` (window, window) are such vectors in time, as
+    coefficients of cosines; None without. ``mean`` (n_channels,), in units of the weights, is what
+    was taken away, ``stored`` the same as a basis.
+    """
+
+    columns: Ints
+    vectors: tuple[Floats, ...]
+    energies: tuple[Floats, ...]
+    mean: Floats
+    stored: Basis | None = None
+    courses: Floats | None = None
+    course_energies: Floats | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a caller has a say in; None: the encoder chooses."""
+
+    step: float
+    window: int
+    threshold: float
+    segment_frames: int
+    prefix: bool
+    rank: int | None
+    frequencies: int | None
+
+
+def asked_of(params: Mapping[str, Any], chosen: Mapping[str, Any], step: float) -> Asked:
+    """The parameters, those on which a preset has a say among ``chosen``."""
+    return Asked(
+        step,
+        chosen["window"],
+        chosen["threshold"],
+        params["segment_frames"] or 0,
+        chosen["coder"] == "prefix",
+        params["rank"],
+        params["frequencies"],
+    )
+
+
+class Windows:
+    """A signal window by window, as often as wanted, in units of the channels' weights."""
+
+    def __init__(self, name: str, source: SignalSource, sample: Sample, asked: Asked) -> None:
+        self.name, self.source, self.sample = name, source, sample
+        n_frames = source.layout.n_frames
+        self.n_frames, self.window = n_frames, max(1, min(asked.window, n_frames))
+        self.step, self.limit = asked.step, LARGEST * asked.step
+        self.weights = np.ones(source.layout.n_channels)
+        if sample.codes is not None:
+            self.weights = np.array([ratio_of(code) for code in sample.codes])
+
+    def __iter__(self) -> Iterator[Floats]:
+        """Each (frames, n_channels); raises MotionError for what cannot be coded."""
+        reader = FrameReader(self.name, self.source)
+        for start in range(0, self.n_frames, self.window):
+            with np.errstate(over="ignore"):
+                values = reader.next(min(start + self.window, self.n_frames)) / self.weights
+            if np.abs(values).max(initial=0.0) > self.limit:
+                raise MotionError(f"{self.name}: a coefficient exceeds 2^40 quantizer steps")
+            yield values
+
+
+def plan_of(
+    name: str,
+    source: SignalSource,
+    sample: Sample,
+    asked: Asked,
+    *,
+    apart: bool,
+    mean: bool,
+    courses: bool,
+) -> Plan:
+    """The plan of an encoder: bases of the clip itself, no more of them than pay.
+
+    ``apart``: x, y and z have each their own; ``mean``: it is taken away first; ``courses``: there
+    is a basis in time, too, where windows are not too long for it. Raises MotionError for what
+    cannot be coded.
+    """
+    windows = Windows(name, source, sample, asked)
+    courses = courses and windows.window <= LONGEST
+    fields: dict[str, Any] = {
+        "flags": WEIGHTED if sample.codes else 0,
+        "basis": COSINES,
+        "model": None,
+        "step": asked.step,
+        "weights": list(sample.codes) if sample.codes else None,
+    }
+    models: tuple[Model, ...] = ()
+    n_frequencies = windows.window
+    if windows.n_frames and len(windows.weights):
+        if len(windows.weights) > MAX_POINTS * (3 if apart else 1):
+            raise MotionError(f"{name}: {len(windows.weights)} channels, at most {MAX_POINTS}")
+        found = fit(windows, apart=apart, mean=mean, courses=courses)
+        bases, n_frequencies = _bases(windows, found, asked)
+        models = (model_of(bases),)
+        fields |= {"basis": LEARNED, "model": id_of(models[0])}
+        there = ((APART, apart), (MEAN, mean), (COURSES, courses))
+        fields["flags"] |= sum(flag for flag, is_there in there if is_there)
+    return Plan(
+        windows.window,
+        n_frequencies,
+        fields,
+        models,
+        (),
+        asked.threshold,
+        asked.segment_frames,
+        asked.prefix,
+    )
+
+
+def fit(windows: Windows, *, apart: bool, mean: bool, courses: bool) -> Fit:
+    """Bases of all windows together: eigenvectors of the sum of their products."""
+    columns = columns_of(len(windows.weights), apart=apart)
+    average, stored = _mean(windows) if mean else (np.zeros(len(windows.weights)), None)
+    in_space = [np.zeros((part.size, part.size)) for part in columns]
+    in_time = np.zeros((windows.window, windows.window))
+    for values in windows:
+        rest = values - average
+        for total, part in zip(in_space, columns, strict=True):
+            total += rest[:, part].T @ rest[:, part]
+        if courses and len(rest) == windows.window:
+            cosines = dct_matrix(len(rest)) @ rest
+            in_time += cosines @ cosines.T
+    pairs = [_principal(total.astype("<f8").tobytes(), len(total)) for total in in_space]
+    vectors, energies = (tuple(parts) for parts in zip(*pairs, strict=True))
+    in_courses = (
+        _principal(in_time.astype("<f8").tobytes(), len(in_time)) if courses else (None, None)
+    )
+    return Fit(columns, vectors, energies, average, stored, *in_courses)
+
+
+def _mean(windows: Windows) -> tuple[Floats, Basis]:
+    """The mean of all frames, and how it is stored; where that is far off, it stands for the mean.
+
+    It is rounded to parts of a step, or as fine as it can be.
+    """
+    total = first = None
+    for values in windows:  # from the first frame, for what stands still to have no rounding
+        first = values[0] if first is None else first
+        part = (values - first).sum(axis=0)
+        total = part if total is None else total + part
+    assert first is not None and total is not None
+    mean = first + total / windows.n_frames
+    plain = mean * windows.weights
+    finest = MEAN_STEPS / (windows.step * float(windows.weights.min()))
+    finest = min(finest, MAX_ENTRY / max(float(np.abs(plain).max()), 1.0))
+    shift = np.clip(np.floor(np.log2(finest)), 0, MAX_SHIFT).astype(np.int64)
+    entries = np.clip(np.rint(np.ldexp(plain, shift)), -MAX_ENTRY, MAX_ENTRY)
+    stored = Basis(shift[None], entries[None].astype(np.int64))
+    near = stored.vectors[0] / windows.weights
+    off = float(np.abs(near - mean).max()) > windows.step / MEAN_STEPS
+    return near if off else mean, stored
+
+
+@lru_cache(maxsize=8)
+def _principal(products: bytes, n: int) -> tuple[Floats, Floats]:
+    """Unit eigenvectors (n, n) of a matrix of products, as rows, and their energies (n,).
+
+    The greatest comes first; the largest entry of each is positive.
+    """
+    energies, vectors = np.linalg.eigh(np.frombuffer(products, "<f8").reshape(n, n))
+    vectors = vectors.T[::-1]
+    largest = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=1)[:, None], axis=1)
+    return vectors * np.where(largest < 0, -1.0, 1.0), np.maximum(energies[::-1], 0.0)
+
+
+def _bases(windows: Windows, found: Fit, asked: Asked) -> tuple[list[Basis | Floats], int]:
+    """The bases of the model, and the coefficients of a row in time."""
+    room = ROOM if found.courses is None else ROOM // 2
+    most = min(found.columns.shape[1], room // found.columns.size)
+    spatial = [
+        _rounded(vectors[:most], energies[:most], asked.step)
+        for vectors, energies in zip(found.vectors, found.energies, strict=True)
+    ]
+    in_time: Basis | None = None
+    if found.courses is not None and found.course_energies is not None:
+        in_time = _rounded(found.courses, found.course_energies, asked.step)
+    gains = _gains(windows, found, [len(b.shifts) for b in spatial], in_time, asked)
+    ranks, n_frequencies = _counts(gains, spatial, in_time, asked)
+    bases: list[Basis | Floats] = [_first(b, r) for b, r in zip(spatial, ranks, strict=True)]
+    if in_time is not None:
+        in_time = _first(in_time, n_frequencies)
+        used = int(np.flatnonzero(in_time.entries.any(axis=0)).max(initial=0)) + 1
+        used = max(used, n_frequencies)
+        bases.append(Basis(in_time.shifts, in_time.entries[:, :used]))
+    if found.stored is not None:
+        bases.append(found.stored)
+    return bases, n_frequencies
+
+
+def _rounded(vectors: Floats, energies: Floats, step: float) -> Basis:
+    """Entries of so many digits that rounding them costs about what a digit more would."""
+    least = math.ceil(math.log2(vectors.shape[1]) / 2) + 1  # or a vector is rounded away
+    sizes = np.sqrt(energies) / step
+    digits = np.ceil(np.log2(np.maximum(sizes, 1.0)) - LESS_DIGITS)
+    return rounded(vectors, np.clip(digits, least, MAX_SHIFT).astype(np.int64))
+
+
+def _first(basis: Basis, count: int) -> Basis:
+    return Basis(basis.shifts[:count], basis.entries[:count])
+
+
+def _gains(
+    windows: Windows, found: Fit, counts: Sequence[int], in_time: Basis | None, asked: Asked
+) -> list[Floats]:
+    """What each coefficient is worth over all windows, in squared steps: (vectors, frequencies).
+
+    That is the error without it less that with it, less its bits.
+    """
+    n_frequencies = windows.window if in_time is None else len(in_time.shifts)
+    gains = [np.zeros((count, n_frequencies)) for count in counts]
+    for values in windows:
+        temporal = dct_matrix(len(values))[:n_frequencies]
+        if found.courses is not None and len(values) == windows.window:
+            temporal = found.courses[:n_frequencies] @ dct_matrix(len(values))
+        rows = (temporal @ ((values - found.mean) / asked.step)).T
+        parts = zip(gains, found.columns, found.vectors, strict=True)
+        for gain, columns, vectors in parts:
+            sizes = np.abs(vectors[: len(gain)] @ rows[columns])
+            worth = sizes**2 - 1 / 12 - BIT * (PER_ONE + PER_OCTAVE * np.log2(1 + sizes))
+            gain[:, : sizes.shape[1]] += np.where(sizes >= asked.threshold, worth, 0.0)
+    return gains
+
+
+def _counts(
+    gains: Sequence[Floats], spatial: Sequence[Basis], in_time: Basis | None, asked: Asked
+) -> tuple[list[int], int]:
+    """The vectors of each matrix and the frequencies with which the sum of gains is greatest."""
+    total = np.zeros(gains[0].shape[1])
+    if in_time is not None:
+        total -= _cost(in_time)[: len(total)]
+    ranks: list[Ints] = []
+    for gain, basis in zip(gains, spatial, strict=True):
+        sums = gain.cumsum(axis=0).cumsum(axis=1) - _cost(basis)[:, None]
+        best = sums.argmax(axis=0)
+        if asked.rank is not None:
+            best = np.full(len(best), min(asked.rank, len(basis.shifts)) - 1)
+        total += np.take_along_axis(sums, best[None], axis=0)[0]
+        ranks.append(best)
+    at = int(total.argmax()) if asked.frequencies is None else asked.frequencies - 1
+    at = min(at, len(total) - 1)
+    return [int(best[at]) + 1 for best in ranks], at + 1
+
+
+def _cost(basis: Basis) -> Floats:
+    """Squared steps that the bits of the first vectors are worth, (n_vectors,)."""
+    bits = (ENTRY + ENTRY_OCTAVE * np.log2(1.0 + np.abs(basis.entries))).sum(axis=1)
+    cost: Floats = BIT * (bits + 8).cumsum()
+    return cost
+
+
+def parameters_of(presets: Presets, window: int) -> tuple[Parameter, ...]:
+    """Those of a codec with these presets, whose windows have ``window`` frames by default."""
+    return (
+        preset_parameter(presets),
+        STEP,
+        Parameter(
+            "window",
+            None,
+            f"frames a window; default {window}",
+            integer("window", 1, MAX_WINDOW),
+        ),
+        Parameter(
+            "threshold",
+            None,
+            f"coefficients below so many steps become 0; default {THRESHOLD}",
+            number("threshold", 0.5, 2.0**20),
+        ),
+        Parameter(
+            "rank",
+            None,
+            "vectors of each basis in space; default: as many as pay",
+            integer("rank", 1, MAX_POINTS),
+        ),
+        Parameter(
+            "frequencies",
+            None,
+            "coefficients of each row in time; default: as many as pay",
+            integer("frequencies", 1, MAX_WINDOW),
+        ),
+        CODER,
+        DOMAIN,
+        VIRTUAL_MARKERS,
+        SEGMENT_FRAMES_PARAMETER,
+    )

@@ -1,0 +1,165 @@
+"""Compiled: the quantized coefficients of one window, coded as residuals, and their way back.
+
+SPEC.md, "Windows", is normative and has the steps below in the same order. One function serves
+encoder and decoder. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.coding.mixing import Bytes, Ints
+from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
+from mcz.coding.space_kernels import FIRSTS, LENGTHS, MAX_INDEX, OTHERS, Transform
+from mcz.jit import inner, kernel
+
+Floats = NDArray[np.float64]
+
+BLOCK_FRAMES = 256  # at a time, so that sums stay near the processor
+
+
+@kernel
+def code_window(state: Ints, data: Bytes, rows: Ints, starts: Ints, lengths: Ints) -> int:
+    """Code ``rows`` (n_rows, n_frequencies) in place; return the row of a fault, or -1.
+
+    ``starts`` has the first row of each matrix, and n_rows. ``lengths`` (n_rows,) is filled with
+    the number of each row's coefficients up to the last that is not zero.
+    """
+    n = rows.shape[1]
+    nothing = np.zeros(n, np.int64)
+    above = side = nothing
+    slow = 16 * n
+    near = matrix = expected = 0
+    for r in range(len(rows)):
+        if r == starts[matrix]:
+            above, matrix = nothing, matrix + 1  # WIND-11
+        beside = starts[matrix - 2] + r - starts[matrix - 1] if matrix > 1 else -1  # WIND-11
+        if 0 <= beside < starts[matrix - 1]:  # WIND-11
+            side, expected = rows[beside], lengths[beside]
+        else:
+            side, expected = nothing, lengths[r - 1] if r else n  # WIND-11
+        length = code_residual(
+            state,
+            data,
+            _length(rows[r]),
+            0,
+            (16 * expected, slow),
+            clamp(near + 3, 0, 7),
+            (0, 0, 0),
+            LENGTHS,
+        )
+        if length < 0 or length > n:  # FAULT is far below 0 (WIND-12)
+            return r
+        near = (near + bits(16 * length) - bits(slow)) >> 1  # WIND-11
+        slow += (16 * length - slow) >> 2
+        lengths[r] = length
+        if _code_row(state, data, rows[r], length, above, side):
+            return r
+        above = rows[r]
+    return -1
+
+
+@inner
+def _length(row: Ints) -> int:
+    n = len(row)
+    while n > 0 and row[n - 1] == 0:
+        n -= 1
+    return n
+
+
+@inner
+def _code_row(state: Ints, data: Bytes, row: Ints, length: int, above: Ints, side: Ints) -> int:
+    """Code the first ``length`` coefficients of a row; 1 where that is impossible."""
+    last = before = side_1 = side_2 = 0
+    n = len(row)
+    for k in range(length):
+        a, b = abs(above[k]), abs(side[k])
+        if k == 0:
+            scales = 16 * a, 16 * b
+            near, sides, first = 0, (side_of(above[0]), side_of(side[0]), 0), FIRSTS
+        else:
+            around = abs(above[k - 1]) + abs(side[k - 1]) if k > 1 else 0  # WIND-11
+            if k + 1 < n:
+                around += abs(above[k + 1]) + abs(side[k + 1])
+            scales = 8 * last + 4 * before + 2 * (a + b), 6 * (a + b) + 3 * around
+            near = min(bits(length - k), 7)
+            sides, first = (side_1, side_2, side_of(above[k])), OTHERS
+        found = code_residual(state, data, row[k], 0, scales, near, sides, first)
+        if found == FAULT or abs(found) > MAX_INDEX:  # SPACE-12
+            return 1
+        row[k] = found
+        if k > 0:  # WIND-11
+            before, last = last, abs(found)
+            side_2, side_1 = side_1, side_of(found)
+    return 0
+
+
+@kernel
+def synthesize_courses(out: Floats, entries: Floats, cosines: Floats) -> None:
+    """Add to ``out`` (n_courses, frames) the cosines times ``entries`` (n_courses, n_cosines)."""
+    for k in range(len(out)):
+        for j in range(entries.shape[1]):
+            entry = entries[k, j]
+            if entry != 0:  # most are
+                for f in range(out.shape[1]):
+                    out[k, f] = out[k, f] + entry * cosines[j, f]
+
+
+@kernel
+def synthesize(
+    out: Floats,
+    rows: Ints,
+    lengths: Ints,
+    temporal: Floats,
+    transform: Transform,
+    mean: Floats,
+) -> None:
+    """Write the frames of a window, (frames, channels), from its coefficients.
+
+    ``temporal`` (n_frequencies, frames), ``mean`` (n_channels,).
+    """
+    vectors, starts, columns, step, weights = transform
+    n_points = vectors.shape[1]
+    most = np.empty((n_points + 1, BLOCK_FRAMES))
+    for begin in range(0, len(out), BLOCK_FRAMES):
+        size = min(BLOCK_FRAMES, len(out) - begin)
+        part, sums, course = (
+            temporal[:, begin : begin + size],
+            most[:, :size],
+            most[n_points, :size],
+        )
+        for m in range(len(starts) - 1):
+            a, b = starts[m], starts[m + 1]
+            _sums(sums, course, rows[a:b], lengths[a:b], part, vectors[a:b])
+            for j in range(n_points):
+                c = columns[m, j]
+                weight, start = weights[c], mean[c]  # WIND-15
+                for f in range(size):
+                    out[begin + f, c] = start + (sums[j, f] * step) * weight  # WIND-13
+
+
+@inner
+def _sums(
+    sums: Floats, course: Floats, rows: Ints, lengths: Ints, temporal: Floats, vectors: Floats
+) -> None:
+    """Write the points of one matrix, (n_points, frames), before step, weight and mean.
+
+    ``course`` (frames,) is of one row at a time.
+    """
+    n_points, n_frames = vectors.shape[1], temporal.shape[1]
+    for j in range(n_points):
+        sums[j] = 0.0
+    for r in range(len(rows)):  # WIND-13
+        if lengths[r] == 0:
+            continue
+        course[:] = 0.0
+        for k in range(lengths[r]):
+            if rows[r, k] != 0:
+                index = float(rows[r, k])
+                for f in range(n_frames):
+                    course[f] = course[f] + index * temporal[k, f]
+        for j in range(n_points):
+            entry = vectors[r, j]
+            for f in range(n_frames):
+                sums[j, f] = sums[j, f] + entry * course[f]  # WIND-13

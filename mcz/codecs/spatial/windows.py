@@ -1,0 +1,261 @@
+"""Windows of frames, transformed in time and space: lsdt-clip, mdtt and pca-rdo.
+
+SPEC.md, "Windows", is normative; the names below are its field names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from construct import ExprValidator, Struct
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import (
+    Encoded,
+    Fetch,
+    Layout,
+    Model,
+    Request,
+    Segment,
+    SignalSource,
+    Span,
+    model_finder,
+)
+from mcz.codecs.gaps import FrameReader
+from mcz.codecs.segments import SEGMENT_FRAMES, TARGET_BYTES
+from mcz.codecs.space import APART, SPACE, WEIGHTED, Space, check, space_of, uses_of
+from mcz.codecs.spatial.prefix_streams import CODE, NO_CODES, Codes, codes_from, fields_of
+from mcz.codecs.spatial.window_streams import MAX_INDEX, build_window, parse_window, windows_of
+from mcz.errors import FormatError, MotionError
+from mcz.schema import UVARINT, build, parse
+from mcz.transforms.dct import dct_matrix
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MAX_WINDOW = 2048  # WIND-05
+MAX_PRODUCTS = 2**30  # of a model's courses with cosines
+
+WINDOWS_HEADER = Struct(
+    "window" / ExprValidator(UVARINT, lambda n, ctx: 1 <= n <= MAX_WINDOW) * "frames, 1 to 2048",
+    "n_frequencies"
+    / ExprValidator(UVARINT, lambda n, ctx: 1 <= n <= ctx.window)  # WIND-06
+    * "coefficients of a row, 1 to window",
+    "space" / SPACE * "how a frame becomes coefficients",
+    "code" / CODE * "how coefficients become bits",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What an encoder has chosen; ``space`` are fields of SPACE.
+
+    A coefficient smaller than ``threshold`` steps becomes 0. ``segment_frames`` may be 0: as many
+    windows as make a DATA of the usual size. ``prefix``: coded by prefix codes.
+    """
+
+    window: int
+    n_frequencies: int
+    space: dict[str, Any]
+    models: tuple[Model, ...]
+    known: tuple[Model, ...]
+    threshold: float
+    segment_frames: int
+    prefix: bool = False
+
+
+def temporal_of(space: Space, fields: Any, n_frames: int) -> Floats:
+    """What turns a row of coefficients into a course over a window, (n_frequencies, n_frames).
+
+    A window that is shorter than the others, the last one, has cosines of its own length.
+    """
+    if space.courses is not None and n_frames == fields.window:  # WIND-14
+        return space.courses
+    return dct_matrix(n_frames)[: min(fields.n_frequencies, n_frames)]
+
+
+def encode(name: str, source: SignalSource, plan: Plan) -> Encoded:
+    """Code the values of ``source``; raises MotionError for what cannot be coded."""
+    fields: dict[str, Any] = {
+        "window": plan.window,
+        "n_frequencies": plan.n_frequencies,
+        "space": plan.space,
+        "code": NO_CODES,
+    }
+    quantizer = _Quantizer(name, source, plan, build(WINDOWS_HEADER, fields, f"{name} header"))
+    if plan.prefix and source.layout.n_channels:  # the codes are those of all windows
+        fields["code"] = fields_of(quantizer.windows())
+    header = build(WINDOWS_HEADER, fields, f"{name} header")
+    codes = codes_from(parse(WINDOWS_HEADER, header, name).code, name)
+    segments = _segments(source.layout, quantizer.windows(), plan, quantizer.space.starts, codes)
+    return Encoded(header, segments, models=plan.models, known=plan.known)
+
+
+class _Quantizer:
+    """The quantized coefficients of the windows of a signal."""
+
+    def __init__(self, name: str, source: SignalSource, plan: Plan, header: bytes) -> None:
+        layout = source.layout
+        layout = replace(layout, find_model=model_finder((*plan.models, *plan.known)))
+        self.name, self.source, self.threshold = name, source, plan.threshold
+        self.fields = parse(WINDOWS_HEADER, header, f"{name} header")
+        self.space = space_of_windows(name, self.fields, layout)
+        self.analysis = self.space.analysis()
+        self.from_courses: Floats | None = None
+        if self.space.courses is not None:
+            self.from_courses = np.asarray(np.linalg.pinv(self.space.courses.T), np.float64)
+
+    def windows(self) -> Iterator[Ints]:
+        """Of each window its coefficients, (n_rows, n_frequencies)."""
+        reader = FrameReader(self.name, self.source)
+        n_frames = self.source.layout.n_frames
+        for start in range(0, n_frames, self.fields.window):
+            yield self._indices(reader.next(min(start + self.fields.window, n_frames)))
+
+    def _indices(self, values: Floats) -> Ints:
+        """Raises MotionError where a coefficient is too large."""
+        space = self.space
+        with np.errstate(all="ignore"):
+            scaled = (values - space.mean) / space.weights / space.step
+            in_time = (self._to_time(values) @ scaled).T
+            pairs = zip(self.analysis, space.columns, strict=True)
+            rows = np.concatenate([part @ in_time[columns] for part, columns in pairs])
+            sizes = np.abs(rows)
+            found = np.floor(sizes + 0.5)
+            found[sizes < self.threshold] = 0
+        if not (found <= MAX_INDEX).all():  # NaN too
+            raise MotionError(
+                f"{self.name}: a coefficient exceeds 2^40 quantizer steps of {space.step:g}"
+            )
+        signed: Floats = np.where(rows < 0, -found, found)
+        return signed.astype(np.int64)
+
+    def _to_time(self, values: Floats) -> Floats:
+        """What makes coefficients in time of a window, (n_frequencies, n_frames)."""
+        if self.from_courses is not None and len(values) == self.fields.window:
+            return self.from_courses
+        return temporal_of(self.space, self.fields, len(values))
+
+
+def _segments(
+    layout: Layout, windows: Iterator[Ints], plan: Plan, starts: Ints, codes: Codes | None
+) -> Iterator[Segment]:
+    if not layout.n_channels:
+        if layout.n_frames:
+            yield Segment(0, layout.n_frames, ())
+        return
+    limit = min(plan.segment_frames or max(SEGMENT_FRAMES, plan.window), layout.most_frames)
+    first, size = 0, 0
+    parts: list[bytes] = []
+    for start, rows in zip(range(0, layout.n_frames, plan.window), windows, strict=True):
+        part = build_window(rows, starts, codes)
+        stop = min(start + plan.window, layout.n_frames)
+        full = stop - first > limit or (not plan.segment_frames and size + len(part) > TARGET_BYTES)
+        if parts and full:
+            yield Segment(first, start - first, (b"".join(parts),))
+            first, parts, size = start, [], 0
+        parts.append(part)
+        size += len(part)
+    if parts:
+        yield Segment(first, layout.n_frames - first, (b"".join(parts),))
+
+
+def decode(
+    name: str,
+    header: bytes,
+    layout: Layout,
+    spans: Sequence[Span],
+    request: Request,
+    fetch: Fetch,
+    *,
+    flags: int = APART | WEIGHTED,  # LCLIP-01, MDTT-01
+) -> Floats:
+    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes.
+
+    ``flags`` are those that the codec may have.
+    """
+    fields = parse(WINDOWS_HEADER, header, f"{name} header")
+    if fields.space.flags & ~flags:  # LCLIP-02, MDTT-02
+        raise FormatError(f"{name}: flags {fields.space.flags:#x}, it has no mean or courses")
+    check(name, layout, spans, fresh=True)
+    n_channels = layout.n_channels if request.groups else 0
+    out = np.zeros((request.stop - request.start, n_channels))
+    space = space_of_windows(name, fields, layout)
+    codes = codes_from(fields.code, f"{name} header")
+    if not n_channels:
+        return out
+    for index, span in enumerate(spans):
+        if span.first < request.stop and request.start < span.stop:
+            _segment(name, space, fields, codes, span, fetch(index, 0, 0), request, out)
+    return out
+
+
+def uses(name: str, header: bytes) -> tuple[bytes, ...]:
+    """The models that a header names."""
+    return uses_of(parse(WINDOWS_HEADER, header, f"{name} header").space)
+
+
+def space_of_windows(name: str, fields: Any, layout: Layout) -> Space:
+    """The Space of a header, its courses those of a whole window."""
+    from mcz.codecs.spatial.window_kernels import synthesize_courses
+
+    space = space_of(name, fields.space, layout)
+    if space.courses is None:
+        return space
+    count, n_cosines = space.courses.shape
+    if count != fields.n_frequencies or n_cosines > fields.window:  # WIND-16
+        raise FormatError(
+            f"{name}: {count} courses of {n_cosines} cosines for {fields.n_frequencies} "
+            f"coefficients and {fields.window} frames"
+        )
+    if count * n_cosines * fields.window > MAX_PRODUCTS:  # WIND-17
+        raise FormatError(f"{name}: {count} courses of {fields.window} frames are too many")
+    courses = np.zeros((count, fields.window))
+    synthesize_courses(courses, space.courses, dct_matrix(fields.window))
+    return replace(space, courses=courses)
+
+
+def _segment(
+    name: str,
+    space: Space,
+    fields: Any,
+    codes: Codes | None,
+    span: Span,
+    stream: bytes,
+    request: Request,
+    out: Floats,
+) -> None:
+    """Write the windows of a segment that the request meets."""
+    from mcz.codecs.spatial.window_kernels import synthesize
+
+    n_windows = -(-span.n_frames // fields.window)
+    where = f"{name}: segment at {span.first}"
+    for number, part in enumerate(windows_of(stream, n_windows, where)):
+        start = span.first + number * fields.window
+        stop = min(start + fields.window, span.stop)
+        a, b = max(start, request.start), min(stop, request.stop)
+        if start >= request.stop:
+            break
+        if a >= b:
+            continue
+        temporal = temporal_of(space, fields, stop - start)
+        window = parse_window(part, space.starts, len(temporal), codes, where)
+        whole = (a, b) == (start, stop)
+        block = (
+            out[a - request.start : b - request.start]
+            if whole
+            else np.empty((stop - start, out.shape[1]))
+        )
+        synthesize(
+            block,
+            window.rows,
+            window.lengths,
+            temporal,
+            space.transform(),
+            space.mean,
+        )
+        if not whole:
+            out[a - request.start : b - request.start] = block[a - start : b - start]

@@ -1,0 +1,1 @@
+"""Wavelets in time, channel by channel: mrdwt, dwt and awt."""

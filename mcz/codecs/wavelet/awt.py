@@ -1,0 +1,137 @@
+"""Codec 6, ``awt``: a wavelet transform in time, coefficients shared out among the channels.
+
+SPEC.md, "Codec 6: awt", is normative; ``shared.py`` has what a decoder needs, this file
+what an encoder chooses.
+Source: P. Beaudoin, P. Poulin, M. van de Panne, Adapting wavelet compression to human motion
+capture clips, 2007, as M. A. Khan, An efficient algorithm for compression of motion capture signal
+using multidimensional quadratic Bezier curve break-and-fit method, 2014, section 5, describes it;
+the preset ``khan2014`` is the method of the latter, the defaults improve upon it.
+
+Exactness: lossy; decoding is bit-exact, as that of codec 2. A stream holds one channel at one
+resolution of one segment. An encoder needs the whole clip in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Codec, Encoded, SignalSource
+from mcz.codecs.parameters import (
+    Dial,
+    Parameter,
+    choice,
+    chosen_of,
+    integer,
+    number,
+    preset_parameter,
+)
+from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, segment_frames_of, skeleton_of
+from mcz.codecs.wavelet import shared
+from mcz.codecs.wavelet.awt_choices import choose, coefficients_of, quantizer_of
+from mcz.codecs.wavelet.recoding import recoder
+from mcz.codecs.wavelet.shared import (
+    WAVELET,
+    N,
+    Plan,
+    Q,
+    transform_of,
+)
+from mcz.codecs.wavelet.windows import sample
+from mcz.codecs.weights import SAMPLED_FRAMES, weights_of
+
+Floats = NDArray[np.float64]
+
+FRAMES_A_COEFFICIENT = 8  # where a_w is not given
+DISTORTIONS = ("positions", "channels")
+PRESETS: dict[str, dict[str, Any]] = {
+    # As published: any coefficient may be dropped, the whole clip at once, and the levels that
+    # were asked for however short it is.
+    "khan2014": {"a_w": 40.0, "Q": 2, "N": 4, "wavelet": "db2", "distortion": "channels"},
+    "default": {"a_w": None, "Q": None, "N": 4, "wavelet": "bior4.4", "distortion": "positions"},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
+    """
+    layout, published = source.layout, params["preset"] == "khan2014"
+    chosen = chosen_of(PRESETS, params)
+    average = chosen["a_w"]
+    if average is None:
+        average = -(-layout.n_frames // FRAMES_A_COEFFICIENT)
+    transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
+    weights = _weights(source, chosen["distortion"])
+    found = choose(
+        coefficients_of("awt", source, transform),
+        weights,
+        average,
+        whole_approximation=not published,
+        iterations=params["iterations"],
+        seed=params["seed"],
+    )
+    quantizer = quantizer_of(found, weights, chosen["Q"])
+    frames = segment_frames_of(layout, params["segment_frames"], as_published=published)
+    return shared.encode(source, Plan("awt", transform, quantizer, frames, found.kept))
+
+
+def _weights(source: SignalSource, distortion: str) -> Floats:
+    """The threshold of each channel that goes with one of 1, (n_channels,)."""
+    layout = source.layout
+    skeleton = skeleton_of("awt", layout)
+    if distortion == "channels":
+        return np.ones(layout.n_channels)
+    frames = sample(source, SAMPLED_FRAMES)
+    return weights_of(skeleton, frames, "sensitivity", unit_aware=True)
+
+
+def _weigh(source: SignalSource, options: Mapping[str, Any]) -> tuple[Floats, None]:
+    """Weights of a clip that was coded with these options; its thresholds are not known."""
+    return _weights(source, chosen_of(PRESETS, options)["distortion"]), None
+
+
+CODEC = Codec(
+    id=6,
+    name="awt",
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=partial(shared.decode, "awt"),  # AWT-01
+    cut=partial(shared.cut, "awt"),
+    recode=recoder("awt", _weigh),
+    grouping="channel",
+    dial=Dial("a_w", 2.0**-20, 2.0**40, rises=True),
+    parameters=(
+        preset_parameter(PRESETS),
+        Parameter(
+            "a_w",
+            None,
+            "coefficients a channel, on average; default: one for 8 frames",
+            number("a_w", 0, 2.0**40),
+        ),
+        Parameter(
+            "distortion",
+            None,
+            "what is lowered: positions (default), or the squared error of channels",
+            choice("distortion", DISTORTIONS),
+        ),
+        Parameter(
+            "iterations",
+            None,
+            "moves of the annealing; default 4000 a channel",
+            integer("iterations", 0, 2**40),
+        ),
+        Parameter("seed", 0, "of the annealing", integer("seed", 0, 2**31 - 1)),
+        Q,
+        N,
+        WAVELET,
+        SEGMENT_FRAMES_PARAMETER,
+    ),
+)

@@ -1,0 +1,92 @@
+"""Codec 5, ``dwt``: a wavelet transform in time, one threshold for all channels.
+
+SPEC.md, "Codec 5: dwt", is normative; ``shared.py`` has what a decoder needs, this file
+what an encoder chooses.
+Source: M. A. Khan, An efficient algorithm for compression of motion capture signal using
+multidimensional quadratic Bezier curve break-and-fit method, 2014, section 5; the preset
+``khan2014`` follows the published implementation, the defaults improve upon it.
+
+Exactness: lossy; decoding is bit-exact, as that of codec 2. A stream holds one channel at one
+resolution of one segment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Codec, Encoded, Layout, SignalSource
+from mcz.codecs.parameters import Dial, Parameter, chosen_of, number, preset_parameter
+from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, segment_frames_of, skeleton_of
+from mcz.codecs.wavelet import shared
+from mcz.codecs.wavelet.quantizer import make_quantizer
+from mcz.codecs.wavelet.recoding import recoder
+from mcz.codecs.wavelet.shared import (
+    WAVELET,
+    N,
+    Plan,
+    Q,
+    transform_of,
+)
+from mcz.codecs.weights import weights_of
+
+Floats = NDArray[np.float64]
+
+PRESETS: dict[str, dict[str, Any]] = {
+    # As published: t_w in the units of the source for positions too, the whole clip at once, and
+    # the levels that were asked for however short it is.
+    "khan2014": {"t_w": 3.0, "Q": 2, "N": 4, "wavelet": "db2"},
+    "default": {"t_w": 0.2, "Q": None, "N": 4, "wavelet": "bior4.4"},
+}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite, OptionError for parameters that do not fit.
+    """
+    layout, published = source.layout, params["preset"] == "khan2014"
+    chosen = chosen_of(PRESETS, params)
+    transform = transform_of(layout, chosen["wavelet"], chosen["N"], as_published=published)
+    weights = _weights(layout, unit_aware=not published)
+    quantizer = make_quantizer(weights, chosen["t_w"], chosen["Q"], "t_w")
+    frames = segment_frames_of(layout, params["segment_frames"], as_published=published)
+    return shared.encode(source, Plan("dwt", transform, quantizer, frames))
+
+
+def _weights(layout: Layout, *, unit_aware: bool) -> Floats:
+    """The threshold of each channel at t_w = 1, (n_channels,), in source units."""
+    no_sample = np.zeros((0, layout.n_channels))
+    return weights_of(skeleton_of("dwt", layout), no_sample, "flat", unit_aware=unit_aware)
+
+
+def _weigh(source: SignalSource, options: Mapping[str, Any]) -> tuple[Floats, float | None]:
+    """Weights and t_w of a clip that was coded with these options."""
+    return _weights(source.layout, unit_aware=options["preset"] != "khan2014"), options["t_w"]
+
+
+CODEC = Codec(
+    id=5,
+    name="dwt",
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=partial(shared.decode, "dwt"),  # DWT-01
+    cut=partial(shared.cut, "dwt"),
+    recode=recoder("dwt", _weigh),
+    grouping="channel",
+    dial=Dial("t_w", 2.0**-20, 2.0**20),
+    parameters=(
+        preset_parameter(PRESETS),
+        Parameter("t_w", None, "threshold in degrees; default 0.2", number("t_w", 0, 2.0**20)),
+        Q,
+        N,
+        WAVELET,
+        SEGMENT_FRAMES_PARAMETER,
+    ),
+)

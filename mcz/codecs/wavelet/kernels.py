@@ -1,0 +1,97 @@
+"""Compiled: wavelet coefficients of one channel and one band, coded as residuals.
+
+SPEC.md, "Codec 2: mrdwt", is normative and has the steps below in the same order. One function
+serves encoder and decoder. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+from mcz.coding.mixing import Bytes, Ints
+from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
+from mcz.jit import inner, kernel
+
+MAX_INDEX = 1 << 40  # of a coefficient: sums of neighbors then stay far below 2^53
+OWN = 0, 0  # a stream has contexts and mixers of its own
+
+
+@inner
+def expected(values: Ints, at: int, predictor: int) -> int:
+    """An approximation from those before it, by one of the four predictors."""
+    step = values[at - 1] - values[at - 2] if at > 1 else 0
+    if predictor == 0:
+        return int(values[at - 1])
+    if predictor == 1:
+        return int(values[at - 1] + (step >> 1))
+    if predictor == 2:
+        return int(values[at - 1] + step)
+    before = values[at - 2] - values[at - 3] if at > 2 else 0
+    return int(values[at - 1] + ((3 * step - 2 * before) >> 2))  # MRDWT-25
+
+
+@kernel
+def code_approximations(
+    state: Ints, data: Bytes, values: Ints, count: int, predictor: int, scale: int
+) -> int:
+    """Code values[1:count] in place, values[0] being known; return the index of a fault or -1."""
+    fast = slow = scale << 4
+    near = side_1 = side_2 = 0
+    for at in range(1, count):
+        predicted = expected(values, at, predictor)
+        momentum = side_of(values[at - 1] - values[at - 2]) if at > 1 else 3  # MRDWT-25
+        sides = side_1, side_2, momentum
+        near_class = clamp(near + 3, 0, 7)
+        error = code_residual(
+            state, data, values[at] - predicted, 0, (fast, slow), near_class, sides, OWN
+        )
+        if error == FAULT or abs(predicted + error) > MAX_INDEX:  # MRDWT-26
+            return at
+        values[at] = predicted + error
+        size = abs(error) << 4
+        near = (near + bits(size) - bits(slow)) >> 1
+        fast += (size - fast) >> 1
+        slow += (size - slow) >> 5  # MRDWT-25
+        side_2, side_1 = side_1, side_of(error)
+    return -1
+
+
+@kernel
+def code_details(
+    state: Ints, data: Bytes, values: Ints, count: int, coarser: Ints, shift: int, least: int
+) -> int:
+    """Code values[:count] in place; return the index of a fault or -1.
+
+    ``coarser`` has what the next coarser band says of the activity there, and the side of its
+    coefficients, (2, n); coefficient ``at`` lies above its column (at + shift) // 2. No value that
+    is not zero is smaller than ``least``.
+    """
+    n_coarser = coarser.shape[1]
+    run = last = before = side_1 = side_2 = 0
+    for at in range(count):
+        above = (at + shift) >> 1  # MRDWT-28
+        activity = beside = 0
+        other = 3
+        if above < n_coarser:
+            activity, other = coarser[0, above], coarser[1, above]
+            beside = coarser[0, above - 1] if above > 0 else 0
+        if above + 1 < n_coarser:
+            beside += coarser[0, above + 1]
+        scales = 11 * last + 5 * before, 8 * activity + 4 * beside
+        given = values[at]
+        size = max(0, abs(given) - least + 1)
+        found = code_residual(
+            state,
+            data,
+            -size if given < 0 else size,
+            0,
+            scales,
+            min(bits(run), 7),
+            (side_1, side_2, other),
+            OWN,
+        )
+        if found == FAULT or abs(found) > MAX_INDEX - least:  # MRDWT-29
+            return at
+        run = run + 1 if found == 0 else 0  # MRDWT-28
+        before, last = last, abs(found)
+        side_2, side_1 = side_1, side_of(found)
+        values[at] = 0 if found == 0 else found + least - 1 if found > 0 else found - least + 1
+    return -1

@@ -1,0 +1,111 @@
+"""Some channels of a clip of wavelets coded anew, under the header that the others have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Fetch, Recode, SignalSource, Span
+from mcz.codecs.groups import Part
+from mcz.codecs.parameters import SCALED
+from mcz.codecs.steps import code_of
+from mcz.codecs.wavelet.quantizer import DEAD_ZONE, Quantizer
+from mcz.codecs.wavelet.shared import WAVELET_HEADER, Plan, Transform, segment_streams
+from mcz.codecs.wavelet.windows import Frames
+from mcz.schema import parse
+from mcz.transforms.wavelets import INLINE, Wavelet, by_id
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class _Held(Quantizer):
+    """A quantizer whose least magnitude of a detail is that of the header."""
+
+    held: int = 1
+
+    @property
+    def least(self) -> int:
+        return self.held
+
+    def indices(self, coefficients: Floats, channel: int, *, detail: bool) -> NDArray[np.int64]:
+        found = Quantizer.indices(self, coefficients, channel, detail=detail)
+        return np.where(np.abs(found) < self.held, 0, found) if detail else found
+
+
+# (source, options) -> the weights (n_channels,) of the signal, which times a threshold are the
+# thresholds of its channels, and that threshold; None: as large as the header says the least is.
+Weigh = Callable[[SignalSource, Mapping[str, Any]], tuple[Floats, float | None]]
+
+
+def recoder(name: str, weigh: Weigh) -> Recode:
+    """The ``recode`` of a wavelet codec; where steps follow the thresholds each channel keeps its.
+
+    Elsewhere its encoder's ``weigh`` says what is small.
+    """
+
+    def recode(
+        header: bytes,
+        source: SignalSource,
+        groups: tuple[int, ...],
+        spans: Sequence[Span],
+        options: Mapping[str, Any],
+        fetch: Fetch,
+    ) -> Iterator[tuple[bytes, ...]]:
+        """The streams of some channels with new values, with the steps of the header."""
+        fields = parse(WAVELET_HEADER, header, f"{name} header")
+        quantizer = _quantizer(fields, groups, spans, fetch, source, *weigh(source, options))
+        plan = Plan(name, _transform(fields), quantizer, 0)
+        part = Part(source, groups, fields.coded_frames)
+        frames = Frames(name, part, plan.wavelet, plan.levels)
+        for span in spans:
+            streams = segment_streams(frames, plan, span.first, span.stop)
+            frames.keep(span.first, span.stop)
+            yield streams[: source.layout.n_resolutions * len(groups)]
+
+    return recode
+
+
+def _transform(fields: Any) -> Transform:
+    wavelet = (
+        by_id(fields.wavelet)
+        if fields.wavelet != INLINE
+        else Wavelet(tuple(fields.lo), tuple(fields.hi))
+    )
+    return Transform(fields.wavelet, wavelet, fields.levels)
+
+
+def _quantizer(
+    fields: Any,
+    groups: tuple[int, ...],
+    spans: Sequence[Span],
+    fetch: Fetch,
+    source: SignalSource,
+    weights: Floats,
+    threshold: float | None,
+) -> Quantizer:
+    columns = [column for group in groups for column in source.layout.groups[group]]
+    own = weights[columns]
+    if fields.decimals == SCALED:
+        codes = tuple(
+            _step_code(group, spans, fetch, code_of(float(weight)))
+            for group, weight in zip(groups, own, strict=True)
+        )
+        return _Held(DEAD_ZONE * fields.unit * own, None, fields.unit, codes, fields.least)
+    if threshold is None:
+        lowest = float(weights.min()) if weights.any() else 1.0
+        threshold = fields.least / 10.0**fields.decimals / lowest
+    return _Held(threshold * own, fields.decimals, 1.0, (0,) * len(own), fields.least)
+
+
+def _step_code(group: int, spans: Sequence[Span], fetch: Fetch, default: int) -> int:
+    """The step code that a channel has had, ``default`` where it was 0 all along."""
+    for segment in range(len(spans)):
+        stream = fetch(segment, 0, group)
+        if len(stream) > 1:
+            return stream[1]
+    return default

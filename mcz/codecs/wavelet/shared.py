@@ -1,0 +1,306 @@
+"""What the wavelet codecs share: header, segments, and the decoder.
+
+SPEC.md, "Codec 2: mrdwt", is normative; names are its field names. A codec that uses this says how
+its encoder chooses a ``Plan``; to a decoder they are alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from construct import ExprValidator, Float64l, IfThenElse, Int8ul, Pass, Struct, this
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
+from mcz.codecs.parameters import MAX_DECIMALS, SCALED, Parameter, decimals_parameter, integer
+from mcz.codecs.segments import SEGMENT_FRAMES, Lengths, halving
+from mcz.codecs.steps import ratio_of
+from mcz.codecs.wavelet.quantizer import Quantizer
+from mcz.codecs.wavelet.streams import Coding, build_streams, parse_streams
+from mcz.codecs.wavelet.windows import Frames
+from mcz.errors import FormatError
+from mcz.schema import UVARINT, build, counted, parse
+from mcz.transforms import dwt
+from mcz.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id, by_name
+
+Floats = NDArray[np.float64]
+
+LEAST_FRAMES = 256  # of a segment: in fewer, hundreds of channels would cost more than they save
+INWARD = 1 / 16  # of a step: how far a scaled detail is set back towards zero (MRDWT-34)
+
+TAPS = counted(Float64l, MAX_TAPS)  # MRDWT-06
+WAVELET_HEADER = Struct(
+    "wavelet" / Int8ul * "id of the registered wavelet; 0: its filters follow",
+    "lo" / IfThenElse(this.wavelet == INLINE, TAPS, Pass) * "synthesis filter of approximations",
+    "hi" / IfThenElse(this.wavelet == INLINE, TAPS, Pass) * "synthesis filter of details",
+    # MRDWT-08
+    "levels" / ExprValidator(Int8ul, lambda obj, ctx: obj <= MAX_LEVELS) * "levels, 0 to 16",
+    "coded_frames" / UVARINT * "frames of the signal that was transformed, from frame 0 on",
+    "decimals"
+    / ExprValidator(Int8ul, lambda obj, ctx: obj <= MAX_DECIMALS or obj == SCALED)  # MRDWT-09
+    * "decimals of a coefficient, 0 to 15; 255: it is scaled",
+    "unit"
+    / IfThenElse(
+        this.decimals == SCALED,
+        ExprValidator(Float64l, lambda obj, ctx: 2.0**-100 <= obj <= 2.0**100),  # MRDWT-10
+        Pass,
+    )
+    * "what step codes multiply, 2^-100 to 2^100, only where decimals is 255",
+    "least"
+    / ExprValidator(UVARINT, lambda obj, ctx: 1 <= obj <= 2**39)  # MRDWT-11
+    * "least magnitude of a detail that is not zero, 1 to 2^39",
+)
+
+
+Q = decimals_parameter("decimals of coefficients; default: steps follow the thresholds")
+N = Parameter("N", None, "levels; default 4", integer("N", 0, MAX_LEVELS))
+WAVELET = Parameter("wavelet", None, "name as in PyWavelets; default bior4.4", str)
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """A wavelet, and the levels of a clip."""
+
+    wavelet_id: int
+    wavelet: Wavelet
+    levels: int
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What an encoder has decided before it codes the first segment.
+
+    ``kept``: band by band of the clip, the coarsest first, which coefficients are not to become 0,
+    (coefficients, channels); None: the quantizer decides.
+    """
+
+    name: str
+    transform: Transform
+    quantizer: Quantizer
+    segment_frames: int  # 0: the size decides
+    kept: Sequence[NDArray[np.bool_]] | None = None
+
+    @property
+    def wavelet(self) -> Wavelet:
+        return self.transform.wavelet
+
+    @property
+    def levels(self) -> int:
+        return self.transform.levels
+
+    @property
+    def coding(self) -> Coding:
+        scaled = self.quantizer.decimals is None
+        return Coding(self.name, scaled, self.quantizer.least, (self.wavelet.n_taps - 2) // 2)
+
+
+def transform_of(
+    layout: Layout, wavelet: str, levels: int, *, as_published: bool = False
+) -> Transform:
+    """The levels that are asked for; where the clip is too short for them, fewer.
+
+    ``as_published``: as many as are asked for, however short it is.
+    """
+    wavelet_id, found = by_name(wavelet)
+    levels = levels if layout.n_frames else 0
+    while levels and not as_published and layout.n_frames < (found.n_taps - 1) << levels:
+        levels -= 1
+    return Transform(wavelet_id, found, levels)
+
+
+def encode(source: SignalSource, plan: Plan) -> Encoded:
+    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite.
+    """
+    scaled = plan.quantizer.decimals is None
+    inline = plan.transform.wavelet_id == INLINE
+    fields = {
+        "wavelet": plan.transform.wavelet_id,
+        "lo": plan.wavelet.lo if inline else None,
+        "hi": plan.wavelet.hi if inline else None,
+        "levels": plan.levels,
+        "coded_frames": source.layout.n_frames,
+        "decimals": SCALED if scaled else plan.quantizer.decimals,
+        "unit": plan.quantizer.unit if scaled else None,
+        "least": plan.quantizer.least,
+    }
+    header = build(WAVELET_HEADER, fields, f"{plan.name} header")
+    return Encoded(header, _segments(source, plan), plan.levels + 1)
+
+
+def _segments(source: SignalSource, plan: Plan) -> Iterator[Segment]:
+    n_frames = source.layout.n_frames
+    frames = Frames(plan.name, source, plan.wavelet, plan.levels)
+    code = partial(segment_streams, frames, plan)
+    for first, stop, streams in halving(n_frames, _lengths(source.layout, plan), code):
+        frames.keep(first, stop)
+        lead = min(first, plan.wavelet.lead(plan.levels))
+        yield Segment(first, stop - first, streams, lead)
+
+
+def _lengths(layout: Layout, plan: Plan) -> Lengths:
+    unit = 1 << plan.levels
+    wanted = min(plan.segment_frames or SEGMENT_FRAMES, layout.most_frames)
+    length = max(unit, -(-wanted // unit) * unit)
+    if plan.segment_frames >= layout.n_frames:
+        length = max(length, layout.n_frames)
+    return Lengths(length, bool(plan.segment_frames), unit, LEAST_FRAMES)
+
+
+def segment_streams(frames: Frames, plan: Plan, first: int, stop: int) -> tuple[bytes, ...]:
+    """All streams of a segment: resolution by resolution, in each channel by channel."""
+    bands = frames.coefficients(first, stop)
+    if plan.kept is not None:
+        levels = [plan.levels, *range(plan.levels, 0, -1)]
+        owns = [dwt.own_range(first, stop, level, frames.lengths) for level in levels]
+        masks = [kept[own[0] : own[1]] for kept, own in zip(plan.kept, owns, strict=True)]
+        bands = [np.where(mask, band, 0.0) for mask, band in zip(masks, bands, strict=True)]
+    by_channel = []
+    for channel in range(bands[0].shape[1]):
+        indices = [
+            plan.quantizer.indices(band[:, channel], channel, detail=number > 0)
+            for number, band in enumerate(bands)
+        ]
+        step = plan.quantizer.codes[channel]
+        by_channel.append(build_streams(indices, step, plan.coding))
+    return tuple(streams[band] for band in range(len(bands)) for streams in by_channel)
+
+
+def decode(
+    name: str, header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+) -> Floats:
+    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
+    decoder = _Decoder(name, header, layout, spans)
+    n_columns = sum(len(layout.groups[group]) for group in request.groups)
+    if request.start == request.stop or not n_columns:
+        return np.zeros((request.stop - request.start, n_columns))
+    return decoder.read(request, fetch)
+
+
+class _Decoder:
+    """Header and segments of a signal, checked."""
+
+    def __init__(self, name: str, header: bytes, layout: Layout, spans: Sequence[Span]) -> None:
+        fields = parse(WAVELET_HEADER, header, f"{name} header")  # CODEC-05
+        self.name, self.fields, self.layout, self.spans = name, fields, layout, spans
+        if layout.samples_per_frame != 1:  # MRDWT-02
+            raise FormatError(f"{name}: {layout.samples_per_frame} samples a frame, it has 1")
+        if layout.n_resolutions > fields.levels + 1:  # CUT-04, MRDWT-03
+            raise FormatError(
+                f"{name}: {layout.n_resolutions} resolutions, but {fields.levels} levels"
+            )
+        if any(len(group) != 1 for group in layout.groups):  # MRDWT-01
+            raise FormatError(f"{name}: a group of more than one channel")
+        self.wavelet = (
+            by_id(fields.wavelet)
+            if fields.wavelet != INLINE
+            else Wavelet(tuple(fields.lo), tuple(fields.hi))
+        )
+        scaled = fields.decimals == SCALED
+        self.coding = Coding(name, scaled, fields.least, (self.wavelet.n_taps - 2) // 2)
+        self.lengths = self.wavelet.lengths(fields.coded_frames, fields.levels)
+        unit, end = 1 << fields.levels, spans[-1].stop if spans else 0
+        lead = self.wavelet.lead(fields.levels)
+        for span in spans:
+            # MRDWT-15, MRDWT-16, MRDWT-17
+            if (span.lead, span.tail, span.fresh) != (min(span.first, lead), 0, True):
+                raise FormatError(
+                    f"{name}: the segment at {span.first} bears upon {span.lead} frames before and "
+                    f"{span.tail} after, not {min(span.first, lead)} and 0, or is not fresh"
+                )
+        # MRDWT-05, MRDWT-12
+        if any(span.first % unit for span in spans) or end > fields.coded_frames:
+            raise FormatError(
+                f"{name}: segments of {unit} frames a coefficient, up to {end} of "
+                f"{fields.coded_frames}, do not fit"
+            )
+        if end < fields.coded_frames and end % unit:  # MRDWT-13
+            raise FormatError(f"{name}: segments that end at {end}, inside a coefficient")
+
+    def read(self, request: Request, fetch: Fetch) -> Floats:
+        levels = self.fields.levels
+        n_bands = self.layout.n_resolutions - request.resolution  # MRDWT-04
+        ranges = dwt.needed(request.start, request.stop, levels, self.wavelet.n_taps)
+        # Band 0 is the approximation, band b > 0 the details of level levels + 1 - b.
+        wanted = [ranges[levels], *(ranges[levels + 1 - band] for band in range(1, n_bands))]
+        bands = [np.zeros((stop - start, len(request.groups))) for start, stop in wanted]
+        due = wanted[0][0]
+        # Frames whose coefficients are wanted; the last segment has those beyond the end, too.
+        scales = [self._level(band) for band in range(n_bands)]
+        low = min(need[0] << level for need, level in zip(wanted, scales, strict=True))
+        high = max(need[1] << level for need, level in zip(wanted, scales, strict=True))
+        for index, span in enumerate(self.spans):
+            if span.first >= high or (span.stop <= low and span.stop != self.lengths[0]):
+                continue
+            owns = [
+                dwt.own_range(span.first, span.stop, self._level(band), self.lengths)
+                for band in range(n_bands)
+            ]
+            pairs = zip(owns, wanted, strict=True)
+            if all(own[1] <= need[0] or need[1] <= own[0] for own, need in pairs):
+                continue
+            if owns[0][0] > due:
+                break
+            due = owns[0][1]
+            for column, group in enumerate(request.groups):
+                stream = partial(_stream, fetch, index, group)
+                self._fill(bands, column, owns, wanted, stream)
+        if due < wanted[0][1]:  # MRDWT-18
+            raise FormatError(
+                f"{self.name}: frames {request.start}:{request.stop} need approximations up to "
+                f"{wanted[0][1]}, there are none from {due} on"
+            )
+        absent = np.zeros((0, len(request.groups)))
+        bands += [absent] * (levels + 1 - n_bands)
+        firsts = [start for start, _ in ranges[1:]]
+        return dwt.synthesize(bands, firsts, request.start, request.stop, self.wavelet)  # MRDWT-35
+
+    def _level(self, band: int) -> int:
+        return int(self.fields.levels + 1 - band if band else self.fields.levels)
+
+    def _fill(
+        self,
+        bands: list[Floats],
+        column: int,
+        owns: list[tuple[int, int]],
+        wanted: list[tuple[int, int]],
+        stream: Any,
+    ) -> None:
+        """Put one channel of one segment where it belongs."""
+        counts = [stop - start for start, stop in owns]
+        prefix = [
+            min(max(need[1] - own[0], 0), own[1] - own[0])
+            for own, need in zip(owns, wanted, strict=True)
+        ]
+        indices, code = parse_streams(stream, counts, prefix, self.coding)
+        for band, (own, need, found) in enumerate(zip(owns, wanted, indices, strict=True)):
+            start = max(own[0], need[0])
+            values = self._values(found[start - own[0] :], code, detail=band > 0)
+            bands[band][start - need[0] : start - need[0] + len(values), column] = values
+
+    def _values(self, indices: NDArray[np.int64], code: int, *, detail: bool) -> Floats:
+        """Coefficients from integers."""
+        found = indices.astype(np.float64)
+        if not self.coding.scaled:
+            return np.asarray(found / 10.0**self.fields.decimals)  # MRDWT-32
+        if detail:
+            found = np.where(indices == 0, 0.0, found - np.copysign(INWARD, found))
+        return np.asarray(found * (self.fields.unit * ratio_of(code)))  # MRDWT-33
+
+
+def _stream(fetch: Fetch, segment: int, group: int, band: int) -> bytes:
+    return fetch(segment, band, group)
+
+
+def cut(
+    name: str, header: bytes, layout: Layout, first: int, stop: int, groups: Sequence[int]
+) -> bytes:
+    """The header for stored frames first <= f < stop alone."""
+    fields = parse(WAVELET_HEADER, header, f"{name} header")
+    fields["coded_frames"] -= first
+    return build(WAVELET_HEADER, fields, f"{name} header")

@@ -1,0 +1,206 @@
+"""The streams of one channel of one segment: its quantized wavelet coefficients, band by band.
+
+SPEC.md, "Codec 2: mrdwt", is normative; names are its field names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.predictors import choose_predictor
+from mcz.coding.start import start_states
+from mcz.coding.streams import code, scale_of, uncode
+from mcz.errors import FormatError, MotionError
+from mcz.schema import read_varint, varint
+
+Ints = NDArray[np.int64]
+
+MAX_INDEX = 2**40
+N_SETS = 5  # start tables: the approximation, then the details from the coarsest on
+CONSTANT = 63  # in place of a scale: every coefficient is the first one
+
+
+@dataclass(frozen=True, slots=True)
+class Coding:
+    """What the streams of a signal have in common.
+
+    The codec's name, for messages; are there step codes; the least magnitude of a detail that is
+    not zero; where a coefficient lies in the next coarser band.
+    """
+
+    name: str
+    scaled: bool
+    least: int
+    shift: int
+
+
+@cache
+def _kernels() -> Any:
+    from mcz.codecs.wavelet import kernels
+
+    return kernels
+
+
+def build_streams(bands: Sequence[Ints], step: int, coding: Coding) -> list[bytes]:
+    """The streams of ``bands``, the approximation first, then the details from the coarsest."""
+    most = [MAX_INDEX, *(MAX_INDEX - 1 for _ in bands[1:])]
+    if any(len(band) and np.abs(band).max() > n for band, n in zip(bands, most, strict=True)):
+        raise MotionError(f"{coding.name}: a coefficient exceeds 2^40 quantizer steps")
+    streams = [_build_approximations(bands[0], step, coding, any(b.any() for b in bands[1:]))]
+    coarser = _activity(bands[0], len(bands[0]))
+    for number, band in enumerate(bands[1:], 1):
+        streams.append(_build_details(band, coarser, min(number, N_SETS - 1), coding))
+        coarser = _magnitudes(band, coding)
+    return streams
+
+
+def parse_streams(
+    stream: Callable[[int], bytes],
+    counts: Sequence[int],
+    wanted: Sequence[int],
+    coding: Coding,
+) -> tuple[list[Ints], int]:
+    """The first ``wanted`` of ``counts`` coefficients of every band, and the step code.
+
+    Raises FormatError on bad bytes.
+    """
+    prefixes = _prefixes(counts, wanted, coding)
+    band, step, known = _parse_approximations(stream(0), counts[0], prefixes[0], coding)
+    bands, coarser = [band], _activity(band, counts[0])
+    for number in range(1, len(counts)):
+        data = stream(number)
+        if data and not known:  # MRDWT-19
+            raise FormatError(f"{coding.name}: details, but no step of the channel")
+        band = _parse_details(
+            data, counts[number], prefixes[number], coarser, min(number, N_SETS - 1), coding
+        )
+        bands.append(band)  # MRDWT-20
+        coarser = _magnitudes(band, coding)
+    return [band[:n] for band, n in zip(bands, wanted, strict=True)], step
+
+
+def _prefixes(counts: Sequence[int], wanted: Sequence[int], coding: Coding) -> list[int]:
+    """How many coefficients of every band must be decoded: a band is the context of the next."""
+    prefixes = list(wanted)
+    for number in range(len(counts) - 1, 0, -1):
+        context = (prefixes[number] + coding.shift) // 2 + 3
+        prefixes[number - 1] = max(prefixes[number - 1], context)
+    return [min(prefix, count) for prefix, count in zip(prefixes, counts, strict=True)]
+
+
+def _activity(approximations: Ints, count: int) -> Ints:
+    """What an approximation says of its details: the size of its second difference, no side."""
+    out = np.zeros((2, len(approximations)), np.int64)
+    out[0, 1:-1] = np.abs(np.diff(approximations, 2))  # MRDWT-27
+    out[1] = 3  # MRDWT-27
+    return out if len(approximations) == count else out[:, :-1]  # the last is not yet known
+
+
+def _magnitudes(details: Ints, coding: Coding) -> Ints:
+    """What details say of the next finer ones: size and side."""
+    sizes = np.maximum(0, np.abs(details) - coding.least + 1)  # MRDWT-27
+    return np.stack([sizes, np.where(details == 0, 0, np.where(details > 0, 1, 2))])
+
+
+def _build_approximations(band: Ints, step: int, coding: Coding, has_details: bool) -> bytes:
+    if not band.any() and not (coding.scaled and has_details):
+        return b""
+    codes = bytes((step,)) if coding.scaled else b""
+    first = varint(_zigzag(int(band[0])))
+    if (band == band[0]).all():
+        return bytes((CONSTANT,)) + codes + first
+    predictor, halves = choose_predictor(band)
+    loops = _kernels()
+    body = code(
+        start_states("wavelet")[0],
+        2 * len(band) + 256,
+        lambda state, data: (
+            loops.code_approximations(
+                state, data, band.copy(), len(band), predictor, scale_of(halves)
+            )
+            < 0
+        ),
+        f"{coding.name}: an approximation",
+    )
+    return bytes((halves | predictor << 6,)) + codes + first + body
+
+
+def _build_details(band: Ints, coarser: Ints, number: int, coding: Coding) -> bytes:
+    if not band.any():
+        return b""
+    loops = _kernels()
+    return code(
+        start_states("wavelet")[number],
+        2 * len(band) + 256,
+        lambda state, data: (
+            loops.code_details(
+                state, data, band.copy(), len(band), coarser, coding.shift, coding.least
+            )
+            < 0
+        ),
+        f"{coding.name}: a detail",
+    )
+
+
+def _parse_approximations(
+    stream: bytes, count: int, prefix: int, coding: Coding
+) -> tuple[Ints, int, bool]:
+    """The first ``prefix`` of ``count`` approximations, the step code, and whether it is known."""
+    band = np.zeros(prefix, np.int64)
+    if not stream:
+        return band, 0, not coding.scaled
+    form, step, at = stream[0], 0, 1
+    if coding.scaled:
+        if len(stream) < 2:
+            raise FormatError(f"{coding.name}: the stream of an approximation ends before its step")
+        step, at = stream[1], 2
+    folded, at = read_varint(stream, at)
+    first = (folded >> 1) ^ -(folded & 1)
+    if abs(first) > MAX_INDEX:  # MRDWT-24
+        raise FormatError(f"{coding.name}: a first coefficient of {first}")
+    halves, predictor = form & 63, form >> 6
+    if halves == CONSTANT:
+        if predictor or at != len(stream):  # MRDWT-21, MRDWT-22
+            raise FormatError(f"{coding.name}: form {form:#04x}, {len(stream) - at} bytes follow")
+        return np.full(prefix, first, np.int64), step, True  # MRDWT-23
+    band[:1] = first
+    loops = _kernels()
+    uncode(
+        stream[at:],
+        start_states("wavelet")[0],  # MRDWT-30
+        lambda state, data: (
+            loops.code_approximations(state, data, band, prefix, predictor, scale_of(halves)) < 0
+        ),
+        f"{coding.name}: an approximation",
+        whole=prefix == count,  # MRDWT-31
+    )
+    return band, step, True
+
+
+def _parse_details(
+    stream: bytes, count: int, prefix: int, coarser: Ints, number: int, coding: Coding
+) -> Ints:
+    band = np.zeros(prefix, np.int64)
+    if stream:
+        loops = _kernels()
+        uncode(
+            stream,
+            start_states("wavelet")[number],  # MRDWT-30
+            lambda state, data: (
+                loops.code_details(state, data, band, prefix, coarser, coding.shift, coding.least)
+                < 0
+            ),
+            f"{coding.name}: a detail",
+            whole=prefix == count,  # MRDWT-31
+        )
+    return band
+
+
+def _zigzag(value: int) -> int:
+    return 2 * value if value >= 0 else -2 * value - 1

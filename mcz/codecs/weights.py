@@ -1,0 +1,63 @@
+"""How an encoder weighs the channels of a skeleton against each other; a decoder needs none of it.
+
+Source: Khan 2016, eq. 2, and its successors here, which ask how far the points move.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MczError
+from mcz.kinematics import depths, reach
+from mcz.kinematics.sensitivity import sensitivities
+from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
+
+Floats = NDArray[np.float64]
+
+RULES = ("sensitivity", "depth", "flat")
+LEAST_SHARE = 1 / 16  # a channel counts at least so much of what rotations do on average
+SAMPLED_FRAMES = 128  # where sensitivities are measured
+
+
+def weights_of(skeleton: Skeleton, sample: Floats, rule: str, *, unit_aware: bool) -> Floats:
+    """The threshold of every channel at T_g = 1, (n_channels,), in source units.
+
+    ``sample``: frames of the signal, unwrapped. ``rule`` is one of ``RULES``; ``unit_aware`` turns
+    the T_g of a position channel from degrees into the length that the farthest point moves.
+    """
+    kinds = [channel.kind for channel in skeleton.channels]
+    degree = math.pi / 180 if skeleton.angle_unit == "rad" else 1.0
+    is_rotation = np.array([kind in ROTATION_KINDS for kind in kinds], np.bool_)
+    if rule == "sensitivity":
+        return _by_sensitivity(skeleton, sample, is_rotation, degree)
+    weights = np.ones(len(kinds))
+    if rule == "depth":
+        counts = [len(joint.channels) for joint in skeleton.joints]
+        weights = np.sqrt(np.log2(np.repeat(depths(skeleton), counts) + 2))
+    if not unit_aware:
+        return weights
+    weights = np.where(is_rotation, weights * degree, weights)
+    is_position = np.array([kind in POSITION_KINDS for kind in kinds], np.bool_)
+    with np.errstate(over="ignore"):
+        lever = reach(skeleton) * math.pi / 180
+    return np.where(is_position, weights * (lever if 0 < lever < math.inf else 1.0), weights)
+
+
+def _by_sensitivity(
+    skeleton: Skeleton, sample: Floats, is_rotation: NDArray[np.bool_], degree: float
+) -> Floats:
+    """Thresholds that move the points alike: T_g is that of a rotation of average effect."""
+    plain = np.where(is_rotation, degree, 1.0)
+    try:
+        effects = sensitivities(skeleton, sample, SAMPLED_FRAMES)
+    except MczError:  # an unknown angle unit: there is no kinematics
+        return plain
+    turning = effects[is_rotation & (effects > 0)]
+    average = float(np.sqrt(np.mean(turning**2))) * degree if len(turning) else 1.0
+    if not np.isfinite(average) or average <= 0:
+        return plain
+    floor = average / degree * LEAST_SHARE
+    return np.where(effects > 0, average / np.maximum(effects, floor), plain)

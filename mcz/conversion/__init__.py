@@ -1,0 +1,60 @@
+"""A motion for another format: the same points over time, said in its words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+from mcz.conversion.acclaim import to_amc
+from mcz.conversion.hierarchy import to_bvh
+from mcz.conversion.markers import to_c3d
+from mcz.conversion.solved import Fit, from_positions
+from mcz.errors import OptionError
+from mcz.formats import FORMATS
+from mcz.kinematics import point_set
+from mcz.motion import Motion
+from mcz.reading.source_files import with_facts
+
+__all__ = ["TARGETS", "Fit", "convert", "converted_files", "from_positions"]
+
+TARGETS = {"bvh": to_bvh, "amc": to_amc, "c3d": to_c3d}
+
+
+def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Motion:
+    """``motion`` on a skeleton that files of the format ``to`` can hold: "bvh", "amc" or "c3d".
+
+    Its points are at the same positions, in the same order wherever both formats have the same
+    points, to 1e-9 of the skeleton's size; numbers that are computed have a grid of 6 decimals,
+    which they are rounded to when they are printed. It has no source: it prints plainly.
+    ``rate`` is the frame rate, in place of the motion's own.
+
+    Raises MotionError, with the reason, where that format cannot say what the motion says, and
+    OptionError for an unknown format or a frame rate that is needed and unknown.
+    """
+    if to not in TARGETS:
+        raise OptionError(f"no conversion to {to!r}, but to {', '.join(TARGETS)}")
+    motion = with_facts(motion, rate, None)
+    same = to == "c3d" and point_set(motion.skeleton) == "markers"
+    if to != "amc" and not same and motion.frame_rate is None:
+        raise OptionError(
+            f"motion {motion.name!r}: its frame rate is unknown, and {to.upper()} states one; "
+            "give the rate"
+        )
+    return replace(TARGETS[to](motion), source=None)
+
+
+def converted_files(
+    motion: Motion,
+    to: str,
+    rate: Fraction | float | None = None,
+    with_skeleton: bool = False,
+) -> dict[str, bytes]:
+    """The plain file of ``convert``, under ``to``, and with an AMC its ASF under "asf" if wanted.
+
+    Raises MotionError and OptionError as ``convert`` does.
+    """
+    converted = convert(motion, to, rate)
+    files: dict[str, bytes] = {to: FORMATS[to].write(converted)}
+    if with_skeleton and to == "amc":
+        files["asf"] = FORMATS["asf"].write(converted.skeleton)
+    return files

@@ -1,0 +1,1 @@
+"""Files -> files, stored bytes copied: cut, replaced, appended to, packed and unpacked."""

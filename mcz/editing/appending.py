@@ -1,0 +1,192 @@
+"""Growing a file in place: one process at a time, and never at the cost of what it held.
+
+SPEC.md, "FOOT", says what follows the FOOT of a file that grew.
+"""
+
+from __future__ import annotations
+
+import builtins
+import errno
+import io
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mcz.container import payloads
+from mcz.container.chunks import FOOT, SIGNATURE, Chunk, read_payload
+from mcz.container.reader import Container
+from mcz.container.scan import scan
+from mcz.container.source import ByteSource
+from mcz.errors import (
+    AccessError,
+    FormatError,
+    LimitError,
+    TruncatedError,
+    UnsupportedError,
+)
+from mcz.schema import parse
+
+BUSY = (errno.EACCES, errno.EAGAIN)  # what a lock says that another process holds
+FAR = 2**62  # Windows locks bytes; no file has one here
+
+
+@dataclass(frozen=True, slots=True)
+class Tail:
+    """What lies behind the last FOOT of a file whose writing was cut short: names of whole things.
+
+    ``kept`` is True where the file goes on behind them, False where it goes on in their place.
+    """
+
+    names: tuple[str, ...] = ()
+    kept: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """A file that is about to grow: what is written to ``added`` will follow ``container``."""
+
+    container: Container
+    added: BinaryIO
+    tail: Tail
+
+
+@contextmanager
+def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
+    """What the block writes lands behind the last valid FOOT, in place of what was cut short there.
+
+    Where whole clips, skeletons or attachments lie behind that FOOT, ``salvage`` keeps them and
+    ``force`` gives them up; otherwise that is a FormatError that names them. Where the end of the
+    file is damaged rather than cut off, one of the two has to be given. If the block fails,
+    the file is not touched; if writing fails, it ends where it ended before, or at that FOOT.
+    Raises AccessError where another process is appending to the file.
+    """
+    try:
+        stream = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below
+    except (OSError, ValueError) as error:
+        raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    with stream:
+        lock(stream, path)
+        container, tail = _whole_part(stream, path, salvage, force)
+        end = container.directory.end  # the writer moves it
+        added = io.BytesIO()
+        yield Growth(container, added, tail)
+        _check_place(stream, path)
+        _write(stream, end, added.getbuffer())
+
+
+def lock(stream: BinaryIO, path: Path) -> None:
+    """Take the file for this process until ``stream`` closes; not every file system can."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            stream.seek(FAR)
+            msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in BUSY:
+            raise AccessError(f"{path}: another process is appending to it") from None
+
+
+def _check_place(stream: BinaryIO, path: Path) -> None:
+    """Refuse to write to a file that was replaced by another one in the meantime."""
+    try:
+        same = os.path.samestat(os.fstat(stream.fileno()), path.stat())
+    except OSError:
+        same = False
+    if not same:
+        raise AccessError(f"{path}: it was replaced by another file while its addition was coded")
+
+
+def _write(stream: BinaryIO, end: int, data: memoryview) -> None:
+    """Put ``data`` at ``end``; where that fails the file ends there, as whole as it was."""
+    try:
+        stream.seek(end)
+        at = 0
+        while at < len(data):
+            at += stream.write(data[at:])
+        stream.truncate()
+        os.fsync(stream.fileno())
+    except BaseException:
+        stream.truncate(end)
+        os.fsync(stream.fileno())
+        raise
+
+
+def _whole_part(stream: BinaryIO, path: Path, salvage: bool, force: bool) -> tuple[Container, Tail]:
+    """The file as far as it will stay, and what else it has."""
+
+    def up_to(end: int, salvage: bool = False) -> Container:
+        return Container(ByteSource(stream, name=str(path), size=end), salvage=salvage)
+
+    size = stream.seek(0, os.SEEK_END)
+    try:
+        return up_to(size), Tail()
+    except FormatError as error:
+        reason = error
+    if isinstance(reason, TruncatedError):
+        foot = reason.last_foot
+    elif isinstance(reason, UnsupportedError | LimitError) or not (salvage or force):
+        raise reason  # its end is damaged, not only cut off: to go on from before must be asked for
+    else:
+        feet = scan(ByteSource(stream), salvage=True).feet
+        foot = feet[-1] + FOOT.size if feet else None
+    end = _whole_until(ByteSource(stream), foot or 0)
+    longer = up_to(end, salvage=True) if end > (foot or len(SIGNATURE)) else None
+    shorter = up_to(foot) if foot else None
+    names = _names(longer) - _names(shorter)
+    if not names or not (salvage or force):
+        if shorter is None:
+            raise reason
+        if names:
+            raise FormatError(
+                f"its writing was cut short; behind the last FOOT, which ends at {foot}, these "
+                f"are whole: {', '.join(sorted(names))}; salvage keeps them, force drops them"
+            )
+        return shorter, Tail()
+    if longer is not None and salvage:
+        longer.directory.end = end
+        return longer, Tail(tuple(sorted(names)), kept=True)
+    if shorter is None:
+        raise reason
+    return shorter, Tail(tuple(sorted(names)))
+
+
+def _names(container: Container | None) -> set[str]:
+    """What can be restored by name."""
+    if container is None:
+        return set()
+    rows = container.directory
+    return {*rows.clips, *rows.attachments, *rows.aliases}
+
+
+def _whole_until(source: ByteSource, start: int) -> int:
+    """Where the last whole thing behind ``start`` ends; nothing counts behind the first fault."""
+    end = at = start or len(SIGNATURE)
+    inside = False
+    found = scan(source, salvage=True)
+    for chunk in found.chunks:
+        if chunk.offset < start:
+            continue
+        if chunk.offset != at or chunk.type == b"INDX":
+            break  # an INDX belongs to its FOOT
+        at = found.ends[at] if chunk.length is None else at + chunk.size
+        inside = chunk.type == b"CLIP" or (inside and chunk.type != b"CEND")
+        if not inside and _is_last_part(source, chunk):
+            end = at
+    return end
+
+
+def _is_last_part(source: ByteSource, chunk: Chunk) -> bool:
+    """Whether ``chunk`` ends a thing: of an attachment only the last part does."""
+    if chunk.type != b"ATTA":
+        return True
+    fields = parse(payloads.ATTA, read_payload(source, chunk, chunk.size), chunk.label)
+    return bool(fields.part + 1 == fields.n_parts)

@@ -1,0 +1,307 @@
+"""Archives: many files into one, more files into it, and all of them out again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from mcz.codecs import DEFAULT
+from mcz.container import payloads
+from mcz.container.reader import Container
+from mcz.container.strict import check_path
+from mcz.editing.appending import growing
+from mcz.errors import AccessError, ExistsError, FormatError, MczError, OptionError, SourceError
+from mcz.formats import FORMATS
+from mcz.reading.file import File, open
+from mcz.reading.source_files import read_bytes
+from mcz.writing.atomic import replacing
+from mcz.writing.clip_writer import Progress
+from mcz.writing.draft import Digest, Draft
+from mcz.writing.entry import Entry, Terms
+from mcz.writing.file import profile_of
+from mcz.writing.names import check_name
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of one file, and why where that is not plain.
+
+    ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
+    "present" (the target has it already), "restored", "skipped", "exists" (it may not be replaced)
+    or "failed"; of a file that was cut short also "salvaged" or "dropped".
+    """
+
+    path: str
+    result: str
+    size: int = 0
+    message: str = ""
+
+
+@dataclass(slots=True)
+class Report:
+    """The outcomes of a command over many files."""
+
+    outcomes: list[Outcome] = field(default_factory=list)
+
+    @property
+    def failures(self) -> list[Outcome]:
+        """The files that failed, those among them that exist and may not be replaced."""
+        return [outcome for outcome in self.outcomes if outcome.result in ("failed", "exists")]
+
+    def count(self, result: str) -> int:
+        return sum(outcome.result == result for outcome in self.outcomes)
+
+
+def pack(
+    directory: str | os.PathLike[str],
+    target: Any,
+    *,
+    codec: str = DEFAULT,
+    params: Mapping[str, Any] | None = None,
+    rate: float | None = None,
+    unit: str | None = None,
+    verbatim: bool = False,
+    keep_all: bool = False,
+    force: bool = False,
+    archive: bool = False,
+    progress: Progress | None = None,
+) -> Report:
+    """Pack every motion file below ``directory`` into one MCZ file.
+
+    A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
+    ``keep_all`` also keeps files of other kinds so. Paths are stored relative to ``directory``.
+    """
+    root = Path(directory)
+    if not root.is_dir():
+        raise OptionError(f"{root}: not a folder")
+    paths, others = _files_below(root, target)
+    known = {suffix for source_format in FORMATS.values() for suffix in source_format.suffixes}
+    if not keep_all:
+        paths = [path for path in paths if path.suffix.lower() in known]
+    terms = Terms(codec, params, rate=rate, unit=unit, verbatim=verbatim or keep_all)
+    entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
+    with replacing(target, force=force) as stream:
+        draft = Draft(stream, profile_of(archive))
+        report = _write_entries(draft, entries, progress)
+        draft.finish()
+    report.outcomes += others
+    return report
+
+
+def _files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
+    """The files below ``root`` but for ``target`` itself, and what else there is, in order."""
+    own = Path(target).resolve() if isinstance(target, (str, os.PathLike)) else None
+    files: list[Path] = []
+    others: list[Outcome] = []
+
+    def say(path: Path, result: str, text: str) -> None:
+        others.append(Outcome(path.relative_to(root).as_posix(), result, 0, text))
+
+    def unreadable(error: OSError) -> None:
+        if Path(error.filename) == root:
+            raise AccessError(f"{root}: {error.strerror or error}") from None
+        say(Path(error.filename), "failed", f"{error.filename}: {error.strerror or error}")
+
+    for folder, folders, names in os.walk(root, onerror=unreadable):
+        for path in (Path(folder, name) for name in (*folders, *names)):
+            if path.is_symlink():
+                say(path, "skipped", "a symbolic link; only files are packed")
+            elif path.is_file():
+                if path.resolve() != own:
+                    files.append(path)
+            elif not path.is_dir():
+                say(path, "skipped", "neither a file nor a folder")
+
+    def key(name: str) -> bytes:
+        return os.fsencode(name)
+
+    files.sort(key=lambda path: key(path.relative_to(root).as_posix()))
+    return files, sorted(others, key=lambda outcome: key(outcome.path))
+
+
+def append(
+    sources: Sequence[str | os.PathLike[str]],
+    target: str | os.PathLike[str],
+    *,
+    codec: str = DEFAULT,
+    params: Mapping[str, Any] | None = None,
+    skeleton: str | os.PathLike[str] | None = None,
+    rate: float | None = None,
+    unit: str | None = None,
+    verbatim: bool = False,
+    root: str | os.PathLike[str] | None = None,
+    salvage: bool = False,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Report:
+    """Add files after the last valid FOOT of an MCZ file; what it held stays readable throughout.
+
+    Each is stored under its path relative to ``root``, or without one under its name alone. A file
+    that the target restores already under the same path is left out as "present"; another one
+    under a path that is taken is refused. When a source cannot be added, nothing is.
+
+    A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
+    lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
+    them. Where its end is damaged, one of the two has to be given. Raises AccessError while another
+    process is appending.
+    """
+    terms = Terms(codec, params, skeleton, rate, unit, verbatim)
+    entries = [Entry(Path(s), _name_below(s, root), terms) for s in sources]
+    with growing(Path(target), salvage=salvage, force=force) as growth:
+        container = growth.container
+        draft = Draft(
+            growth.added, container.profile, container.directory, _stored_paths(container)
+        )
+        report = _write_entries(draft, entries, progress)
+        if report.failures:
+            raise SourceError("; ".join(o.message for o in report.failures))
+        if growth.tail.kept or any(outcome.result != "present" for outcome in report.outcomes):
+            draft.finish()
+    tail = growth.tail
+    text = "it lay whole behind the last FOOT of a file whose writing was cut short"
+    result = "salvaged" if tail.kept else "dropped"
+    report.outcomes += [Outcome(name, result, 0, text) for name in tail.names]
+    return report
+
+
+def _name_below(path: str | os.PathLike[str], root: str | os.PathLike[str] | None) -> str:
+    if root is None:
+        return Path(path).name
+    try:
+        return Path(path).resolve().relative_to(Path(root).resolve()).as_posix()
+    except ValueError:
+        raise OptionError(f"{path} does not lie below {root}") from None
+
+
+def _stored_paths(container: Container) -> dict[str, Digest]:
+    """What the file restores under each path: the SHA-256, or what finds it."""
+    file = File(container)
+    paths: dict[str, Digest] = {}
+    for clip in file.clips.values():
+        with suppress(FormatError):  # what is damaged cannot be restored
+            if clip.source is not None and clip.source.path:
+                paths.setdefault(clip.source.path, clip.source.sha256)
+    for name, restore in named_files(file, clips=False):
+        paths.setdefault(name, partial(_digest_of, restore))
+    return paths
+
+
+def _digest_of(restore: Callable[[], bytes]) -> bytes:
+    return hashlib.sha256(restore()).digest()
+
+
+def _write_entries(draft: Draft, entries: Sequence[Entry], progress: Progress | None) -> Report:
+    report = Report()
+    seen: dict[bytes, tuple[int, bytes]] = {}
+    for done, entry in enumerate(entries):
+        size = 0
+        with suppress(OSError, ValueError):
+            size = entry.path.stat().st_size
+        try:
+            result = _write_entry(draft, entry, seen)
+            report.outcomes.append(Outcome(entry.name, result, size, entry.reason))
+        except MczError as error:
+            report.outcomes.append(Outcome(entry.name, "failed", size, str(error)))
+        if progress is not None:
+            progress(done + 1, len(entries), entry.name)
+    return report
+
+
+def _write_entry(draft: Draft, entry: Entry, seen: dict[bytes, tuple[int, bytes]]) -> str:
+    """Write one file, or only its name where the same bytes are there already."""
+    digest = hashlib.sha256(read_bytes(entry.path)).digest()
+    is_amc = entry.path.suffix.lower() == ".amc"  # its values hang on the ASF beside it
+    writer = draft.writer
+    if digest in seen and not is_amc and not draft.holds(entry.name, digest):
+        check_name(entry.name)
+        with draft.step():
+            writer.alias(entry.name, *seen[digest])
+        draft.paths[entry.name] = digest
+        return "alias"
+    clips, attachments = len(writer.directory.clips), len(writer.directory.attachments)
+    result = entry.write(draft)
+    if len(writer.directory.clips) > clips:
+        name = next(reversed(writer.directory.clips))
+        seen[digest] = (payloads.OF_CLIP, name.encode())
+    elif len(writer.directory.attachments) > attachments:
+        seen[digest] = (payloads.OF_ATTACHMENT, entry.name.encode())
+    return result
+
+
+def unpack(
+    target: Any,
+    directory: str | os.PathLike[str],
+    *,
+    force: bool = False,
+    max_decoded: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Write every source file and attachment of an MCZ file below ``directory``.
+
+    Each file appears under its name only when it is whole and its hash is right. Clips without
+    a source are reported as skipped.
+    """
+    root, report = Path(directory), Report()
+    with open(target, max_decoded=max_decoded) as file:
+        jobs = list(named_files(file))
+        written: set[Path] = set()
+        for done, (name, restore) in enumerate(jobs):
+            try:
+                path = root / safe_path(name)
+                if path in written:
+                    raise FormatError("another file in the archive has the same path")  # PATH-06
+                data = restore()
+                written.add(path)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                with replacing(path, force=force) as stream:
+                    stream.write(data)
+                report.outcomes.append(Outcome(name, "restored", len(data)))
+            except (MczError, OSError) as error:
+                result = "exists" if isinstance(error, ExistsError) else "failed"
+                report.outcomes.append(Outcome(name, result, 0, f"{name}: {error}"))
+            if progress is not None:
+                progress(done + 1, len(jobs), name)
+        for clip in file.clips.values():
+            if clip.source is None or not clip.source.path:
+                text = "it has no source file" if clip.source is None else "its file has no name"
+                report.outcomes.append(Outcome(clip.name, "skipped", 0, text))
+    return report
+
+
+def named_files(file: File, *, clips: bool = True) -> Iterator[tuple[str, Any]]:
+    """Path and restoring function of every file that the archive holds under a name."""
+    for clip in file.clips.values() if clips else ():
+        if clip.source is not None and clip.source.path:
+            yield clip.source.path, clip.source_bytes
+    for attachment in file.attachments.values():
+        yield attachment.name, attachment.read
+    for name, (of, target) in file.aliases.items():
+        yield name, _alias_reader(file, name, of, target)
+
+
+def _alias_reader(file: File, name: str, of: int, target: bytes) -> Any:
+    """What restores an alias; it raises FormatError where its target is not there."""
+    if of == payloads.OF_SKELETON:
+        return lambda: file.skeleton_bytes(target)
+
+    def restore() -> bytes:
+        table: Mapping[str, Any] = file.clips if of == payloads.OF_CLIP else file.attachments
+        found = table.get(target.decode("utf-8", "replace"))
+        if found is None:
+            raise FormatError(f"alias {name!r} names {target!r}, which is not there")
+        data: bytes = found.source_bytes() if of == payloads.OF_CLIP else found.read()
+        return data
+
+    return restore
+
+
+def safe_path(name: str) -> PurePosixPath:
+    """``name`` as a relative path; raises FormatError where it would leave the folder."""
+    check_path(name, "archive")
+    return PurePosixPath(name)

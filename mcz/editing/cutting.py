@@ -1,0 +1,286 @@
+"""What is left of a clip when frames, joints or resolutions are cut from its stored bytes.
+
+SPEC.md, "Cutting without re-encoding", is normative. ``extraction.py`` writes what is planned here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.directory import SegmentRow
+from mcz.container.frame_numbers import KEY, frame_number_metadata
+from mcz.container.reader import Container
+from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
+from mcz.errors import MotionError, OptionError
+from mcz.motion import Skeleton
+from mcz.reading.clip import Clip
+from mcz.reading.signal_info import SignalInfo
+from mcz.schema import build, parse
+
+WITHOUT_SOURCE = "the source file was left out when joints were cut"
+WITHOUT_CHANNELS = "the channels of other joints were cut"
+
+
+@dataclass(frozen=True, slots=True)
+class SignalCut:
+    """What is left of one signal: segments, groups, and all but ``dropped`` finest resolutions.
+
+    ``skip`` and ``spare`` are those of the cut signal.
+    """
+
+    info: SignalInfo
+    rows: tuple[SegmentRow, ...]
+    groups: tuple[int, ...]
+    dropped: int
+    skip: int
+    spare: int
+
+    @property
+    def base(self) -> int:
+        """The stored frame that becomes frame 0."""
+        return self.rows[0].header.first if self.rows else 0
+
+    @property
+    def has_all_groups(self) -> bool:
+        return len(self.groups) == self.info.counts.n_groups
+
+
+@dataclass(frozen=True, slots=True)
+class ClipCut:
+    """What is left of one clip: frames start <= f < stop, these joints (None: all)."""
+
+    clip: Clip
+    start: int
+    stop: int
+    joints: frozenset[int] | None
+    resolution: int
+    signals: tuple[SignalCut, ...]
+
+    @property
+    def n_frames(self) -> int:
+        return self.stop - self.start
+
+    @property
+    def has_all_frames(self) -> bool:
+        return (self.start, self.stop) == (0, self.clip.n_frames)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is cut."""
+        return self.has_all_frames and self.joints is None and not self.resolution
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        """The addresses of the joints, None for all."""
+        if self.joints is None:
+            return None
+        addresses = self.clip.skeleton.addresses()
+        return tuple(addresses[joint] for joint in sorted(self.joints))
+
+
+def plan_cut(
+    clip: Clip,
+    frames: tuple[int, int | None] | None,
+    joints: Sequence[int | str] | None,
+    resolution: int,
+) -> ClipCut:
+    """What is left of ``clip``; raises OptionError or MotionError where it cannot be cut so."""
+    start, stop = frames if frames is not None else (0, None)
+    stop = clip.n_frames if stop is None else stop
+    if not 0 <= start <= stop <= clip.n_frames:
+        raise OptionError(f"clip {clip.name!r} has frames 0 to {clip.n_frames}, not {start}:{stop}")
+    motion = clip.signals[0]
+    if not 0 <= resolution < motion.counts.n_resolutions:
+        raise OptionError(
+            f"clip {clip.name!r}: the {resolution} finest resolutions cannot be cut, "
+            f"it has {motion.counts.n_resolutions}"
+        )
+    kept = None if joints is None else _kept_joints(clip, joints)
+    cut = ClipCut(clip, start, stop, kept, resolution, ())
+    signals = []
+    for info in clip.signals:
+        groups = tuple(range(info.counts.n_groups))
+        if kept is not None and info.index == 0:
+            groups = _kept_groups(clip, info, kept)
+        signals.append(_plan_signal(cut, info, groups))
+    return replace(cut, signals=tuple(signals))
+
+
+def _kept_joints(clip: Clip, joints: Sequence[int | str]) -> frozenset[int] | None:
+    """The joints as indices, None where no joint with channels is left out."""
+    skeleton = clip.skeleton
+    if clip.signals[0].channels is not None:
+        raise OptionError(f"clip {clip.name!r}: its motion has channels of its own, no joints")
+    try:
+        kept = frozenset(skeleton.find(joint) for joint in joints)
+    except MotionError as error:
+        raise MotionError(f"clip {clip.name!r}: {error}") from None
+    others = (joint for index, joint in enumerate(skeleton.joints) if index not in kept)
+    return kept if any(joint.channels for joint in others) else None
+
+
+def joint_of_column(skeleton: Skeleton) -> list[int]:
+    """The joint of every channel."""
+    return [index for index, joint in enumerate(skeleton.joints) for _ in joint.channels]
+
+
+def _kept_groups(clip: Clip, info: SignalInfo, joints: frozenset[int]) -> tuple[int, ...]:
+    owners, groups = joint_of_column(clip.skeleton), []
+    for number, columns in enumerate(info.layout.groups):
+        inside = {owners[column] for column in columns if owners[column] in joints}
+        outside = {owners[column] for column in columns} - inside
+        if inside and outside:
+            names = clip.skeleton.addresses()
+            raise OptionError(
+                f"clip {clip.name!r}: joint {names[min(inside)]} cannot be cut out, its channels "
+                f"are coded in one group with those of {names[min(outside)]}"
+            )
+        if inside:
+            groups.append(number)
+    return tuple(groups)
+
+
+def _plan_signal(cut: ClipCut, info: SignalInfo, groups: tuple[int, ...]) -> SignalCut:
+    dropped = info.coarser(cut.resolution)
+    if cut.is_whole:
+        return SignalCut(info, info.rows, groups, 0, info.skip, info.spare)
+    start, stop = cut.start + info.skip, cut.stop + info.skip
+    rows = _kept_rows(info, start, stop)
+    if not rows:
+        return SignalCut(info, (), groups, dropped, 0, 0)
+    skip, spare = start - rows[0].header.first, rows[-1].header.stop - stop
+    return SignalCut(info, rows, groups, dropped, skip, spare)
+
+
+def _kept_rows(info: SignalInfo, start: int, stop: int) -> tuple[SegmentRow, ...]:
+    """The segments that bear upon the stored frames start <= f < stop, and those they need."""
+    hits = [
+        index
+        for index, row in enumerate(info.rows)
+        if row.header.first - row.header.lead < stop and start < row.header.stop + row.header.tail
+    ]
+    if start == stop or not hits:
+        return ()
+    first = hits[0]
+    while not info.rows[first].header.flags & FRESH:
+        first -= 1
+    return info.rows[first : hits[-1] + 1]
+
+
+def clip_fields(cut: ClipCut, skeleton: bytes, fields: Any) -> dict[str, Any]:
+    """The fields of the CLIP of the cut clip, its source not yet changed; ``fields``: of before."""
+    metadata = {pair.key: pair.value for pair in fields.metadata}
+    if not cut.has_all_frames:
+        numbers = cut.clip.frame_numbers[cut.start : cut.stop]
+        given = metadata.pop(KEY, None) is not None or cut.start > 0
+        metadata |= frame_number_metadata(numbers if given else None)
+    if cut.joints is not None:
+        add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
+    return dict(fields) | {
+        "flags": fields.flags & ~payloads.OPEN_CLIP,
+        "skeleton": skeleton,
+        "n_frames": cut.n_frames,
+        "metadata": metadata,
+        "source": list(fields.source),
+        "signals": [
+            _signal_fields(part, own) for part, own in zip(cut.signals, fields.signals, strict=True)
+        ],
+    }
+
+
+def add_note(metadata: dict[str, str], key: str, text: str) -> None:
+    """Put ``text`` behind what the metadata say under ``key`` already, once."""
+    old = metadata.get(key, "")
+    if text not in old:
+        metadata[key] = f"{old}; {text}" if old else text
+
+
+def _signal_fields(part: SignalCut, fields: Any) -> dict[str, Any]:
+    info = part.info
+    header = info.header
+    stored_all = len(part.rows) == len(info.rows) and part.has_all_groups
+    if not stored_all and info.codec.cut is not None:
+        stop = part.rows[-1].header.stop if part.rows else part.base
+        header = info.codec.cut(header, info.layout, part.base, stop, part.groups)
+    groups = dict(fields.groups)
+    if groups["sizes"] is not None:
+        groups["sizes"] = [len(info.layout.groups[group]) for group in part.groups]
+    columns = [column for group in part.groups for column in info.layout.groups[group]]
+    return dict(fields) | {
+        "skip": part.skip,
+        "spare": part.spare,
+        "grids": _grid_runs([info.grids[column] for column in columns]),
+        "header": header,
+        "groups": groups,
+        "n_resolutions": fields.n_resolutions - part.dropped,
+    }
+
+
+def _grid_runs(grids: Sequence[Any]) -> list[dict[str, Any]]:
+    runs: list[dict[str, Any]] = []
+    for grid in grids:
+        if runs and runs[-1]["grid"] == grid:
+            runs[-1]["n_channels"] += 1
+        else:
+            runs.append({"n_channels": 1, "grid": grid})
+    return runs
+
+
+class _Numbers(dict[int, int]):
+    """The new number of each group that is left."""
+
+    def __init__(self, part: SignalCut, name: str) -> None:
+        super().__init__({old: new for new, old in enumerate(part.groups)})
+        self._part, self._name = part, name
+
+    def __missing__(self, group: int) -> int:
+        layout = self._part.info.layout
+        skeleton = layout.skeleton
+        assert skeleton is not None
+        joint = joint_of_column(skeleton)[layout.groups[group][0]]
+        raise OptionError(
+            f"clip {self._name!r}: channels of the chosen joints are stored as copies of those "
+            f"of joint {skeleton.addresses()[joint]}, which must be extracted, too"
+        )
+
+
+def cut_segment(
+    container: Container, part: SignalCut, row: SegmentRow, *, noted: bool, name: str
+) -> tuple[SegmentHeader, list[bytes]]:
+    """The header and the streams of what is left of a segment; ``noted``: with frame notes.
+
+    Its chunk is read whole, so that damage is found and not copied.
+    """
+    table, streams = container.streams(row, part.info.counts, None)
+    header, kept = row.header, []
+    flags = header.flags & ~(FRAME_NOTES | GROUP_NOTES | MASKS)
+    index = table.frame_notes()
+    if noted and index is not None:
+        flags |= FRAME_NOTES
+        kept.append(streams[index])
+    for flag, stream_of in ((GROUP_NOTES, table.group_notes), (MASKS, table.mask)):
+        if header.flags & flag and part.groups:
+            flags |= flag
+            kept += [streams[stream_of(group) or 0] for group in part.groups]
+    numbers = _Numbers(part, name)
+    for resolution in range(part.info.counts.n_resolutions - part.dropped):
+        for group in part.groups:
+            stream = streams[table.codec(resolution, group)]
+            if not part.has_all_groups and part.info.codec.regroup is not None:
+                stream = part.info.codec.regroup(stream, part.info.layout, group, numbers)
+            kept.append(stream)
+    first = header.first - part.base
+    lead = min(header.lead, first)
+    return SegmentHeader(header.signal, first, header.n_frames, lead, header.tail, flags), kept
+
+
+def cut_skeleton(payload: bytes, id_: bytes, joints: frozenset[int]) -> bytes:
+    """The payload of a SKEL whose other joints have no channels; ``id_`` is its base's."""
+    fields = parse(payloads.SKEL, payload, f"SKEL {id_.hex()}")
+    for index, joint in enumerate(fields.joints):
+        if index not in joints:
+            joint.channels = []
+    return build(payloads.SKEL, dict(fields) | {"base": [id_], "source": []}, "skeleton")

@@ -1,0 +1,376 @@
+"""``extract``: frames, joints and coarser resolutions cut out of the stored bytes of a file.
+
+Streams are copied byte for byte, never encoded anew. SPEC.md, "Cutting without re-encoding", is
+normative.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
+
+from mcz.container import payloads
+from mcz.container.chunks import (
+    CRC,
+    FOOT,
+    HEADER,
+    SAFE_TO_COPY,
+    SIGNATURE,
+    Chunk,
+    is_foot_at,
+    read_chunk,
+)
+from mcz.container.directory import ClipRow
+from mcz.container.packets import read_packets
+from mcz.container.reader import Container
+from mcz.container.source import Forward
+from mcz.container.value_hash import ValueDigest, value_hash
+from mcz.container.writer import Writer, payload_id
+from mcz.editing.cutting import (
+    WITHOUT_SOURCE,
+    ClipCut,
+    SignalCut,
+    add_note,
+    clip_fields,
+    cut_segment,
+    cut_skeleton,
+    plan_cut,
+)
+from mcz.errors import ChecksumError, FormatError, MotionError, OptionError
+from mcz.formats import FORMATS
+from mcz.reading.file import File, open
+from mcz.reading.signal_reader import SignalReader
+from mcz.schema import build, parse
+from mcz.writing.atomic import replacing
+from mcz.writing.clip_writer import Progress
+
+
+@dataclass(frozen=True, slots=True)
+class ExtractedClip:
+    """What was cut: frames a <= f < b of a clip, joints (None: all), finest resolutions.
+
+    ``stored_frames`` are those whose bytes were copied; the two sizes are of whole DATA payloads.
+    """
+
+    name: str
+    frames: tuple[int, int]
+    joints: tuple[str, ...] | None
+    resolution: int
+    stored_frames: int
+    data_bytes: int
+    data_bytes_before: int
+
+
+@dataclass(slots=True)
+class Extraction:
+    """What ``extract`` wrote, and what of the source file it left out beside what was cut."""
+
+    clips: list[ExtractedClip] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    size: int = 0
+
+
+def extract(
+    source: Any,
+    target: Any,
+    *,
+    resolution: int = 0,
+    joints: Sequence[int | str] | None = None,
+    frames: tuple[int, int | None] | None = None,
+    clip: str | None = None,
+    force: bool = False,
+    max_decoded: int | None = None,
+    progress: Progress | None = None,
+) -> Extraction:
+    """Write what is left of the MCZ file ``source`` when all else is cut, without re-encoding.
+
+    ``resolution``: the number of finest resolutions to leave out. ``joints``: those whose channels
+    are kept; all joints stay in the skeleton. ``frames``: a <= f < b, b None for the end.
+    ``clip``: take out this clip alone; otherwise all clips are cut alike, and attachments kept.
+    ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
+    Raises OptionError or MotionError for what cannot be cut so, FormatError for bad bytes; nothing
+    is left under the target's name then.
+    """
+    if not resolution and joints is None and frames is None and clip is None:
+        raise OptionError("nothing to extract: give a resolution, joints, frames or a clip")
+    with open(source, max_decoded=max_decoded) as file:
+        clips = [file.only_clip(clip)] if clip is not None else list(file.clips.values())
+        if not clips:
+            raise OptionError(f"{file.name} has no clip to extract from")
+        cuts = [plan_cut(one, frames, joints, resolution) for one in clips]
+        with replacing(target, force=force) as stream:
+            return Copier(file, stream, progress).run(cuts, alone=clip is not None)
+
+
+class Copier:
+    """Copies what is left of a file to ``stream``."""
+
+    def __init__(self, file: File, stream: BinaryIO, progress: Progress | None) -> None:
+        self.file, self.progress = file, progress
+        self.container: Container = file.container
+        head = parse(payloads.HEAD, self.container.directory.head, "HEAD")
+        self.writer = Writer(
+            stream, profile=self.container.profile, head_extension=bytes(head.extension)
+        )
+        self.found = Extraction()
+        self.done = self.total = 0  # segments
+
+    def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> Extraction:
+        self.total = sum(len(part.rows) for cut in cuts for part in cut.signals)
+        for (kind, id_), chunk in self.container.directory.shared.items():
+            if kind == b"MODL":  # which one a clip needs, its codec alone knows
+                self.writer.shared(kind, self.container.payload(chunk))
+            elif kind == b"SKEL" and not alone:
+                self.skeleton(id_)
+        if not alone:
+            for chunk in self._before_clips():
+                self.ancillary(chunk)
+            for name, row in self.container.directory.attachments.items():
+                parts = [self.container.payload(part) for part in row.parts]
+                self.writer.attachment_parts(name, row.size, parts)
+        for cut in cuts:
+            self.clip(cut)
+        self._aliases({cut.clip.name: cut for cut in cuts}, alone)
+        self.writer.finish()
+        self.found.size = self.writer.offset
+        return self.found
+
+    def skeleton(self, id_: bytes) -> bytes:
+        """Copy a SKEL after its bases and their templates; return its payload."""
+        chain = [(id_, self._shared(b"SKEL", id_))]
+        while base := parse(payloads.SKEL, chain[-1][1], "SKEL").base:
+            chain.append((bytes(base[0]), self._shared(b"SKEL", bytes(base[0]))))
+        for _, payload in reversed(chain):
+            for source in parse(payloads.SKEL, payload, "SKEL").source:
+                self.template(bytes(source.template))
+            self.writer.shared(b"SKEL", payload)
+        return chain[0][1]
+
+    def template(self, id_: bytes) -> None:
+        self.writer.shared(b"SRCE", self._shared(b"SRCE", id_))
+
+    def _shared(self, kind: bytes, id_: bytes) -> bytes:
+        chunk = self.container.directory.shared.get((kind, id_))
+        if chunk is None:
+            raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
+        payload = self.container.payload(chunk)
+        if payload_id(payload) != id_:
+            raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
+        return payload
+
+    def _before_clips(self) -> Iterator[Chunk]:
+        """The ancillary chunks before the first clip, to which they do not belong."""
+        source, at = self.container.source, len(SIGNATURE)
+        end = min(row.clip.offset for row in self.container.directory.clips.values())
+        while at < end:
+            if is_foot_at(source, at):
+                at += FOOT.size
+                continue
+            chunk = read_chunk(source, at)
+            if chunk.flags:
+                yield chunk
+            at += chunk.size
+
+    def is_same(self, cut: ClipCut) -> bool:
+        """Whether the clip stays what it was."""
+        return cut.is_whole
+
+    def clip(self, cut: ClipCut) -> None:
+        """Write one clip."""
+        clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
+        fields = self.container.clip(row)
+        skeleton = clip.skeleton_id
+        payload = self.skeleton(skeleton)
+        if cut.joints is not None:
+            payload = cut_skeleton(payload, skeleton, cut.joints)
+            skeleton = self.writer.shared(b"SKEL", payload)
+        new = dict(fields) if cut.is_whole else clip_fields(cut, skeleton, fields)
+        source, hashes = self._finish_fields(cut, new)
+        n_channels = [
+            sum(len(part.info.layout.groups[group]) for group in part.groups)
+            for part in cut.signals
+        ]
+        self.writer.begin_clip(new, n_channels)
+        self.inside(row)
+        self._segments(cut, noted=bool(new["source"]))
+        cend = self.container.cend(row)
+        self.writer.end_clip(cut.n_frames, source, hashes, bytes(cend.extension))
+        self._quality(cut, row)
+        self._note(cut)
+
+    def _finish_fields(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
+        """Source and metadata of the new CLIP; return the hashes of the source and the signals."""
+        cend = self.container.cend(self.container.directory.clips[cut.clip.name])
+        if cut.is_whole:
+            source, hashes = b"".join(map(bytes, cend.source_sha256)), list(cend.value_sha256)
+        else:
+            source, hashes = self._decoded(cut, new)
+            pairs = new["metadata"]
+            new["metadata"] = [{"key": key, "value": pairs[key]} for key in sorted(pairs)]
+        for held in new["source"]:
+            self.template(bytes(held["template"]))
+        return source, hashes
+
+    def _decoded(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
+        """The hashes of what is left, decoded once, and the source file that it has now."""
+        held, metadata = new["source"], new["metadata"]
+        if held and cut.joints is not None:
+            new["source"] = []
+            add_note(metadata, "source-note", WITHOUT_SOURCE)
+            self.found.left_out.append(f"clip {cut.clip.name}: its source file, as joints were cut")
+        elif held:
+            motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
+            hashes = [value_hash(signal.values, signal.mask) for signal in motion.signals]
+            assert motion.source is not None
+            try:
+                data = FORMATS[motion.source.format].write(motion)
+            except MotionError as error:
+                new["source"] = []
+                add_note(metadata, "source-note", f"the source file was left out: {error}")
+                self.found.left_out.append(f"clip {cut.clip.name}: its source file, as {error}")
+                return b"", hashes
+            new["source"] = [dict(held[0]) | {"size": len(data)}]
+            return hashlib.sha256(data).digest(), hashes
+        return b"", [self._value_hash(cut, part) for part in cut.signals]
+
+    def _value_hash(self, cut: ClipCut, part: SignalCut) -> bytes:
+        """The hash of what is left of a signal, a few segments in memory at a time."""
+        info, digest = part.info, ValueDigest()
+        reader = SignalReader(self.container, info, part.groups, part.dropped, cut.clip.name)
+        for block in reader.blocks(cut.start + info.skip, cut.stop + info.skip):
+            digest.update(block.values, block.mask)
+        return digest.digest()
+
+    def _segments(self, cut: ClipCut, *, noted: bool) -> None:
+        """Copy the segments in the order of the file."""
+        rows = [(row.offset, row, part) for part in cut.signals for row in part.rows]
+        for _, row, part in sorted(rows, key=lambda entry: entry[0]):
+            self.writer.segment(
+                *cut_segment(self.container, part, row, noted=noted, name=cut.clip.name)
+            )
+            self.done += 1
+            if self.progress is not None:
+                self.progress(self.done, self.total, cut.clip.name)
+
+    def _quality(self, cut: ClipCut, row: ClipRow) -> None:
+        """The quality record, changed where something was cut, and the other ancillary chunks."""
+        records = [chunk for chunk in row.ancillary if chunk.type == b"QUAL"]
+        if not cut.is_whole:
+            fields: dict[str, Any] = {"entries": [], "extension": b""}
+            if records:
+                payload = self.container.payload(records[0])
+                fields = dict(parse(payloads.QUAL, payload, records[0].label))
+            fields["entries"] = cut_quality(cut, {e.key: e.value for e in fields["entries"]})
+            self.writer.ancillary(b"QUAL", build(payloads.QUAL, fields, "quality record"))
+        for chunk in row.ancillary:
+            if cut.is_whole or chunk.type != b"QUAL":
+                self.ancillary(read_chunk(self.container.source, chunk.offset))
+
+    def inside(self, row: ClipRow) -> None:
+        """Copy the ancillary chunks between CLIP and CEND."""
+        for chunk in _inside(self.container, row):
+            self.ancillary(chunk)
+
+    def ancillary(self, chunk: Chunk) -> None:
+        """Copy an ancillary chunk where that is safe."""
+        if chunk.flags & SAFE_TO_COPY:  # CHUNK-13, CHUNK-14
+            self.writer.ancillary(chunk.type, self.container.payload(chunk))
+        else:
+            self.found.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
+
+    def _note(self, cut: ClipCut) -> None:
+        written = self.writer.directory.clips[cut.clip.name].segments
+        rows = [row for part in cut.signals for row in part.rows]
+        before = [row for part in cut.signals for row in part.info.rows]
+        part = cut.signals[0]
+        assert sum(row.header.n_frames for row in rows) == sum(r.header.n_frames for r in written)
+        self.found.clips.append(
+            ExtractedClip(
+                cut.clip.name,
+                (cut.start, cut.stop),
+                cut.names,
+                cut.resolution,
+                part.skip + cut.n_frames + part.spare,
+                sum(row.size for row in written),
+                sum(row.size for row in before),
+            )
+        )
+
+    def _aliases(self, cuts: dict[str, ClipCut], alone: bool) -> None:
+        """Copy the aliases of what is here and as it was."""
+        for name, (of, target) in self.file.aliases.items():
+            if of == payloads.OF_CLIP:
+                cut = cuts.get(target.decode("utf-8", "replace"))
+                if cut is None:
+                    continue  # of a clip that was not chosen
+                if not self.is_same(cut):
+                    text = f"{name}, a file identical to that of clip {cut.clip.name} before"
+                    self.found.left_out.append(text)
+                    continue
+            elif of == payloads.OF_SKELETON:
+                if (b"SKEL", bytes(target)) not in self.writer.directory.shared:
+                    continue
+            elif alone:
+                continue
+            self.writer.alias(name, of, target)
+
+
+def cut_quality(cut: ClipCut, old: dict[str, str]) -> list[dict[str, str]]:
+    """The entries of the quality record of a cut clip; ``old`` are those of the clip it came from.
+
+    Where these say of a former cut what cannot be, it is taken for none.
+    """
+    now = {key: value for key, value in old.items() if key.startswith("cut-")}
+    if cut.resolution:
+        before = _first_number(old.get("cut-resolution", ""), 1)
+        now["cut-resolution"] = str(before + cut.resolution)
+    if not cut.has_all_frames:
+        start = _first_number(old.get("cut-frames", ""), 2)
+        now["cut-frames"] = f"{start + cut.start}:{start + cut.stop}"
+    if cut.names is not None:
+        now["cut-joints"] = ",".join(cut.names)
+    for key, value in old.items():
+        if key.startswith(("param.", "uncut_")) or key in ("codec", "edit-joints"):
+            now[key] = value
+        elif not key.startswith("cut-"):
+            now[f"uncut_{key}"] = value
+    return [{"key": key, "value": value} for key, value in now.items()]
+
+
+def _first_number(text: str, count: int) -> int:
+    """The first of ``count`` numbers with colons between them, 0 where the text is another."""
+    words = text.split(":")
+    good = len(words) == count and all(re.fullmatch("[0-9]{1,16}", word) for word in words)
+    return int(words[0]) if good else 0
+
+
+def _inside(container: Container, row: ClipRow) -> Iterator[Chunk]:
+    """The ancillary chunks between CLIP and CEND."""
+    assert row.cend is not None
+    source, at = container.source, row.clip.offset + row.clip.size
+    ends = {
+        segment.chunk().offset: segment.stop + CRC.size
+        for segment in row.segments
+        if not segment.packet
+    }
+    while at < row.cend.offset:
+        if at in ends:
+            at = ends[at]
+            continue
+        chunk = read_chunk(source, at)
+        if chunk.length is None:
+            at = _end_of_packets(container, chunk)
+            continue
+        if chunk.flags:
+            yield chunk
+        at += chunk.size
+
+
+def _end_of_packets(container: Container, chunk: Chunk) -> int:
+    read = Forward(container.source, chunk.offset + HEADER.size)
+    for _ in read_packets(read, container.profile.packet_bytes):
+        pass
+    return read.at

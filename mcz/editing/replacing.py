@@ -1,0 +1,261 @@
+"""``replace``: one joint of a clip gets other values; no other stream of the file is touched.
+
+SPEC.md, "Replacing a joint", is normative. ``recoding.py`` codes the joint, this file writes what
+it has coded.
+"""
+
+from __future__ import annotations
+
+import builtins
+import dataclasses
+import hashlib
+import os
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from mcz.container import payloads
+from mcz.container.chunks import read_chunk
+from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeader
+from mcz.container.value_hash import value_hash
+from mcz.editing.appending import lock
+from mcz.editing.cutting import ClipCut, add_note, cut_segment, plan_cut
+from mcz.editing.extraction import Copier
+from mcz.editing.recoding import Recoded, recode
+from mcz.errors import AccessError, MotionError, OptionError
+from mcz.formats import FORMATS
+from mcz.metrics import compare
+from mcz.motion import Motion
+from mcz.reading.clip import Clip
+from mcz.reading.file import File, open
+from mcz.reading.source_info import of_no_file
+from mcz.schema import build, parse
+from mcz.writing.atomic import replacing
+from mcz.writing.clip_writer import Progress
+from mcz.writing.quality import CHUNK, texts_of
+
+
+@dataclass(frozen=True, slots=True)
+class Replacement:
+    """What ``replace`` did.
+
+    ``recoded``: the joints that stood in the file as copies of this one and were coded anew, their
+    values as before. The two numbers of bytes are those of the joint's streams. ``max_error``: how
+    far a decoded value is from the one that was given, at most, in source units.
+    """
+
+    clip: str
+    joint: str
+    codec: str
+    recoded: tuple[str, ...]
+    joint_bytes: int
+    joint_bytes_before: int
+    max_error: float
+    left_out: tuple[str, ...]
+    size: int
+
+
+def replace(
+    source: Any,
+    clip: str | None,
+    joint: int | str,
+    values: Any,
+    target: Any = None,
+    *,
+    on_grid: bool = False,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Replacement:
+    """Give one joint of a clip other values; write the file to ``target``, by default in place.
+
+    ``source`` is what ``mcz.open`` takes, or a File that is open, which stays what it is and needs
+    a ``target``. ``clip`` may be None where there is only one. ``values``, of shape (n_frames,
+    channels of the joint), are in source units; a clip without a source file takes NaN for invalid.
+    The joint is coded anew with the clip's own codec and settings, all other streams are copied
+    byte for byte. A lossless clip takes every number exactly, or, ``on_grid``, the nearest that its
+    source would print.
+
+    Raises OptionError where the codec cannot code a joint alone, MotionError for values that it
+    cannot hold; the file is as it was then.
+    """
+    with ExitStack() as stack:
+        if target is None:
+            target, force = _locked(source, stack), True
+        stream = stack.enter_context(replacing(target, force=force))
+        file = source if isinstance(source, File) else stack.enter_context(open(source))
+        chosen = file.only_clip(clip)
+        return _write(file, chosen, recode(chosen, joint, values, on_grid), stream, progress)
+
+
+def _locked(source: Any, stack: ExitStack) -> Path:
+    """The file that ``source`` names, taken for this process until ``stack`` ends."""
+    if not isinstance(source, (str, os.PathLike)) or "://" in str(source):
+        raise OptionError(f"{source!r} cannot be edited in place; name a target")
+    path = Path(source).resolve()
+    if os.name == "posix":  # elsewhere nothing can be renamed to what is open
+        try:
+            held = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the stack
+        except (OSError, ValueError) as error:
+            raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+        lock(stack.enter_context(held), path)
+    return path
+
+
+def _write(
+    file: File, clip: Clip, recoded: Recoded, stream: BinaryIO, progress: Progress | None
+) -> Replacement:
+    writer = _Editor(file, stream, clip.name, recoded, progress)
+    found = writer.run(
+        [plan_cut(one, None, None, 0) for one in file.clips.values()],
+        alone=False,
+    )
+    addresses = clip.skeleton.addresses()
+    return Replacement(
+        clip=clip.name,
+        joint=addresses[recoded.joint],
+        codec=clip.codec,
+        recoded=tuple(addresses[other] for other in recoded.others),
+        joint_bytes=recoded.size,
+        joint_bytes_before=recoded.size_before,
+        max_error=recoded.max_error,
+        left_out=tuple(found.left_out),
+        size=found.size,
+    )
+
+
+class _Editor(Copier):
+    """Copies a file, the streams of one joint of one clip replaced."""
+
+    def __init__(
+        self, file: File, stream: BinaryIO, name: str, recoded: Recoded, progress: Progress | None
+    ) -> None:
+        super().__init__(file, stream, progress)
+        self.name, self.recoded = name, recoded
+
+    def is_same(self, cut: ClipCut) -> bool:
+        return cut.clip.name != self.name
+
+    def clip(self, cut: ClipCut) -> None:
+        if self.is_same(cut):
+            super().clip(cut)
+            return
+        row = self.container.directory.clips[cut.clip.name]
+        fields = dict(self.container.clip(row))
+        self.skeleton(cut.clip.skeleton_id)
+        source = self._source(fields)
+        for held in fields["source"]:
+            self.template(bytes(held["template"]))
+        self.writer.begin_clip(fields, [part.info.layout.n_channels for part in cut.signals])
+        self.inside(row)
+        self._edited_segments(cut, noted=bool(fields["source"]))
+        cend = self.container.cend(row)
+        signal = self.recoded.decoded.signals[0]
+        hashes = [value_hash(signal.values, signal.mask), *cend.value_sha256[1:]]
+        self.writer.end_clip(cut.n_frames, source, hashes, bytes(cend.extension))
+        self._edited_quality(row)
+
+    def _source(self, fields: dict[str, Any]) -> bytes:
+        """Put the size of the new source file into the fields of CLIP; return its hash."""
+        motion, held = self.recoded.decoded, fields["source"]
+        if motion.source is None or not held:
+            return b""
+        try:
+            data = _source_file(motion)
+        except MotionError as error:
+            metadata = {pair.key: pair.value for pair in fields["metadata"]}
+            add_note(metadata, "source-note", f"the source file was left out: {error}")
+            fields["metadata"] = [{"key": k, "value": metadata[k]} for k in sorted(metadata)]
+            fields["source"] = []
+            self.found.left_out.append(f"clip {self.name}: its source file, as {error}")
+            return b""
+        fields["source"] = [dict(held[0]) | {"size": len(data)}]
+        return hashlib.sha256(data).digest()
+
+    def _edited_segments(self, cut: ClipCut, *, noted: bool) -> None:
+        motion = cut.signals[0]
+        numbers = {row.offset: index for index, row in enumerate(motion.rows)}
+        rows = [(row.offset, row, part) for part in cut.signals for row in part.rows]
+        for _, row, part in sorted(rows, key=lambda entry: entry[0]):
+            if part is motion:
+                written = self._segment(row, numbers[row.offset], noted)
+            else:
+                written = cut_segment(self.container, part, row, noted=noted, name=self.name)
+            self.writer.segment(*written)
+            self.done += 1
+            if self.progress is not None:
+                self.progress(self.done, self.total, self.name)
+
+    def _segment(
+        self, row: SegmentRow, index: int, noted: bool
+    ) -> tuple[SegmentHeader, list[bytes]]:
+        """Header and streams of a segment, those of the joint in their places."""
+        counts, edit = self.recoded.info.counts, self.recoded
+        table, old = self.container.streams(row, counts, None)
+        flags = row.header.flags & ~(FRAME_NOTES | GROUP_NOTES | MASKS)
+        kept: list[bytes] = []
+        at = table.frame_notes()
+        if noted and at is not None:
+            flags |= FRAME_NOTES
+            kept.append(old[at])
+        new_notes, new_masks = edit.beside(row.header.first, row.header.stop)
+        for flag, where, new in (
+            (GROUP_NOTES, table.group_notes, new_notes),
+            (MASKS, table.mask, new_masks),
+        ):
+            numbers = [where(group) for group in range(counts.n_groups)]
+            streams = [b"" if number is None else old[number] for number in numbers]
+            for group, stream in new.items():
+                streams[group] = stream
+            if row.header.flags & flag or any(streams):
+                flags |= flag
+                kept += streams
+        for resolution in range(counts.n_resolutions):
+            for group in range(counts.n_groups):
+                coded = edit.streams.get((index, group))
+                kept.append(
+                    old[table.codec(resolution, group)] if coded is None else coded[resolution]
+                )
+        return dataclasses.replace(row.header, flags=flags), kept
+
+    def _edited_quality(self, row: ClipRow) -> None:
+        """The quality record with what is known of the new values, and the other chunks."""
+        records = [chunk for chunk in row.ancillary if chunk.type == CHUNK]
+        if records or not self.recoded.info.codec.lossless:
+            fields: dict[str, Any] = {"entries": [], "extension": b""}
+            if records:
+                payload = self.container.payload(records[0])
+                fields = dict(parse(payloads.QUAL, payload, records[0].label))
+            old = {entry.key: entry.value for entry in fields["entries"]}
+            entries = edited_quality(old, self.recoded).items()
+            fields["entries"] = [{"key": key, "value": value} for key, value in entries]
+            self.writer.ancillary(CHUNK, build(payloads.QUAL, fields, "quality record"))
+        for chunk in row.ancillary:
+            if chunk.type != CHUNK:
+                self.ancillary(read_chunk(self.container.source, chunk.offset))
+
+
+def _source_file(motion: Motion) -> bytes:
+    """The source file of a motion whose values are not those of the file that it came from."""
+    assert motion.source is not None
+    source = of_no_file(motion.source)
+    data: bytes = FORMATS[source.format].write(dataclasses.replace(motion, source=source))
+    return data
+
+
+def edited_quality(old: dict[str, str], recoded: Recoded) -> dict[str, str]:
+    """The entries of the quality record of an edited clip; ``old`` are those of before."""
+    address = recoded.given.skeleton.addresses()[recoded.joint]
+    now = {"codec": recoded.info.codec.name}
+    for key, value in old.items():
+        if key == "codec" or key.startswith(("param.", "cut-", "uncut_", "unedited_")):
+            now[key] = value
+        elif key != "edit-joints" and not key.startswith("edit_"):
+            now[f"unedited_{key}"] = value
+    edited = [name for name in old.get("edit-joints", "").split(",") if name]
+    now["edit-joints"] = ",".join(dict.fromkeys([*edited, address]))
+    if not recoded.info.codec.lossless:
+        figures = texts_of(compare(recoded.given, recoded.decoded).entries())
+        now |= {f"edit_{key}": value for key, value in figures.items()}
+    return now

@@ -1,0 +1,198 @@
+"""The compiled loops of ``rows`` and ``restore``; imported on first use.
+
+Blanks are the bytes up to 0x20.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.formats.layout import Items
+from mcz.jit import kernel
+
+Bytes = NDArray[np.uint8]
+Ints = NDArray[np.int64]
+
+BLANK = 0x20
+MINUS, PLUS, HASH, ZERO, NINE, LF = 0x2D, 0x2B, 0x23, 0x30, 0x39, 0x0A
+
+
+@kernel
+def _is_at(text: Bytes, at: int, gaps: Bytes, start: int, stop: int) -> bool:
+    """Whether gaps[start:stop] stands at ``at``."""
+    if at + stop - start > len(text):
+        return False
+    for k in range(start, stop):
+        if text[at + k - start] != gaps[k]:
+            return False
+    return True
+
+
+@kernel
+def _token_end(text: Bytes, at: int) -> int:
+    while at < len(text) and text[at] > BLANK:
+        at += 1
+    return at
+
+
+@kernel
+def _blanks(text: Bytes, at: int) -> int:
+    """How many 0x20 stand at ``at``."""
+    start = at
+    while at < len(text) and text[at] == BLANK:
+        at += 1
+    return at - start
+
+
+@kernel
+def _number(text: Bytes, start: int, stop: int) -> int:
+    """The plain decimal integer text[start:stop]; -1 where it is anything else."""
+    if stop == start or stop - start > 15 or (text[start] == ZERO and stop > start + 1):
+        return -1
+    value = 0
+    for k in range(start, stop):
+        if text[k] < ZERO or text[k] > NINE:
+            return -1
+        value = value * 10 + (int(text[k]) - ZERO)
+    return value
+
+
+@kernel
+def _begins_frame(text: Bytes, at: int) -> bool:
+    """Whether the next thing at ``at`` is a line with one integer, or the end."""
+    while at < len(text) and text[at] <= BLANK:
+        at += 1
+    if at == len(text):
+        return True
+    digits = at
+    while at < len(text) and ZERO <= text[at] <= NINE:
+        at += 1
+    if at == digits:
+        return False
+    while at < len(text) and text[at] <= BLANK and text[at] != LF:
+        at += 1
+    return at == len(text) or text[at] == LF
+
+
+@kernel
+def _match_token(text: Bytes, at: int, width: int) -> tuple[int, int, int]:
+    """Start and stop of the token at ``at`` and the offset after its padding; start -1: none."""
+    fail = (-1, -1, -1)
+    blanks = 0
+    if width > 0:
+        blanks = _blanks(text, at)
+        at += blanks
+    stop = _token_end(text, at)
+    if stop == at or text[at] == HASH:
+        return fail
+    if width == 0:
+        return at, stop, stop
+    size = stop - at
+    if width == 1:
+        signed = text[at] == MINUS or text[at] == PLUS
+        return (at, stop, stop) if blanks == (0 if signed else 1) else fail
+    if width > 1:
+        return (at, stop, stop) if blanks == max(0, width - size) else fail
+    pad = max(0, -width - size)
+    return (at, stop, stop + pad) if _blanks(text, stop) >= pad else fail
+
+
+@kernel
+def _match_row(text: Bytes, at: int, items: Items, start: Ints, stop: Ints) -> tuple[int, int]:
+    """The offset after a row of the pattern at ``at`` and its frame number; offset -1: no match.
+
+    Fills ``start`` and ``stop`` (n_columns,) of its tokens.
+    """
+    gaps, gap_start, gap_stop, columns, widths = items
+    number = 0
+    for k in range(len(columns)):
+        if not _is_at(text, at, gaps, gap_start[k], gap_stop[k]):
+            return -1, 0
+        first, last, at = _match_token(text, at + gap_stop[k] - gap_start[k], widths[k])
+        if first < 0:
+            return -1, 0
+        if columns[k] >= 0:
+            start[columns[k]] = first
+            stop[columns[k]] = last
+        else:
+            number = _number(text, first, last)
+            if number < 0:
+                return -1, 0
+    tail = len(columns)
+    if not _is_at(text, at, gaps, gap_start[tail], gap_stop[tail]):
+        return -1, 0
+    return at + gap_stop[tail] - gap_start[tail], number
+
+
+@kernel
+def match_rows(
+    text: Bytes, at: int, items: Items, row: int, start: Ints, stop: Ints, numbers: Ints
+) -> tuple[int, int]:
+    """Match as many rows of one pattern as possible from offset ``at`` and row ``row`` on.
+
+    Fills ``start`` and ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,). Returns the row and
+    the offset of the first row that does not match, or for which there is no room.
+    """
+    columns = items.columns
+    numbered = len(columns) > 0 and columns[0] == -1
+    while row < len(numbers):
+        end, number = _match_row(text, at, items, start[row], stop[row])
+        if end <= at or (numbered and not _begins_frame(text, end)):
+            break
+        numbers[row] = number
+        at = end
+        row += 1
+    return row, at
+
+
+@kernel
+def _pad(first: int, size: int, width: int) -> int:
+    """Blanks beside a token of ``size`` bytes that begins with ``first``."""
+    if width == 1:
+        return 0 if first == MINUS or first == PLUS else 1  # AMC-06
+    return max(0, abs(width) - size)
+
+
+@kernel
+def measure_rows(items: Items, gap_size: int, texts: Bytes, start: Ints, size: Ints) -> int:
+    """Bytes of rows of one pattern whose gaps and tail take ``gap_size``; see ``fill_rows``."""
+    columns, widths = items.columns, items.widths
+    total = gap_size * len(start)
+    for k in range(len(columns)):
+        column = columns[k]
+        for row in range(start.shape[0]):
+            total += int(size[row, column])
+            if widths[k]:
+                total += int(_pad(texts[start[row, column]], size[row, column], widths[k]))
+    return total
+
+
+@kernel
+def fill_rows(out: Bytes, at: int, items: Items, texts: Bytes, start: Ints, size: Ints) -> int:
+    """Write rows of one pattern to ``out`` from ``at`` on; returns the offset after them.
+
+    The token of ``row`` and ``column`` is texts[start[row, column]:][:size[row, column]]; column -1
+    wraps around to the last one, which holds the frame numbers. No token is empty.
+    """
+    gaps, gap_start, gap_stop, columns, widths = items
+    n_items = len(columns)
+    for row in range(start.shape[0]):
+        for k in range(n_items + 1):
+            for j in range(gap_start[k], gap_stop[k]):
+                out[at] = gaps[j]
+                at += 1
+            if k == n_items:
+                break
+            first, count, width = start[row, columns[k]], size[row, columns[k]], widths[k]
+            pad = _pad(texts[first], count, width) if width else 0
+            if width > 0:  # AMC-06
+                out[at : at + pad] = BLANK
+                at += pad
+            for j in range(first, first + count):
+                out[at] = texts[j]
+                at += 1
+            if width < 0:  # AMC-06
+                out[at : at + pad] = BLANK
+                at += pad
+    return at

@@ -1,0 +1,153 @@
+"""A live clip as its reader knows it: what CLIP says, its decoder, the hash of its values.
+
+SPEC.md, "Open DATA and packets", is normative.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import by_id
+from mcz.codecs.contract import LiveDecoder
+from mcz.container import payloads
+from mcz.container.chunks import SIGNATURE, Chunk, build_foot
+from mcz.container.directory import ClipRow, signal_rows
+from mcz.container.masks import parse_mask
+from mcz.container.packets import SHORT
+from mcz.container.reader import Container
+from mcz.container.segments import FRESH, MASKS, SegmentHeader, frame_table, parse_table
+from mcz.container.source import ByteSource
+from mcz.container.value_hash import ValueDigest
+from mcz.errors import ChecksumError, FormatError, TruncatedError, UnsupportedError
+from mcz.motion import Skeleton
+from mcz.reading.signal_info import SignalInfo, read_signal
+
+Floats = NDArray[np.float64]
+Shared = dict[tuple[bytes, bytes], bytes]  # kind and id -> chunk
+
+
+@dataclass(frozen=True, slots=True)
+class LiveClip:
+    """What a clip that is being read says of its motion; ``frame_rate`` None: unknown."""
+
+    name: str
+    skeleton: Skeleton
+    frame_rate: Fraction | None
+    codec: str
+
+
+def needs(fields: Any) -> Iterator[tuple[bytes, bytes]]:
+    """Kind and id of the chunks that a clip with these ``fields`` cannot be read without."""
+    yield b"SKEL", bytes(fields.skeleton)
+    for source in fields.source:
+        yield b"SRCE", bytes(source.template)
+    for signal in fields.signals:
+        with suppress(FormatError):  # it is said when the signal is read
+            uses = by_id(signal.codec, signal.codec_version).uses
+            for id_ in () if uses is None else uses(bytes(signal.header)):
+                yield b"MODL", id_
+
+
+def row_of(fields: Any, chunk: Chunk) -> ClipRow:
+    """A clip of which nothing but its CLIP is known; raises FormatError."""
+    if not fields.name or not fields.signals:
+        raise FormatError(f"chunk {chunk.label}: a clip without a name or a signal")
+    rate = fields.rate_numerator, fields.rate_denominator
+    rows = signal_rows(fields, chunk.label)
+    return ClipRow(fields.name, fields.skeleton, fields.n_frames, *rate, rows, chunk)
+
+
+def begin(head: bytes, shared: Shared, row: ClipRow, fields: Any) -> ClipState | None:
+    """What decodes the frames of the clip that begins; None where its codec needs all of them.
+
+    ``head`` is HEAD, ``shared`` the chunks before the clip. Raises FormatError where the clip needs
+    one that is not there.
+    """
+    container = Container(ByteSource(io.BytesIO(opening(head, shared, fields) + build_foot(0, 0))))
+    skeleton = container.skeleton(row.skeleton)
+    rate = Fraction(row.rate_numerator, row.rate_denominator) if row.rate_numerator else None
+    motion = fields.signals[0]
+    shown = range(motion.skip, motion.skip + fields.n_frames)
+    motion.skip = motion.spare = 0
+    nothing = replace(row, n_frames=0, segments=[])  # it is not known what will come
+    info = read_signal(container, nothing, fields, 0, skeleton, rate)
+    one = (info.counts.n_groups, info.counts.n_resolutions, info.layout.samples_per_frame)
+    if info.codec.follow is None or one != (1, 1, 1):
+        return None
+    is_open = bool(fields.flags & payloads.OPEN_CLIP)
+    clip = LiveClip(row.name, skeleton, rate, info.codec.name)
+    return ClipState(clip, info, None if is_open else shown, len(fields.signals))
+
+
+def opening(head: bytes, shared: Shared, fields: Any) -> bytes:
+    """A file as far as the clip with these ``fields``: what it needs, and no more."""
+    needed = [shared[key] for key in needs(fields) if key in shared]
+    return b"".join([SIGNATURE, head, *needed])
+
+
+class ClipState:
+    """A clip that is decoded frame by frame.
+
+    ``shown`` are the stored frames that the clip shows, None where those are all.
+    """
+
+    def __init__(
+        self, clip: LiveClip, info: SignalInfo, shown: range | None, n_signals: int
+    ) -> None:
+        assert info.codec.follow is not None
+        self.clip, self.info, self.shown, self.n_signals = clip, info, shown, n_signals
+        self._where = f"clip {clip.name!r}"
+        self.decoder: LiveDecoder = info.codec.follow(info.header, info.layout)
+        self._digest = ValueDigest()
+
+    def parts(
+        self, header: SegmentHeader, packet: int, payload: bytes
+    ) -> tuple[bytes, NDArray[np.bool_] | None]:
+        """The codec's stream of a segment of one frame, and its mask, (n_channels,).
+
+        ``packet`` is the kind of packet that it came in, 0 for a closed DATA. Raises FormatError,
+        UnsupportedError for a segment of several frames.
+        """
+        if packet in SHORT:
+            frame_table(header, self.info.counts, len(payload))
+            return payload, None
+        where = f"{self._where}, frame {header.first}"
+        if header.n_frames != 1 or header.flags & ~(FRESH | MASKS):
+            raise UnsupportedError(
+                f"{self._where}: a segment of {header.n_frames} frames, flags {header.flags}, "
+                "cannot be followed; read the whole file"
+            )
+        try:
+            table = parse_table(payload, self.info.counts)
+        except TruncatedError as error:
+            raise FormatError(f"{where}: {error}") from None
+        if table.payload_size != len(payload):
+            raise FormatError(f"{where}: {len(payload)} bytes of streams")
+        streams = [
+            payload[at : at + size] for at, size in zip(table.offsets, table.lengths, strict=True)
+        ]
+        number = table.mask(0)
+        mask = None
+        if number is not None and streams[number]:
+            mask = parse_mask(streams[number], 1, self.info.layout.n_channels, self._where)[0]
+        return streams[table.codec(0, 0)], mask
+
+    def digest(self, values: Floats, mask: NDArray[np.bool_] | None) -> None:
+        """Take a frame that is shown into the hash."""
+        self._digest.update(values[None], None if mask is None else mask[None])
+
+    def check_hash(self, fields: Any) -> None:
+        """Compare the hash of all frames with that of CEND; raises ChecksumError."""
+        hashes = fields.value_sha256
+        if len(hashes) != self.n_signals:
+            raise FormatError(f"{self._where}: {len(hashes)} hashes of {self.n_signals} signals")
+        if self._digest.digest() != hashes[0]:
+            raise ChecksumError(f"{self._where}: its frames are not those it was closed with")

@@ -1,0 +1,135 @@
+"""Reading a clip while it is being written, strictly.
+
+SPEC.md, "Open DATA and packets", is normative. ``reader_with_losses.py`` goes on where frames are
+lost.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.container import payloads
+from mcz.container.chunks import build_foot
+from mcz.container.reader import Container
+from mcz.container.segments import FRESH
+from mcz.container.source import ByteSource
+from mcz.container.walk_arriving import Arrival, ArrivingWalker
+from mcz.container.writer import payload_id
+from mcz.errors import FormatError, OptionError
+from mcz.live.clip_state import ClipState, LiveClip, Shared, begin, opening
+from mcz.reading.clip import Clip
+from mcz.schema import parse
+
+Frame = tuple[int, NDArray[Any], NDArray[np.bool_]]
+SHARED = (b"SKEL", b"MODL", b"SRCE")  # what clips refer to
+
+
+def live_frames(stream: Any) -> Iterator[Frame]:
+    """The frames of the MCZ file that a binary stream gives, each as soon as its bytes are there.
+
+    Yields the number of the frame in its clip, from 0, its values and which of them are valid, both
+    (n_channels,) of the motion signal, the values NaN where invalid. A clip whose codec does not
+    decode frame by frame comes when it has ended. Raises FormatError at the first fault, after all
+    frames before it: TruncatedError where the stream ends too early, ChecksumError where the
+    frames of a clip were not those that it was closed with. ``stream_decode`` goes on instead.
+    """
+    if not hasattr(stream, "read"):
+        raise OptionError(f"cannot read from {stream!r}: not a binary stream")
+    return StrictFrames(stream).frames()
+
+
+class StrictFrames:
+    """The frames of a stream, and what is known while they come.
+
+    ``clip`` is the one that the last frame is of, ``payload_bytes`` are those of streams so far,
+    ``is_checked`` is True where a value hash was right.
+    """
+
+    def __init__(self, stream: Any) -> None:
+        self._walker = ArrivingWalker(stream)
+        self.clip: LiveClip | None = None
+        self.payload_bytes = 0
+        self.is_checked = False
+
+    @property
+    def size(self) -> int:
+        """The bytes that came."""
+        return self._walker.pipe.end
+
+    def frames(self) -> Iterator[Frame]:
+        """As ``live_frames``."""
+        head = b""
+        shared: Shared = {}
+        clip: ClipState | _Held | None = None
+        for arrival in self._walker.arrivals():
+            kind = arrival.chunk.type if arrival.chunk is not None else b"FOOT"
+            if kind == b"HEAD":
+                head = arrival.data
+            elif kind in SHARED:
+                shared.setdefault((kind, payload_id(arrival.payload)), arrival.data)
+            elif kind == b"CLIP":
+                row = self._walker.clip
+                assert row is not None
+                fields = parse(payloads.CLIP, arrival.payload, row.clip.label)
+                before = opening(head, shared, fields)
+                clip = begin(head, shared, row, fields) or _Held(before + arrival.data, row.name)
+            elif isinstance(clip, ClipState):
+                yield from self._frame(clip, kind, arrival)
+            elif clip is not None:
+                yield from clip.take(self, kind, arrival)
+            clip = None if kind == b"CEND" else clip
+
+    def _frame(self, clip: ClipState, kind: bytes, arrival: Arrival) -> Iterator[Frame]:
+        row = arrival.segment
+        if kind == b"CEND":
+            clip.check_hash(parse(payloads.CEND, arrival.payload, "CEND"))  # PACK-19
+            self.is_checked = True
+        if row is None or row.header.signal:
+            return
+        stream, mask = clip.parts(row.header, row.packet, arrival.payload)
+        self.payload_bytes += len(stream)
+        frame = row.header.first
+        fresh = bool(row.header.flags & FRESH)
+        if not (frame or fresh):
+            raise FormatError(f"clip {clip.clip.name!r}: the first segment needs one before it")
+        values = clip.decoder.push(stream, fresh)
+        if clip.shown is not None:
+            if frame not in clip.shown:
+                return
+            frame -= clip.shown.start
+        clip.digest(values, mask)
+        self.clip = clip.clip
+        if mask is None:
+            yield frame, values, np.ones(values.shape, np.bool_)
+        else:
+            yield frame, np.where(mask, values, np.nan), mask
+
+
+class _Held:
+    """A clip that is decoded when it has ended."""
+
+    def __init__(self, data: bytes, name: str) -> None:
+        self._parts, self._name = [data], name
+
+    def take(self, reader: StrictFrames, kind: bytes, arrival: Arrival) -> Iterator[Frame]:
+        self._parts.append(arrival.data)
+        if kind != b"CEND":
+            return
+        container = Container(ByteSource(io.BytesIO(b"".join(self._parts) + build_foot(0, 0))))
+        clip = Clip(container, container.directory.clips[self._name])
+        values, mask = clip.read_masked()
+        reader.clip = LiveClip(clip.name, clip.skeleton, clip.frame_rate, clip.codec)
+        reader.payload_bytes += sum(row.size for row in clip.signals[0].rows)
+        reader.is_checked = True
+        per_frame = clip.signals[0].layout.samples_per_frame
+        valid = np.ones(values.shape, np.bool_) if mask is None else mask
+        if not valid.all():
+            values = np.where(valid, values, np.nan)
+        for frame in range(clip.n_frames):
+            rows = frame if per_frame == 1 else slice(frame * per_frame, (frame + 1) * per_frame)
+            yield frame, values[rows], valid[rows]

@@ -1,0 +1,103 @@
+"""A motion whose text arrives line by line -> a live clip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from mcz.codecs import by_name
+from mcz.container.writer import Sink
+from mcz.errors import OptionError
+from mcz.formats import FORMATS, sniffed
+from mcz.formats.line_by_line import Arriving
+from mcz.live.writer import LiveWriter
+from mcz.motion import Skeleton
+from mcz.reading.source_files import read_skeleton
+from mcz.units import in_unit
+from mcz.writing.entry import Terms
+
+NOTE = "coded live, frame by frame, from {format} text, which was not kept"
+
+
+@dataclass(slots=True)
+class LiveReport:
+    """What ``encode_live`` wrote, and what it could not say in the clip."""
+
+    n_frames: int = 0
+    n_channels: int = 0
+    remarks: tuple[str, ...] = ()
+
+
+def encode_live(
+    lines: Iterable[bytes], sink: Sink, source_format: str, terms: Terms, name: str = "live"
+) -> LiveReport:
+    """Write the motion that ``lines`` spell to ``sink``, each frame before the next line is read.
+
+    ``source_format`` is ``bvh`` or ``amc``; an AMC needs the ``skeleton`` of ``terms``, the path of
+    its ASF. Raises SourceError at text that is none of the format; the clip is closed then with all
+    frames before it. Otherwise raises as ``LiveWriter`` does.
+    """
+    arriving, base = _arriving(lines, source_format, terms)
+    notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
+    writer = LiveWriter(
+        sink,
+        in_unit(arriving.skeleton, terms.unit),
+        terms.codec,
+        terms.params or {},
+        frame_rate=arriving.frame_rate if terms.rate is None else Fraction(terms.rate),
+        frame_rate_exact=arriving.frame_rate_exact if terms.rate is None else True,
+        name=name,
+        metadata=dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))},
+        first_number=arriving.first_number,
+        base=base,
+    )
+    report = LiveReport(n_channels=arriving.skeleton.n_channels)
+    with writer:
+        _push_all(arriving, writer, report)
+    if arriving.declared not in (None, report.n_frames):
+        remark = f"{arriving.declared} frames are declared, {report.n_frames} came"
+        report.remarks = (*report.remarks, remark)
+    return report
+
+
+def _arriving(
+    lines: Iterable[bytes], source_format: str, terms: Terms
+) -> tuple[Arriving, Skeleton | None]:
+    """What comes line by line, and the skeleton that it needs beside it."""
+    found = FORMATS.get(source_format)
+    if found is None or found.arrive is None:
+        able = ", ".join(f.name for f in FORMATS.values() if f.arrive is not None)
+        raise OptionError(f"format {source_format!r} cannot come line by line; these can: {able}")
+    base = None
+    if found.wants_skeleton:
+        if terms.skeleton is None:
+            raise OptionError(f"{source_format} that comes line by line needs its skeleton file")
+        base = in_unit(read_skeleton(terms.skeleton), terms.unit)
+    arriving: Arriving = found.arrive(iter(lines), base)
+    return arriving, base
+
+
+def _push_all(arriving: Arriving, writer: LiveWriter, report: LiveReport) -> None:
+    due = arriving.first_number
+    for number, values in arriving.frames:
+        if number is not None and number != due:
+            remark = f"frame {number} comes where {due} is due; the clip counts on"
+            report.remarks = report.remarks or (remark,)
+            due = number
+        writer.push(values)
+        due += 1
+        report.n_frames += 1
+
+
+def codes_live(codec: str) -> bool:
+    """Whether the codec of that name codes frame by frame; raises OptionError without one."""
+    return by_name(codec).live is not None
+
+
+def format_name_of(data: bytes) -> str:
+    """The name of the source format that ``data`` looks like; raises OptionError."""
+    name = sniffed(data)
+    if name is None:
+        raise OptionError("it looks like no known format; say which it is")
+    return name

@@ -1,0 +1,341 @@
+"""Live clips: frames written as they come, each decodable at once, and read as they arrive.
+
+SPEC.md, "Open DATA and packets", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from types import MappingProxyType, TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import by_name
+from mcz.codecs.contract import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
+from mcz.container import payloads
+from mcz.container.chunks import ANCILLARY, REPEAT, REPEATED
+from mcz.container.masks import build_mask
+from mcz.container.segments import FRESH, MASKS, SegmentHeader
+from mcz.container.value_hash import ValueDigest
+from mcz.container.writer import Sink, Writer
+from mcz.errors import LimitError, MotionError, OptionError
+from mcz.kinematics import point_names, point_set
+from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
+from mcz.kinematics.single import FramePositions
+from mcz.motion import Motion, Signal, Skeleton
+from mcz.schema import build
+from mcz.writing.clip_writer import asked, open_clip, write_skeleton
+from mcz.writing.names import name_skeleton
+from mcz.writing.positions import wants_positions
+from mcz.writing.quality import CHUNK, texts_of
+from mcz.writing.signal_source import MemorySource
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class LiveWriter:
+    """Writes one clip to ``sink`` frame by frame; nothing is sought, so a pipe will do.
+
+    ``skeleton`` is that of the frames that are pushed; a codec of positions of points codes those,
+    under a skeleton of markers. ``codec`` names one that works live, ``params`` are its parameters;
+    ``metadata`` are those of the clip, ``first_number`` is the number of its first frame, ``base``
+    the skeleton that its own was derived from where that says so. Each frame's bytes are
+    written in one call, and flushed. Every ``repeat``-th frame that starts fresh, but the first,
+    is preceded by what a reader needs who joins there (0: none is). Raises OptionError for a codec
+    that cannot, for a bad parameter or one that needs all frames, MotionError for a skeleton
+    without channels.
+
+    ``entry`` is where, in the bytes that are being written or were last, a reader can join, who has
+    those of the beginning or finds them repeated there; None where that is nowhere.
+
+    As a context manager it closes the clip where the block fails, too: what was written is whole.
+    """
+
+    def __init__(
+        self,
+        sink: Sink,
+        skeleton: Skeleton,
+        codec: str,
+        params: Mapping[str, Any] = MappingProxyType({}),
+        *,
+        frame_rate: Fraction | None = None,
+        frame_rate_exact: bool = True,
+        name: str = "live",
+        metadata: Mapping[str, str] = MappingProxyType({}),
+        first_number: int = 1,
+        base: Skeleton | None = None,
+        repeat: int = 1,
+    ) -> None:
+        if repeat < 0:
+            raise OptionError(f"repeat is {repeat}, not 0 or more")
+        self.n_frames = 0
+        self.entry: int | None = None
+        self._repeat, self._n_fresh, self._changed = repeat, 0, set[str]()
+        self.codec = by_name(codec)
+        self.options = self.codec.options(params)
+        self._outlet = _Outlet(sink)
+        self._writer = Writer(self._outlet)
+        self._is_open = self._has_data = self._is_stuck = False
+        self._written: tuple[bytes, bool, Mask | None, Floats] | None = None
+        self._decoded: Floats | None = None
+        if base is not None:
+            name_skeleton(self._writer, base)
+            if skeleton.base is not None:
+                skeleton = replace(skeleton, base=write_skeleton(self._writer, base))
+        self.skeleton, self._n_channels = skeleton, skeleton.n_channels
+        self._positions = wants_positions(self.codec, self.options, skeleton)
+        coded = self._coded_skeleton()
+        signal = Signal(np.zeros((0, coded.n_channels)))
+        if self._positions:
+            note = metadata.get("source-note", "")
+            metadata = dict(metadata) | {"source-note": SEPARATOR.join(filter(None, (NOTE, note)))}
+        motion = Motion(coded, (signal,), frame_rate, frame_rate_exact, name, metadata)
+        self._encoder, self._decoder = _coders(self.codec, motion, self.options, self._writer)
+        header, models = self._encoder.header, self._encoder.models
+        encoded = Encoded(header, iter(()), models=models)
+        open_clip(self._writer, motion, self.codec, encoded, first_number)
+        self._is_open = True
+        self._digest = ValueDigest()
+        self._figures = _Figures(coded)
+        self._opening = self._outlet.chunks(REPEATED) if repeat else b""  # REPT-01
+        self._outlet.send()
+
+    def _coded_skeleton(self) -> Skeleton:
+        if not self._positions:
+            return self.skeleton
+        base = write_skeleton(self._writer, self.skeleton)
+        self._placed = FramePositions(self.skeleton, virtual_markers=self._virtual)
+        return marker_skeleton(self.skeleton, base, virtual_markers=self._virtual)
+
+    @property
+    def _virtual(self) -> bool:
+        return bool(self.options.get("virtual_markers"))
+
+    def __enter__(self) -> LiveWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if not isinstance(error, OSError):  # the sink itself, it seems
+            self.close()
+
+    def push(self, values: Floats) -> Floats:
+        """Write the next frame, (n_channels,) in source units, NaN where invalid.
+
+        Returns what a reader will have, NaN where invalid. Raises MotionError for values that the
+        codec cannot hold, LimitError for a frame too large for a packet; nothing is written then,
+        and after a LimitError the clip can only be closed: the codec has gone on without its file.
+        """
+        if not self._is_open or self._is_stuck:
+            raise MotionError(
+                "a frame was too large, the live clip can only be closed"
+                if self._is_open
+                else "the live clip is closed"
+            )
+        row = np.asarray(values, np.float64)
+        if row.shape != (self._n_channels,):
+            raise MotionError(
+                f"frame {self.n_frames}: values of shape {row.shape}, "
+                f"the skeleton has {self._n_channels} channels"
+            )
+        if self._positions:
+            row = self._placed(row).reshape(-1)
+        known = ~np.isnan(row)
+        valid = None if known.all() else known
+        given = row if valid is None else np.where(valid, row, 0.0)
+        stream, fresh = self._encoder.push(given, valid)
+        try:
+            self._write(stream, fresh, valid)
+        except LimitError:
+            self._is_stuck = True
+            raise
+        self._written = stream, fresh, valid, row
+        self._decoded = None
+        self._outlet.send()
+        return self._settle()
+
+    def change(self, /, **params: Any) -> None:
+        """Let parameters of the codec have other values from the next group of frames on.
+
+        Raises OptionError for one that cannot change, or a bad value; nothing changes then.
+        """
+        if not self._is_open:
+            raise MotionError("the live clip is closed")
+        options = self.codec.options(params)
+        self._encoder.change({name: options[name] for name in params})
+        self._changed |= set(params)
+
+    def _settle(self) -> Floats:
+        """Count the frame that was written, and take it into the hash and the figures.
+
+        An interrupt amid this leaves it to ``close``.
+        """
+        assert self._written is not None
+        stream, fresh, valid, row = self._written
+        if self._decoded is None:
+            self._decoded = self._decoder.push(stream, fresh)
+        decoded = self._decoded
+        self._digest.update(decoded[None], None if valid is None else valid[None])
+        self.n_frames, self._written = self.n_frames + 1, None
+        self._figures.add(row, decoded)
+        return decoded if valid is None else np.where(valid, decoded, np.nan)
+
+    def _write(self, stream: bytes, fresh: bool, valid: Mask | None) -> None:
+        """Write one frame, each fresh one as the first of a DATA of its own."""
+        self.entry = None
+        if fresh and self._has_data:
+            self._writer.close_data()
+            self._has_data = False
+        if self._has_data and valid is None:
+            self._writer.frame(self.n_frames, stream, fresh=fresh)
+        else:
+            if not self._has_data:
+                self._begin_data()
+            flags, streams = fresh * FRESH, [stream]
+            if valid is not None:
+                flags, streams = flags | MASKS, [build_mask(valid[None]), stream]
+            self._writer.segment(SegmentHeader(0, self.n_frames, 1, flags=flags), streams)
+
+    def _begin_data(self) -> None:
+        """Open a DATA, from time to time behind a copy of what is needed to read it."""
+        self.entry = self._outlet.size
+        self._n_fresh += 1
+        if self._repeat and self._n_fresh > 1 and (self._n_fresh - 1) % self._repeat == 0:
+            self._writer.chunk(REPEAT, self._opening, ANCILLARY)  # REPT-02
+        self._writer.open_data()
+        self._has_data = True
+
+    def close(self) -> None:
+        """Write what comes behind the frames: hash, quality record, index."""
+        if not self._is_open:
+            return
+        self._is_open = False
+        if self._written is not None:  # an interrupt came after a frame, before it was counted
+            self._settle()
+        if self._has_data:
+            self._writer.close_data()
+        self.entry = self._outlet.size
+        self._writer.end_clip(self.n_frames, b"", [self._digest.digest()])
+        if not self.codec.lossless:
+            fixed = {k: v for k, v in self.options.items() if k not in self._changed}
+            settings = {f"param.{name}": value for name, value in fixed.items()}
+            found = {"codec": self.codec.name, **settings, **self._figures.entries()}
+            rows = [{"key": key, "value": value} for key, value in texts_of(found).items()]
+            payload = build(payloads.QUAL, {"entries": rows, "extension": b""}, "quality record")
+            self._writer.ancillary(CHUNK, payload)
+        self._writer.finish()
+        self._outlet.send()
+
+
+def _coders(
+    codec: Codec, motion: Motion, options: Mapping[str, Any], writer: Writer
+) -> tuple[LiveEncoder, LiveDecoder]:
+    if codec.live is None or codec.follow is None:
+        raise OptionError(f"codec {codec.name} does not code frame by frame")
+    if asked(options):
+        raise OptionError(f"{', '.join(asked(options))}: needs all frames, and none is known yet")
+    layout = MemorySource(motion, 0, codec, writer.profile.segment_bytes).layout
+    if len(layout.groups) != 1:
+        raise MotionError(f"codec {codec.name}: {len(layout.groups)} groups, live there is one")
+    encoder = codec.live(layout, options)
+    known = replace(layout, find_model=model_finder(encoder.models))
+    return encoder, codec.follow(encoder.header, known)
+
+
+class _Outlet:
+    """Collects what is written and sends it in one call."""
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+        self._pending: list[bytes] = []
+        self._left = memoryview(b"")  # of what is being sent
+
+    def write(self, data: bytes, /) -> None:
+        self._pending.append(data)
+
+    @property
+    def size(self) -> int:
+        """The bytes that were collected and not sent."""
+        return len(self._left) + sum(map(len, self._pending))
+
+    def chunks(self, kinds: Sequence[bytes]) -> bytes:
+        """Those of the chunks that were collected that are of these types, in order."""
+        return b"".join(part for part in self._pending if part[:4] in kinds)
+
+    def send(self) -> None:
+        self._left = memoryview(b"".join((self._left, *self._pending)))
+        self._pending.clear()
+        while self._left:  # a raw stream may take a part alone
+            taken = self._sink.write(self._left)  # type: ignore[arg-type]  # any buffer will do
+            self._left = self._left[len(self._left) if taken is None else taken :]
+        flush = getattr(self._sink, "flush", None)
+        if flush is not None:
+            flush()
+
+
+class _Figures:
+    """The errors of a quality record, frame by frame: of values and, of markers, of positions."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
+        self._positions = bool(skeleton.joints) and point_set(skeleton) == "markers"
+        self._frames = self._values = self._points = 0
+        self._squares = self._sum = 0.0
+        self._most = -1.0
+        self._where: tuple[int, int] | None = None
+
+    def add(self, given: Floats, decoded: Floats) -> None:
+        """Add a frame; NaN in ``given`` does not count."""
+        with np.errstate(all="ignore"):  # what overflows is no figure
+            squares = np.square(decoded - given)
+            self._squares, self._values = _added(self._squares, self._values, squares)
+            if self._positions:
+                distances = np.sqrt(squares.reshape(-1, 3).sum(axis=1))
+                self._sum, self._points = _added(self._sum, self._points, distances)
+                distances[np.isnan(distances)] = -1.0
+                point = int(distances.argmax())
+                if distances[point] > self._most:
+                    self._most, self._where = float(distances[point]), (self._frames, point)
+        self._frames += 1
+
+    def entries(self) -> dict[str, Any]:
+        """The figures by their metric ids, None where there is none."""
+        unit = self.skeleton.unit_cm
+        found: dict[str, Any] = {"frames": self._frames, "channels": self.skeleton.n_channels}
+        found["mse_raw"] = self._squares / self._values if self._values else None
+        if self._positions and self._where is not None:
+            mean, (frame, point) = self._sum / self._points, self._where
+            found |= {
+                "point_set": point_set(self.skeleton),
+                "points": self.skeleton.n_joints,
+                "unit_cm": unit,
+                "mean_position_error": mean,
+                "mean_position_error_cm": mean * unit if unit is not None else None,
+                "max_position_error": self._most,
+                "max_position_error_cm": self._most * unit if unit is not None else None,
+                "max_position_error_frame": frame,
+                "max_position_error_point": point_names(self.skeleton)[point],
+            }
+        return {key: value for key, value in found.items() if not _is_absurd(value)}
+
+
+def _added(total: float, count: int, more: Floats) -> tuple[float, int]:
+    """Sum and number with those of ``more`` that are not NaN."""
+    found = float(more.sum())
+    if found == found:
+        return total + found, count + more.size
+    valid = ~np.isnan(more)
+    return total + float(more[valid].sum()), count + int(np.count_nonzero(valid))
+
+
+def _is_absurd(value: Any) -> bool:
+    return isinstance(value, float) and not np.isfinite(value)

@@ -1,0 +1,390 @@
+"""A clip of an open file: values decoded on demand, in part if that is all that is asked for."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import by_id
+from mcz.codecs.contract import Layout
+from mcz.container import payloads
+from mcz.container.directory import ClipRow
+from mcz.container.frame_numbers import parse_frame_numbers
+from mcz.container.limits import check_decoded
+from mcz.container.reader import Container
+from mcz.container.value_hash import value_hash
+from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
+from mcz.formats import FORMATS, format_by_id
+from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
+from mcz.reading.decimation import decimated, decimated_rows
+from mcz.reading.preview import Preview, preview
+from mcz.reading.signal_info import SignalInfo, read_signal
+from mcz.reading.signal_reader import SignalReader
+from mcz.reading.source_info import SourceInfo, of_no_file, read_source, sourced_skeleton
+from mcz.reading.views import ClipValues
+from mcz.schema import parse
+
+
+class Clip:
+    """One clip; nothing is decoded before it is asked for."""
+
+    def __init__(self, container: Container, row: ClipRow) -> None:
+        self.container = container
+        self._row = row
+        self.name = row.name
+        self.n_frames = row.n_frames
+
+    def __repr__(self) -> str:
+        return f"<Clip {self.name!r}: {self.n_frames} frames, {self.n_channels} channels>"
+
+    @cached_property
+    def _fields(self) -> Any:
+        return self.container.clip(self._row)
+
+    @cached_property
+    def _cend(self) -> Any:
+        fields = self.container.cend(self._row)
+        if fields is not None and len(fields.source_sha256) != len(self._fields.source):  # CEND-01
+            raise FormatError(f"clip {self.name!r}: a source without a hash, or a hash without it")
+        return fields
+
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        """The skeleton of the clip, its own source file not read."""
+        return self.container.skeleton(self._row.skeleton)
+
+    @property
+    def skeleton_id(self) -> bytes:
+        return self._row.skeleton
+
+    @cached_property
+    def base_skeleton(self) -> Skeleton | None:
+        """The skeleton that this one was derived from, with its own source file if it has one."""
+        base = self.skeleton.base
+        return sourced_skeleton(self.container, base) if base else None
+
+    @property
+    def frame_rate(self) -> Fraction | None:
+        """Frames a second, None while unknown."""
+        if not self._row.rate_numerator:
+            return None
+        if not self._row.rate_denominator:
+            raise FormatError(f"clip {self.name!r}: frame rate with the denominator 0")
+        return Fraction(self._row.rate_numerator, self._row.rate_denominator)
+
+    @property
+    def frame_rate_exact(self) -> bool:
+        return not self._fields.flags & payloads.ROUNDED_RATE
+
+    @cached_property
+    def metadata(self) -> Mapping[str, str]:
+        return {pair.key: pair.value for pair in self._fields.metadata}
+
+    @property
+    def frame_numbers(self) -> NDArray[np.int64]:
+        """The number of every frame; 1, 2, 3, ... unless the metadata say otherwise."""
+        where = f"clip {self.name!r}: frame numbers"
+        check_decoded(where, 8 * self.n_frames, self.container.max_decoded)
+        return parse_frame_numbers(
+            self.metadata.get("frame-numbers", "1"), self.n_frames, self.name
+        )
+
+    @property
+    def damage(self) -> list[str]:
+        """What salvage found wrong with this clip."""
+        return self._row.damage
+
+    @cached_property
+    def signals(self) -> tuple[SignalInfo, ...]:
+        """The signals, the motion first."""
+        fields = self._fields
+        if not fields.signals:  # CLIP-05
+            raise FormatError(f"clip {self.name!r} has no signal")
+        skeleton, rate = self.skeleton, self.frame_rate
+        return tuple(
+            read_signal(self.container, self._row, fields, index, skeleton, rate)
+            for index in range(len(fields.signals))
+        )
+
+    @property
+    def n_channels(self) -> int:
+        """Channels of the motion signal."""
+        return self._row.signals[0].n_channels
+
+    @property
+    def codec(self) -> str:
+        """Name of the codec of the motion signal, ``codec N`` where it is unknown."""
+        row = self._row.signals[0]
+        try:
+            return by_id(row.codec, row.codec_version).name
+        except UnsupportedError:
+            return f"codec {row.codec}"
+
+    @property
+    def source(self) -> SourceInfo | None:
+        """Format, path, size and hash of the source file; None where the clip has none."""
+        if not self._fields.source:
+            return None
+        fields = self._fields.source[0]
+        hashes = self._cend.source_sha256 if self._cend is not None else []
+        return SourceInfo(
+            format_by_id(fields.format).name,
+            fields.path,
+            fields.size,
+            bytes(hashes[0]) if hashes else b"",
+        )
+
+    @property
+    def quality(self) -> dict[str, str] | None:
+        """The quality record, None where the clip has none."""
+        for chunk in self._row.ancillary:
+            if chunk.type == b"QUAL":
+                fields = parse(payloads.QUAL, self.container.payload(chunk), chunk.label)
+                return {entry.key: entry.value for entry in fields.entries}
+        return None
+
+    @property
+    def values(self) -> ClipValues:
+        """The motion signal as something to slice: ``clip.values[100:200]`` decodes 100 frames."""
+        return ClipValues(self)
+
+    def read(
+        self,
+        frames: tuple[int, int] | None = None,
+        joints: Sequence[int | str] | None = None,
+        resolution: int = 0,
+        *,
+        decimate: bool = False,
+        signal: int = 0,
+    ) -> NDArray[Any]:
+        """The values of frames a <= f < b of some joints, NaN where invalid.
+
+        Shape (rows, channels of the joints in the order given), binary64 in source units.
+        ``resolution`` leaves out that many of the finest details; with ``decimate`` only the rows
+        of every 2^resolution-th frame are returned; ``motion`` also gives their numbers. Raises
+        OptionError for a range outside the clip and FormatError for bad bytes; a full read also
+        checks the value hash.
+        """
+        values, mask = self.read_masked(frames, joints, resolution, signal=signal)
+        if mask is not None:
+            values = np.where(mask, values, np.nan)
+        if not decimate:
+            return values
+        per_frame = self.signals[signal].layout.samples_per_frame
+        return decimated_rows(values, per_frame, 2**resolution)
+
+    def read_masked(
+        self,
+        frames: tuple[int, int] | None = None,
+        joints: Sequence[int | str] | None = None,
+        resolution: int = 0,
+        *,
+        signal: int = 0,
+    ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+        """The values with the stored coordinates beneath the mask, and the mask."""
+        info = self._info(signal)
+        start, stop = self.checked_range(frames)
+        self._check_resolution(info, resolution)
+        groups, columns = self.groups_of(info, joints)
+        reader = SignalReader(self.container, info, groups, resolution, self.name)
+        values, mask = reader.read(start + info.skip, stop + info.skip)  # CLIP-18
+        if joints is not None:
+            values = values[:, columns]
+            mask = mask[:, columns] if mask is not None else None
+        if (start, stop) == (0, self.n_frames) and joints is None and resolution == 0:
+            self._check_whole(info, values, mask)
+        return values, mask
+
+    def _check_whole(
+        self, info: SignalInfo, values: NDArray[Any], mask: NDArray[np.bool_] | None
+    ) -> None:
+        if not self.container.salvage:
+            self.check_hash(info, values, mask)
+
+    def _info(self, signal: int) -> SignalInfo:
+        if not 0 <= signal < len(self.signals):
+            raise OptionError(f"clip {self.name!r} has {len(self.signals)} signals, not {signal}")
+        return self.signals[signal]
+
+    def _check_resolution(self, info: SignalInfo, resolution: int) -> None:
+        if not 0 <= resolution < info.counts.n_resolutions:
+            raise OptionError(
+                f"clip {self.name!r} has resolutions 0 to {info.counts.n_resolutions - 1}, "
+                f"not {resolution}"
+            )
+
+    def checked_range(self, frames: tuple[int, int] | None) -> tuple[int, int]:
+        """``frames``, or all; raises OptionError where they are not in the clip."""
+        start, stop = frames if frames is not None else (0, self.n_frames)
+        if not 0 <= start <= stop <= self.n_frames:
+            raise OptionError(
+                f"clip {self.name!r} has frames 0 to {self.n_frames}, not {start}:{stop}"
+            )
+        return start, stop
+
+    def groups_of(
+        self, info: SignalInfo, joints: Sequence[int | str] | None
+    ) -> tuple[tuple[int, ...], list[int]]:
+        """The groups that hold the channels of these joints, and where each is among theirs."""
+        return _groups_of(info.layout, self._columns(info, joints))
+
+    def _columns(self, info: SignalInfo, joints: Sequence[int | str] | None) -> list[int]:
+        if joints is None:
+            return list(range(info.layout.n_channels))
+        if info.channels is not None:
+            raise OptionError(f"signal {info.name!r} has channels of its own, no joints")
+        return joint_columns(self.skeleton, joints)
+
+    def check_hash(
+        self, info: SignalInfo, values: NDArray[Any], mask: NDArray[np.bool_] | None
+    ) -> None:
+        """Raise ChecksumError where these are not the values and the mask of a whole signal."""
+        hashes = self._cend.value_sha256
+        if len(hashes) != len(self.signals):  # CEND-02
+            raise FormatError(
+                f"clip {self.name!r}: {len(hashes)} hashes of {len(self.signals)} signals"
+            )
+        found = value_hash(values, mask)
+        if found != hashes[info.index]:  # CEND-05
+            raise ChecksumError(
+                f"clip {self.name!r}, signal {info.index}: value hash is {found.hex()}, "
+                f"stored is {hashes[info.index].hex()}"
+            )
+
+    def check_segments(self, info: SignalInfo) -> None:
+        """Read the segments of a signal that cannot be decoded: their tables hold all the same."""
+        for row in info.rows:
+            self.container.streams(row, info.counts, None)
+
+    def motion(
+        self,
+        frames: tuple[int, int] | None = None,
+        resolution: int = 0,
+        *,
+        decimate: bool = False,
+    ) -> Motion:
+        """The whole clip, or frames a <= f < b of it, as a Motion with its source.
+
+        ``resolution`` leaves out that many of the finest details of the motion, and of every
+        other signal as many as it has. With ``decimate`` only frames a, a + 2^resolution, ... are
+        there, at a frame rate divided by 2^resolution, their numbers in ``frame_numbers``; the
+        source then is left out where its text states the rate.
+        """
+        motion = self._motion(frames, resolution, decimate)
+        return replace(motion, skeleton=self._sourced_skeleton)
+
+    @cached_property
+    def _sourced_skeleton(self) -> Skeleton:
+        """The skeleton with its own source file, unless salvage finds that damaged."""
+        try:
+            return sourced_skeleton(self.container, self.skeleton_id)
+        except FormatError:
+            if not self.container.salvage:
+                raise
+            return self.skeleton
+
+    def _motion(self, frames: tuple[int, int] | None, resolution: int, decimate: bool) -> Motion:
+        start, stop = self.checked_range(frames)
+        self._check_resolution(self.signals[0], resolution)
+        numbers = self.frame_numbers[start:stop]
+        motion = Motion(
+            skeleton=self.skeleton,
+            signals=tuple(self._read_signal(s, start, stop, resolution) for s in self.signals),
+            frame_rate=self.frame_rate,
+            frame_rate_exact=self.frame_rate_exact,
+            name=self.name,
+            metadata={k: v for k, v in self.metadata.items() if k != "frame-numbers"},
+            frame_numbers=None if "frame-numbers" not in self.metadata and not start else numbers,
+        )
+        step = 2**resolution if decimate else 1
+        if step > 1:
+            motion = decimated(motion, step)
+        return replace(motion, source=self._source(start, stop, resolution, step))
+
+    def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:
+        whole = (start, stop) == (0, self.n_frames)
+        resolution = info.coarser(resolution)
+        groups = tuple(range(len(info.layout.groups)))
+        reader = SignalReader(self.container, info, groups, resolution, self.name)
+        signal = reader.signal(start + info.skip, stop + info.skip)
+        if whole and resolution == 0:
+            self._check_whole(info, signal.values, signal.mask)
+        return signal
+
+    def _source(self, start: int, stop: int, resolution: int, step: int) -> Source | None:
+        info = self.source
+        if info is None or (step > 1 and FORMATS[info.format].states_rate):
+            return None
+        skip = self.signals[0].skip
+        frames = range(start + skip, stop + skip, step)
+        fields = self._fields.source[0]
+        source = read_source(self.container, fields, info, self.signals[0], frames)
+        if (start, stop, resolution) == (0, self.n_frames, 0):
+            return source
+        return of_no_file(source)
+
+    def preview(
+        self, joints: Sequence[int | str] | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[Any]]:
+        """What can be read without decoding the rest: frames, counted from 0, and their values.
+
+        The values, of shape (frames, channels of the joints), are those that ``read`` gives for
+        these frames where the codec has some that it stores apart (qbc: its marks); otherwise
+        they are its coarsest resolution. Raises OptionError where there is no such thing.
+        """
+        found = self.previewed(joints)
+        return found.frames, found.masked()
+
+    def previewed(self, joints: Sequence[int | str] | None = None) -> Preview:
+        """``preview`` with the mask apart, and how far its frames lie from each other."""
+        info = self.signals[0]
+        groups, columns = self.groups_of(info, joints)
+        reader = SignalReader(
+            self.container, info, groups, info.counts.n_resolutions - 1, self.name
+        )
+        return preview(reader, self.n_frames, columns)
+
+    def source_bytes(
+        self,
+        frames: tuple[int, int] | None = None,
+        resolution: int = 0,
+        *,
+        decimate: bool = False,
+    ) -> bytes:
+        """The source file, byte for byte (of a lossy clip: like it), or a part of it.
+
+        The arguments are those of ``motion``. Raises ChecksumError where a lossless clip does not
+        give back the bytes it was made of.
+        """
+        info = self.source
+        if info is None:
+            raise OptionError(f"clip {self.name!r} has no source file; choose a format with --to")
+        check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
+        data: bytes = FORMATS[info.format].write(self._motion(frames, resolution, decimate))
+        lossless = all(signal.codec.lossless for signal in self.signals)
+        if frames is None and not resolution and lossless and not self.container.salvage:
+            self._check_source(data, info)
+        return data
+
+    def _check_source(self, data: bytes, info: SourceInfo) -> None:
+        digest = hashlib.sha256(data).digest()
+        if len(data) != info.size or digest != info.sha256:  # SRC-01, SRC-02
+            raise ChecksumError(
+                f"clip {self.name!r}: the restored {info.path} has {len(data)} bytes and hash "
+                f"{digest.hex()}, stored are {info.size} and {info.sha256.hex()}"
+            )
+
+
+def _groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...], list[int]]:
+    """The groups that hold ``columns``, and where each column is among theirs."""
+    group_of = {c: g for g, group in enumerate(layout.groups) for c in group}
+    groups = tuple(dict.fromkeys(sorted(group_of[c] for c in columns)))
+    column = {c: i for i, c in enumerate(c for g in groups for c in layout.groups[g])}
+    return groups, [column[c] for c in columns]

@@ -1,0 +1,161 @@
+"""``mcz.open``: an MCZ file and what is in it by name, nothing decoded yet.
+
+``clip.py`` turns chunks into values, ``report.py`` tells what a file says of itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from functools import cached_property
+from types import TracebackType
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.directory import AttachmentRow
+from mcz.container.reader import Container
+from mcz.container.source import open_source
+from mcz.errors import AccessError, ChecksumError, FormatError, MczError, MotionError, OptionError
+from mcz.formats import FORMATS
+from mcz.motion import Skeleton
+from mcz.reading.clip import Clip
+from mcz.reading.source_info import sourced_skeleton
+from mcz.schema import parse
+
+
+class Attachment:
+    """A file kept as it is."""
+
+    def __init__(self, container: Container, row: AttachmentRow) -> None:
+        self._container, self._row = container, row
+        self.name, self.size = row.name, row.size
+
+    def read(self) -> bytes:
+        """The bytes, their hash checked."""
+        return self._container.attachment(self._row)
+
+
+class File:
+    """An open MCZ file: its clips, skeletons and attachments by name, nothing decoded yet."""
+
+    def __init__(self, container: Container) -> None:
+        self.container = container
+        rows = container.directory
+        self.clips: Mapping[str, Clip] = {
+            name: Clip(container, row) for name, row in rows.clips.items()
+        }
+        self.attachments: Mapping[str, Attachment] = {
+            name: Attachment(container, row) for name, row in rows.attachments.items()
+        }
+
+    def __enter__(self) -> File:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self.container.source.close()
+
+    @property
+    def name(self) -> str:
+        return self.container.source.name
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return self.container.source.size
+
+    @property
+    def aliases(self) -> Mapping[str, tuple[int, bytes]]:
+        """Further names of a clip, skeleton or attachment: name -> (of, target)."""
+        return self.container.directory.aliases
+
+    @property
+    def damage(self) -> list[str]:
+        """What salvage found wrong, in file order."""
+        return self.container.damage
+
+    @property
+    def unverified(self) -> int:
+        """Chunks of which so far only a part was read, and checked by its own table alone."""
+        return self.container.unverified
+
+    @cached_property
+    def header(self) -> dict[str, Any]:
+        """Format version, version needed and profile, from HEAD."""
+        head = parse(payloads.HEAD, self.container.directory.head, "HEAD")
+        return {
+            "format_version": f"{head.major}.{head.minor}",
+            "needs_version": f"{head.needs_major}.{head.needs_minor}",
+            "profile": self.container.profile.name,
+        }
+
+    @cached_property
+    def skeletons(self) -> list[tuple[bytes, Skeleton]]:
+        """The skeletons with their ids, in file order."""
+        ids = [id_ for kind, id_ in self.container.directory.shared if kind == b"SKEL"]
+        return [(id_, self.skeleton(id_)) for id_ in ids]
+
+    def skeleton(self, id_: bytes, *, with_source: bool = False) -> Skeleton:
+        """The skeleton with this id; ``with_source`` also reads the template of its own file."""
+        return (sourced_skeleton if with_source else Container.skeleton)(self.container, id_)
+
+    def skeleton_bytes(self, id_: bytes) -> bytes:
+        """The skeleton's own source file (ASF), byte for byte."""
+        skeleton = self.skeleton(id_, with_source=True)
+        source = skeleton.source
+        if source is None:
+            raise OptionError(
+                f"skeleton {skeleton.name or id_.hex()} has no source file of its own"
+            )
+        try:
+            data = FORMATS[source.format].write(skeleton)
+        except MotionError:  # printed anew, and the format cannot say it
+            data = b""
+        if data != source.template:
+            raise FormatError(f"skeleton {id_.hex()}: its source describes another skeleton")
+        # SRC-01, SRC-02
+        if len(data) != source.size or hashlib.sha256(data).digest() != source.sha256:
+            raise ChecksumError(f"skeleton {id_.hex()}: the restored file differs from its source")
+        return data
+
+    def only_clip(self, name: str | None = None) -> Clip:
+        """The clip called ``name``, or the only one there is; raises OptionError."""
+        if name is not None and name in self.clips:
+            return self.clips[name]
+        names = ", ".join(list(self.clips)[:8]) + (" ..." if len(self.clips) > 8 else "")
+        if name is not None:
+            raise OptionError(f"{self.name}: no clip {name!r}; there are: {names or 'none'}")
+        if len(self.clips) != 1:
+            raise OptionError(f"{self.name} has {len(self.clips)} clips, choose one: {names}")
+        return next(iter(self.clips.values()))
+
+
+def open(target: Any, salvage: bool = False, max_decoded: int | None = None) -> File:
+    """Open an MCZ file lazily: a path, an fsspec target, bytes or a binary stream.
+
+    ``salvage`` reads what a damaged file still holds and lists the rest in ``File.damage``.
+    ``max_decoded`` replaces the limit of decoded bytes, max(64 MiB, 4096 x file size).
+    Raises FormatError, in particular TruncatedError where there is no FOOT at the end, and
+    AccessError where the file cannot be read.
+    """
+    try:
+        source = open_source(target)
+    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
+        text = getattr(error, "strerror", None) or error
+        raise AccessError(f"{target}: {text}") from None
+    try:
+        return File(Container(source, salvage=salvage, max_decoded=max_decoded))
+    except MczError as error:
+        source.close()
+        error.args = (f"{source.name}: {error}",)
+        raise
+    except BaseException:
+        source.close()
+        raise

@@ -1,0 +1,40 @@
+"""``mcz.read``: the motion in a file of any format."""
+
+from __future__ import annotations
+
+import os
+from fractions import Fraction
+from pathlib import Path
+
+from mcz.errors import OptionError
+from mcz.formats import format_of
+from mcz.motion import Motion, Skeleton
+from mcz.reading.file import open
+from mcz.reading.source_files import read_source, skeleton_of, with_facts
+
+
+def read(
+    path: str | os.PathLike[str],
+    *,
+    skeleton: str | os.PathLike[str] | Skeleton | None = None,
+    rate: Fraction | float | None = None,
+    unit: str | None = None,
+    clip: str | None = None,
+    max_decoded: int | None = None,
+) -> Motion:
+    """The motion in a BVH, AMC, C3D or MCZ file.
+
+    An AMC finds its ASF beside it, or takes ``skeleton``, a path or a Skeleton. ``rate`` in frames
+    a second and ``unit`` (a key of ``UNIT_CM``) say what the file does not. Of an MCZ file ``clip``
+    is read, with ``max_decoded`` as in ``open``. Raises SourceError, FormatError or OptionError.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".mcz":
+        with open(path, max_decoded=max_decoded) as file:
+            motion = file.only_clip(clip).motion()
+    else:
+        source_format = format_of(path)
+        if source_format.is_skeleton:
+            raise OptionError(f"{path}: a skeleton without motion (mcz.read_skeleton reads it)")
+        motion = read_source(path, source_format, skeleton_of(path, source_format, skeleton))
+    return with_facts(motion, rate, unit)

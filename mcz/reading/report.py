@@ -1,0 +1,387 @@
+"""What a file says of itself: the ``info`` document, its layout byte by byte, its faults.
+
+Everything that ``mcz info`` and ``mcz verify`` print is computed here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from mcz.codecs.basis_models import name_of
+from mcz.container import payloads
+from mcz.container.chunks import CRC, FOOT, HEADER, SIGNATURE, Chunk
+from mcz.container.directory import ClipRow
+from mcz.container.reader import Container
+from mcz.container.scan import scan
+from mcz.container.segments import GROUP_NOTES, StreamTable
+from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
+from mcz.motion import Skeleton
+from mcz.reading.clip import Clip
+from mcz.reading.file import File, open
+from mcz.reading.sizes import Sizes, clip_sizes, models_used
+from mcz.schema import parse
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One fault: where, under which heading of SPEC.md, and what."""
+
+    offset: int
+    heading: str
+    message: str
+
+
+def info(file: File) -> dict[str, Any]:
+    """The document that ``mcz info --json`` prints; its keys are stable."""
+    container = file.container
+    clips = [_clip_info(file, clip) for clip in file.clips.values()]
+    shared = container.directory.shared
+    sources = [c["source_bytes"] for c in clips if c["source_bytes"]]
+    return {
+        "format_version": file.header["format_version"],
+        "needs_version": file.header["needs_version"],
+        "profile": file.header["profile"],
+        "file_bytes": file.size,
+        "index_bytes": container.index.index_length if container.index else 0,
+        "skeletons": [_skeleton_info(container, id_, s) for id_, s in file.skeletons],
+        "models": [_model_info(container, id_) for kind, id_ in shared if kind == b"MODL"],
+        "clips": clips,
+        "attachments": [{"name": a.name, "bytes": a.size} for a in file.attachments.values()],
+        "aliases": sorted(file.aliases),
+        "cr_file": sum(sources) / file.size if sources else None,
+        "damage": list(file.damage),
+    }
+
+
+def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> dict[str, Any]:
+    chunk = container.directory.shared[b"SKEL", id_]
+    return {
+        "id": id_.hex(),
+        "name": skeleton.name,
+        "n_joints": skeleton.n_joints,
+        "n_channels": skeleton.n_channels,
+        "unit_cm": skeleton.unit_cm,
+        "angle_unit": skeleton.angle_unit,
+        "up_axis": skeleton.up_axis,
+        "base": skeleton.base.hex() if skeleton.base else None,
+        "chunk_bytes": chunk.size,
+        "joints": [
+            {
+                "name": joint.name,
+                "parent": joint.parent,
+                "channels": [channel.label for channel in joint.channels],
+            }
+            for joint in skeleton.joints
+        ],
+    }
+
+
+def _model_info(container: Container, id_: bytes) -> dict[str, Any]:
+    fields = container.shared(b"MODL", id_, payloads.MODL)
+    size = container.directory.shared[b"MODL", id_].size
+    return {"id": id_.hex(), "kind": fields.kind, "chunk_bytes": size}
+
+
+def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
+    rate = clip.frame_rate
+    sizes = clip_sizes(file.container, clip)
+    document = {
+        "name": clip.name,
+        "codec": clip.codec,
+        "codecs": [
+            {
+                "signal": s.name,
+                "id": s.codec_id,
+                "version": s.codec_version,
+                "header": s.header.hex(),
+                "segments": len(s.rows),
+                "groups": s.counts.n_groups,
+                "resolutions": s.counts.n_resolutions,
+                "stored_frames": s.layout.n_frames,
+            }
+            for s in clip.signals
+        ],
+        "skeleton": clip.skeleton_id.hex(),
+        "n_frames": clip.n_frames,
+        "n_channels": clip.n_channels,
+        "n_joints": clip.skeleton.n_joints,
+        "frame_rate": float(rate) if rate is not None else None,
+        "frame_rate_exact": clip.frame_rate_exact,
+        "metadata": dict(clip.metadata),
+        "payload_bytes": sizes.payload,
+        "overhead_bytes": sizes.overhead,
+        "packets": sum(row.packet > 0 for signal in clip.signals for row in signal.rows),
+        "packet_bytes": sizes.packets,
+        "between_bytes": sizes.between,
+        "source_chunk_bytes": sizes.source,
+        "hash_bytes": sizes.hashes,
+        "quality_bytes": sizes.quality,
+        "model_bytes": sizes.models,
+        "models": [
+            {"id": id_.hex(), "name": name_of(id_)}
+            for signal in clip.signals
+            for id_ in models_used(signal)
+        ],
+        **_source_info(clip),
+        **exceptions_info(file.container, clip),
+        "quality": clip.quality,
+        "damage": list(clip.damage),
+    }
+    return document | _ratios(file, clip, sizes)
+
+
+def _source_info(clip: Clip) -> dict[str, Any]:
+    source = clip.source
+    if source is None:
+        return {
+            "source_mode": "none",
+            "source_format": None,
+            "source_path": None,
+            "source_bytes": None,
+            "source_sha256": None,
+        }
+    return {
+        "source_mode": "parsed",
+        "source_format": source.format,
+        "source_path": source.path,
+        "source_bytes": source.size,
+        "source_sha256": source.sha256.hex(),
+    }
+
+
+def clip_ratios(file: File, clip: Clip) -> dict[str, float | None]:
+    """``cr_source cr_float32 cr_40B cr_file`` of one clip."""
+    return _ratios(file, clip, clip_sizes(file.container, clip))
+
+
+def _ratios(file: File, clip: Clip, sizes: Sizes) -> dict[str, float | None]:
+    """The compression ratios of SPEC.md's registry; None where the numerator is unknown."""
+    coded = sizes.payload + sizes.overhead + sizes.models
+    try:
+        lossless = all(signal.codec.lossless for signal in clip.signals)
+    except UnsupportedError:
+        lossless = False
+    restored = coded + sizes.source + sizes.hashes if lossless else coded
+    source = clip.source.size if clip.source else 0
+    rows = sum(
+        clip.n_frames * s.layout.samples_per_frame * s.layout.n_channels for s in clip.signals
+    )
+    return {
+        "cr_source": source / restored if source else None,
+        "cr_float32": 4 * rows / coded if rows else None,
+        "cr_40B": 40 * clip.n_frames * clip.skeleton.n_joints / coded if rows else None,
+        "cr_file": source / file.size if source and len(file.clips) == 1 else None,
+    }
+
+
+def exceptions_info(container: Container, clip: Clip) -> dict[str, Any]:
+    """How many tokens are coded as exceptions, and their share."""
+    n_exceptions = n_tokens = 0
+    for signal in clip.signals:
+        n_tokens += (
+            signal.layout.n_frames * signal.layout.samples_per_frame * (signal.layout.n_channels)
+        )
+        for row in signal.rows:
+            if not row.header.flags & GROUP_NOTES:
+                continue
+            table = container.table(row, signal.counts)
+            wanted = [
+                i
+                for g in range(signal.counts.n_groups)
+                if (i := table.group_notes(g)) is not None and table.lengths[i]
+            ]
+            if wanted:
+                _, streams = container.streams(row, signal.counts, wanted)
+                n_exceptions += sum(_count(streams[i]) for i in wanted)
+    share = n_exceptions / n_tokens if n_tokens else 0.0
+    return {"n_exceptions": n_exceptions, "exceptions_share": share}
+
+
+def _count(notes: bytes) -> int:
+    return len(parse(payloads.GROUP_NOTES, notes, "group notes").exceptions)
+
+
+def layout(file: File) -> list[tuple[int, int, str]]:
+    """(offset, size, meaning) of every byte range of the file, in order, without gaps."""
+    container = file.container
+    found = scan(container.source, salvage=container.salvage)
+    parts: list[tuple[int, int, str]] = [(0, len(SIGNATURE), "signature")]
+    tables = dict(_segment_tables(file))
+    for chunk in found.chunks:
+        parts += _chunk_parts(chunk, tables)
+    parts += [(at, FOOT.size, "FOOT") for at in found.feet]
+    for at, (table, text) in tables.items():
+        if text == "packet":
+            parts += _segment_parts(at, table)
+    return _filled(sorted(parts), file.size)
+
+
+def _filled(parts: list[tuple[int, int, str]], size: int) -> list[tuple[int, int, str]]:
+    """``parts`` with the ranges between them named too."""
+    filled, at = [], 0
+    for offset, length, text in [*parts, (size, 0, "")]:
+        if offset > at:
+            filled.append((at, offset - at, "packet framing or damage"))
+        if length:
+            filled.append((offset, length, text))
+        at = max(at, offset + length)
+    return filled
+
+
+def _segment_tables(file: File) -> Iterator[tuple[int, tuple[StreamTable, str]]]:
+    for clip in file.clips.values():
+        for signal in clip.signals:
+            for row in signal.rows:
+                table = file.container.table(row, signal.counts)
+                yield row.offset, (table, "packet" if row.packet else "chunk")
+
+
+def _chunk_parts(
+    chunk: Chunk, tables: dict[int, tuple[StreamTable, str]]
+) -> Iterator[tuple[int, int, str]]:
+    name = chunk.type.decode("latin-1")
+    yield chunk.offset, HEADER.size, f"{name} header"
+    if chunk.length is None:
+        return
+    if chunk.payload_offset in tables:
+        yield from _segment_parts(chunk.payload_offset, tables[chunk.payload_offset][0])
+    elif chunk.length:
+        yield chunk.payload_offset, chunk.length, f"{name} payload"
+    yield chunk.payload_offset + chunk.length, CRC.size, f"{name} crc"
+
+
+def _segment_parts(at: int, table: StreamTable) -> Iterator[tuple[int, int, str]]:
+    header = table.header
+    what = f"signal {header.signal}, frames {header.first}:{header.stop}"
+    if table.size:
+        yield at, table.size, f"stream table, {what}"
+    names = {table.frame_notes(): "frame notes"}
+    for group in range(table.counts.n_groups):
+        names[table.group_notes(group)] = f"notes of group {group}"
+        names[table.mask(group)] = f"mask of group {group}"
+        for resolution in range(table.counts.n_resolutions):
+            text = f"group {group}"
+            if table.counts.n_resolutions > 1:
+                text += f", stored resolution {resolution}"
+            names[table.codec(resolution, group)] = text
+    for index, (offset, length) in enumerate(zip(table.offsets, table.lengths, strict=True)):
+        if length:
+            yield at + offset, length, names[index]
+
+
+HEADINGS = tuple("HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL REPT INDX".split())
+
+
+def validate(file: File) -> list[Problem]:
+    """Every fault of the file: structure, checksums, values, sources, index."""
+    problems = structure_problems(file)
+    for _, _, found in part_problems(file):
+        problems += found
+    return problems
+
+
+def structure_problems(file: File) -> list[Problem]:
+    """The faults of chunks, their order, their checksums and the index."""
+    try:
+        scan(file.container.source, whole=True)
+    except FormatError as error:
+        offset = error.offset or 0
+        return [Problem(offset, _heading(file, offset), str(error))]
+    return []
+
+
+def _heading(file: File, offset: int) -> str:
+    """The heading of SPEC.md under which the chunk at ``offset`` stands."""
+    source = file.container.source
+    kind = source.read(offset, min(4, source.size - offset)).decode("latin-1")
+    return kind if kind in HEADINGS else "Chunks"
+
+
+def verify(target: Any, max_decoded: int | None = None) -> list[Problem]:
+    """Check every checksum of a file, decode everything, restore every source.
+
+    Returns the faults, none for a sound file; raises FormatError where it cannot even be opened.
+    ``max_decoded`` is that of ``mcz.open``.
+    """
+    with open(target, max_decoded=max_decoded) as file:
+        return validate(file)
+
+
+def part_problems(file: File) -> Iterator[tuple[str, str, list[Problem]]]:
+    """Kind, name and faults of every skeleton, clip and attachment, one after the other."""
+    problems: list[Problem] = []
+    for id_, skeleton in _guarded(problems, file):
+        found: list[Problem] = []
+        _check(found, file, id_)
+        yield "skeleton", skeleton.name or id_.hex(), found
+    if problems:
+        yield "skeletons", "", problems
+    for clip in file.clips.values():
+        yield "clip", clip.name, clip_problems(file, clip)
+    for attachment in file.attachments.values():
+        found = []
+        try:
+            attachment.read()
+        except MczError as error:
+            offset = file.container.directory.attachments[attachment.name].parts[0].offset
+            found.append(Problem(offset, "ATTA", str(error)))
+        yield "attachment", attachment.name, found
+
+
+def _guarded(problems: list[Problem], file: File) -> list[tuple[bytes, Skeleton]]:
+    try:
+        return file.skeletons
+    except MczError as error:
+        problems.append(Problem(0, "SKEL", str(error)))
+        return []
+
+
+def _check(problems: list[Problem], file: File, id_: bytes) -> None:
+    try:
+        if file.skeleton(id_, with_source=True).source is not None:
+            file.skeleton_bytes(id_)
+    except MczError as error:
+        offset = file.container.directory.shared[b"SKEL", id_].offset
+        problems.append(Problem(offset, "SKEL", str(error)))
+
+
+def clip_problems(file: File, clip: Clip) -> list[Problem]:
+    """The faults of one clip: its values and its restored source."""
+    row: ClipRow = file.container.directory.clips[clip.name]
+    found = [
+        Problem(row.clip.offset, _clip_heading(error), str(error)) for error in _clip_errors(clip)
+    ]
+    return list(dict.fromkeys(found))
+
+
+def _clip_errors(clip: Clip) -> Iterator[MczError]:
+    """What is wrong with each signal; one that is unsupported does not hide more."""
+    found = _error(lambda: clip.signals)
+    yield from found
+    sound = not found
+    for signal in clip.signals if sound else ():
+        try:
+            clip.read_masked(signal=signal.index)
+        except MczError as error:
+            sound = False
+            yield error
+            if isinstance(error, UnsupportedError):
+                yield from _error(clip.check_segments, signal)
+    if sound and clip.source is not None:
+        yield from _error(clip.source_bytes)
+
+
+def _error(work: Callable[..., object], *arguments: object) -> list[MczError]:
+    try:
+        work(*arguments)
+    except MczError as error:
+        return [error]
+    return []
+
+
+def _clip_heading(error: MczError) -> str:
+    if isinstance(error, UnsupportedError):
+        return "Codecs"
+    return "CEND" if isinstance(error, ChecksumError) else "CLIP"

@@ -1,0 +1,180 @@
+"""What CLIP says of a signal, checked: channels, grids, groups, and where its segments lie."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+from mcz.codecs import by_id
+from mcz.codecs.contract import Codec, Layout, Model, Span
+from mcz.container import payloads
+from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.limits import check
+from mcz.container.packets import SHORT
+from mcz.container.reader import Container
+from mcz.container.segments import FRAME_NOTES, FRESH, StreamCounts, frame_table
+from mcz.container.skeletons import parse_channels
+from mcz.errors import FormatError
+from mcz.motion import Channel, Skeleton
+from mcz.numbers import Grid, GridKind
+
+
+@dataclass(frozen=True, slots=True)
+class SignalInfo:
+    """What CLIP says of one signal, and where its segments lie.
+
+    ``layout`` and ``rows`` count stored frames, of which the clip shows those from ``skip`` on.
+    """
+
+    index: int
+    name: str
+    channels: tuple[Channel, ...] | None
+    grids: tuple[Grid, ...]
+    codec_id: int
+    codec_version: int
+    header: bytes
+    layout: Layout
+    counts: StreamCounts
+    rows: tuple[SegmentRow, ...]
+    skip: int = 0
+    spare: int = 0
+
+    @property
+    def codec(self) -> Codec:
+        """Raises UnsupportedError where this reader lacks the codec."""
+        return by_id(self.codec_id, self.codec_version)
+
+    @property
+    def is_integer(self) -> bool:
+        # GRID-10
+        return bool(self.grids) and all(grid.kind == GridKind.INTEGER for grid in self.grids)
+
+    @property
+    def spans(self) -> list[Span]:
+        """What a codec is told of the segments."""
+        headers = [row.header for row in self.rows]
+        return [Span(h.first, h.n_frames, h.lead, h.tail, bool(h.flags & FRESH)) for h in headers]
+
+    def covering(self, start: int, stop: int) -> range:
+        """The segments whose own frames meet the stored frames start <= f < stop."""
+        low = bisect_right(self.rows, start, key=lambda row: row.header.stop)
+        return range(low, bisect_left(self.rows, stop, key=lambda row: row.header.first))
+
+    def coarser(self, resolution: int) -> int:
+        """The details to leave out of a signal beside the motion: no more than it has."""
+        return min(resolution, self.counts.n_resolutions - 1)
+
+
+def read_signal(
+    container: Container,
+    row: ClipRow,
+    fields: Any,
+    index: int,
+    skeleton: Skeleton,
+    frame_rate: Fraction | None,
+) -> SignalInfo:
+    """The checked SignalInfo of signal ``index`` of a clip; ``fields`` are those of CLIP.
+
+    Raises FormatError or LimitError.
+    """
+    where = f"clip {row.name!r}, signal {index}"
+    own = fields.signals[index]
+    channels = None
+    if own.flags & payloads.OWN_CHANNELS:
+        channels = parse_channels(own.channels, where)
+    n_channels = skeleton.n_channels if channels is None else len(channels)
+    check(f"{where}: channels", n_channels, container.profile.channels)
+    layout = Layout(
+        own.skip + row.n_frames + own.spare,
+        # CLIP-09
+        parse_groups(own.groups, skeleton if channels is None else None, n_channels, where),
+        own.samples_per_frame,
+        skeleton,
+        frame_rate,
+        parse_grids(own.grids, n_channels, where),
+        own.n_resolutions,
+        find_model=partial(_model, container, row.clip.offset),
+    )
+    info = SignalInfo(
+        index,
+        own.name,
+        channels,
+        layout.grids,
+        own.codec,
+        own.codec_version,
+        bytes(own.header),
+        layout,
+        StreamCounts(len(layout.groups), own.n_resolutions),
+        tuple(segment for segment in row.segments if segment.header.signal == index),  # DATA-08
+        own.skip,
+        own.spare,
+    )
+    _check_segments(container, info, index == 0 and bool(fields.source), where)
+    return info
+
+
+def _model(container: Container, before: int, id_: bytes) -> Model | None:
+    """The model with this id, None where the file has none before this offset, that of the clip."""
+    chunk = container.directory.shared.get((b"MODL", id_))
+    if chunk is None or chunk.offset > before:  # GRAM-10
+        return None
+    fields = container.shared(b"MODL", id_, payloads.MODL)
+    return Model(fields.kind, bytes(fields.data))
+
+
+def _check_segments(container: Container, info: SignalInfo, noted: bool, where: str) -> None:
+    """``noted``: frame notes are legal."""
+    limit = container.profile.segment_bytes
+    per_frame = max(1, info.layout.n_channels) * info.layout.samples_per_frame * 8
+    due = 0
+    for row in info.rows:
+        if row.packet in SHORT:
+            frame_table(row.header, info.counts, row.size)  # refuses what cannot be such a packet
+        if row.header.flags & FRAME_NOTES and not noted:  # NOTES-01
+            raise FormatError(f"{where}: frame notes, but no source that they belong to")
+        if not (row.header.first or row.header.flags & FRESH):  # DATA-12
+            raise FormatError(f"{where}: the first segment needs one before it")
+        check(f"{where}: bytes of a segment", row.header.n_frames * per_frame, limit)
+        if row.header.first != due and not container.salvage:
+            raise FormatError(f"{where}: a segment begins at {row.header.first}, {due} is due")
+        due = row.header.stop
+    if due != info.layout.n_frames and not container.salvage:
+        raise FormatError(f"{where}: segments end at frame {due} of {info.layout.n_frames}")
+
+
+def parse_groups(
+    fields: Any, skeleton: Skeleton | None, n_channels: int, where: str
+) -> tuple[tuple[int, ...], ...]:
+    """The channels of each group, as the ``kind`` of GROUPS defines them."""
+    if fields.kind == payloads.GROUP_ALL:
+        return (tuple(range(n_channels)),) if n_channels else ()
+    if fields.kind == payloads.GROUP_JOINT:
+        if skeleton is None:
+            raise FormatError(f"{where}: groups per joint, but the channels have no joints")
+        sizes = [len(joint.channels) for joint in skeleton.joints]
+    elif fields.kind == payloads.GROUP_CHANNEL:
+        sizes = [1] * n_channels  # CLIP-08
+    else:
+        sizes = list(fields.sizes)
+        if 0 in sizes or sum(sizes) != n_channels:  # CLIP-10, CLIP-11
+            raise FormatError(f"{where}: groups of {sizes} channels do not make {n_channels}")
+    groups, at = [], 0
+    for size in sizes:
+        if size:  # CLIP-08
+            groups.append(tuple(range(at, at + size)))
+        at += size
+    return tuple(groups)
+
+
+def parse_grids(runs: Any, n_channels: int, where: str) -> tuple[Grid, ...]:
+    grids: list[Grid] = []
+    for run in runs:
+        if not 1 <= run.n_channels <= n_channels - len(grids):  # CLIP-06, CLIP-07
+            raise FormatError(f"{where}: grids for more than its {n_channels} channels")
+        grids += [run.grid] * run.n_channels
+    if len(grids) != n_channels:  # CLIP-07
+        raise FormatError(f"{where}: grids for {len(grids)} of {n_channels} channels")
+    return tuple(grids)

@@ -1,0 +1,297 @@
+"""One signal of a clip: its description, and decoding a range of its frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Request, Span
+from mcz.container.limits import check_decoded
+from mcz.container.masks import parse_mask
+from mcz.container.packets import SHORT
+from mcz.container.reader import Container
+from mcz.container.segments import FRESH, StreamTable
+from mcz.errors import FormatError
+from mcz.motion import Exceptions, Signal, grid_blocks
+from mcz.numbers import Grid, GridKind
+from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values_of_exceptions
+from mcz.reading.salvage import salvage
+from mcz.reading.signal_info import SignalInfo
+
+BLOCK_ROWS = 2048  # decoded at a time, at least
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Frames start <= f < stop: what the codec decoded, values, and mask (None: all valid)."""
+
+    start: int
+    stop: int
+    coded: NDArray[Any]
+    values: NDArray[Any]
+    mask: NDArray[np.bool_] | None
+
+
+class SignalReader:
+    """Decodes a range of stored frames of some groups, each stream fetched once."""
+
+    def __init__(
+        self,
+        container: Container,
+        info: SignalInfo,
+        groups: tuple[int, ...],
+        resolution: int,
+        name: str,
+    ) -> None:
+        self.container = container
+        self.info = info
+        self.groups = groups
+        self.resolution = resolution
+        self.name = name
+        self._cache: dict[int, tuple[StreamTable, dict[int, bytes]]] = {}
+
+    def read(self, start: int, stop: int) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+        """Values and mask of frames start <= f < stop, groups side by side."""
+        return self._read(start, stop, None)
+
+    def signal(self, start: int, stop: int) -> Signal:
+        """The same of all groups as a Signal, decoded once."""
+        info = self.info
+        binary = not info.is_integer and any(not grid.is_text for grid in info.grids)
+        keep = binary and info.codec.domain == "ordinals" and not self.container.salvage
+        ordinals = np.empty(self._shape(start, stop), np.int64) if keep else None
+        values, mask = self._read(start, stop, ordinals)
+        exceptions, changes = self.exceptions(start, stop)
+        return Signal(
+            values=values,
+            grids=info.grids,
+            name=info.name,
+            samples_per_frame=info.layout.samples_per_frame,
+            mask=mask,
+            exceptions=exceptions,
+            grid_changes=changes,
+            channels=info.channels,
+            ordinals=ordinals,
+        )
+
+    def _read(
+        self, start: int, stop: int, ordinals: NDArray[np.int64] | None
+    ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+        """Values and mask; what a codec of ordinals decoded goes to ``ordinals``."""
+        if self.container.salvage:
+            return self._salvage(self._prepare(start, stop), start, stop)
+        self._check_size(start, stop)
+        per_frame = self.info.layout.samples_per_frame
+        values = np.empty(
+            self._shape(start, stop), np.int64 if self.info.is_integer else np.float64
+        )
+        mask: NDArray[np.bool_] | None = None
+        for block in self.blocks(start, stop):
+            rows = slice((block.start - start) * per_frame, (block.stop - start) * per_frame)
+            values[rows] = block.values
+            if ordinals is not None:
+                ordinals[rows] = block.coded
+            if block.mask is not None:
+                mask = np.ones(values.shape, np.bool_) if mask is None else mask
+                mask[rows] = block.mask
+        return values, mask
+
+    def _shape(self, start: int, stop: int) -> tuple[int, int]:
+        layout = self.info.layout
+        n_columns = sum(len(layout.groups[group]) for group in self.groups)
+        return (stop - start) * layout.samples_per_frame, n_columns
+
+    def blocks(self, start: int, stop: int) -> Iterator[Block]:
+        """The same block by block."""
+        spans = self._prepare(start, stop)
+        if start == stop:  # the header has to be right all the same (CODEC-05)
+            self._decode(spans, start, stop)
+        for a, b in self._ranges(start, stop):
+            coded = self._decode(spans, a, b)
+            yield Block(a, b, coded, *self._finish(coded, a, b))
+
+    def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
+        """The range in blocks of a few segments, which bound the memory beside the result."""
+        rows = self.info.rows
+        for index in self.info.covering(start, stop):
+            end = min(rows[index].header.stop, stop)
+            full = (end - start) * self.info.layout.samples_per_frame >= BLOCK_ROWS
+            # A block that began amid what hangs together would be decoded from its start.
+            if full and index + 1 < len(rows) and rows[index + 1].header.flags & FRESH:
+                yield start, end
+                start = end
+        if start < stop:
+            yield start, stop
+
+    def _decode(self, spans: Sequence[Span], start: int, stop: int) -> NDArray[Any]:
+        return self.info.codec.decode(
+            self.info.header,
+            self.info.layout,
+            spans,
+            Request(start, stop, self.groups, self.resolution),
+            self.fetch,
+        )
+
+    def _prepare(self, start: int, stop: int) -> list[Span]:
+        """The spans of all segments, after the limit was checked and near ones were read."""
+        self._check_size(start, stop)
+        info = self.info
+        covering = info.covering(start, stop)
+        self.container.source.read_ahead(
+            (info.rows[i].chunk().offset, info.rows[i].chunk().size)
+            for i in covering
+            if not info.rows[i].packet
+        )
+        return info.spans
+
+    def _check_size(self, start: int, stop: int) -> None:
+        """Raise LimitError for more than may be decoded."""
+        n_rows, n_columns = self._shape(start, stop)
+        size = 8 * n_rows * max(1, n_columns)
+        check_decoded(f"clip {self.name!r}: values", size, self.container.max_decoded)
+
+    def _salvage(
+        self, spans: Sequence[Span], start: int, stop: int
+    ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """What can be decoded; the rest is invalid."""
+        per_frame, shape = self.info.layout.samples_per_frame, self._shape(start, stop)
+        values = np.zeros(shape, np.int64) if self.info.is_integer else np.full(shape, np.nan)
+        mask = np.zeros(shape, np.bool_)
+
+        def rescue(a: int, b: int) -> None:
+            part, valid = self._finish(self._decode(spans, a, b), a, b)
+            rows = slice((a - start) * per_frame, (b - start) * per_frame)
+            values[rows], mask[rows] = part, True if valid is None else valid
+
+        salvage(spans, self.info.covering(start, stop), (start, stop), rescue, self._complain)
+        return values, mask
+
+    def _complain(self, start: int, stop: int, reason: object) -> None:
+        self.container.damage.append(f"clip {self.name!r}, frames {start}:{stop}: {reason}")
+
+    def fetch(self, segment: int, resolution: int, group: int) -> bytes:
+        """One stream of the codec."""
+        table, streams = self._streams(segment)
+        index = table.codec(resolution, group)
+        if index not in streams:  # a group that another depends upon
+            streams.update(
+                self.container.streams(self.info.rows[segment], table.counts, [index], table)[1]
+            )
+        return streams[index]
+
+    def _streams(self, segment: int) -> tuple[StreamTable, dict[int, bytes]]:
+        if segment not in self._cache:
+            row, counts = self.info.rows[segment], self.info.counts
+            everything = len(self.groups) == counts.n_groups and not self.resolution
+            table = wanted = None
+            if not everything:
+                table = self.container.table(row, counts)
+                wanted = self._wanted(table)
+            self._cache[segment] = self.container.streams(row, counts, wanted, table)
+            while len(self._cache) > 4:  # neighbors only: memory is bounded by segments
+                self._cache.pop(next(iter(self._cache)))
+        return self._cache[segment]
+
+    def _wanted(self, table: StreamTable) -> list[int]:
+        stored = range(table.counts.n_resolutions - self.resolution)
+        wanted = [table.codec(r, g) for r in stored for g in self.groups]
+        for stream_of in (table.group_notes, table.mask):
+            wanted += [i for i in map(stream_of, self.groups) if i is not None]
+        return wanted
+
+    def _finish(
+        self, coded: NDArray[Any], start: int, stop: int
+    ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+        """Ordinals to values, exceptions and masks put in."""
+        layout = self.info.layout
+        columns = [c for g in self.groups for c in layout.groups[g]]
+        exceptions, changes = self.exceptions(start, stop, columns)
+        values = coded
+        if self.info.is_integer:
+            if self.info.codec.domain == "values":  # CODEC-01
+                raise FormatError(
+                    f"clip {self.name!r}: signal {self.info.name!r} is of integers, codec "
+                    f"{self.info.codec.name} decodes none"
+                )
+            Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
+        if self.info.codec.domain == "ordinals" and not self.info.is_integer:
+            values = _values_of(coded, [layout.grids[c] for c in columns], changes)  # NOTES-09
+        if len(exceptions):  # NOTES-10
+            values[exceptions.rows, exceptions.channels] = values_of_exceptions(
+                exceptions.texts, self.name
+            )
+        return values, self._mask(start, stop, columns)  # MASK-04
+
+    def exceptions(
+        self, start: int, stop: int, columns: Sequence[int] | None = None
+    ) -> tuple[Exceptions, tuple[tuple[int, int, Grid], ...]]:
+        """Exceptions and grid changes of the range, rows from its start.
+
+        Channels are numbered as in ``columns``, by default as in the signal.
+        """
+        layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
+        of_signal = range(layout.n_channels) if columns is None else columns
+        column = {channel: number for number, channel in enumerate(of_signal)}
+        noted = Noted([layout.grids[channel] for channel in column], (stop - start) * per_frame)
+        for index in self.info.covering(start, stop):
+            shift = (self.info.rows[index].header.first - start) * per_frame
+            noted.begin(shift)
+            if self.info.rows[index].packet in SHORT:
+                continue  # it has no notes, and the grids of the clip
+            for group in self.groups:
+                notes = self._group_notes(index, group)
+                # NOTES-07
+                if self.info.is_integer and any(g.kind != GridKind.INTEGER for _, g in notes[0]):
+                    raise FormatError(f"clip {self.name!r}: another grid in a signal of integers")
+                noted.add(shift, [column[c] for c in layout.groups[group]], notes)
+        return noted.exceptions(), noted.grid_changes()
+
+    def _group_notes(self, index: int, group: int) -> GroupNotes:
+        """The notes of one group in the segment ``index``."""
+        table, streams = self._streams(index)
+        at = table.group_notes(group)
+        layout = self.info.layout
+        return parse_group_notes(
+            streams[at] if at is not None else b"",
+            self.info.rows[index].header.n_frames * layout.samples_per_frame,
+            [layout.grids[channel] for channel in layout.groups[group]],
+            self.name,
+        )
+
+    def _mask(self, start: int, stop: int, columns: Sequence[int]) -> NDArray[np.bool_] | None:
+        layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
+        mask: NDArray[np.bool_] | None = None
+        for index in self.info.covering(start, stop):
+            if self.info.rows[index].packet in SHORT:
+                continue  # all of it is valid
+            header = self.info.rows[index].header
+            table, streams = self._streams(index)
+            if table.mask(0) is None:
+                continue
+            a, b = max(start, header.first), min(stop, header.stop)
+            rows = slice((a - start) * per_frame, (b - start) * per_frame)
+            cut = slice((a - header.first) * per_frame, (b - header.first) * per_frame)
+            at = 0
+            for group in self.groups:
+                n = len(layout.groups[group])
+                data = streams[table.mask(group) or 0]
+                if data:
+                    if mask is None:
+                        mask = np.ones(((stop - start) * per_frame, len(columns)), np.bool_)
+                    bits = parse_mask(data, header.n_frames * per_frame, n, self.name)
+                    mask[rows, at : at + n] = bits[cut]
+                at += n
+        return mask
+
+
+def _values_of(
+    ordinals: NDArray[np.int64], grids: Sequence[Grid], changes: Sequence[tuple[int, int, Grid]]
+) -> NDArray[np.float64]:
+    values = np.empty(ordinals.shape)
+    for rows, columns, grid in grid_blocks(len(ordinals), grids, changes):
+        values[rows, columns] = grid.values(ordinals[rows][:, columns])
+    return values

@@ -1,0 +1,80 @@
+"""Source files on disk -> Motion or Skeleton, with what the caller says and the file does not."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from mcz.errors import MczError, OptionError, SourceError
+from mcz.formats import Format, find_asf, format_of
+from mcz.motion import Motion, Skeleton
+from mcz.units import in_unit
+
+
+def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
+    """The skeleton in an ASF file, with its source."""
+    path = Path(path)
+    source_format = format_of(path)
+    if not source_format.is_skeleton:
+        raise OptionError(f"{path}: not a skeleton file")
+    skeleton: Skeleton = _named(path, source_format.read, read_bytes(path), path.stem)
+    if skeleton.source is None:
+        return skeleton
+    return replace(skeleton, source=replace(skeleton.source, path=path.name))
+
+
+def skeleton_of(
+    path: Path, source_format: Format, given: str | os.PathLike[str] | Skeleton | None
+) -> Skeleton | None:
+    if not source_format.wants_skeleton:
+        return None
+    if isinstance(given, Skeleton):
+        return given
+    found = Path(given) if given is not None else find_asf(path)
+    return read_skeleton(found) if found is not None else None
+
+
+def read_source(
+    path: Path, source_format: Format, skeleton: Skeleton | None, data: bytes | None = None
+) -> Motion:
+    """The motion in the file ``path``, whose bytes are ``data`` if they were read already."""
+    arguments = (skeleton,) if source_format.wants_skeleton else ()
+    data = read_bytes(path) if data is None else data
+    motion: Motion = _named(path, source_format.read, data, path.stem, *arguments)
+    if motion.source is None:
+        return motion
+    return replace(motion, source=replace(motion.source, path=path.name))
+
+
+def _named(path: Path, reader: Any, data: bytes, *arguments: Any) -> Any:
+    """What ``reader`` makes of ``data``; its errors say which file."""
+    try:
+        return reader(data, *arguments)
+    except MczError as error:
+        error.args = (f"{path}: {error}",)
+        raise
+
+
+def read_bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SourceError(f"{path}: {error.strerror or error}") from None
+
+
+def with_facts(motion: Motion, rate: Fraction | float | None, unit: str | None) -> Motion:
+    if rate is not None:
+        try:
+            exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))
+            value = exact.limit_denominator(2**52)
+        except (TypeError, ValueError, OverflowError):
+            raise OptionError(f"frame rate {rate!r} is not a number") from None
+        if value <= 0:
+            raise OptionError(f"frame rate {rate} is not positive")
+        motion = replace(motion, frame_rate=value, frame_rate_exact=True)
+    if unit is not None:
+        motion = replace(motion, skeleton=in_unit(motion.skeleton, unit))
+    return motion

@@ -1,0 +1,89 @@
+"""A clip's source file: what is known of it, and its stored parts put together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.reader import Container
+from mcz.formats import Format, format_by_id
+from mcz.motion import FrameNotes, Skeleton, Source
+from mcz.reading.decimation import picked_notes
+from mcz.reading.signal_info import SignalInfo
+
+
+@dataclass(frozen=True, slots=True)
+class SourceInfo:
+    """What is known of a source file without restoring it."""
+
+    format: str
+    path: str
+    size: int
+    sha256: bytes
+
+
+def read_source(
+    container: Container, fields: Any, info: SourceInfo, signal: SignalInfo, frames: range
+) -> Source:
+    """The source of the stored ``frames`` of a clip; ``fields`` are those of CLIP_SOURCE.
+
+    ``signal`` is the clip's motion, whose segments hold the notes. Raises FormatError.
+    """
+    source_format = format_by_id(fields.format)
+    return Source(
+        format=info.format,
+        template=container.template(fields.template, fields.format),
+        detail=bytes(fields.detail),
+        notes=_notes(container, source_format, signal, frames),
+        path=info.path,
+        size=info.size,
+        sha256=info.sha256,
+    )
+
+
+def _notes(
+    container: Container, source_format: Format, signal: SignalInfo, frames: range
+) -> FrameNotes | None:
+    """The notes of ``frames``, numbered from 0."""
+    if source_format.join_notes is None:
+        return None
+    base, parts = frames.start, []
+    for row in (signal.rows[i] for i in signal.covering(frames.start, frames.stop)):
+        table, streams = container.streams(row, signal.counts, None)
+        index = table.frame_notes()
+        part = b"" if index is None else streams[index]
+        base = min(base, row.header.first)
+        parts.append((row.header.first, row.header.stop, part))
+    notes = source_format.join_notes([(a - base, b - base, part) for a, b, part in parts])
+    whole = range(base, max((b for _, b, _ in parts), default=base))
+    if frames == whole:
+        return notes
+    picked = range(frames.start - base, frames.stop - base, frames.step)
+    return picked_notes(source_format.join_notes, notes, picked)
+
+
+def sourced_skeleton(container: Container, id_: bytes) -> Skeleton:
+    """The skeleton ``id_`` with its own source file, if it has one."""
+    return replace(container.skeleton(id_), source=_skeleton_source(container, id_))
+
+
+def _skeleton_source(container: Container, id_: bytes) -> Source | None:
+    """The source file of the skeleton ``id_``, under the first name that the file has for it."""
+    fields = container.shared(b"SKEL", id_, payloads.SKEL)
+    if not fields.source:
+        return None
+    source = fields.source[0]
+    own = (payloads.OF_SKELETON, id_)
+    return Source(
+        format=format_by_id(source.format, of_skeleton=True).name,
+        template=container.template(bytes(source.template), source.format),
+        path=next((n for n, alias in container.directory.aliases.items() if alias == own), ""),
+        size=source.size,
+        sha256=bytes(source.sha256),
+    )
+
+
+def of_no_file(source: Source) -> Source:
+    """``source`` for other values or frames than its file had: it has neither size nor hash."""
+    return replace(source, size=0, sha256=b"")

@@ -1,0 +1,22 @@
+"""Length units by name, in centimeters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mcz.errors import OptionError
+from mcz.motion import Skeleton
+
+UNIT_CM = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}
+
+
+def unit_cm_of(unit: str) -> float:
+    """Centimeters of a length unit, a key of ``UNIT_CM``; raises OptionError for another."""
+    if unit not in UNIT_CM:
+        raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
+    return UNIT_CM[unit]
+
+
+def in_unit(skeleton: Skeleton, unit: str | None) -> Skeleton:
+    """``skeleton`` in the length unit of that name, None: as it is; raises OptionError."""
+    return skeleton if unit is None else replace(skeleton, unit_cm=unit_cm_of(unit))

@@ -1,0 +1,286 @@
+"""Motion -> chunks: what a clip says of itself, its segments, its hashes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import DEFAULT, by_name
+from mcz.codecs.contract import Codec, Encoded, Request, Segment, Span, model_finder
+from mcz.codecs.parameters import TARGETS
+from mcz.container import payloads
+from mcz.container.frame_numbers import KEY, frame_number_metadata
+from mcz.container.limits import ARCHIVE, check
+from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
+from mcz.container.skeletons import build_skeleton, channel_fields
+from mcz.container.strict import is_plain_path
+from mcz.container.value_hash import value_hash
+from mcz.container.writer import Writer
+from mcz.errors import MotionError, OptionError
+from mcz.formats import FORMATS
+from mcz.motion import Motion, Signal, Skeleton, Source
+from mcz.schema import MAX_COUNT, build
+from mcz.writing.quality import CHUNK, quality_payload
+from mcz.writing.signal_source import MemorySource, settle
+
+Progress = Callable[[int, int, str], None]
+
+
+def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
+    """Write SKEL, after the SRCE of its own file if it has one; return its id."""
+    check("joints", skeleton.n_joints, writer.profile.joints)
+    check("channels", skeleton.n_channels, writer.profile.channels)
+    if skeleton.base and (b"SKEL", skeleton.base) not in writer.directory.shared:
+        skeleton = replace(skeleton, base=None)  # it is in another file
+    source = None
+    if skeleton.source is not None:
+        format_id = FORMATS[skeleton.source.format].id
+        source = {
+            "template": writer.template(format_id, skeleton.source.template),
+            "format": format_id,
+            "size": skeleton.source.size,
+            "sha256": skeleton.source.sha256,
+        }
+    return writer.shared(b"SKEL", build_skeleton(skeleton, source))
+
+
+@dataclass(frozen=True, slots=True)
+class _Coded:
+    """A signal on its way into a file."""
+
+    source: MemorySource
+    codec: Codec
+    encoded: Encoded
+
+
+def write_clip(
+    writer: Writer,
+    motion: Motion,
+    codec: Codec,
+    params: Mapping[str, Any],
+    progress: Progress | None = None,
+    *,
+    quality: bool = True,
+    remarks: Mapping[str, str] = MappingProxyType({}),
+) -> None:
+    """Write one clip: its skeleton and template if new, CLIP, segments, CEND, quality if lossy.
+
+    A lossy codec takes the motion alone; further signals stay lossless. ``remarks`` join the
+    quality record. Raises OptionError for a bad parameter or a target that nobody has met yet (see
+    ``tuning.py``), MotionError for values that the codec cannot hold.
+    """
+    options = codec.options(params)
+    if codec.dial and asked(options) and options[codec.dial.parameter] is None:
+        raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
+    motion = _with_source_hash(motion)
+    for signal in motion.signals:
+        check(f"signal {signal.name!r}: channels", signal.n_channels, writer.profile.channels)
+    coded = [
+        _coded(motion, index, codec, options, writer.profile.segment_bytes)
+        for index in range(len(motion.signals))
+    ]
+    for part in coded:
+        _write_models(writer, part.encoded)
+    fields = _clip_fields(writer, motion, coded)
+    writer.begin_clip(fields, [signal.n_channels for signal in motion.signals])
+    decoded = [
+        _write_signal(writer, motion, index, part, progress) for index, part in enumerate(coded)
+    ]
+    hashes = [
+        value_hash(values, signal.mask)
+        for values, signal in zip(decoded, motion.signals, strict=True)
+    ]
+    sha256 = motion.source.sha256 if motion.source else b""
+    writer.end_clip(motion.n_frames, sha256, hashes)
+    if quality and not codec.lossless:
+        payload = quality_payload(motion, decoded, codec.name, options, remarks)
+        writer.ancillary(CHUNK, payload)
+
+
+def open_clip(
+    writer: Writer, motion: Motion, codec: Codec, encoded: Encoded, first_number: int = 1
+) -> None:
+    """Write the CLIP, and what it refers to, of a motion of which no frame is known yet.
+
+    ``first_number`` is that of its first frame.
+    """
+    check("channels", motion.signals[0].n_channels, writer.profile.channels)
+    _write_models(writer, encoded)
+    source = MemorySource(motion, 0, codec, writer.profile.segment_bytes)
+    fields = _clip_fields(writer, motion, [_Coded(source, codec, encoded)])
+    fields["flags"] |= payloads.OPEN_CLIP
+    numbers = frame_number_metadata(np.array([first_number], np.int64))
+    more = [{"key": key, "value": value} for key, value in numbers.items()]
+    fields["metadata"] = sorted(fields["metadata"] + more, key=lambda pair: pair["key"])
+    writer.begin_clip(fields, [motion.signals[0].n_channels])
+
+
+def _write_models(writer: Writer, encoded: Encoded) -> None:
+    """Write the models that a signal needs; well-known ones where all shall be in the file."""
+    known = encoded.known if writer.profile is ARCHIVE else ()
+    for model in (*encoded.models, *known):
+        fields = {"kind": model.kind, "data": model.data}
+        writer.shared(b"MODL", build(payloads.MODL, fields, "MODL"))
+
+
+def asked(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The targets among the options of a codec."""
+    return {t.name: options[t.name] for t in TARGETS if options.get(t.name) is not None}
+
+
+def _coded(
+    motion: Motion, index: int, codec: Codec, options: Mapping[str, Any], segment_bytes: int
+) -> _Coded:
+    if index and not codec.lossless:
+        codec = by_name(DEFAULT)
+        options = codec.options({})
+    signal = motion.signals[index]
+    if not codec.lossless and signal.channels is not None:
+        raise MotionError(f"codec {codec.name}: signal {signal.name!r} has channels of its own")
+    if codec.domain == "values" and signal.values.dtype == np.int64:
+        raise MotionError(f"codec {codec.name}: signal {signal.name!r} is one of integers")
+    source = MemorySource(motion, index, codec, segment_bytes)
+    if codec.domain == "values" and source.signal.values.dtype == np.int64:
+        raise MotionError(f"signal {source.signal.name!r}: codec {codec.name} holds no integers")
+    return _Coded(source, codec, codec.encode(source, options))
+
+
+def _write_signal(
+    writer: Writer, motion: Motion, index: int, coded: _Coded, progress: Progress | None
+) -> NDArray[Any]:
+    """Write the segments of a signal; return its values as a reader will have them."""
+    kept = []
+    for segment in coded.encoded.segments:
+        _write_segment(writer, motion, index, coded.source, segment)
+        if not coded.codec.lossless:
+            kept.append(segment)
+        if progress is not None:
+            progress(segment.first + segment.n_frames, motion.n_frames, motion.name)
+    return coded.source.signal.values if coded.codec.lossless else _decoded(coded, kept)
+
+
+def _with_source_hash(motion: Motion) -> Motion:
+    """The motion with size and hash of its source file, which was changed or cut since."""
+    source = motion.source
+    if source is None or source.sha256:
+        return motion
+    signals = tuple(settle(signal)[1] for signal in motion.signals)  # as a reader will have them
+    data = FORMATS[source.format].write(replace(motion, signals=signals))
+    digest = hashlib.sha256(data).digest()
+    return replace(motion, source=replace(source, size=len(data), sha256=digest))
+
+
+def _clip_fields(writer: Writer, motion: Motion, coded: Sequence[_Coded]) -> dict[str, Any]:
+    rate = motion.frame_rate
+    if rate is not None and max(rate.numerator, rate.denominator) > MAX_COUNT:
+        raise MotionError(f"frame rate {rate} has a term beyond 2^53 - 1")
+    if KEY in motion.metadata:
+        raise MotionError(f"metadata {KEY!r} is written from the motion's frame_numbers")
+    metadata = dict(motion.metadata) | frame_number_metadata(motion.frame_numbers)
+    return {
+        "name": motion.name,
+        "flags": 0 if motion.frame_rate_exact else payloads.ROUNDED_RATE,
+        "skeleton": write_skeleton(writer, motion.skeleton),
+        "n_frames": motion.n_frames,
+        "rate_numerator": rate.numerator if rate else 0,
+        "rate_denominator": rate.denominator if rate else 1,
+        "metadata": [{"key": k, "value": metadata[k]} for k in sorted(metadata)],
+        "source": [_source_fields(writer, motion.source)] if motion.source else [],
+        "signals": [_signal_fields(part.source.signal, part.codec, part.encoded) for part in coded],
+        "extension": b"",
+    }
+
+
+def _source_fields(writer: Writer, source: Source) -> dict[str, Any]:
+    format_id = FORMATS[source.format].id
+    if source.path and not is_plain_path(source.path):
+        raise MotionError(f"source path {source.path!r} is not relative and plain")
+    return {
+        "template": writer.template(format_id, source.template),
+        "format": format_id,
+        "detail": source.detail,
+        "path": source.path,
+        "size": source.size,
+    }
+
+
+def _signal_fields(signal: Signal, codec: Codec, part: Encoded) -> dict[str, Any]:
+    runs: list[dict[str, Any]] = []
+    for grid in signal.grids:
+        if runs and runs[-1]["grid"] == grid:
+            runs[-1]["n_channels"] += 1
+        else:
+            runs.append({"n_channels": 1, "grid": grid})
+    kinds = {"all": payloads.GROUP_ALL, "joint": payloads.GROUP_JOINT}
+    own = signal.channels is not None
+    kind = kinds.get(codec.grouping, payloads.GROUP_CHANNEL)
+    if own and codec.grouping == "joint":
+        kind = payloads.GROUP_CHANNEL
+    return {
+        "name": signal.name,
+        "flags": payloads.OWN_CHANNELS if own else 0,
+        "channels": channel_fields(signal.channels) if signal.channels is not None else None,
+        "samples_per_frame": signal.samples_per_frame,
+        "skip": 0,
+        "spare": 0,
+        "grids": runs,
+        "codec": codec.id,
+        "codec_version": codec.version,
+        "header": part.header,
+        "groups": {"kind": kind, "sizes": None},
+        "n_resolutions": part.n_resolutions,
+        "extension": b"",
+    }
+
+
+def _write_segment(
+    writer: Writer, motion: Motion, index: int, source: MemorySource, segment: Segment
+) -> None:
+    start, stop = segment.first, segment.first + segment.n_frames
+    per_frame = 8 * source.layout.samples_per_frame * max(1, source.layout.n_channels)
+    size = segment.n_frames * per_frame
+    check(f"frames {start}:{stop}: decoded bytes", size, writer.profile.segment_bytes)
+    flags = FRESH if segment.fresh else 0
+    streams: list[bytes] = []
+    notes = b""
+    if index == 0 and motion.source is not None and motion.source.notes is not None:
+        notes = motion.source.notes.cut(start, stop)
+    if notes:
+        flags |= FRAME_NOTES
+        streams.append(notes)
+    group_notes = source.group_notes(start, stop)
+    if any(group_notes):
+        flags |= GROUP_NOTES
+        streams += group_notes
+    masks = source.masks(start, stop)
+    if any(masks):
+        flags |= MASKS
+        streams += masks
+    streams += segment.streams
+    header = SegmentHeader(index, start, segment.n_frames, segment.lead, segment.tail, flags)
+    writer.segment(header, streams)
+
+
+def _decoded(coded: _Coded, segments: Sequence[Segment]) -> NDArray[np.float64]:
+    encoded = coded.encoded
+    layout = replace(
+        coded.source.layout,
+        n_resolutions=encoded.n_resolutions,
+        find_model=model_finder((*encoded.models, *encoded.known)),
+    )
+    spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
+    n_groups = len(layout.groups)
+    request = Request(0, layout.n_frames, tuple(range(n_groups)))
+    return coded.codec.decode(
+        coded.encoded.header,
+        layout,
+        spans,
+        request,
+        lambda segment, resolution, group: segments[segment].streams[resolution * n_groups + group],
+    )

@@ -1,0 +1,114 @@
+"""One source file on its way into an MCZ file: read, coded, named."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from mcz.codecs import DEFAULT, by_name
+from mcz.container.writer import Writer
+from mcz.errors import LimitError, MotionError, SourceError
+from mcz.formats import format_of
+from mcz.motion import Motion, Skeleton
+from mcz.reading.source_files import read_bytes, read_skeleton, read_source, skeleton_of, with_facts
+from mcz.units import in_unit, unit_cm_of
+from mcz.writing.clip_writer import Progress, write_skeleton
+from mcz.writing.draft import Draft
+from mcz.writing.names import alias_once, check_name, clip_name
+from mcz.writing.tuning import write_tuned
+
+
+@dataclass(frozen=True)
+class Terms:
+    """On which terms source files are taken: how they are coded, and what is said of them.
+
+    ``skeleton`` is the ASF of an AMC, ``rate`` in frames a second and ``unit`` what the file does
+    not say. ``verbatim``: one that cannot be parsed is kept as an attachment. ``keep_skeleton``: an
+    ASF is restored as well, under its own name. Raises OptionError for an unknown codec or unit.
+    """
+
+    codec: str = DEFAULT
+    params: Mapping[str, Any] | None = None
+    skeleton: str | os.PathLike[str] | None = None
+    rate: Fraction | float | None = None
+    unit: str | None = None
+    verbatim: bool = False
+    keep_skeleton: bool = False
+
+    def __post_init__(self) -> None:
+        by_name(self.codec)
+        if self.unit is not None:
+            unit_cm_of(self.unit)
+
+
+class Entry:
+    """One source file on its way into an MCZ file, under the relative path ``name``."""
+
+    def __init__(self, path: Path, name: str, terms: Terms) -> None:
+        self.path, self.name, self.terms = path, name, terms
+        self.reason = ""  # why it was kept verbatim
+
+    def write(self, draft: Draft, progress: Progress | None = None) -> str:
+        """Write the file; return how: "skeleton", "parsed", "present" or "verbatim"."""
+        check_name(self.name)
+        data = read_bytes(self.path)
+        digest = hashlib.sha256(data).digest()
+        if draft.holds(self.name, digest):
+            return "present"
+        given = self._given_skeleton()
+        try:
+            with draft.step():
+                result = self._parsed(draft.writer, data, given, progress)
+        except (SourceError, MotionError, LimitError) as error:
+            if not self.terms.verbatim:
+                raise
+            self.reason = str(error)
+            with draft.step():
+                draft.writer.attachment(self.name, data)
+            result = "verbatim"
+        draft.paths[self.name] = digest
+        return result
+
+    def _given_skeleton(self) -> Skeleton | None:
+        """The skeleton that was asked for; that it cannot be read is not the source's fault."""
+        if self.terms.skeleton is None or self.path.suffix.lower() != ".amc":
+            return None
+        return in_unit(read_skeleton(self.terms.skeleton), self.terms.unit)
+
+    def _parsed(
+        self, writer: Writer, data: bytes, given: Skeleton | None, progress: Progress | None
+    ) -> str:
+        source_format = format_of(self.path)
+        if source_format.is_skeleton:
+            id_ = write_skeleton(writer, in_unit(read_skeleton(self.path), self.terms.unit))
+            alias_once(writer, self.name, id_)
+            return "skeleton"
+        skeleton = skeleton_of(self.path, source_format, given)
+        if skeleton is not None:
+            skeleton = in_unit(skeleton, self.terms.unit)
+        motion = read_source(self.path, source_format, skeleton, data)
+        motion = with_facts(motion, self.terms.rate, self.terms.unit)
+        if motion.source is not None:
+            motion = replace(motion, source=replace(motion.source, path=self.name))
+        if skeleton is not None:
+            motion = self._based(writer, motion, skeleton)
+        name = clip_name(self.name, writer.directory)
+        motion = replace(motion, name=name)
+        codec, params = by_name(self.terms.codec), self.terms.params or {}
+        write_tuned(writer, motion, codec, params, progress)
+        return "parsed"
+
+    def _based(self, writer: Writer, motion: Motion, skeleton: Skeleton) -> Motion:
+        """``motion`` after its ASF was written; a derived skeleton names it as its base."""
+        id_ = write_skeleton(writer, skeleton)
+        if self.terms.keep_skeleton:
+            path = skeleton.source.path if skeleton.source is not None else ""
+            alias_once(writer, path or f"{skeleton.name}.asf", id_)
+        if motion.skeleton.base is None:
+            return motion
+        return replace(motion, skeleton=replace(motion.skeleton, base=id_))

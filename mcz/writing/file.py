@@ -1,0 +1,80 @@
+"""``mcz.write`` and ``mcz.encode``: one motion, or one source file, to a new MCZ file.
+
+``entry.py`` reads source files, ``tuning.py`` finds settings, ``clip_writer.py`` turns a Motion
+into chunks.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from mcz.codecs import DEFAULT, by_name
+from mcz.container.limits import ARCHIVE, BASE, Profile
+from mcz.container.writer import Writer
+from mcz.motion import Motion
+from mcz.writing.atomic import replacing
+from mcz.writing.clip_writer import Progress
+from mcz.writing.draft import Draft
+from mcz.writing.entry import Entry, Terms
+from mcz.writing.names import name_skeleton
+from mcz.writing.tuning import write_tuned
+from mcz.writing.written import Written, written
+
+
+def write(
+    motion: Motion,
+    target: Any,
+    codec: str = DEFAULT,
+    *,
+    force: bool = False,
+    archive: bool = False,
+    progress: Progress | None = None,
+    **params: Any,
+) -> Written:
+    """Write ``motion`` to a new MCZ file: a path, an fsspec target or a binary stream.
+
+    ``params`` are the codec's; ``archive`` chooses the profile of large limits. Raises
+    OptionError, MotionError, or LimitError where the profile is too small.
+    """
+    with replacing(target, force=force) as stream:
+        writer = Writer(stream, profile=profile_of(archive))
+        name_skeleton(writer, motion.skeleton)
+        write_tuned(writer, motion, by_name(codec), params, progress)
+        writer.finish()
+    return written(writer.directory, writer.offset)
+
+
+def profile_of(archive: bool) -> Profile:
+    return ARCHIVE if archive else BASE
+
+
+def encode(
+    source: str | os.PathLike[str],
+    target: Any,
+    *,
+    codec: str = DEFAULT,
+    params: Mapping[str, Any] | None = None,
+    skeleton: str | os.PathLike[str] | None = None,
+    rate: Fraction | float | None = None,
+    unit: str | None = None,
+    verbatim: bool = False,
+    force: bool = False,
+    archive: bool = False,
+    progress: Progress | None = None,
+) -> Written:
+    """Turn one ASF, AMC, BVH or C3D file into an MCZ file.
+
+    ``verbatim`` keeps a file that cannot be parsed as an attachment. Raises SourceError,
+    OptionError, MotionError or LimitError; nothing is left under the final name then.
+    """
+    path = Path(source)
+    terms = Terms(codec, params, skeleton, rate, unit, verbatim, keep_skeleton=True)
+    with replacing(target, force=force) as stream:
+        draft = Draft(stream, profile_of(archive), hold=verbatim)
+        Entry(path, path.name, terms).write(draft, progress)
+        draft.finish()
+    return written(draft.writer.directory, draft.writer.offset)

@@ -1,0 +1,47 @@
+"""Names in a file: of clips, of skeletons whose own files it restores, of paths."""
+
+from __future__ import annotations
+
+import os
+from itertools import chain, count
+from pathlib import Path
+
+from mcz.container import payloads
+from mcz.container.directory import Directory
+from mcz.container.strict import is_plain_path
+from mcz.container.writer import Writer
+from mcz.errors import MotionError
+from mcz.motion import Skeleton
+from mcz.writing.clip_writer import write_skeleton
+
+
+def name_skeleton(writer: Writer, skeleton: Skeleton) -> None:
+    """Write the skeleton, and the name under which its own file is restored, if it has one."""
+    path = skeleton.source.path if skeleton.source is not None else ""
+    if path:
+        alias_once(writer, path, write_skeleton(writer, skeleton))
+
+
+def alias_once(writer: Writer, name: str, id_: bytes) -> None:
+    """Let ``name`` be that of the skeleton ``id_``, unless it is another's already."""
+    check_name(name)
+    if name not in writer.directory.aliases:
+        writer.alias(name, payloads.OF_SKELETON, id_)
+
+
+def check_name(path: str) -> None:
+    """Raise MotionError where a file cannot be stored and restored under ``path``."""
+    try:
+        path.encode("utf-8")
+    except UnicodeEncodeError:
+        raise MotionError(
+            f"the name {os.fsencode(path)!r} is not UTF-8, as MCZ keeps names; rename the file"
+        ) from None
+    if not is_plain_path(path):
+        raise MotionError(f"source path {path!r} is not relative and plain; rename the file")
+
+
+def clip_name(path: str, directory: Directory) -> str:
+    """The relative path without its suffix; with it, or a number, where that name is taken."""
+    names = chain((Path(path).with_suffix("").as_posix(), path), (f"{path}#{n}" for n in count(2)))
+    return next(name for name in names if name not in directory.clips)

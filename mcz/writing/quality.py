@@ -1,0 +1,77 @@
+"""The quality record: what a lossy codec changed, and how it was asked to.
+
+SPEC.md, "QUAL" and "Metrics", are normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.container import payloads
+from mcz.metrics import compare
+from mcz.motion import Exceptions, Motion, Signal
+from mcz.schema import build
+
+CHUNK = b"QUAL"
+
+
+def quality_payload(
+    original: Motion,
+    decoded: Sequence[NDArray[Any]],
+    codec_name: str,
+    options: Mapping[str, Any],
+    remarks: Mapping[str, str],
+) -> bytes:
+    """The payload of QUAL; ``decoded`` are the values of every signal as a reader has them."""
+    signals = tuple(map(with_values, original.signals, decoded))
+    entries = quality_entries(original, replace(original, signals=signals), codec_name, options)
+    rows = [{"key": key, "value": value} for key, value in (entries | dict(remarks)).items()]
+    return build(payloads.QUAL, {"entries": rows, "extension": b""}, "quality record")
+
+
+def quality_entries(
+    original: Motion, decoded: Motion, codec_name: str, options: Mapping[str, Any]
+) -> dict[str, str]:
+    """Settings, then figures, as text; what there is no figure of is left out.
+
+    Numbers are the shortest decimals that read back as the same binary64.
+    """
+    settings = {f"param.{name}": value for name, value in options.items()}
+    found = {"codec": codec_name, **settings, **compare(original, decoded).entries()}
+    return texts_of(found)
+
+
+def texts_of(entries: Mapping[str, Any]) -> dict[str, str]:
+    """Settings or figures as text, without those that are None."""
+    return {key: _text(value) for key, value in entries.items() if value is not None}
+
+
+def with_values(signal: Signal, values: NDArray[Any]) -> Signal:
+    """``signal`` with decoded values, which need not lie on its grids."""
+    return replace(
+        signal,
+        values=np.asarray(values, np.float64),
+        grids=(),
+        grid_changes=(),
+        exceptions=Exceptions(),
+        ordinals=None,
+    )
+
+
+def _text(value: Any) -> str:
+    """
+    >>> _text(0.1), _text(3), _text(True), _text((1.0, -0.5))
+    ('0.1', '3', 'true', '1.0,-0.5')
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(float(value))
+    if isinstance(value, (tuple, list)):
+        return ",".join(map(_text, value))
+    return str(value)

@@ -1,0 +1,171 @@
+"""A signal in memory, as a codec reads it, and what is said of it beside the codec's streams.
+
+One block of frames is worked on at a time, so that encoding needs memory for a segment beside the
+values themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Codec, Layout
+from mcz.container import payloads
+from mcz.container.masks import build_mask
+from mcz.errors import MotionError
+from mcz.motion import Exceptions, Motion, Signal, Skeleton
+from mcz.numbers import Grid, values_of_texts
+from mcz.schema import build
+
+MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
+Block = tuple[NDArray[np.int64], Signal]
+
+
+class MemorySource:
+    """The SignalSource of one signal of a motion.
+
+    Values that lie on no point of their text grid join the exceptions, so that nothing is lost.
+    """
+
+    def __init__(self, motion: Motion, index: int, codec: Codec, segment_bytes: int) -> None:
+        signal = motion.signals[index]
+        # What a lossy codec returns is no longer the number that an exception spells.
+        self.signal = signal if codec.lossless else replace(signal, exceptions=Exceptions())
+        self.layout = Layout(
+            n_frames=motion.n_frames,
+            groups=make_groups(motion.skeleton, signal, codec.grouping),
+            samples_per_frame=signal.samples_per_frame,
+            skeleton=motion.skeleton,
+            frame_rate=motion.frame_rate,
+            grids=signal.grids,
+            segment_bytes=segment_bytes,
+        )
+        frames = {row // signal.samples_per_frame for row, _, _ in signal.grid_changes}
+        self.breaks: Sequence[int] = sorted(frames - {0})
+        self._settled: dict[tuple[int, int], Block] = {}  # the last block
+
+    def grids(self, frame: int) -> tuple[Grid, ...]:
+        return self.signal.cut(frame, frame).grids
+
+    def values(self, start: int, stop: int) -> NDArray[Any]:
+        return self.signal.cut(start, stop).values
+
+    def valid(self, start: int, stop: int) -> NDArray[np.bool_] | None:
+        return self.signal.cut(start, stop).mask
+
+    def ordinals(self, start: int, stop: int) -> NDArray[np.int64]:
+        return self._block(start, stop)[0]
+
+    def _block(self, start: int, stop: int) -> Block:
+        """Ordinals of a block, exceptions repeating the row before, and its signal with strays."""
+        if (start, stop) not in self._settled:
+            self._settled = {(start, stop): settle(self.signal.cut(start, stop))}
+        return self._settled[start, stop]
+
+    def group_notes(self, start: int, stop: int) -> list[bytes]:
+        """The group notes of frames start <= f < stop, b"" for a group that needs none."""
+        signal = self.signal.cut(start, stop)
+        if (start, stop) in self._settled:
+            signal = self._settled[start, stop][1]
+        changed = [c for c, grid in enumerate(signal.grids) if grid != self.layout.grids[c]]
+        if not changed and not len(signal.exceptions):
+            return []
+        notes: list[dict[str, list[Any]]] = [
+            {"grid_changes": [], "exceptions": []} for _ in self.layout.groups
+        ]
+        groups = enumerate(self.layout.groups)
+        where = {c: (g, column) for g, group in groups for column, c in enumerate(group)}
+        for channel in changed:
+            group, column = where[channel]
+            row = {"channel": column, "grid": signal.grids[channel]}
+            notes[group]["grid_changes"].append(row)
+        before = [0] * len(notes)
+        found = signal.exceptions
+        for number, channel, text in zip(found.rows, found.channels, found.texts, strict=True):
+            group, column = where[int(channel)]
+            row = {"row": int(number) - before[group], "channel": column, "text": text}
+            notes[group]["exceptions"].append(row)
+            before[group] = int(number)
+        return [
+            build(payloads.GROUP_NOTES, n, "group notes") if any(n.values()) else b"" for n in notes
+        ]
+
+    def masks(self, start: int, stop: int) -> list[bytes]:
+        """The mask of each group, b"" where all is valid."""
+        mask = self.signal.cut(start, stop).mask
+        if mask is None:
+            return []
+        blocks = (mask[:, list(group)] for group in self.layout.groups)
+        return [b"" if block.all() else build_mask(block) for block in blocks]
+
+
+def settle(signal: Signal) -> Block:
+    """The ordinals of a signal, and the signal with every value off its grid as an exception."""
+    if signal.values.dtype == np.int64:
+        inside = (signal.values >= -MAX_INTEGER) & (signal.values <= MAX_INTEGER)
+        if not inside.all():
+            raise MotionError(f"signal {signal.name!r}: an integer is beyond 2^53")
+        return signal.values, signal
+    signal = replace(signal, exceptions=_holding(signal))
+    ordinals, exact = signal.to_ordinals()
+    exact[signal.exceptions.rows, signal.exceptions.channels] = True
+    if not exact.all():
+        signal = replace(signal, exceptions=_with_strays(signal, ~exact))
+    exceptions = signal.exceptions
+    for row, channel in zip(exceptions.rows, exceptions.channels, strict=True):
+        ordinals[row, channel] = ordinals[row - 1, channel] if row else 0
+    return ordinals, signal
+
+
+def _holding(signal: Signal) -> Exceptions:
+    """The exceptions that still spell the value at their row and channel."""
+    old = signal.exceptions
+    if not len(old):
+        return old
+    meant, bad = values_of_texts(old.texts)
+    held = signal.values[old.rows, old.channels]
+    same = (meant.view(np.int64) == held.view(np.int64)) | (np.isnan(meant) & np.isnan(held))
+    keep = np.flatnonzero(same & ~bad)
+    texts = tuple(old.texts[i] for i in keep)
+    return Exceptions(old.rows[keep], old.channels[keep], texts)
+
+
+def _with_strays(signal: Signal, stray: NDArray[np.bool_]) -> Exceptions:
+    """The exceptions and every value in ``stray``, written as its shortest decimal."""
+    rows, channels = (cells.tolist() for cells in np.nonzero(stray))
+    for row, channel in zip(rows, channels, strict=True):
+        if not signal.grids[channel].is_text:
+            raise MotionError(
+                f"signal {signal.name!r}: row {row} of a segment, channel {channel} is "
+                f"{signal.values[row, channel]!r}, which its grid "
+                f"{signal.grids[channel].kind.name} does not hold"
+            )
+    old = signal.exceptions
+    texts = [repr(float(v)).encode() for v in signal.values[rows, channels]]
+    merged = sorted(
+        [
+            *zip(old.rows.tolist(), old.channels.tolist(), old.texts, strict=True),
+            *zip(rows, channels, texts, strict=True),
+        ]
+    )
+    return Exceptions(
+        np.array([m[0] for m in merged], np.int64),
+        np.array([m[1] for m in merged], np.int64),
+        tuple(m[2] for m in merged),
+    )
+
+
+def make_groups(skeleton: Skeleton, signal: Signal, grouping: str) -> tuple[tuple[int, ...], ...]:
+    """The channels of each group; a signal with channels of its own has no joints."""
+    if grouping == "all" and signal.n_channels:
+        return (tuple(range(signal.n_channels)),)
+    if grouping == "joint" and signal.channels is None:
+        ends = accumulate(len(joint.channels) for joint in skeleton.joints)
+        bounds = pairwise([0, *ends])
+        return tuple(tuple(range(start, stop)) for start, stop in bounds if start < stop)
+    return tuple((channel,) for channel in range(signal.n_channels))

@@ -1,0 +1,52 @@
+"""What a file just written holds, told by its writer, so that nobody has to open it again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mcz.container.directory import ClipRow, Directory
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenClip:
+    """Of a clip its name, and the shape of its motion."""
+
+    name: str
+    n_frames: int
+    n_channels: int
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What ``write`` and ``encode`` have written.
+
+    ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal.
+    """
+
+    size: int
+    clips: tuple[WrittenClip, ...]
+    n_skeletons: int
+    n_attachments: int
+    decoded_bytes: int
+
+
+def written(directory: Directory, size: int) -> Written:
+    """What the file of ``size`` bytes with this directory holds."""
+    return Written(
+        size=size,
+        clips=tuple(
+            WrittenClip(row.name, row.n_frames, row.signals[0].n_channels)
+            for row in directory.clips.values()
+        ),
+        n_skeletons=sum(kind == b"SKEL" for kind, _ in directory.shared),
+        n_attachments=len(directory.attachments),
+        decoded_bytes=max(map(_decoded_bytes, directory.clips.values()), default=0),
+    )
+
+
+def _decoded_bytes(row: ClipRow) -> int:
+    """Bytes of the largest signal of a clip."""
+    return max(
+        8 * row.n_frames * signal.samples_per_frame * max(1, signal.n_channels)
+        for signal in row.signals
+    )

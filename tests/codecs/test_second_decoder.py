@@ -1,0 +1,295 @@
+"""What this package writes, and files made at random, read by the decoder in JavaScript, too.
+
+That decoder was written from SPEC.md alone. Both have to give the same bits, of whole clips, of
+parts and of every resolution. The stored vectors are conformance/run.py's, files that are changed
+are tools/fuzz/differential.py's.
+"""
+
+from __future__ import annotations
+
+import io
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, reject, settings
+from hypothesis import strategies as st
+
+import mcz
+from conformance import run
+from conformance.child import Limits
+from conformance.server import Server
+from mcz.cli import conformance
+from mcz.codecs import by_name
+from mcz.errors import OptionError
+from mcz.motion import Motion
+from tests.codecs.lossy import gapped, markers, rough, saved, wandering
+from tests.motions import smooth
+from tests.test_vector_tools import vector_of
+from tools import make_vectors
+from tools.fuzz.differential import equal
+from tools.vectors.valid.random import COUNT
+
+JS = Path(__file__).parents[2] / "tools" / "js" / "conformance.js"
+MOST_OUTPUT = 2**27
+
+pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
+
+# Codecs of channels.
+MRDWT = (
+    {"T_g": 1},
+    {"T_g": 1e-4},
+    {"T_g": 0.2, "segment_frames": 32},
+    {"T_g": 1, "segment_frames": 64, "wavelet": "db8", "N": 3},
+    {"T_g": 0.5, "wavelet": "haar", "N": 16},
+    {"T_g": 0.5, "wavelet": "coif2", "segment_frames": 32, "N": 2},
+    {"T_g": 2, "wavelet": "sym4", "N": 0},
+    {"T_g": 0.1, "wavelet": "db2", "Q": 4, "threshold_rule": "flat"},
+    {"T_g": 3, "preset": "khan2016"},
+)
+QBC = (
+    {"d2_lmt": 1},
+    {"d2_lmt": 1e-4, "delta": 7},
+    {"d2_lmt": 0.2, "delta": 8, "segment_frames": 16},
+    {"d2_lmt": 5, "preset": "khan2014"},
+    {"d2_lmt": 5, "preset": "khan2014", "middle": "least-squares", "segment_frames": 80},
+    {"d2_lmt": 2, "delta": 1, "segment_frames": 5},
+    {"d2_lmt": 0.5, "breaks": "fewest", "delta": 16, "segment_frames": 32},
+    {"d2_lmt": 0.5, "breaks": "split", "delta": 3, "Q": 4},
+    {"d2_lmt": 30, "delta": 1000, "middle": "published"},
+)
+PCA = (
+    {},
+    {"q": 3, "segment_frames": 17},
+    {"q": 1},
+    {"q": 99, "Q": 5},
+    {"q": 4, "Q": 0},
+    {"preset": "khan2014", "q": 4},
+    {"preset": "khan2014", "q": 99, "segment_frames": 20},
+)
+# Codecs of points.
+FRAME = (
+    {},
+    {"step": 0.01, "segment_frames": 17},
+    {"step": 0.01, "basis": "cosines", "coder": "prefix", "segment_frames": 30},
+    {"step": 1, "basis": "learned"},
+    {"step": 5, "basis": "learned", "coder": "prefix"},
+    {"preset": "hou2016"},
+    {"preset": "hou2016", "step": 1e-4},
+)
+WINDOWS = (*FRAME, {"window": 1}, {"window": 16, "segment_frames": 40})
+OWN = (
+    {},
+    {"step": 0.01, "window": 20, "coder": "prefix"},
+    {"step": 0.1, "window": 16, "frequencies": 3, "segment_frames": 40},
+    {"rank": 2, "window": 1},
+    {"preset": "hou2016"},
+)
+ONLINE = (
+    {},
+    {"step": 0.01, "segment_frames": 17},
+    {"step": 0.01, "basis": "cosines", "coder": "golomb", "segment_frames": 30, "gof": 7},
+    {"step": 1, "basis": "learned", "intra_period": 0},
+    {"step": 3, "order": "reordered", "gof": 1, "intra_period": 3},
+    {"step": 0.001, "order": "reordered", "coder": "golomb", "gof": 2, "ltr_step": 1},
+    {"preset": "mod"},
+    {"preset": "rc", "bitrate": 20},
+    {"preset": "rca", "bitrate": 5, "gof": 12, "intra_period": 2},
+    {"bitrate": 10},
+    {"bitrate": 0.5, "gof": 4, "coder": "golomb"},
+)
+SETTINGS: dict[str, tuple[dict[str, Any], ...]] = {
+    "raw": ({}, {"segment_frames": 17}),
+    "lossless": ({}, {"segment_frames": 17}),
+    "mrdwt": MRDWT,
+    "qbc": QBC,
+    "pca": PCA,
+    "dwt": ({}, {"preset": "khan2014", "t_w": 1}),
+    "awt": ({"segment_frames": 16}, {"preset": "khan2014", "a_w": 10}),
+    "lsdt-frame": FRAME,
+    "lsdt-clip": WINDOWS,
+    "mdtt": OWN,
+    "pca-rdo": OWN,
+    "online": ONLINE,
+}
+CASES = [(codec, params) for codec, rows in SETTINGS.items() for params in rows]
+POINTS = ("lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo", "online")
+REAL_CLIPS = ("cmu/amc/05_01.amc", "cmu/bvh-daz/09_01.bvh", "other/ezc3d-testfiles/FP_Type1.c3d")
+
+
+@pytest.fixture(scope="module")
+def other() -> Iterator[Server]:
+    server = Server(["node", str(JS)], Limits())
+    yield server
+    server.close()
+
+
+def check(data: bytes, other: Server, what: object) -> None:
+    """Both give the same for all of each clip, some of its frames, and at every resolution."""
+    with mcz.open(data) as file:
+        requests: list[list[str]] = [[]]
+        for clip in file.clips.values():
+            own, n = ["--clip", clip.name], clip.n_frames
+            ranges = (n // 3, n // 2), (n - n // 5, n)
+            requests += [[*own, "--frames", f"{a}:{b}"] for a, b in ranges]
+            coarser = range(1, clip.signals[0].counts.n_resolutions)
+            requests += [[*own, "--resolution", str(resolution)] for resolution in coarser]
+    for request in requests:
+        code, output = conformance.answer(data, request)
+        told = other.ask(request, data, MOST_OUTPUT)
+        assert code == 0, (what, request)
+        assert (told.code, told.fault) == (0, ""), (what, request, told.errors)
+        assert equal(output, told.output), (what, request)
+
+
+@pytest.mark.parametrize(("codec", "params"), CASES, ids=str)
+def test_clips(codec: str, params: dict[str, Any], other: Server) -> None:
+    motions = [(f"smooth({n})", smooth(n)) for n in (0, 1, 2, 3, 33, 64, 100)]
+    motions += [("rough", rough(70, 1)), ("rougher", rough(73, 3))]
+    motions += [("wandering", wandering(50, ["rx", "ty", "tz"])), ("gapped", gapped())]
+    if codec in POINTS:
+        motions += [("markers", markers(90)), ("31 markers", markers(40, 31))]
+    for name, motion in motions:
+        timed = replace(motion, frame_rate=motion.frame_rate or Fraction(60))  # a rate needs one
+        check(saved(codec, timed, **params), other, name)
+
+
+@pytest.mark.parametrize("codec", POINTS)
+def test_places_and_channels(codec: str, other: Server) -> None:
+    for params in ({"domain": "channels"}, {"virtual_markers": True}):
+        for n_frames in (0, 60):
+            check(saved(codec, smooth(n_frames), **params), other, (params, n_frames))
+
+
+CUTS: tuple[dict[str, Any], ...] = (
+    {"frames": (70, 90)},
+    {"frames": (0, 5)},
+    {"frames": (149, 150)},
+    {"frames": (40, 41)},
+    {"frames": (9, 9)},
+)
+CHANNEL_CUTS: tuple[dict[str, Any], ...] = (
+    {"joints": ["spine", "knee"]},
+    {"resolution": 1},
+    {"resolution": 2},
+    {"frames": (0, 5), "resolution": 1},
+)
+CHANNEL_CODECS = ("mrdwt", "qbc", "dwt", "awt")
+
+
+@pytest.mark.parametrize("codec", SETTINGS)
+def test_cut_clips(codec: str, tmp_path: Path, other: Server) -> None:
+    source, target = tmp_path / "all.mcz", tmp_path / "cut.mcz"
+    mcz.write(smooth(150), source, codec=codec, segment_frames=20)
+    for cut in (*CUTS, *(CHANNEL_CUTS if codec in CHANNEL_CODECS else ())):
+        if codec == "qbc" and cut.get("resolution") == 2:
+            continue  # it has two
+        mcz.extract(source, target, **cut, force=True)
+        check(target.read_bytes(), other, cut)
+
+
+@pytest.mark.parametrize("codec", [name for name in SETTINGS if by_name(name).live])
+@pytest.mark.parametrize(
+    "params", [{"step": 1}, {"step": 0.01}, {"step": 0.3, "basis": "cosines"}], ids=str
+)
+def test_live_clips(codec: str, params: dict[str, Any], other: Server) -> None:
+    """Segments of a frame, of which only some start fresh."""
+    motion = gapped()
+    signal = motion.signals[0]
+    out = io.BytesIO()
+    writer = mcz.LiveWriter(out, motion.skeleton, codec, params, frame_rate=Fraction(60), name="a")
+    for row in np.where(signal.mask, signal.values, np.nan):
+        writer.push(row)
+    writer.close()
+    check(out.getvalue(), other, params)
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_files_made_at_random(part: int, other: Server) -> None:
+    """Headers and streams that no encoder of ours would choose, beyond the stored ones."""
+    for seed in range(COUNT + part, COUNT + 60, 4):
+        vector = vector_of(seed)
+        for request in run.requests(make_vectors.row(vector), conformance.OPTIONS):
+            told = other.ask(request.arguments, vector.data, MOST_OUTPUT)
+            fault = run.judge(request, told.code, told.output)
+            assert fault is None, (seed, request.arguments, fault, told.errors)
+
+
+MOTIONS = st.one_of(
+    st.builds(smooth, st.integers(1, 90)),
+    st.builds(rough, st.integers(1, 90), st.integers(0, 99)),
+    st.builds(gapped, st.integers(62, 120)),
+    st.builds(wandering, st.integers(1, 60), st.just(["tx", "ty", "tz", "rx", "ry", "rz"])),
+    st.builds(markers, st.integers(1, 70), st.integers(1, 9), st.integers(0, 99)),
+    st.builds(markers, st.integers(1, 40), st.just(31), st.integers(0, 99)),
+)
+COMMON = {
+    "preset": st.sampled_from(["mod", "rc", "rca"]),
+    "gof": st.integers(1, 50),
+    "intra_period": st.integers(0, 4),
+    "coder": st.sampled_from(["golomb", "mixed"]),
+    "order": st.sampled_from(["apart", "reordered"]),
+    "domain": st.just("channels"),
+    "virtual_markers": st.booleans(),
+    "basis": st.sampled_from(["cosines", "known", "learned"]),
+    "segment_frames": st.integers(1, 70),
+    "threshold": st.sampled_from([0.5, 0.6, 3.0]),
+}
+STEPS = {
+    "step": st.sampled_from([1e-5, 0.01, 0.3, 1.0, 20.0, 1e4]),
+    "ltr_step": st.sampled_from([1e-3, 0.3, 0.5, 1.0, 2.0]),
+}
+RATES = {"bitrate": st.sampled_from([0.01, 1.0, 8.0, 50.0, 1e4])}
+CONTROLS = {"rate_control": st.sampled_from(["rc", "rca", "steady"])}
+PARAMS = st.one_of(
+    st.fixed_dictionaries({}, optional=COMMON | STEPS),
+    st.fixed_dictionaries(RATES, optional=COMMON | CONTROLS),
+)
+KNOWN = st.tuples(
+    st.builds(markers, st.integers(1, 40), st.just(31)),
+    PARAMS.map(lambda params: params | {"basis": "known", "order": "apart"}),
+)
+
+
+@given(case=st.one_of(st.tuples(MOTIONS, PARAMS), KNOWN))
+@settings(
+    max_examples=40,
+    suppress_health_check=[
+        *(HealthCheck.filter_too_much, HealthCheck.too_slow, HealthCheck.function_scoped_fixture)
+    ],
+)
+def test_any_parameters_of_online(case: tuple[Motion, dict[str, Any]], other: Server) -> None:
+    motion, params = case
+    try:
+        data = saved("online", motion, **params)
+    except OptionError:  # parameters that do not go together
+        reject()
+    check(data, other, params)
+
+
+REAL: dict[str, tuple[dict[str, Any], ...]] = {
+    "lossless": ({},),
+    "mrdwt": ({}, {"T_g": 0.2, "segment_frames": 64}, {"T_g": 10, "preset": "khan2016"}),
+    "qbc": (
+        {"d2_lmt": 1},
+        {"d2_lmt": 0.05, "delta": 16, "segment_frames": 64, "breaks": "split"},
+        {"d2_lmt": 24, "preset": "khan2014"},
+    ),
+    "pca": ({}, {"preset": "khan2014"}),
+    **{name: ({}, {"preset": "hou2016"}) for name in POINTS[:-1]},
+    "online": ({}, {"step": 0.1, "order": "reordered"}, {"coder": "golomb"}),
+}
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("codec", REAL)
+def test_real_clips(codec: str, data: Path, other: Server) -> None:
+    for name in REAL_CLIPS:
+        motion = mcz.read(data / name, rate=120 if name.endswith("amc") else None)
+        for params in REAL[codec]:
+            check(saved(codec, motion, **params), other, (name, params))

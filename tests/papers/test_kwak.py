@@ -1,0 +1,442 @@
+"""tools.papers kwak: clips, rates, coders, losses, fits, the whole run on generated clips."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.bench import plots
+from mcz.bench.cache import Cache
+from mcz.bench.cases import Case, Variant
+from mcz.bench.tasks import Runner
+from mcz.cli.common import run as run_command
+from mcz.codecs import by_name
+from mcz.codecs.online.units import Unit
+from mcz.errors import OptionError
+from tests.papers.walks import put_walk
+from tools import fit_bit_allocation
+from tools.papers.__main__ import command
+from tools.papers.kinds import KINDS
+from tools.papers.kwak import (
+    claims,
+    clips,
+    coder,
+    fit,
+    losses,
+    measure,
+    printed,
+    tables,
+    tasks,
+    versus,
+    work,
+)
+from tools.papers.kwak.clips import (
+    MADE,
+    MARKED,
+    POINTS,
+    VIRTUAL,
+    Clip,
+    find_clips,
+    motion_in_positions,
+)
+from tools.papers.kwak.coder import indices_of, rice_bits
+from tools.papers.kwak.fit import Point
+from tools.papers.kwak.losses import INTRA, LTR, STR, received, regardless
+from tools.papers.kwak.measure import (
+    code,
+    dialed,
+    errors,
+    group_bytes,
+    live_basis,
+    rate_point,
+    rates,
+)
+from tools.papers.kwak.run import kwak
+from tools.papers.kwak.tasks import (
+    CHAINED,
+    CODED,
+    FIL,
+    MOD,
+    OURS,
+    RC,
+    RCA,
+    Found,
+    rates_task,
+)
+from tools.papers.kwak.versus import bd, kbps_at
+from tools.papers.outcome import Outcome
+
+
+@pytest.fixture(scope="module")
+def folder(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The generated walk under names of the paper's clips."""
+    found = tmp_path_factory.mktemp("cmu")
+    for name in ("13_29", "17_10"):
+        put_walk(samples, found, name, 120)
+    shutil.copy(samples / "walk.c3d", found / "86_02.c3d")
+    shutil.copy(samples / "walk.bvh", found / "unknown.bvh")
+    return found
+
+
+@pytest.fixture(scope="module")
+def clip(folder: Path) -> Clip:
+    return Clip(Case(str(folder / "17_10.amc")), POINTS)
+
+
+# Clips
+
+
+def test_clips_are_markers_then_skeletons(folder: Path) -> None:
+    assert [found.name for found in find_clips([str(folder)], None)] == [
+        *("13_29.amc, 41 markers", "86_02.c3d", "17_10.amc")
+    ]
+
+
+def test_without_clips_there_is_a_word(samples: Path) -> None:
+    with pytest.raises(OptionError, match="17_10"):
+        find_clips([str(samples / "walk.bvh")], None)
+
+
+def test_a_set_of_41_markers_in_mm(folder: Path) -> None:
+    case = Case(str(folder / "13_29.amc"))
+    made, whole = motion_in_positions(Clip(case, MADE)), motion_in_positions(Clip(case, VIRTUAL))
+    assert made.skeleton.n_joints == 41 and made.skeleton.unit_cm == 0.1
+    assert len({joint.name for joint in made.skeleton.joints}) == 41
+    assert made.frame_rate == 120
+    names = [joint.name for joint in whole.skeleton.joints]
+    column = 3 * names.index("ltoes+x")
+    ours = 3 * [joint.name for joint in made.skeleton.joints].index("ltoes+x")
+    scale = 10 * (whole.skeleton.unit_cm or 0)
+    expected = whole.values[:, column : column + 3] * scale
+    assert made.values[:, ours : ours + 3] == pytest.approx(expected)
+    with pytest.raises(OptionError, match="no virtual marker"):
+        bvh = mcz.read(folder / "unknown.bvh")
+        clips._made(replace(bvh, skeleton=replace(bvh.skeleton, unit_cm=1.0)))
+
+
+def test_of_bvh_the_first_pose_is_left_out(folder: Path) -> None:
+    whole = mcz.read(folder / "unknown.bvh")
+    found = motion_in_positions(Clip(Case(str(folder / "unknown.bvh"), "cm"), POINTS))
+    assert found.n_frames == whole.n_frames - 1
+
+
+def test_frames_at_the_ends_that_show_nothing_are_left_out(folder: Path) -> None:
+    motion = motion_in_positions(Clip(Case(str(folder / "86_02.c3d")), MARKED))
+    signal = motion.signals[0]
+    mask = np.ones(signal.values.shape, np.bool_)
+    mask[:3] = mask[-2:] = mask[10] = False
+    found = clips._seen(replace(motion, signals=(replace(signal, mask=mask),)))
+    assert found.n_frames == motion.n_frames - 5
+    np.testing.assert_array_equal(found.signals[0].mask, mask[3:-2])
+
+
+# Rates and errors
+
+
+def test_rates_are_held_or_searched_for(clip: Clip) -> None:
+    (free,) = rates(clip, MOD.params, [5.0])
+    assert free["kbps"] == pytest.approx(5.0, rel=0.05)
+    (held,) = rates(clip, CHAINED.params, [5.0])
+    assert held["setting"] == held["target"] == 5.0
+    assert held["kbps"] == pytest.approx(5.0, rel=0.2)
+    assert held["framed_kbps"] > held["kbps"]
+
+
+def test_rates_are_those_of_units(clip: Clip) -> None:
+    motion = motion_in_positions(clip)
+    found = code(motion, {"step": 0.2})
+    point = rate_point(motion, {"step": 0.2})
+    size = sum(len(unit.data) for unit in found.units)
+    assert point["kbps"] == pytest.approx(size * 8 / motion.n_frames * 120 / 1000)
+    assert point["framed_kbps"] == pytest.approx(
+        found.stream_bytes * 8 / motion.n_frames * 120 / 1000
+    )
+    assert point["sqnr"] == pytest.approx(errors(motion, found.values)[0])
+    assert point["sqnr_filtered"] != point["sqnr"]
+
+
+def test_errors_are_those_of_valid_places() -> None:
+    source = np.array([[3.0, 0, 0, 9, 9, 9], [0, 4, 0, 8, 8, 8]])
+    mask = np.array([[True] * 3 + [False] * 3, [True] * 3 + [False] * 3])
+    markers = tuple(
+        mcz.Joint(name, channels=tuple(map(mcz.Channel, ("tx", "ty", "tz")))) for name in "ab"
+    )
+    skeleton = mcz.Skeleton(markers, "s", 0.1)
+    motion = mcz.Motion(skeleton, (mcz.Signal(source, mask=mask),))
+    sqnr, cm = errors(motion, source + np.array([[0, 0, 0.5, 100, 0, 0], [0, 0, 0, 0, 7, 0]]))
+    assert sqnr == pytest.approx(10 * np.log10(25 / 0.25))
+    assert cm == pytest.approx(0.1 * 0.25)
+
+
+def test_a_live_encoder_has_known_bases_or_cosines(folder: Path, clip: Clip) -> None:
+    assert live_basis(clip) == "known"
+    assert live_basis(Clip(Case(str(folder / "13_29.amc")), MADE)) == "cosines"
+    assert OURS.variant(clip).params == (("rate_control", "steady"), ("basis", "known"))
+    learned = rate_point(motion_in_positions(clip), {"step": 0.5, "basis": "learned"})
+    assert learned["model_kbps"] > 0
+
+
+def test_bytes_of_whole_groups_alone_count() -> None:
+    units = [
+        *(Unit(2, 30, b"a" * 7), Unit(1, 20, b"b" * 5), Unit(0, 10, b"c" * 4)),
+        Unit(1, 3, b"d"),
+    ]
+    assert group_bytes(units, 30) == [7, 9]
+
+
+@pytest.mark.parametrize("start", [1e-3, 1.0, 300.0])
+def test_settings_are_found_by_rate(start: float) -> None:
+    points = dialed(lambda s: {"setting": s, "kbps": 4 * s**-0.6}, start, (3.0, 7.0))
+    assert [p["kbps"] for p in points] == pytest.approx([3.0, 7.0], rel=0.003)
+
+
+# Coders
+
+
+def test_indices_come_back(clip: Clip) -> None:
+    motion = motion_in_positions(clip)
+    for options in ({"preset": "mod", "step": 0.5}, {"ltr_step": 1.0, "step": 0.5}):
+        found = code(motion, options)
+        indices, starts, kinds = indices_of(found)
+        assert indices.shape == (motion.n_frames, int(starts[-1]))
+        assert kinds[0] == INTRA and kinds[1] == STR
+        # Coded again, they take as many bits as the signs at least.
+        assert rice_bits(found, motion) > np.count_nonzero(indices)
+
+
+def test_rice_codes_alone_take_a_bit_a_coefficient(clip: Clip) -> None:
+    motion = motion_in_positions(clip)
+    found = code(motion, {"preset": "mod", "step": 1e4})
+    assert not indices_of(found)[0].any()
+    n_groups = -(-motion.n_frames // 30)
+    assert rice_bits(found, motion) <= motion.n_frames + 8 * n_groups
+
+
+# Losses
+
+
+def test_a_decoder_that_goes_on_regardless_errs_for_good() -> None:
+    values = np.arange(8.0)[:, None]
+    kinds = [INTRA, STR, LTR, STR, LTR, STR, INTRA, STR]
+    lost = np.zeros(8, np.bool_)
+    lost[2] = True
+    out, decoded = regardless(values, kinds, lost, chain=False)
+    assert decoded.tolist() == [True, True, False, False, True, True, True, True]
+    # It shows frame 1 for frame 2, and is off by their difference until something intra comes.
+    assert out[:, 0].tolist() == [0, 1, 1, 1, 3, 4, 6, 7]
+    out, decoded = regardless(values, kinds, lost, chain=True)
+    assert decoded.tolist() == [True, True, False, True, True, True, True, True]
+    assert out[:, 0].tolist() == [0, 1, 1, 2, 3, 4, 6, 7]
+
+
+def test_a_live_decoder_goes_on_where_it_can(clip: Clip) -> None:
+    motion, codec = motion_in_positions(clip), by_name("online")
+    pushed = losses.pushed_by(codec, motion, {"step": 0.5, "gof": 10, "intra_period": 2})
+    lost = np.zeros(motion.n_frames, np.bool_)
+    whole, _ = received(codec, pushed, lost)
+    lost[25] = lost[30] = True  # an STR frame, and an LTR that is not intra coded
+    out, decoded = received(codec, pushed, lost)
+    assert np.flatnonzero(~decoded).tolist() == list(range(25, 40))
+    assert (out[25:40] == whole[24]).all()
+    assert (out[40:] == whole[40:]).all()
+
+
+def test_the_first_frame_always_comes() -> None:
+    assert not losses.lost_frames(1000, 1.0, 1)[0]
+    assert losses.lost_frames(1000, 1.0, 1)[1:].all()
+    assert losses.lost_frames(4000, 0.05, 1).mean() == pytest.approx(0.05, abs=0.02)
+
+
+# Fits
+
+
+def test_a_line_without_outliers() -> None:
+    points = [Point("a", 30, 5.0, 10.0, 2.0**x, 0.25 * x - 1.5) for x in range(100)]
+    points[50] = replace(points[50], g=1e3)
+    found = fit.fit(points)
+    assert (found.a, found.b) == (pytest.approx(0.25), pytest.approx(-1.5))
+    assert (found.n_points, found.n_outliers) == (99, 1)
+    assert found.residual == pytest.approx(0, abs=1e-9)
+
+
+def test_variances_are_those_of_decoded_coefficients() -> None:
+    values = np.array([0.0, 1, 2, 10, 11, 12, 20])[:, None]
+    assert fit.variances(values, 3) == (100, 1)
+
+
+def test_g_follows_from_the_best_ratio(clip: Clip) -> None:
+    motion = motion_in_positions(clip)
+    (point,) = fit.points_of(motion, (30,), (5.0,), (5.0, 20.0))
+    assert point.alpha in (5.0, 20.0)
+    bits = 5000 * 30 / 120 / (motion.values.shape[1] * (point.alpha + 29))
+    expected = (point.alpha - 1) * bits - 0.5 * np.log2(point.ratio)
+    assert point.g == pytest.approx(expected)
+    start = replace(motion, signals=(motion.signals[0].cut(0, 60),))
+    assert len(fit.curve_of(start, {"preset": "rc"}, (3.0, 9.0))) == 2
+
+
+def test_the_tool_fits_the_papers_training_clips(
+    folder: Path, samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    for path in (folder / "17.asf", folder / "17_10.amc"):
+        shutil.copy(path, tmp_path)
+    shutil.copy(samples / "walk.asf", tmp_path / "05.asf")
+    shutil.copy(samples / "walk.amc", tmp_path / "05_02.amc")
+    shutil.copy(samples / "walk.c3d", tmp_path / "01_01.c3d")
+
+    def few(motion: mcz.Motion) -> list[Point]:
+        return fit.points_of(motion, (20, 30), (5.0, 9.0), (5.0, 20.0))
+
+    monkeypatch.setattr(fit_bit_allocation, "points_of", few)
+    monkeypatch.setattr(fit_bit_allocation, "FEWEST", 5)
+    fit_bit_allocation.main(str(tmp_path))
+    shown = capsys.readouterr().out
+    assert "01_01.c3d: 4 points" in shown and "05_02.amc, 41 markers: 4 points" in shown
+    assert "skeletons: 1 clips" in shown and "too few points" in shown
+    assert "published -0.4121, 3.2745" in shown
+    monkeypatch.setattr(fit_bit_allocation, "FEWEST", 1)
+    fit_bit_allocation.main(str(tmp_path))
+    shown = capsys.readouterr().out
+    assert "17_10.amc, published: BD" in shown and "17_10.amc, fitted: BD" in shown
+
+
+# Claims
+
+
+def _points(kbps: tuple[float, ...], sqnr: float) -> list[dict[str, Any]]:
+    return [
+        {
+            "target": t,
+            "kbps": r,
+            "framed_kbps": r + 0.1,
+            "deviation": 9.0,
+            "groups": [1],
+            "model_kbps": 0.0,
+            "sqnr": sqnr + 3 * r,
+            "cm": 1.0,
+            "sqnr_filtered": sqnr + 3 * r + 2,
+            "cm_filtered": 0.8,
+        }
+        for t, r in zip(printed.TARGETS, kbps, strict=True)
+    ]
+
+
+def test_claims_are_judged_by_the_figures(clip: Clip) -> None:
+    found = Found([clip])
+    exact = printed.TARGETS
+    off = (3.2, *exact[1:])
+    for method, kbps, sqnr in ((MOD, exact, 20.0), (RC, off, 22.0), (RCA, exact, 21.0)):
+        found.results[rates_task(clip, method, exact)] = _points(kbps, sqnr)
+    rows = {row[:2]: row[2:] for row in claims.claims(found).rows}
+    assert rows["MOD < RC", "skeletons"] == ("yes", "17_10.amc +2.00 dB")
+    assert rows["RC < RCA", "skeletons"][0] == "no"
+    assert rows["RCA < FIL", "skeletons"] == ("yes", "17_10.amc +2.00 dB")
+    assert rows["MOD < RC < RCA < FIL", "skeletons"][0] == "no"
+    assert rows["rates of RC within 1 %", "skeletons"] == ("no", "17_10.amc 6.67 %")
+    assert rows["rates of RCA within 1 %", "skeletons"][0] == "yes"
+    assert rows["RC deviates by as few bytes a group", "skeletons"] == (
+        *("yes", "17_10.amc 9.0 (11.9)"),
+    )
+    assert rows["MOD < RC", "markers"] == ("-", "no such clip here")
+    assert bd(found, clip, MOD, FIL)[0] == pytest.approx(3)
+    assert bd(found, clip, MOD, OURS) == (None, None)
+
+
+def test_rates_at_an_error_lie_on_lines_in_logarithms() -> None:
+    points = [{"kbps": r, "cm": 8 / r} for r in (2.0, 4.0, 8.0)]
+    assert kbps_at(points, "cm", 8 / 3) == pytest.approx(3)
+    assert kbps_at(points, "cm", 0.5) is None
+
+
+# The whole run
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few points, few schemes."""
+    monkeypatch.setattr(measure, "MOST_TRIES", 4)
+    monkeypatch.setattr("tools.papers.curves.MOST_POINTS", 2)
+    monkeypatch.setattr("mcz.bench.measure.MOST_RUNS", 1)
+    monkeypatch.setattr(losses, "SCHEMES", losses.SCHEMES[:1])
+    monkeypatch.setattr(losses, "SHARES", (0.0, 0.05))
+    monkeypatch.setattr(tasks, "SPEEDS", tasks.SPEEDS[:1])
+    monkeypatch.setattr(tasks, "OTHER_SPEEDS", ())
+    monkeypatch.setattr(tasks, "FILE_RATES", (4.0, 10.0))
+    for module in (tasks, versus):
+        monkeypatch.setattr(module, "MARKER_RATES", (3.0, 5.0, 7.0))
+    for module in (tasks, tables):
+        monkeypatch.setattr(module, "CODER_KBPS", (5.0,))
+    # Learning a basis takes longer than all else.
+    for name in ("CODED", "HELD"):
+        monkeypatch.setattr(tasks, name, getattr(tasks, name)[:-1])
+    monkeypatch.setattr("tools.papers.kwak.coder.PLACES", coder.PLACES[:3])
+    monkeypatch.setattr("tools.papers.kwak.coder.PERIODS", (4, 0))
+    monkeypatch.setattr("tools.papers.kwak.coder.GOFS", (30, 2**20))
+
+
+@pytest.mark.usefixtures("short")
+def test_all_tables_of_generated_clips(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.setattr("tools.papers.__main__.default_folder", lambda: tmp_path / "cache")
+    out = tmp_path / "out"
+    arguments = ["kwak", str(folder), "--jobs", "1"]
+    assert run_command(command, "papers", [*arguments, "--out", str(out)]) == 0
+    shown, told = capsys.readouterr()
+    assert "Kwak and Bajic, claim by claim" in shown
+    assert "clips that are not here: 85_12" in told
+    found = {t["title"]: t for t in json.loads((out / "results.json").read_text())["tables"]}
+    assert len(found) == 14
+    for title, table in found.items():
+        assert table["rows"], title
+    held = found["Kwak and Bajic, Tables VIII and IX: rate control"]["rows"]
+    assert [row[1] for row in held] == list(printed.TARGETS)
+    assert held[0][-2:] == [3.01, 3.02]
+    markers = found["Kwak and Bajic, Table VI: bytes a group"]["rows"]
+    assert [row[0] for row in markers] == ["13_29.amc, 41 markers", "86_02.c3d"]
+    bd_rows = found["Kwak and Bajic, Table III: BD SQNR and BD rate"]["rows"]
+    assert {"MOD", "RC", "RCA", "FIL", "ours", "ours + filter"} <= {row[1] for row in bd_rows}
+    if plots.can_draw():
+        names = {path.name for path in out.glob("*.png")}
+        assert {"kwak_sqnr_markers.png", "kwak_sizes.png", "kwak_losses.png"} <= names
+    monkeypatch.setattr("mcz.bench.tasks.perform", lambda *given: pytest.fail("measured again"))
+    assert run_command(command, "papers", arguments) == 0
+
+
+def test_what_cannot_be_measured_is_left_out(folder: Path) -> None:
+    clip = Clip(Case(str(folder / "17_10.amc")), POINTS)
+    found = Found([clip])
+    for method in (MOD, *CODED):
+        found.results[rates_task(clip, method, printed.TARGETS)] = {"error": "no"}
+    assert {len(table.rows) for table in tables.tables(found)} >= {0}
+    (judged,) = [table for table in tables.tables(found) if "claim" in table.title]
+    assert {row[2] for row in judged.rows} == {"-"}
+
+
+def test_a_folder_without_its_clips_is_refused(samples: Path) -> None:
+    with pytest.raises(OptionError, match="kwak"):
+        kwak(Outcome(), [str(samples)], None, Runner(1, Cache(None), KINDS))
+
+
+def test_studies_have_names(clip: Clip) -> None:
+    found = work.perform(clip.case, Variant("online"), "packets", POINTS, (8.0,))
+    keys = ("stored", "terminated", "streams", "packets", "with_entries")
+    for row in found:
+        assert sorted(row[key] for key in keys) == [row[key] for key in keys]
+
+
+@pytest.mark.real
+def test_the_papers_rates_on_a_clip_of_the_paper(data: Path) -> None:
+    here = {clip.name: clip for clip in find_clips([str(data)], None)}
+    assert {"01_01.c3d", "13_29.amc, 41 markers", "17_10.amc", "14_08.bvh"} <= set(here)
+    assert here["01_01.c3d"].form == MARKED
+    for method in (RC, RCA, OURS, CHAINED):
+        for point in rates(here["17_10.amc"], method.params, printed.TARGETS):
+            assert point["kbps"] == pytest.approx(point["target"], rel=0.01)

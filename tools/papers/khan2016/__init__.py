@@ -1,0 +1,1 @@
+"""Khan 2016: MRDWT beside QBC."""

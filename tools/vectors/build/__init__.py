@@ -1,0 +1,1 @@
+"""What generators share: files, motions, source files and streams to order."""

@@ -1,0 +1,67 @@
+"""C3D files to order: of counted words, in any byte order."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.formats import c3d
+from mcz.motion import Motion
+from tests.formats.c3d_files import DEC, INTEL, SGI, Made, real
+from tools.vectors.build.source_files import HEADING, called
+
+C3D_SPEC = f"{HEADING}; Template and detail of C3D; The bytes of C3D"
+ORDERS = {"intel": INTEL, "dec": DEC, "sgi": SGI}
+
+
+def words(shape: tuple[int, ...], processor: int, size: int, seed: int = 0) -> NDArray[np.uint32]:
+    """Counted numbers: words of integers, or floats with a fraction."""
+    counted = [(seed + k * k * 7) % 997 for k in range(int(np.prod(shape)))]
+    if size == 2:
+        return np.array(counted, np.uint32).reshape(shape)
+    kind = ">u4" if processor == SGI else "<u4"
+    data = b"".join(real(n / 4 + 0.125, processor) for n in counted)
+    return np.frombuffer(data, kind).astype(np.uint32).reshape(shape)
+
+
+def c3d_file(
+    n_frames: int = 4,
+    n_points: int = 2,
+    channels: int = 2,
+    subframes: int = 2,
+    processor: int = INTEL,
+    size: int = 4,
+    **more: Any,
+) -> Made:
+    """A file of counted words, all points valid."""
+    points = words((n_frames, n_points, 4), processor, size)
+    analog = words((n_frames, subframes, channels), processor, size, 5)
+    return Made(points, analog, processor=processor, size=size, **more)
+
+
+def take_c3d(source: bytes, name: str) -> Motion:
+    """The motion in a C3D file, its source called after it; it must come back."""
+    motion = called(c3d.read(source, name), f"{name}.c3d")
+    assert c3d.write(motion) == source, name
+    return motion
+
+
+def c3d_rotations() -> Made:
+    """Two frames of one rotation at 2 samples a frame, in the block behind the data."""
+    file = c3d_file(2)
+    rotation = {
+        "USED": file.number(1),
+        "RATIO": file.number(2),
+        "DATA_START": file.number(0),
+        "LABELS": file.texts([b"pelvis"]),
+    }
+    file.parameters = {"ROTATION": rotation}
+    size = len(file.build())
+    start = -(-size // 512)
+    rotation["DATA_START"] = file.number(start + 1)
+    matrices = [float(k * k % 19) / 8 for k in range(2 * 2 * 17)]
+    file.tail = bytes(512 * start - size) + struct.pack(f"<{len(matrices)}f", *matrices)
+    return file

@@ -1,0 +1,225 @@
+"""Edits of payloads, chunks and segments, for files that no writer would write."""
+
+from __future__ import annotations
+
+import io
+import math
+import struct
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import construct
+
+from mcz.container import payloads
+from mcz.container.segments import SegmentHeader, StreamCounts, parse_table
+from mcz.numbers import Grid, GridKind
+from mcz.schema import build, varint
+
+BAD_STEPS = {  # that no codec takes, by what their vectors are called
+    "0": 0.0,
+    "minus": -1.0,
+    "NaN": math.nan,
+    "infinite": math.inf,
+    "tiny": 2.0**-100 * (1 - 2.0**-53),
+    "huge": 2.0**100 * (1 + 2.0**-52),
+}
+Edit = Callable[[bytes], bytes]
+Made = list[tuple[SegmentHeader, Sequence[bytes]]]  # segments before they are built
+
+
+def both(*edits: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """One edit after the other."""
+
+    def edit(value: Any) -> Any:
+        for one in edits:
+            value = one(value)
+        return value
+
+    return edit
+
+
+def put(schema: Any, path: str, new: bytes) -> Edit:
+    """Replace the bytes of the field at ``path``, such as "signals.0.codec"."""
+
+    def edit(payload: bytes) -> bytes:
+        start, stop = span(schema, payload, path)
+        return payload[:start] + new + payload[stop:]
+
+    return edit
+
+
+def span(schema: Any, payload: bytes, path: str) -> tuple[int, int]:
+    """Where the field at ``path`` begins and ends in ``payload``."""
+    stream = io.BytesIO(payload)
+    start, stop = 0, len(payload)
+    for name in path.split("."):
+        while not isinstance(schema, (construct.Struct, construct.FocusedSeq)):
+            schema = schema.subcon
+        stream.seek(start)
+        if isinstance(schema, construct.Struct):
+            schema, start, stop = _field(schema, stream, name)
+        else:
+            schema, start, stop = _item(schema, stream, int(name))
+    return start, stop
+
+
+def _field(schema: construct.Struct, stream: io.BytesIO, name: str) -> tuple[Any, int, int]:
+    parts = []
+    for part in schema.subcons:
+        parts += [f"{part.name}_at" / construct.Tell, part, f"{part.name}_end" / construct.Tell]
+    places = construct.Struct(*parts).parse_stream(stream)
+    part = next(part for part in schema.subcons if part.name == name)
+    return part.subcon, places[f"{name}_at"], places[f"{name}_end"]
+
+
+def _item(schema: construct.FocusedSeq, stream: io.BytesIO, index: int) -> tuple[Any, int, int]:
+    count, items = (renamed.subcon for renamed in schema.subcons)
+    count.subcon.parse_stream(stream)
+    for _ in range(index):
+        items.subcon.parse_stream(stream)
+    start = stream.tell()
+    items.subcon.parse_stream(stream)
+    return items.subcon, start, stream.tell()
+
+
+def says(data: bytes) -> Edit:
+    """Put another header of the codec into CLIP."""
+    return put(payloads.CLIP, "signals.0.header", varint(len(data)) + data)
+
+
+def binary64(value: float) -> bytes:
+    return struct.pack("<d", value)
+
+
+def swap(old: bytes, new: bytes) -> Edit:
+    """Replace ``old``, which must be there once."""
+
+    def edit(payload: bytes) -> bytes:
+        assert payload.count(old) == 1, (payload.count(old), old)
+        return payload.replace(old, new)
+
+    return edit
+
+
+def at(offset: int, new: bytes) -> Edit:
+    """Overwrite the bytes at ``offset``, counted from the end where it is negative."""
+
+    def edit(payload: bytes) -> bytes:
+        start = offset % len(payload)
+        return payload[:start] + new + payload[start + len(new) :]
+
+    return edit
+
+
+def plus(tail: bytes) -> Edit:
+    return lambda payload: payload + tail
+
+
+def flip(offset: int) -> Edit:
+    """Flip the lowest bit of the byte at ``offset``."""
+    return lambda data: at(offset, bytes((data[offset] ^ 1,)))(data)
+
+
+def framed(**changes: bytes) -> Edit:
+    """Edit the header of a chunk; its header_check and crc are made anew unless they are given."""
+
+    def edit(chunk: bytes) -> bytes:
+        parts = {
+            "type": chunk[:4],
+            "flags": chunk[4:5],
+            "reserved": chunk[5:6],
+            "header_check": b"",
+            "length": chunk[8:16],
+            "payload": chunk[16:-4],
+            "crc": b"",
+        } | changes
+        head = parts["type"] + parts["flags"] + parts["reserved"]
+        check = struct.pack("<H", zlib.crc32(head + parts["length"]) & 0xFFFF)
+        body = head + (parts["header_check"] or check) + parts["length"] + parts["payload"]
+        return body + (parts["crc"] or struct.pack("<I", zlib.crc32(body)))
+
+    return edit
+
+
+def table(n_groups: int, **changes: bytes) -> Edit:
+    """Edit the fields of a segment; its table_crc is made anew unless it is given."""
+
+    def edit(payload: bytes) -> bytes:
+        found = parse_table(payload, StreamCounts(n_groups, 1))
+        header, n_streams = found.header, len(found.lengths)
+        marked = sum(1 << i for i, length in enumerate(found.lengths) if length)
+        parts = {
+            "signal": varint(header.signal),
+            "first_frame": varint(header.first),
+            "n_frames": varint(header.n_frames),
+            "lead": varint(header.lead),
+            "tail": varint(header.tail),
+            "flags": bytes((header.flags,)),
+            "present": marked.to_bytes((n_streams + 7) // 8, "little"),
+            "lengths": b"".join(varint(length) for length in found.lengths if length),
+            "table_crc": b"",
+            "streams": payload[found.size :],
+        } | changes
+        streams, crc = parts.pop("streams"), parts.pop("table_crc")
+        head = b"".join(parts.values())
+        return head + (crc or struct.pack("<I", zlib.crc32(head))) + streams
+
+    return edit
+
+
+def stream(index: int, edit: Callable[[bytes], bytes]) -> Callable[[Any], Any]:
+    """Edit stream ``index`` of the first segment."""
+
+    def edit_segments(made: Made) -> Any:
+        header, streams = made[0]
+        changed = [edit(s) if i == index else s for i, s in enumerate(streams)]
+        return [(header, changed), *made[1:]]
+
+    return edit_segments
+
+
+def headed(index: int, **changes: int) -> Callable[[Any], Any]:
+    """Edit the header of segment ``index``."""
+
+    def edit_segments(made: Made) -> Any:
+        header, streams = made[index]
+        return [*made[:index], (replace(header, **changes), streams), *made[index + 1 :]]
+
+    return edit_segments
+
+
+def raw_stream(ordinals: Sequence[Sequence[int]], widths: Sequence[int]) -> bytes:
+    """A stream of raw: ``ordinals`` channel by channel, in offsets of ``widths`` bytes."""
+    out = b""
+    for column, width in zip(ordinals, widths, strict=True):
+        least = min(column)
+        out += (least % 2**64).to_bytes(8, "little") + bytes((width,))
+        out += b"".join((o - least).to_bytes(width, "little") for o in column)
+    return out
+
+
+def indexed(**changes: Any) -> Callable[[Any], Any]:
+    """What INDX says of the clip, so that it agrees with what was edited."""
+    return lambda row: replace(row, **changes)
+
+
+class Nth:
+    """An edit of the one of this number alone, from 0."""
+
+    def __init__(self, number: int, edit: Callable[[Any], Any]) -> None:
+        self.number, self.edit, self.count = number, edit, -1
+
+    def __call__(self, value: Any) -> Any:
+        self.count += 1
+        return self.edit(value) if self.count == self.number else value
+
+
+def all_integers(n_channels: int) -> Edit:
+    run = {"n_channels": n_channels, "grid": Grid(GridKind.INTEGER)}
+    return put(payloads.CLIP, "signals.0.grids", b"\1" + build(payloads.GRID_RUN, run, "grids"))
+
+
+def two_rows(found: Any) -> Any:
+    return replace(found, signals=(replace(found.signals[0], samples_per_frame=2),))

@@ -1,0 +1,397 @@
+"""Files made to order: a Writer whose payloads can be edited before they are framed and hashed.
+
+Every edit comes before checksums, ids, hashes and INDX are made, so a file has the one fault that
+was put into it and no other.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from mcz.codecs import raw
+from mcz.codecs.contract import Codec
+from mcz.container import payloads
+from mcz.container.chunks import (
+    ANCILLARY,
+    HEADER,
+    REPEAT,
+    REPEATED,
+    SIGNATURE,
+    Chunk,
+    build_chunk,
+    build_foot,
+    parse_header,
+)
+from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow, build_index
+from mcz.container.limits import BASE, Profile
+from mcz.container.packets import (
+    CHECK_SIZE,
+    END,
+    FRAME,
+    SEGMENT,
+    Packet,
+    build_packet,
+    numbered_frame,
+)
+from mcz.container.segments import SegmentHeader, build_segment
+from mcz.container.value_hash import canonical
+from mcz.container.writer import Writer, payload_id
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.schema import build, deflate, inflate, parse, varint
+from mcz.writing.clip_writer import write_clip, write_skeleton
+from tools.vectors.build.edits import Edit, Made, put
+from tools.vectors.build.motions import dance, puppet
+
+OK, REFUSED, UNSUPPORTED = 0, 1, 3
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """One file and what a decoder must make of it.
+
+    ``name`` is its path below vectors/ without the suffix; ``arrays`` are rows of the contract
+    with the bytes behind them, ``sources`` pairs of path and bytes; ``modes`` are the calls that
+    are made: "arrays", "sources". ``parts`` are (arguments, arrays) of partial reads. ``seed``
+    is that of a file made at random, ``since`` a format version that the bytes do not tell.
+    """
+
+    name: str
+    spec: tuple[str, ...]
+    purpose: str
+    data: bytes
+    exit: tuple[int, ...] = (OK,)
+    arrays: tuple[tuple[dict[str, Any], bytes], ...] = ()
+    sources: tuple[tuple[str, bytes], ...] = ()
+    modes: tuple[str, ...] = ("arrays",)
+    parts: tuple[tuple[tuple[str, ...], tuple[tuple[dict[str, Any], bytes], ...]], ...] = ()
+    seed: int | None = None
+    since: str = ""
+
+
+class Crafter(Writer):
+    """A Writer whose ``edits`` change what it writes.
+
+    A chunk type names an edit of its payload, TYPE_frame one of its whole bytes. "table" changes
+    the fields of INDEX, "FOOT" edits its 32 bytes, "row" the ClipRow behind INDX, "segments" the
+    list of (header, streams) of a clip. ``packets``: segments go into an open DATA; "packet" and
+    "end_packet" edit their bytes. ``frames``: those of signal 0 from this number on that have one
+    stream alone are packets of kind 2, ``numbered`` of kind 3; "number" changes what their checks
+    say. ``anew``: a segment that starts fresh begins an open DATA. ``repeat``: a REPT, which "REPT"
+    edits, precedes the open DATA of these numbers, from 0.
+    """
+
+    def __init__(
+        self,
+        *,
+        packets: bool = False,
+        frames: int | None = None,
+        numbered: bool = False,
+        anew: bool = False,
+        repeat: Collection[int] = (),
+        profile: Profile = BASE,
+        **edits: Callable[..., Any],
+    ) -> None:
+        self.edits = edits
+        self.anew = anew
+        self.numbered = numbered
+        self.repeat = repeat
+        self._n_data = 0
+        self.packets = packets
+        self.frames = frames
+        self._made: Made = []
+        self._sink_bytes = io.BytesIO()
+        super().__init__(self._sink_bytes, profile=profile)
+
+    def _write_head(self, extension: bytes) -> None:
+        super()._write_head(extension)
+        self.directory.head = self.edited("HEAD", self.directory.head)
+
+    @property
+    def data(self) -> bytes:
+        return self._sink_bytes.getvalue()
+
+    def edited(self, name: str, value: Any) -> Any:
+        edit = self.edits.get(name)
+        return edit(value) if edit else value
+
+    def chunk(self, kind: bytes, payload: bytes, flags: int = 0) -> Chunk:
+        return self.plain_chunk(kind, self.edited(kind.decode(), payload), flags)
+
+    def plain_chunk(self, kind: bytes, payload: bytes, flags: int = 0) -> Chunk:
+        """A chunk whose payload is edited already."""
+        chunk = Chunk(kind, flags, self.offset, len(payload))
+        name = kind.decode("latin-1") + "_frame"
+        self._write(self.edited(name, build_chunk(kind, payload, flags)))
+        return chunk
+
+    def shared(self, kind: bytes, payload: bytes) -> bytes:
+        payload = self.edited(kind.decode(), payload)
+        id_ = payload_id(payload)
+        if (kind, id_) not in self.directory.shared:
+            self.directory.shared[kind, id_] = self.plain_chunk(kind, payload)
+        return id_
+
+    def clip(
+        self, motion: Motion, *, grouping: str = "joint", codec: Codec = raw.CODEC, **params: Any
+    ) -> None:
+        """Write ``motion`` with the raw codec, or another, without a quality record."""
+        write_clip(self, motion, replace(codec, grouping=grouping), params, quality=False)
+
+    def parts(self, name: str, *pieces: bytes) -> None:
+        """Write an attachment in these parts, each stored or deflated, whichever is shorter."""
+        whole = b"".join(pieces)
+        digest = hashlib.sha256(whole).digest()
+        common = {"name": name, "n_parts": len(pieces), "size": len(whole), "sha256": digest}
+        row = AttachmentRow(name, len(whole), [])
+        for part, piece in enumerate(pieces):
+            packed = deflate(piece)
+            shorter = len(packed) < len(piece)
+            fields = {"part": part, "part_size": len(piece), "encoding": int(shorter)}
+            fields["data"] = packed if shorter else piece
+            row.parts.append(self.chunk(b"ATTA", build(payloads.ATTA, common | fields, name)))
+        self.directory.attachments[name] = row
+
+    def segment(self, header: SegmentHeader, streams: Sequence[bytes]) -> None:
+        self._made.append((header, streams))
+
+    def end_clip(self, n_frames: int, source_sha256: bytes, value_sha256: Sequence[bytes]) -> None:
+        made, self._made = self.edited("segments", self._made), []
+        opening = self._opening() if self.repeat else b""
+        if self.packets:
+            self._begin_data(opening)
+        for header, streams in made:
+            if self.anew and header.flags & 1 and self._next_packet:
+                self.close_data()
+                self._begin_data(opening)
+            if self._is_frame(header, streams):
+                self._frame(header, streams[0])
+                continue
+            payload = self.edited("DATA", build_segment(header, streams))
+            self._segment(header, payload)
+        row = self._clip
+        super().end_clip(n_frames, source_sha256, value_sha256)
+        assert row is not None
+        self.directory.clips[row.name] = self.edited("row", row)
+
+    def _opening(self) -> bytes:
+        """What a REPT repeats, of a file of one clip."""
+        data, at, found = self.data, len(SIGNATURE), b""
+        while at < len(data):
+            chunk = parse_header(data[at : at + HEADER.size], at)
+            found += data[at : at + chunk.size] if chunk.type in REPEATED else b""
+            at += chunk.size
+        return found
+
+    def _begin_data(self, opening: bytes) -> None:
+        if self._n_data in self.repeat:
+            self.chunk(REPEAT, opening, ANCILLARY)
+        self._n_data += 1
+        self.open_data()
+
+    def _is_frame(self, header: SegmentHeader, streams: Sequence[bytes]) -> bool:
+        number = self._next_packet
+        short = self.frames is not None and number is not None and number >= self.frames
+        return short and len(streams) == 1 and header.signal == 0
+
+    def _frame(self, header: SegmentHeader, stream: bytes) -> None:
+        clip: ClipRow | None = self._clip
+        assert clip is not None
+        assert self._next_packet is not None
+        made = Packet(FRAME, self._next_packet, stream, bool(header.flags & 1))
+        if self.numbered:
+            number = self.edited("number", header.first)
+            made = numbered_frame(made.sequence, number, stream, fresh=made.fresh)
+        packet = build_packet(made)
+        at = self.offset + len(packet) - CHECK_SIZE - len(stream)
+        clip.segments.append(SegmentRow(at, len(stream), header, made.kind))
+        self._write(self.edited("packet", packet))
+        self._next_packet += 1
+
+    def _segment(self, header: SegmentHeader, payload: bytes) -> None:
+        clip: ClipRow | None = self._clip
+        assert clip is not None
+        if self._next_packet is None:
+            chunk = self.plain_chunk(b"DATA", payload)
+            row = SegmentRow(chunk.payload_offset, len(payload), header)
+        else:
+            packet = Packet(SEGMENT, self._next_packet, payload, bool(header.flags & 1))
+            data = build_packet(packet)
+            at = self.offset + len(data) - CHECK_SIZE - len(payload)
+            row = SegmentRow(at, len(payload), header, SEGMENT)
+            self._write(self.edited("packet", data))
+            self._next_packet += 1
+        clip.segments.append(row)
+
+    def close_data(self) -> None:
+        assert self._next_packet is not None
+        self._write(self.edited("end_packet", build_packet(Packet(END, self._next_packet, b""))))
+        self._next_packet = None
+
+    def finish(self, *, index: bool = True) -> None:
+        start, length = 0, 0
+        if index:
+            chunk = self.edited("INDX_frame", self._index_chunk())
+            start, length = self.offset, len(chunk)
+            self._write(chunk)
+        self._write(self.edited("FOOT", build_foot(start, length)))
+
+    def _index_chunk(self) -> bytes:
+        whole = build_index(self.directory)
+        outer = parse(payloads.INDX, whole[16:-4], "INDX")
+        fields = parse(payloads.INDEX, inflate(outer.data, outer.size, "INDX"), "INDX")
+        self.edited("table", fields)
+        content = build(payloads.INDEX, fields, "INDX")
+        packed = {"size": len(content), "data": deflate(content)}
+        return build_chunk(b"INDX", self.edited("INDX", build(payloads.INDX, packed, "INDX")))
+
+
+def file_of(
+    *motions: Motion,
+    index: bool = True,
+    packets: bool = False,
+    frames: int | None = None,
+    numbered: bool = False,
+    anew: bool = False,
+    repeat: Collection[int] = (),
+    grouping: str = "joint",
+    segment_frames: int = 0,
+    codec: Codec = raw.CODEC,
+    **edits: Any,
+) -> bytes:
+    """A file of these clips, edited; a segment has all frames unless ``segment_frames`` says it."""
+    live: dict[str, Any] = {"packets": packets, "frames": frames, "numbered": numbered}
+    crafter = Crafter(**live, anew=anew, repeat=repeat, **edits)
+    for motion in motions:
+        crafter.clip(motion, grouping=grouping, codec=codec, segment_frames=segment_frames)
+    return finished(crafter, index=index)
+
+
+def finished(crafter: Crafter, *motions: Motion, index: bool = True) -> bytes:
+    """The file of ``crafter`` with these clips added."""
+    for motion in motions:
+        crafter.clip(motion)
+    crafter.finish(index=index)
+    return crafter.data
+
+
+def rehash(*signals: np.ndarray) -> Edit:
+    """Put the hashes of these canonical arrays into CEND."""
+    hashes = [hashlib.sha256(canonical(values)).digest() for values in signals]
+    return put(payloads.CEND, "value_sha256", varint(len(hashes)) + b"".join(hashes))
+
+
+def arrays(*motions: Motion) -> tuple[tuple[dict[str, Any], bytes], ...]:
+    """The canonical arrays of these clips, as the contract lists them."""
+    return tuple(part for motion in motions for part in _arrays(motion))
+
+
+def _arrays(motion: Motion) -> Iterable[tuple[dict[str, Any], bytes]]:
+    for signal in motion.signals:
+        dtype = "<i8" if signal.values.dtype == np.int64 else "<f8"
+        common = {"clip": motion.name, "signal": signal.name}
+        shape = list(signal.values.shape)
+        values = {"array": "values", "dtype": dtype, "shape": shape}
+        yield common | values, canonical(signal.values)
+        if signal.mask is not None and not signal.mask.all():
+            mask = {"array": "mask", "dtype": "u1", "shape": shape}
+            yield common | mask, signal.mask.astype("u1").tobytes()
+
+
+@dataclass(slots=True)
+class Shelf:
+    """Collects vectors under one folder."""
+
+    folder: str
+    vectors: list[Vector] = field(default_factory=list)
+
+    def add(self, name: str, spec: str, purpose: str, data: bytes, **rest: Any) -> None:
+        """``spec``: headings of SPEC.md, separated by semicolons."""
+        headings = tuple(heading.strip() for heading in spec.split(";"))
+        self.vectors.append(Vector(f"{self.folder}/{name}", headings, purpose, data, **rest))
+
+
+class Broken(Shelf):
+    """A Shelf of files that must be refused."""
+
+    def add(self, name: str, spec: str, purpose: str, data: bytes, **rest: Any) -> None:
+        rest.setdefault("exit", (REFUSED,))
+        Shelf.add(self, name, spec, purpose, data, **rest)
+
+    def edited(self, name: str, spec: str, purpose: str, **edits: Any) -> None:
+        """The file of one dance, edited."""
+        self.add(name, spec, purpose, file_of(dance(), **edits))
+
+
+class Whole(Shelf):
+    """A Shelf of files that must be decoded; its ``exit`` are the codes that are allowed."""
+
+    def __init__(self, folder: str, exit: tuple[int, ...] = (OK,)) -> None:
+        super().__init__(folder)
+        self.exit = exit
+
+    def hold(
+        self, name: str, spec: str, purpose: str, data: bytes, *motions: Motion, **rest: Any
+    ) -> None:
+        """Add a file of these clips."""
+        rest.setdefault("exit", self.exit)
+        self.add(name, spec, purpose, data, arrays=arrays(*motions), **rest)
+
+
+def skeleton_chunk() -> bytes:
+    crafter = Crafter()
+    before = len(crafter.data)
+    write_skeleton(crafter, puppet())
+    return crafter.data[before:]
+
+
+def partial(motion: Motion, frames: tuple[int, int], joints: Sequence[int] | None = None) -> Any:
+    """Arguments and arrays of a partial read: of joints, or of all channels of all signals."""
+    arguments = ("--clip", motion.name, "--frames", f"{frames[0]}:{frames[1]}")
+    if joints is None:
+        cut = [signal.cut(*frames) for signal in motion.signals]
+        return arguments, arrays(replace(motion, signals=tuple(cut), frame_numbers=None))
+    columns = [c for joint in joints for c in motion.skeleton.columns(joint)]
+    signal, rows = motion.signals[0], slice(*frames)
+    mask = signal.mask[rows][:, columns] if signal.mask is not None else None
+    part = Signal(signal.values[rows][:, columns], mask=mask)
+    names = tuple(Channel("", str(column)) for column in columns)
+    bones = Skeleton((Joint("", channels=names),))
+    listed = ",".join(map(str, joints))
+    return (*arguments, "--joints", listed), arrays(Motion(bones, (part,), name=motion.name))
+
+
+def attached(stream: bytes, size: int, whole: bytes | None = None) -> bytes:
+    """A file of one attachment, deflated to ``stream``; ``whole``: what it says that it is."""
+    content = b"" if whole is None else whole
+
+    def edit(payload: bytes) -> bytes:
+        fields = parse(payloads.ATTA, payload, "ATTA")
+        fields.update({"encoding": 1, "size": size, "part_size": size, "data": stream})
+        return build(payloads.ATTA, fields, "ATTA")
+
+    def row(fields: Any) -> Any:
+        fields.attachments[0].size = size
+        return fields
+
+    crafter = Crafter(ATTA=edit, table=row)
+    crafter.parts("a.bin", content)
+    return finished(crafter)
+
+
+def live_file(motion: Motion, **edits: Any) -> bytes:
+    """The clip as a live one: packets of one frame, of kind 2 or 3 where that can be."""
+    given = {"packets": True, "frames": 1, "segment_frames": 1, "grouping": "all"}
+    return file_of(motion, **given | edits)
+
+
+class Unrestorable(Broken):
+    """A Shelf of files whose sources must be refused."""
+
+    def add(self, name: str, spec: str, purpose: str, data: bytes, **rest: Any) -> None:
+        super().add(name, spec, purpose, data, modes=("sources",), **rest)

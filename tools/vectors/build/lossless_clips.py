@@ -1,0 +1,174 @@
+"""Streams of codec 1, ``lossless``, to order: heads that its encoder would never choose.
+
+Nothing here is fitted or estimated, so the bytes do not depend on a machine's arithmetic.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Codec, Encoded, Segment
+from mcz.codecs.lossless import heads as lossless_heads
+from mcz.codecs.lossless import lossless
+from mcz.codecs.lossless.choices import Lattice
+from mcz.coding.start import start_states
+from mcz.motion import Motion
+from mcz.numbers import Grid, GridKind
+from mcz.schema import varint
+from tools.vectors.build.files import Whole, file_of
+
+Ints = NDArray[np.int64]
+PLAIN, MULTIPLES, BINARY32, BINARY64 = 0, 32, 88, 117  # forms; 1 to 15: digits of base 10
+UNEXAMINED = 2**16  # bytes, more than any crafted stream has
+HEADING = "Codec 1: lossless"
+WHOLE, SIX = Grid(GridKind.INTEGER), Grid(GridKind.GENERAL, 6)
+DOUBLE, SINGLE = Grid(GridKind.BINARY64), Grid(GridKind.BINARY32)
+
+
+@dataclass(frozen=True, slots=True)
+class Coded:
+    """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top`` None: as
+    great as the ordinals need. Nothing is checked, so that what is forbidden can be written.
+    ``multiples``: what is coded in place of the ordinals, for form 32 with its ``unit``."""
+
+    form: int | None = None
+    drop: int = 0
+    top: int | None = None
+    scale: int = 8
+    from_last: int = 1
+    taps: tuple[int, ...] = ()
+    unit: float | None = None
+    multiples: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A constant channel, of its first ordinal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Copy:
+    group: int
+    channel: int
+
+
+Head = Coded | Constant | Copy
+USUAL = Coded()
+
+
+def codec_of(*segments: Sequence[Head]) -> Codec:
+    """Codec 1 with these heads, channel by channel, in the first segment, the second, ...
+
+    The last counts for all further segments; a channel without a head is ``USUAL``. A parameter
+    ``segment_frames`` of 0 makes segments as long as the grids allow.
+    """
+
+    def encode(source: Any, params: Any) -> Encoded:
+        layout = source.layout
+        made: list[Segment] = []
+        fixed, start = params["segment_frames"] or layout.n_frames, 0
+        ends = sorted({*source.breaks, layout.n_frames})
+        while start < layout.n_frames:
+            stop = min(start + fixed, *(end for end in ends if end > start))
+            heads = segments[min(len(made), len(segments) - 1)] if segments else ()
+            streams = _streams(layout, source.ordinals(start, stop), heads)
+            made.append(Segment(start, stop - start, streams))
+            start = stop
+        return Encoded(b"", iter(made))
+
+    return replace(lossless.CODEC, encode=encode)
+
+
+def _streams(layout: Any, ordinals: Ints, heads: Sequence[Head]) -> tuple[bytes, ...]:
+    every = [*heads, *[USUAL] * (layout.n_channels - len(heads))]
+    return tuple(
+        build_stream(
+            ordinals[:, list(group)],
+            [layout.grids[channel] for channel in group],
+            [every[channel] for channel in group],
+        )
+        for group in layout.groups
+    )
+
+
+def build_stream(
+    ordinals: Any, grids: Sequence[Grid], heads: Sequence[Head], *, faulty: bool = False
+) -> bytes:
+    """The stream of a group: ``ordinals`` (rows, channels), the grids of the clip, the heads.
+
+    ``faulty``: an ordinal has no code, and the bits end with the fault.
+    """
+    table = np.array(ordinals, np.int64)
+    data, plans, coded = b"", [], []
+    code = _code_to_the_fault if faulty else lossless._code
+    for place, head in enumerate(heads):
+        column = table[:, place]
+        if isinstance(head, Copy):
+            data += b"\2" + varint(head.group) + varint(head.channel)
+        elif isinstance(head, Constant):
+            data += lossless._constant_head(int(column[0]))
+        else:
+            shape = _shape(head, grids[place], column.tolist())
+            data += _coded_head(head, shape)
+            plans.append(
+                lossless_heads.make_plan(
+                    shape, head.scale, head.from_last, head.taps[: lossless_heads.MAX_TAPS]
+                )
+            )
+            coded.append(head.multiples or column.tolist())
+    return data + code(np.array(coded, np.int64).T, plans) if plans else data
+
+
+def _shape(head: Coded, grid: Grid, column: Sequence[int]) -> Lattice:
+    form = lossless.form_of_grid(grid) if head.form is None else head.form
+    if form in (PLAIN, MULTIPLES):
+        return Lattice(0, 0, head.drop)
+    base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)
+    greatest = max(o if o >= 0 else -1 - o for o in column) >> head.drop
+    per_class = (base - 1) * base ** (digits - 1)
+    top = max(0, (greatest - (base == 10)) // per_class) if head.top is None else head.top
+    return Lattice(base, digits, head.drop, top)
+
+
+def _coded_head(head: Coded, shape: Lattice) -> bytes:
+    own = head.form is not None
+    kind = head.from_last << 2 | len(head.taps) << 3 | lossless.OWN_FORM * own
+    data = bytes((kind, *((head.form, head.drop) if head.form is not None else ())))
+    data += struct.pack("<d", head.unit) if head.unit is not None else b""
+    data += varint(shape.top) if shape.base else b""
+    folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)
+    return data + bytes((head.scale,)) + b"".join(map(varint, folded))
+
+
+def _code_to_the_fault(ordinals: Ints, plans: Sequence[Ints]) -> bytes:
+    """The bits up to what cannot be coded."""
+    loops, coding = lossless._kernels()
+    data, state = np.zeros(UNEXAMINED, np.uint8), start_states("lossless")[0].copy()
+    coding.start(state, data, 1)
+    rows = np.ascontiguousarray(ordinals).copy()
+    fault = loops.code_rows(state, data, rows, np.stack(plans), lossless._powers())
+    assert fault >= 0
+    return data[: coding.finish(state, data)].tobytes()
+
+
+class Streams(Whole):
+    """A Shelf of files of one clip that codec 1 codes."""
+
+    def code(
+        self,
+        name: str,
+        purpose: str,
+        motion: Motion,
+        heads: Sequence[Head] = (),
+        spec: str = HEADING,
+        **rest: Any,
+    ) -> None:
+        parts = rest.pop("parts", ())
+        data = file_of(motion, codec=codec_of(heads), **rest)
+        self.hold(name, spec, purpose, data, motion, parts=parts)

@@ -1,0 +1,151 @@
+"""The motions that the vectors hold: small, with every number written out or counted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
+from mcz.numbers import Grid, GridFlag, GridKind
+
+HUNDREDTHS = Grid(GridKind.FIXED, 2)
+UNROUNDED = (Grid(GridKind.INTEGER), Grid(GridKind.FIXED, 1), HUNDREDTHS)
+LONG = 70_000  # frames, more than a u16 counts
+INFINITE, NOT_A_NUMBER = float("inf"), float("nan")
+INFINITE, NOT_A_NUMBER = float("inf"), float("nan")
+
+
+def channels(kinds: str) -> tuple[Channel, ...]:
+    return tuple(map(Channel, kinds.split()))
+
+
+def puppet() -> Skeleton:
+    """Three joints of 4, 2 and 0 channels."""
+    return Skeleton(
+        (
+            Joint("hips", -1, (0.0, 0.9, 0.0), channels=channels("tx ty tz rz")),
+            Joint("spine", 0, (0.0, 0.2, -0.0), channels=channels("rx ry")),
+            Joint("tip", 1, (0.0, 0.3, 0.0), ((0.0, 0.1, 0.0),)),
+        ),
+        name="puppet",
+        up_axis="y",
+    )
+
+
+def numbers(n_rows: int, n_columns: int) -> np.ndarray:
+    """Hundredths from -97 to 102, none twice in a row."""
+    counted = np.arange(n_rows * n_columns) * 37 % 200 - 97
+    return (counted / 100).reshape(n_rows, n_columns)
+
+
+def dance(n_frames: int = 4, **changes: Any) -> Motion:
+    """The motion of most vectors: 6 channels of hundredths at 120 frames a second."""
+    signal = Signal(numbers(n_frames, 6), (HUNDREDTHS,) * 6)
+    fields: dict[str, Any] = {"skeleton": puppet(), "signals": (signal,), "name": "dance"}
+    return Motion(**(fields | {"frame_rate": Fraction(120)} | changes))
+
+
+def column(values: Any, grid: Grid, **changes: Any) -> Motion:
+    """One plain scalar on ``grid``, named after it."""
+    dtype = np.int64 if grid.kind == GridKind.INTEGER else np.float64
+    table = np.array(values, dtype).reshape(-1, 1)
+    skeleton = Skeleton((Joint("dial", channels=(Channel("", "needle", "V"),)),), name="dial")
+    signal = Signal(table, (grid,), **changes)
+    return Motion(skeleton, (signal,), name=grid.kind.name.lower())
+
+
+def panel(
+    columns: Sequence[Sequence[Any]], grids: Sequence[Grid], split: Sequence[int] = (), **more: Any
+) -> Motion:
+    """Plain scalars, column by column: one joint of all, or joints of ``split`` channels each."""
+    dtype = np.int64 if all(g.kind == GridKind.INTEGER for g in grids) else np.float64
+    table = np.array(columns, dtype).T
+    names = [Channel("", f"needle {c}") for c in range(len(columns))]
+    ends = np.cumsum(split or [len(columns)]).tolist()
+    joints = tuple(
+        Joint(f"panel {j}", channels=tuple(names[a:b]))
+        for j, (a, b) in enumerate(zip([0, *ends], ends, strict=False))
+    )
+    signal = Signal(table, tuple(grids), **more)
+    return Motion(Skeleton(joints), (signal,), name="panel")
+
+
+def wave(n_rows: int, seed: int = 0) -> list[float]:
+    """Hundredths of a smooth curve with some noise: about -60 to 60, no two alike by ``seed``."""
+    places = [(row + 7 * seed) % 96 - 48 for row in range(n_rows)]
+    smooth = [x * (48 - abs(x)) * 10 for x in places]
+    return [(s + (row * row * 37 + seed * 11) % 23) / 100 for row, s in enumerate(smooth)]
+
+
+def with_exceptions() -> Motion:
+    spelled: list[tuple[int, int, bytes, float]] = [
+        (0, 0, b"1e3", 1e3),
+        (0, 5, b"-NaN", NOT_A_NUMBER),
+        (1, 0, b"+5", 5.0),
+        (1, 1, b"Infinity", INFINITE),
+        (1, 4, b"-1.#INF00", -INFINITE),
+        (2, 3, b"007", 7.0),
+        (3, 0, b".1", 0.1),
+        (3, 3, b"1e-400", 0.0),
+        (3, 5, b"12.", 12.0),
+    ]
+    rows, columns, texts, meant = zip(*spelled, strict=True)
+    values = numbers(4, 6)
+    values[rows, columns] = meant
+    exceptions = Exceptions(np.array(rows), np.array(columns), texts)
+    return dance(signals=(Signal(values, (HUNDREDTHS,) * 6, exceptions=exceptions),))
+
+
+def with_grid_changes() -> Motion:
+    """Seven frames; frames 2 to 4 become a segment of their own."""
+    values = numbers(7, 6)
+    values[2:5, 1] = [0.1, -0.0, 1e-9]
+    values[2:5, 5] = [3.0, -4.0, 5.0]
+    changes = (
+        (2, 1, Grid(GridKind.TEXT64)),
+        (2, 5, Grid(GridKind.FIXED, 0)),
+        (5, 1, HUNDREDTHS),
+        (5, 5, HUNDREDTHS),
+    )
+    return dance(signals=(Signal(values, (HUNDREDTHS,) * 6, grid_changes=changes),))
+
+
+def with_mask() -> Motion:
+    mask = np.ones((4, 6), np.bool_)
+    mask[0:2, 4], mask[2, 5] = False, False
+    return dance(signals=(Signal(numbers(4, 6), (HUNDREDTHS,) * 6, mask=mask),))
+
+
+def grid_cases() -> dict[str, tuple[Grid, list[float]]]:
+    """Grids of every kind, each with values at its ends and between them."""
+    flag = GridFlag
+    bits = [0.0, -0.0, 1.5, -INFINITE, INFINITE, NOT_A_NUMBER]
+    tiny = [5e-324, -1.7976931348623157e308]
+    return {
+        "fixed": (Grid(GridKind.FIXED, 4), [9.3722, -0.0, 0.0, -7.5, 225179981368.5247]),
+        "fixed-integers": (Grid(GridKind.FIXED, 0), [7.0, -7.0, 2251799813685247.0]),
+        "fixed-22-digits": (Grid(GridKind.FIXED, 22), [1e-22, -3e-22, 2.251799813685247e-7]),
+        "trimmed": (Grid(GridKind.TRIMMED, 4, flag.POINT_ZERO), [12.313, -27.0, -0.0, 0.0001]),
+        "general": (Grid(GridKind.GENERAL, 6), [0.0, -0.0, 1e-14, 123456.0, -1.5e300, 1e-307]),
+        "general-exponent3": (
+            Grid(GridKind.GENERAL, 6, flag.EXPONENT3),
+            [3.18055e-15, 0.0001, -99.9999, 100000.0, 1234560.0],
+        ),
+        "general-point-zero": (Grid(GridKind.GENERAL, 6, flag.POINT_ZERO), [24.0, 7e-9, -0.0]),
+        "general-15-digits": (
+            Grid(GridKind.GENERAL, 15),
+            [0.123456789012345, -9.99999999999999e307, 8.88888888888888e-300, 1e22, 1e23],
+        ),
+        "text64": (Grid(GridKind.TEXT64, 0), [0.1, -0.0, 1e300, 0.30000000000000004, *tiny]),
+        "text64-17-digits": (Grid(GridKind.TEXT64, 17), [0.1, -2.0, 1e22, *tiny]),
+        "text64-fixed": (Grid(GridKind.TEXT64, 84), [0.1, -1e20, 3.5]),
+        "text32": (Grid(GridKind.TEXT32), [0.1, -0.0, 3.4028235e38, 1e-45, 16777216.0]),
+        "integer": (Grid(GridKind.INTEGER), [0, -1, 2**53, -(2**53), 127]),
+        "scaled": (Grid(GridKind.SCALED, scale=0.1), [3 * 0.1, -7 * 0.1, 0.0, 10**15 * 0.1]),
+        "binary32": (Grid(GridKind.BINARY32), [*bits, 2.0**-149, -3.4028234663852886e38]),
+        "binary64": (Grid(GridKind.BINARY64), [*bits, *tiny]),
+        "vax-f": (Grid(GridKind.VAX_F), [0.0, 1.0, -0.5, 1.7014117331926443e38, 2.0**-128]),
+    }

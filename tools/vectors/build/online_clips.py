@@ -1,0 +1,149 @@
+"""Files of codec 11, ``online``, to order, and what is in them.
+
+The values are summed from the coefficients, never decoded: a decoder has to agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import by_name, raw
+from mcz.codecs.contract import Encoded
+from mcz.codecs.online import coder as online_coder
+from mcz.codecs.online.units import Unit
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.schema import varint
+from tools.vectors.build.edits import stream
+from tools.vectors.build.files import Whole, file_of, partial
+from tools.vectors.build.online_units import (
+    GOLOMB,
+    HEADING,
+    MIXED,
+    ONE,
+    ONLINE,
+    Coding,
+    Plan,
+    header,
+    segments_of,
+    units_of,
+)
+from tools.vectors.build.spatial_clips import Ints
+
+Floats = NDArray[np.float64]
+
+
+def values_of(plan: Plan) -> Floats:
+    """The values of all frames, of coefficients that may be none as well."""
+    coder = online_coder.Coder(header(plan), plan.space.layout)
+    space, table = coder.space, plan.table
+    values = np.zeros((len(table), plan.n_channels))
+    now = reference = np.zeros(plan.n_channels)
+    step = ltr_step = 0
+    for f, kind in enumerate(plan.kinds):
+        here = table[f].any() or f in plan.said
+        step = plan.steps(f, kind) if here else (step, ltr_step, ONE)[kind]
+        now = (now, reference, np.zeros(plan.n_channels))[kind].copy()
+        if here:
+            _add(space, now, table[f], space.step * ((8 + step % 8) * 2.0 ** (step // 8 - 35)))
+        if kind:
+            ltr_step, reference = step, now
+        values[f] = now
+    return values
+
+
+def _add(space: Any, values: Floats, row: Ints, step: float) -> None:
+    """Add what the coefficients stand for."""
+    for m, columns in enumerate(space.columns):
+        sums = np.zeros(len(columns))
+        for r in range(space.starts[m], space.starts[m + 1]):
+            sums = sums + float(row[r]) * space.vectors[r]
+        values[columns] = values[columns] + (sums * step) * space.weights[columns]
+
+
+def codec_of(plan: Plan, coding: type[Coding] = Coding) -> Any:
+    """The codec with this content, whatever the values of the motion."""
+    model = plan.space.model
+    own = (model,) if model and (plan.embedded or not plan.known) else ()
+    known = (model,) if model and plan.known else ()
+
+    def encode(source: Any, params: Any) -> Encoded:
+        return Encoded(header(plan), iter(segments_of(plan, coding)), models=own, known=known)
+
+    def decode(header: bytes, layout: Any, spans: Any, request: Any, fetch: Any) -> Floats:
+        return values_of(plan)[request.start : request.stop]
+
+    changes: dict[str, Any] = {
+        "encode": encode,
+        "decode": decode,
+        "parameters": raw.CODEC.parameters,
+    }
+    return replace(by_name(ONLINE), **changes, dial=None)
+
+
+def motion_of(plan: Plan, **changes: Any) -> Motion:
+    """The clip as it is decoded: plain scalars of one joint, or as ``changes`` have it."""
+    names = tuple(Channel("", f"n{c}") for c in range(plan.n_channels))
+    skeleton = Skeleton((Joint("dial", channels=names),), name="dial")
+    signal = Signal(values_of(plan), mask=changes.pop("mask", None))
+    fields = {"skeleton": skeleton, "signals": (signal,), "name": "wave"}
+    return Motion(**(fields | changes))
+
+
+def file_with(
+    plan: Plan, motion: Motion | None = None, *, coding: type[Coding] = Coding, **edits: Any
+) -> bytes:
+    motion = motion_of(plan) if motion is None else motion
+    return file_of(motion, codec=codec_of(plan, coding), **{"grouping": "all", **edits})
+
+
+class Groups(Whole):
+    """A Shelf of files of one clip of codec 11."""
+
+    def plan(
+        self,
+        name: str,
+        purpose: str,
+        plan: Plan,
+        requests: Iterable[tuple[int, int]] = (),
+        *,
+        spec: str = "",
+        motion: Motion | None = None,
+        **edits: Any,
+    ) -> None:
+        """Add a file; ``requests`` are frames, ``spec`` are headings beside the codec's."""
+        motion = motion_of(plan) if motion is None else motion
+        data = file_with(plan, motion, **edits)
+        parts = tuple(partial(motion, frames) for frames in requests)
+        headings = f"{HEADING}; {spec}" if spec else HEADING
+        self.hold(name, headings, purpose, data, motion, parts=parts)
+
+
+def both(name: str, purpose: str, plan: Plan) -> Iterable[tuple[str, str, Plan]]:
+    """Names, purposes and plans for either coder; ``purpose`` ends without a full stop."""
+    yield name, f"{purpose}.", replace(plan, coder=MIXED)
+    yield f"{name}-golomb", f"{purpose}, Golomb.", replace(plan, coder=GOLOMB)
+
+
+def numbered(values: Sequence[int]) -> Callable[[int, int], int]:
+    """Steps of these codes in turn."""
+    return lambda number, kind: values[number]
+
+
+def with_stream(plan: Plan, data: bytes) -> bytes:
+    """The file of ``plan`` with another stream; the hash stays."""
+    return file_with(plan, segments=stream(0, lambda _: data))
+
+
+def only_units(plan: Plan) -> list[Unit]:
+    """The units of the only segment."""
+    (units,) = units_of(plan)
+    return units
+
+
+def head_of(kind: int, n_frames: int) -> bytes:
+    return varint(4 * n_frames + kind)

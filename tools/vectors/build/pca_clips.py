@@ -1,0 +1,163 @@
+"""Clips of codec 4, ``pca``, to order: integers, heads and headers that no encoder chooses.
+
+Everything coded is integers that are written out or counted, so the bytes do not depend on a
+machine's arithmetic; values are those of the decoder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import raw
+from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
+from mcz.codecs.pca import kernels, pca
+from mcz.codecs.table_kernels import code_table
+from mcz.coding import mixing
+from mcz.coding.start import start_states
+from mcz.coding.streams import scale_of
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.schema import varint
+from tools.vectors.build.files import Whole, file_of, partial
+from tools.vectors.build.motions import wave
+
+HEADING = "Codec 4: pca"
+UNEXAMINED = 2**16  # bytes, more than any crafted stream has
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One segment: means (channels), basis (components x channels), coefficients (frames x
+    components), and the head; ``said``: the components that the head claims.
+    """
+
+    means: Sequence[int]
+    basis: Sequence[Sequence[int]] = ()
+    coefficients: Sequence[Sequence[int]] = ()
+    step: int = 128
+    mean_scale: int = 12
+    shifts: Sequence[int] = ()
+    forms: Sequence[int] = ()
+    said: bytes | None = None
+    faulty: bool = False  # an integer has no code
+    n_frames: int = 0  # where there are no components
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Header and segments of a signal; an empty stream where a part is None."""
+
+    parts: tuple[Part, ...]
+    decimals: int = 2
+    empty: tuple[int, ...] = ()
+
+
+def part_of(n_frames: int, n_channels: int, count: int, seed: int = 0, **changes: Any) -> Part:
+    """Integers of all sizes, no two segments alike."""
+    table = [
+        [(37 * (i + seed) + 11 * c * c) % 129 - 64 for c in range(n_channels)] for i in range(count)
+    ]
+    columns = [wave(n_frames, 3 * seed + i) for i in range(count)]
+    rows = [[round(100 * column[f]) for column in columns] for f in range(n_frames)]
+    fields = {
+        "means": [(-1) ** c * 50 * c * c for c in range(n_channels)],
+        "basis": table,
+        "coefficients": rows,
+        "shifts": [6 + i % 2 for i in range(count)],
+        "forms": [(i % 4) * 64 + 8 + i for i in range(count)],
+        "n_frames": n_frames,
+    }
+    return Part(**(fields | changes))
+
+
+def stream_of(part: Part, decimals: int) -> bytes:
+    """The stream of one segment."""
+    count = len(part.basis)
+    means = np.array(part.means, np.int64)
+    basis = np.array(part.basis, np.int64).reshape(count, len(means))
+    rows = np.array(part.coefficients, np.int64).reshape(part.n_frames, count)
+    head = bytes((part.step,)) if decimals == pca.SCALED else b""
+    head += bytes((part.mean_scale,)) + (varint(count) if part.said is None else part.said)
+    head += bytes((*part.shifts, *part.forms))
+    data, state = np.zeros(UNEXAMINED, np.uint8), start_states("pca")[0].copy()
+    mixing.start(state, data, 1)
+    # What has no code is the last of its table, so that the next one follows all the same.
+    forms = np.array(part.forms, np.int64)
+    shifts = np.array(part.shifts, np.int64)
+    scales = np.array([scale_of(form & 63) for form in part.forms], np.int64)
+    firsts = (np.int64(1) << shifts) >> (len(means).bit_length() // 2)
+    faults = (
+        code_table(state, data, means[None], np.array([scale_of(part.mean_scale)]), 0),
+        code_table(state, data, basis, firsts, 1),
+        kernels.code_coefficients(state, data, rows, forms >> 6, scales) >= 0,
+    )
+    assert any(faults) == part.faulty
+    return head + data[: mixing.finish(state, data)].tobytes()
+
+
+def segments_of(plan: Plan) -> list[Segment]:
+    found, first = [], 0
+    for index, part in enumerate(plan.parts):
+        data = b"" if index in plan.empty else stream_of(part, plan.decimals)
+        found.append(Segment(first, part.n_frames, (data,)))
+        first += part.n_frames
+    return found
+
+
+def codec_of(plan: Plan) -> Codec:
+    """Codec 4 with this content, whatever the values of the motion."""
+
+    def encode(source: Any, params: Any) -> Encoded:
+        return Encoded(bytes((plan.decimals,)), iter(segments_of(plan)))
+
+    return replace(pca.CODEC, encode=encode, parameters=raw.CODEC.parameters, dial=None)
+
+
+def values_of(plan: Plan) -> NDArray[np.float64]:
+    """The values of all frames."""
+    made = segments_of(plan)
+    n_frames, n_channels = sum(s.n_frames for s in made), len(plan.parts[0].means)
+    spans = [Span(s.first, s.n_frames) for s in made]
+    values: NDArray[np.float64] = pca.CODEC.decode(
+        bytes((plan.decimals,)),
+        Layout(n_frames, (tuple(range(n_channels)),)),
+        spans,
+        Request(0, n_frames, (0,)),
+        lambda segment, _, __: made[segment].streams[0],
+    )
+    return values
+
+
+def motion_of(plan: Plan) -> Motion:
+    """The clip as it is decoded: plain scalars of one joint."""
+    n_channels = len(plan.parts[0].means)
+    names = tuple(Channel("", f"needle {c}") for c in range(n_channels))
+    skeleton = Skeleton((Joint("dial", channels=names),), name="dial")
+    return Motion(skeleton, (Signal(values_of(plan)),), name="wave")
+
+
+def file_with(plan: Plan, motion: Motion, **edits: Any) -> bytes:
+    return file_of(motion, codec=codec_of(plan), grouping="all", **edits)
+
+
+class Parts(Whole):
+    """A Shelf of files of one clip that codec 4 codes."""
+
+    def hold_plan(
+        self,
+        name: str,
+        purpose: str,
+        plan: Plan,
+        requests: Sequence[tuple[int, int]] = (),
+        **edits: Any,
+    ) -> None:
+        """Add a file; ``requests`` are frames."""
+        motion = motion_of(plan)
+        data = file_with(plan, motion, **edits)
+        parts = tuple(partial(motion, frames) for frames in requests)
+        self.hold(name, f"{HEADING}; Residuals", purpose, data, motion, parts=parts)

@@ -1,0 +1,260 @@
+"""Clips of codecs 0 and 1 made at random: grids, changes of grid, exceptions, masks, copies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import by_name, raw
+from mcz.codecs.contract import Encoded, Segment
+from mcz.codecs.lossless import lossless
+from mcz.motion import Exceptions, Motion, Signal
+from mcz.numbers import Grid, GridFlag, GridKind
+from tools.vectors.build import (
+    lossless_clips,
+)
+from tools.vectors.build.edits import raw_stream
+from tools.vectors.build.random_parts import (
+    Chance,
+    Clip,
+    Ints,
+    any_channel,
+    integers,
+    partition,
+    skeleton,
+    split,
+)
+
+
+def any_grids(chance: Chance, n: int, *, whole: bool) -> tuple[Grid, ...]:
+    return tuple(Grid(GridKind.INTEGER) if whole else _grid(chance) for _ in range(n))
+
+
+def _grid(chance: Chance) -> Grid:
+    flag = GridFlag
+    printed = chance.choice((flag(0), flag.POINT_ZERO, flag.NO_ZERO | flag.PLUS, flag.POINT))
+    choices = (
+        Grid(GridKind.FIXED, chance.randrange(1, 23), flag.PLUS),
+        Grid(GridKind.FIXED, 2),
+        Grid(GridKind.TRIMMED, chance.randrange(1, 23), printed),
+        Grid(GridKind.GENERAL, chance.randrange(1, 16), printed | flag.EXPONENT3),
+        Grid(GridKind.TEXT64, chance.choice((0, 1, 16, 17)), printed | flag.UPPER),
+        Grid(GridKind.TEXT64, chance.randrange(74, 105)),
+        Grid(GridKind.TEXT32, 0, printed),
+        Grid(GridKind.INTEGER),
+        Grid(GridKind.SCALED, scale=chance.choice((0.1, 2.0**-200, 2.0**200, 1 / 3))),
+        Grid(GridKind.BINARY32),
+        Grid(GridKind.BINARY64),
+        Grid(GridKind.VAX_F),
+    )
+    return chance.choice(choices)
+
+
+def _column(chance: Chance, grid: Grid, n: int) -> list[int]:
+    """Ordinals of a grid: small, or anywhere up to its ends."""
+    limit = grid.limit
+    if grid.kind in (GridKind.FIXED, GridKind.TRIMMED, GridKind.SCALED, GridKind.INTEGER):
+        limit = min(limit, 2**43)  # which codec 1 holds as plain numbers
+    if chance.random() < 0.6:
+        return [max(-limit, min(limit, value)) for value in integers(chance, n, limit)]
+    return [chance.randrange(-limit, limit + 1) for _ in range(n)]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Ordinals (rows, channels) in segments of ``parts`` frames; ``copies``: of which column."""
+
+    ordinals: Ints
+    values: NDArray[np.float64]
+    changes: tuple[tuple[int, int, Grid], ...]
+    copies: dict[int, int]
+
+
+def _table(chance: Chance, grids: Sequence[Grid], parts: Sequence[int], per_frame: int) -> Table:
+    """Columns of all sorts, some on another grid in some segments, some copies of others."""
+    rows = [n * per_frame for n in parts]
+    columns, values, changes = [], [], []
+    copies: dict[int, int] = {}
+    for place, grid in enumerate(grids):
+        twins = [p for p in range(place) if grids[p] == grid and p not in copies]
+        if twins and chance.random() < 0.4:
+            copies[place] = chance.choice(twins)
+            columns.append(columns[copies[place]])
+            values.append(values[copies[place]])
+            continue
+        own = [grid] * len(rows)
+        if grid.is_text and not any(g == grid for g in grids[place + 1 :]):
+            own = [_text_grid(chance) if chance.random() < 0.2 else grid for _ in rows]
+        changes += _changes(place, grid, own, rows)
+        found = [_column(chance, g, n) for g, n in zip(own, rows, strict=True)]
+        if len(set(own)) <= 1:
+            own = own[:1] or [grid]
+            found = [_column(chance, own[0], sum(rows))]
+        columns.append([o for part in found for o in part])
+        meant = [g.values(np.array(o, np.int64)) for g, o in zip(own, found, strict=True)]
+        values.append(np.concatenate([*meant, np.empty(0)]))
+    shape = len(grids), sum(rows)
+    return Table(
+        np.array(columns, np.int64).reshape(shape).T.copy(),
+        np.array(values, np.float64).reshape(shape).T.copy(),
+        tuple(sorted(changes, key=lambda change: change[:2])),
+        copies,
+    )
+
+
+def _text_grid(chance: Chance) -> Grid:
+    while not (grid := _grid(chance)).is_text:
+        pass
+    return grid
+
+
+def _changes(
+    channel: int, grid: Grid, own: Sequence[Grid], rows: Sequence[int]
+) -> Iterable[tuple[int, int, Grid]]:
+    """Where the grid of a channel becomes another."""
+    at, before = 0, grid
+    for now, n in zip(own, rows, strict=True):
+        if now != before:
+            yield at, channel, now
+        at, before = at + n, now
+
+
+def any_signal(
+    chance: Chance, parts: Sequence[int], n: int, **about: Any
+) -> tuple[Signal, dict[int, int]]:
+    per_frame = about.get("samples_per_frame", 1)
+    grids = any_grids(chance, n, whole=n > 0 and chance.random() < 0.15)
+    made = _table(chance, grids, parts, per_frame)
+    whole = bool(n) and all(grid.kind == GridKind.INTEGER for grid in grids)
+    signal = Signal(
+        made.ordinals if whole else made.values,
+        grids,
+        ordinals=None if whole else made.ordinals,
+        mask=mask_of(chance, made.ordinals.shape),
+        grid_changes=made.changes,
+        **about,
+    )
+    return signal if whole else _noted(chance, signal), made.copies
+
+
+def mask_of(chance: Chance, shape: tuple[int, int]) -> NDArray[np.bool_] | None:
+    if chance.random() < 0.6:
+        return None
+    mask = np.ones(shape, np.bool_)
+    for _ in range(chance.randrange(4)):
+        if mask.size:
+            row, channel = chance.randrange(shape[0]), chance.randrange(shape[1])
+            mask[row : row + chance.randrange(5), channel] = False
+    return mask
+
+
+TOKENS = (b"1e3", b"-NaN", b"+5", b"Infinity", b"-1.#INF00", b"007", b".1", b"1e-400", b"12.")
+MEANT = (1e3, np.nan, 5.0, np.inf, -np.inf, 7.0, 0.1, 0.0, 12.0)
+
+
+def _noted(chance: Chance, signal: Signal) -> Signal:
+    """``signal`` with some exceptions."""
+    odd = {channel for _, channel, _ in signal.grid_changes}
+    shown = [c for c, grid in enumerate(signal.grids) if grid.is_text and c not in odd]
+    if not shown or not signal.n_rows or chance.random() < 0.6:
+        return signal
+    n_rows, n = signal.n_rows, chance.randrange(5)
+    places = sorted({(chance.randrange(n_rows), chance.choice(shown)) for _ in range(n)})
+    values, texts = signal.values.copy(), []
+    for row, channel in places:
+        which = chance.randrange(len(TOKENS))
+        values[row, channel] = MEANT[which]
+        texts.append(TOKENS[which])
+    rows, channels = (np.array([p[k] for p in places], np.int64) for k in range(2))
+    return replace(signal, values=values, exceptions=Exceptions(rows, channels, tuple(texts)))
+
+
+def clip_of_ordinals(chance: Chance, name: str) -> Clip:
+    n_frames = chance.choice((0, 1, 2, 5, 11, 26))
+    n = chance.choice((0, 1, 3, 6, 9))
+    parts = [split(chance, n_frames) for _ in range(chance.choice((1, 1, 2, 3)))]
+    found = [any_signal(chance, parts[0], n)]
+    for number, own in enumerate(parts[1:]):
+        size = chance.randrange(1, 4)
+        about: dict[str, Any] = {
+            "name": chance.choice(("analog", "residuals", f"more {number}")),
+            "samples_per_frame": chance.choice((1, 2, 5)),
+            "channels": tuple(any_channel(chance) for _ in range(size)),
+        }
+        found.append(any_signal(chance, own, size, **about))
+    bones = skeleton(chance, partition(chance, n))
+    motion = Motion(bones, tuple(signal for signal, _ in found))
+    grouping = chance.choice(("all", "joint", "channel"))
+    write = _raw_streams if name == "raw" else _lossless_streams
+    count = iter(range(len(found)))
+
+    def encode(source: Any, params: Any) -> Encoded:
+        which = next(count)
+        made = _segments(chance, source, parts[which], found[which][1], write)
+        return Encoded(b"", iter(made))
+
+    codec = replace(by_name(name), encode=encode, parameters=raw.CODEC.parameters)
+    return Clip(codec, motion, grouping)
+
+
+Streams = Callable[[Chance, Any, Sequence[Grid], Ints, dict[int, int]], tuple[bytes, ...]]
+
+
+def _segments(
+    chance: Chance, source: Any, parts: Sequence[int], copies: dict[int, int], write: Streams
+) -> list[Segment]:
+    """Segments of these frames."""
+    found, start = [], 0
+    for part in parts:
+        block, grids = source.ordinals(start, start + part), source.grids(start)
+        found.append(Segment(start, part, write(chance, source.layout, grids, block, copies)))
+        start += part
+    return found
+
+
+def _raw_streams(
+    chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
+) -> tuple[bytes, ...]:
+    """Offsets of any width that is enough."""
+    streams = []
+    for group in layout.groups:
+        columns = [[int(o) for o in block[:, c]] for c in group]
+        least = [(max(column) - min(column)).bit_length() for column in columns]
+        widths = [chance.randrange(-(-bits // 8), 9) for bits in least]
+        streams.append(raw_stream(columns, widths))
+    return tuple(streams)
+
+
+def _lossless_streams(
+    chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
+) -> tuple[bytes, ...]:
+    """Constants, copies where the ordinals allow it, and coded channels with any taps."""
+    place = {c: (g, k) for g, group in enumerate(layout.groups) for k, c in enumerate(group)}
+    heads: list[lossless_clips.Head] = []
+    for c in range(layout.n_channels):
+        column = block[:, c]
+        twin = copies.get(c)
+        if twin is not None and (column == block[:, twin]).all() and chance.random() < 0.8:
+            heads.append(lossless_clips.Copy(*place[twin]))
+        elif (column == column[0]).all() and chance.random() < 0.7:
+            heads.append(lossless_clips.Constant())
+        else:
+            form = lossless.form_of_grid(grids[c])
+            own = form != lossless.form_of_grid(layout.grids[c]) or chance.random() < 0.1
+            heads.append(_coded(chance, form if own else None))
+    return lossless_clips._streams(layout, block, heads)
+
+
+def _coded(chance: Chance, form: int | None) -> lossless_clips.Coded:
+    wild = chance.random() < 0.2
+    taps = [chance.randrange(-511, 512) if wild else chance.randrange(-9, 40) for _ in range(8)]
+    return lossless_clips.Coded(
+        form,
+        scale=chance.choice((0, 3, 8, 40, 77, 172)),
+        from_last=chance.randrange(2),
+        taps=tuple(taps[: chance.randrange(9)]),
+    )

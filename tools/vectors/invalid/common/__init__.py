@@ -1,0 +1,1 @@
+"""Faults of clips of more than one codec: functions that add them to the shelf of any."""

@@ -1,0 +1,15 @@
+"""Valid: codec 6, ``awt``, which is coded as codec 2 is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from tools.vectors.build.files import Vector, Whole
+from tools.vectors.valid.common import every_codec, wavelets
+
+
+def vectors() -> Iterable[Vector]:
+    shelf = Whole("valid/awt")
+    wavelets.add(shelf, "awt")
+    every_codec.add(shelf, "awt")
+    return shelf.vectors

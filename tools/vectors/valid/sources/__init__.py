@@ -1,0 +1,20 @@
+"""Valid: clips and skeletons that give back their source files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from tools.vectors.build.files import Vector, Whole
+from tools.vectors.valid.sources import c3d, c3d_parts, layouts, lossy, lossy_steps, numbers, text
+
+
+def vectors() -> Iterable[Vector]:
+    shelf = Whole("valid/sources")
+    text.add(shelf)
+    numbers.add(shelf)
+    layouts.add(shelf)
+    lossy.add(shelf)
+    lossy_steps.add(shelf)
+    c3d.add(shelf)
+    c3d_parts.add(shelf)
+    return shelf.vectors
