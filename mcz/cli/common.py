@@ -183,8 +183,11 @@ def existing(path: str) -> None:
 
 
 @contextmanager
-def opened(path: str, *, salvage: bool = False, max_decoded: int | None = None) -> Iterator[File]:
-    """The MCZ file at ``path``, or on standard input where that is ``-``; errors name it."""
+def opened(path: str, **options: Any) -> Iterator[File]:
+    """The MCZ file at ``path``, or on standard input where that is ``-``; errors name it.
+
+    ``options`` are those of ``mcz.open``.
+    """
     import mcz
 
     target: str | bytes = path
@@ -194,7 +197,7 @@ def opened(path: str, *, salvage: bool = False, max_decoded: int | None = None) 
         target = sys.stdin.buffer.read()
     else:
         existing(path)
-    with about(path), mcz.open(target, salvage=salvage, max_decoded=max_decoded) as file:
+    with about(path), mcz.open(target, **options) as file:
         yield file
 
 

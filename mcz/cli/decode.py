@@ -14,6 +14,7 @@ from mcz.cli.common import (
     binary_output,
     opened,
     plain_name,
+    plural,
     print_json,
     printable,
     say,
@@ -111,6 +112,11 @@ class _Wanted(NamedTuple):
 )
 @click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
 @click.option("--salvage", is_flag=True, help="Write what a damaged file still holds.")
+@click.option(
+    "--unverified",
+    is_flag=True,
+    help="Read no more than the part that is wanted: fewer bytes, but no checksum covers them.",
+)
 @decoded_option
 @force_option
 @json_option
@@ -118,6 +124,7 @@ def command(
     file: str,
     output: str | None,
     salvage: bool,
+    unverified: bool,
     max_decoded: int | None,
     force: bool,
     as_json: bool,
@@ -129,10 +136,11 @@ def command(
     """
     wanted = _Wanted(**options)
     _check_options(wanted, salvage)
+    _refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
     if output == "-" and (as_json or wanted.with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
     fit: Fit | None = None
-    with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
+    with opened(file, salvage=salvage, max_decoded=max_decoded, unverified=unverified) as held:
         if held.clips:
             outputs, fit = _of_clip(held, wanted)
         elif wanted.target is not None or wanted.frames is not None or wanted.filtered:
@@ -142,14 +150,17 @@ def command(
             )
         else:
             outputs = [_other(held, wanted.name)]
-        damage = list(held.damage)
-    facts = {"damage": damage} if fit is None else {"damage": damage, "fit": facts_of(fit)}
+        facts: dict[str, Any] = {"damage": held.damage, "unverified_segments": held.unverified}
+    if fit is not None:
+        facts["fit"] = facts_of(fit)
     _deliver(file, output, outputs, force, as_json, facts)
+    if facts["unverified_segments"]:
+        say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")
     if fit is not None:
         say(f"{file}: {told(fit)}")
-    for line in damage:
+    for line in facts["damage"]:
         say(f"{file}: salvage: {line}")
-    return Exit.SALVAGED if damage else Exit.FINE
+    return Exit.SALVAGED if facts["damage"] else Exit.FINE
 
 
 def _check_options(wanted: _Wanted, salvage: bool) -> None:

@@ -63,13 +63,22 @@ TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a
 
 
 class Container:
-    """An open file. ``unverified`` counts chunks of which only a part was read and checked."""
+    """An open file. ``unverified`` counts the segments of which only a part was read.
+
+    That happens where ``reads_parts`` allows it, and never otherwise.
+    """
 
     def __init__(
-        self, source: ByteSource, *, salvage: bool = False, max_decoded: int | None = None
+        self,
+        source: ByteSource,
+        *,
+        salvage: bool = False,
+        max_decoded: int | None = None,
+        reads_parts: bool = False,
     ) -> None:
         self.source = source
         self.salvage = salvage
+        self.reads_parts = reads_parts and not salvage
         self.max_decoded = output_limit(source.size) if max_decoded is None else max_decoded
         self.damage: list[str] = []
         self.unverified = 0
@@ -241,16 +250,16 @@ class Container:
         wanted: Sequence[int] | None,
         table: StreamTable | None = None,
     ) -> tuple[StreamTable, dict[int, bytes]]:
-        """The streams with the indices ``wanted`` (None: all), read together where they are near.
+        """At least the streams with the indices ``wanted`` (None: all) of a segment.
 
         ``table`` is that of the segment where it was read before.
-        A chunk that is read whole is checked by its crc; otherwise it counts as unverified.
+        All that holds the segment is read and checked (CHUNK-03), unless parts may be.
         """
         self._check_row(row)
-        if wanted is None or self.source.remote:
+        if wanted is None or not self.in_part(row):
             return self._all_streams(row, counts)
         table = table or self.table(row, counts)
-        self.unverified += 1
+        self.unverified += 1  # CHUNK-07
         got: dict[int, bytes] = {}
         for run in _runs(table, sorted(wanted), self.source.gap):
             start = table.offsets[run[0]]
@@ -260,6 +269,10 @@ class Container:
                 at = table.offsets[index] - start
                 got[index] = data[at : at + table.lengths[index]]
         return table, got
+
+    def in_part(self, row: SegmentRow) -> bool:
+        """Whether less than the whole segment may be read: not where one request gets it all."""
+        return self.reads_parts and row.size > self.source.gap
 
     def _all_streams(
         self, row: SegmentRow, counts: StreamCounts

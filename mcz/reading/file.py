@@ -83,7 +83,7 @@ class File:
 
     @property
     def unverified(self) -> int:
-        """Chunks of which so far only a part was read, and checked by its own table alone."""
+        """Segments of which so far only a part was read: nothing vouches for its numbers."""
         return self.container.unverified
 
     @cached_property
@@ -137,11 +137,19 @@ class File:
         return next(iter(self.clips.values()))
 
 
-def open(target: Any, salvage: bool = False, max_decoded: int | None = None) -> File:
+def open(
+    target: Any,
+    salvage: bool = False,
+    max_decoded: int | None = None,
+    unverified: bool = False,
+) -> File:
     """Open an MCZ file lazily: a path, an fsspec target, bytes or a binary stream.
 
     ``salvage`` reads what a damaged file still holds and lists the rest in ``File.damage``.
     ``max_decoded`` replaces the limit of decoded bytes, max(64 MiB, 4096 x file size).
+    ``unverified`` reads no more of a segment than what is asked for (joints, a resolution), so that
+    its checksum cannot be checked and a damaged file may give wrong numbers; ``File.unverified``
+    counts such segments. It saves bytes where segments are large, and does nothing in salvage.
     Raises FormatError, in particular TruncatedError where there is no FOOT at the end, and
     AccessError where the file cannot be read.
     """
@@ -151,7 +159,10 @@ def open(target: Any, salvage: bool = False, max_decoded: int | None = None) -> 
         text = getattr(error, "strerror", None) or error
         raise AccessError(f"{target}: {text}") from None
     try:
-        return File(Container(source, salvage=salvage, max_decoded=max_decoded))
+        container = Container(
+            source, salvage=salvage, max_decoded=max_decoded, reads_parts=unverified
+        )
+        return File(container)
     except MczError as error:
         source.close()
         error.args = (f"{source.name}: {error}",)

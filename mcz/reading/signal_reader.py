@@ -144,7 +144,7 @@ class SignalReader:
         self.container.source.read_ahead(
             (info.rows[i].chunk().offset, info.rows[i].chunk().size)
             for i in covering
-            if not info.rows[i].packet
+            if not info.rows[i].packet and not self.container.in_part(info.rows[i])
         )
         return info.spans
 
@@ -188,7 +188,7 @@ class SignalReader:
             row, counts = self.info.rows[segment], self.info.counts
             everything = len(self.groups) == counts.n_groups and not self.resolution
             table = wanted = None
-            if not everything:
+            if not everything and self.container.in_part(row):
                 table = self.container.table(row, counts)
                 wanted = self._wanted(table)
             self._cache[segment] = self.container.streams(row, counts, wanted, table)
