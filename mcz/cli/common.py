@@ -198,6 +198,8 @@ def opened(path: str, **options: Any) -> Iterator[File]:
     else:
         existing(path)
     with about(path), mcz.open(target, **options) as file:
+        if file.grows:
+            say(f"{path}: another process is appending to it; this is what it held before")
         yield file
 
 

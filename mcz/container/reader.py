@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from typing import Any
+from weakref import finalize
 
 from mcz.container import payloads
 from mcz.container.chunks import (
@@ -85,6 +86,9 @@ class Container:
         self.index: Foot | None = None
         self.directory = self._salvage() if salvage else self._open()
         self.profile: Profile = parse_head(self.directory.head)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _reopened, (self.source, self.salvage, self.max_decoded, self.reads_parts)
 
     def _salvage(self) -> Directory:
         found = scan(self.source, salvage=True)
@@ -313,6 +317,20 @@ class Container:
             raise FormatError(f"a segment is said to lie at {row.offset}, past the end of the file")
         limit = self.profile.packet_bytes if row.packet else self.profile.chunk_bytes
         check(f"DATA at {row.offset}: bytes", row.size, limit)
+
+
+def _reopened(source: ByteSource, *options: Any) -> Container:
+    """What a pickled Container becomes: the same file, opened anew, closed when it is let go."""
+    salvage, max_decoded, reads_parts = options
+    try:
+        container = Container(
+            source, salvage=salvage, max_decoded=max_decoded, reads_parts=reads_parts
+        )
+    except BaseException:
+        source.close()
+        raise
+    finalize(container, source.close)
+    return container
 
 
 def _check_table(table: StreamTable, row: SegmentRow) -> None:

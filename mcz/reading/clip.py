@@ -41,6 +41,9 @@ class Clip:
         self.name = row.name
         self.n_frames = row.n_frames
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _reopened, (self.container, self.name)
+
     def __repr__(self) -> str:
         return f"<Clip {self.name!r}: {self.n_frames} frames, {self.n_channels} channels>"
 
@@ -380,6 +383,14 @@ class Clip:
                 f"clip {self.name!r}: the restored {info.path} has {len(data)} bytes and hash "
                 f"{digest.hex()}, stored are {info.size} and {info.sha256.hex()}"
             )
+
+
+def _reopened(container: Container, name: str) -> Clip:
+    """What a pickled Clip becomes; raises OptionError where the file has changed meanwhile."""
+    row = container.directory.clips.get(name)
+    if row is None:
+        raise OptionError(f"{container.source.name}: the clip {name!r} is no longer there")
+    return Clip(container, row)
 
 
 def _groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...], list[int]]:

@@ -14,8 +14,16 @@ from typing import Any
 from mcz.container import payloads
 from mcz.container.directory import AttachmentRow
 from mcz.container.reader import Container
-from mcz.container.source import open_source
-from mcz.errors import AccessError, ChecksumError, FormatError, MczError, MotionError, OptionError
+from mcz.container.source import ByteSource, open_source
+from mcz.errors import (
+    AccessError,
+    ChecksumError,
+    FormatError,
+    MczError,
+    MotionError,
+    OptionError,
+    TruncatedError,
+)
 from mcz.formats import FORMATS
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
@@ -36,10 +44,15 @@ class Attachment:
 
 
 class File:
-    """An open MCZ file: its clips, skeletons and attachments by name, nothing decoded yet."""
+    """An open MCZ file: its clips, skeletons and attachments by name, nothing decoded yet.
+
+    Threads may share it, and processes after a fork. A File and what is taken from it, opened by
+    path, URL or from bytes, can be pickled: what is unpickled opens the same file anew.
+    """
 
     def __init__(self, container: Container) -> None:
         self.container = container
+        self.grows = False  # another process was appending: this is the file up to its last end
         rows = container.directory
         self.clips: Mapping[str, Clip] = {
             name: Clip(container, row) for name, row in rows.clips.items()
@@ -47,6 +60,9 @@ class File:
         self.attachments: Mapping[str, Attachment] = {
             name: Attachment(container, row) for name, row in rows.attachments.items()
         }
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return File, (self.container,)
 
     def __enter__(self) -> File:
         return self
@@ -158,11 +174,9 @@ def open(
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
         text = getattr(error, "strerror", None) or error
         raise AccessError(f"{target}: {text}") from None
+    options = {"salvage": salvage, "max_decoded": max_decoded, "reads_parts": unverified}
     try:
-        container = Container(
-            source, salvage=salvage, max_decoded=max_decoded, reads_parts=unverified
-        )
-        return File(container)
+        return _opened(source, options)
     except MczError as error:
         source.close()
         error.args = (f"{source.name}: {error}",)
@@ -170,3 +184,23 @@ def open(
     except BaseException:
         source.close()
         raise
+
+
+def _opened(source: ByteSource, options: Mapping[str, Any]) -> File:
+    """The file; while another process appends to it, the file up to its last end."""
+    while True:
+        try:
+            return File(Container(source, **options))
+        except TruncatedError as error:
+            size = source.size_now()
+            if source.grows():
+                if error.last_foot is None:
+                    raise
+                end = error.last_foot
+                break
+            if size == source.size:  # nobody is at it, or has been meanwhile
+                raise
+            source = source.up_to(size)
+    file = File(Container(source.up_to(end), **options))
+    file.grows = True
+    return file
