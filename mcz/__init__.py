@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from mcz.conversion import Fit, convert, from_positions
     from mcz.editing.archive import Outcome, Report, append, pack, unpack
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
+    from mcz.editing.repair import Repair, repair
     from mcz.editing.replacing import Replacement, replace
     from mcz.errors import (
         AccessError,
@@ -52,6 +53,7 @@ _HOMES = {
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions"),
+    "mcz.editing.repair": ("Repair", "repair"),
     "mcz.editing.replacing": ("Replacement", "replace"),
     "mcz.errors": (
         "AccessError",
@@ -111,6 +113,7 @@ __all__ = [
     "OptionError",
     "Outcome",
     "Problem",
+    "Repair",
     "Replacement",
     "Report",
     "Signal",
@@ -134,6 +137,7 @@ __all__ = [
     "post_filter",
     "read",
     "read_skeleton",
+    "repair",
     "replace",
     "stream_decode",
     "stream_encode",

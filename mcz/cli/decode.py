@@ -12,6 +12,7 @@ from mcz.cli.common import (
     Exit,
     Failure,
     binary_output,
+    damage_of,
     opened,
     plain_name,
     plural,
@@ -23,7 +24,7 @@ from mcz.cli.common import (
     write_output,
 )
 from mcz.cli.fits import facts_of, told
-from mcz.cli.options import decoded_option, force_option, json_option
+from mcz.cli.options import decoded_option, force_option, json_option, salvage_option
 from mcz.cli.parts import Filtered, Part, Preview
 
 if TYPE_CHECKING:
@@ -111,7 +112,7 @@ class _Wanted(NamedTuple):
     help="Fit the skeleton of a clip of positions to them (with --to amc or bvh).",
 )
 @click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
-@click.option("--salvage", is_flag=True, help="Write what a damaged file still holds.")
+@salvage_option
 @click.option(
     "--unverified",
     is_flag=True,
@@ -158,9 +159,7 @@ def command(
         say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")
     if fit is not None:
         say(f"{file}: {told(fit)}")
-    for line in facts["damage"]:
-        say(f"{file}: salvage: {line}")
-    return Exit.SALVAGED if facts["damage"] else Exit.FINE
+    return damage_of(file, facts["damage"])
 
 
 def _check_options(wanted: _Wanted, salvage: bool) -> None:

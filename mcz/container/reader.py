@@ -82,6 +82,8 @@ class Container:
         self.reads_parts = reads_parts and not salvage
         self.max_decoded = output_limit(source.size) if max_decoded is None else max_decoded
         self.damage: list[str] = []
+        self.broken: list[tuple[int, Chunk | None]] = []
+        self.feet: list[int] = []  # offsets of FOOTs, as far as salvage found them
         self.unverified = 0
         self.index: Foot | None = None
         self.directory = self._salvage() if salvage else self._open()
@@ -90,9 +92,15 @@ class Container:
     def __reduce__(self) -> tuple[Any, ...]:
         return _reopened, (self.source, self.salvage, self.max_decoded, self.reads_parts)
 
+    def strictly(self) -> Container:
+        """The same file, of which what is read is checked as in a sound one."""
+        other = Container.__new__(Container)
+        other.__dict__.update(self.__dict__ | {"salvage": False})
+        return other
+
     def _salvage(self) -> Directory:
         found = scan(self.source, salvage=True)
-        self.damage = found.damage
+        self.damage, self.broken, self.feet = found.damage, found.broken, found.feet
         if not found.chunks:
             raise FormatError("nothing can be salvaged: no chunk is whole")
         return found.directory
@@ -191,7 +199,10 @@ class Container:
             n_frames = row.n_frames
         found = (fields.name, fields.skeleton, n_frames, *rate, signals)
         listed = (row.name, row.skeleton, row.n_frames, row.rate_numerator, row.rate_denominator)
-        if found != (*listed, row.signals) and not (self.salvage and row.damage):
+        differs = found != (*listed, row.signals)
+        if differs and row.damage and not self.salvage:
+            raise FormatError(f"clip {row.name!r}: {row.damage[0]}")
+        if differs and not row.damage:
             raise FormatError(f"clip {row.name!r} is {found}, but the index says {listed}")
         return fields
 

@@ -170,6 +170,21 @@ class SignalReader:
         salvage(spans, self.info.covering(start, stop), (start, stop), rescue, self._complain)
         return values, mask
 
+    def whole_runs(self, start: int, stop: int) -> list[tuple[int, int]]:
+        """The runs of the stored frames start <= f < stop that can be decoded."""
+        spans, found = self._prepare(start, stop), []
+
+        def rescue(a: int, b: int) -> None:
+            self._finish(self._decode(spans, a, b), a, b)
+            found.append((a, b))
+
+        salvage(spans, self.info.covering(start, stop), (start, stop), rescue, lambda *_: None)
+        runs: list[tuple[int, int]] = []
+        for a, b in sorted(found):
+            joined = bool(runs) and runs[-1][1] == a
+            runs[-1:] = [(runs[-1][0], b)] if joined else [*runs[-1:], (a, b)]
+        return runs
+
     def _complain(self, start: int, stop: int, reason: object) -> None:
         self.container.damage.append(f"clip {self.name!r}, frames {start}:{stop}: {reason}")
 

@@ -111,7 +111,7 @@ def _locked_file(path: Path, prefix: str) -> tuple[BinaryIO, str]:
             handle, name = tempfile.mkstemp(prefix=prefix, suffix=SUFFIX, dir=path.parent)
         except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
             raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
-        stream = os.fdopen(handle, "wb")
+        stream = os.fdopen(handle, "w+b")
         if lock(stream) and Path(name).exists():  # else one has cleared it away just now
             return stream, name
         stream.close()
