@@ -126,7 +126,8 @@ def _check(stream: BinaryIO, size: int, max_decoded: int | None) -> None:
         return
     stream.flush()
     source = ByteSource(stream, name="the repaired file", size=size)
-    problems = validate(File(Container(source, max_decoded=max_decoded)))
+    file = File(Container(source, max_decoded=max_decoded))
+    problems = [problem for problem in validate(file) if problem.heading != "Codecs"]
     stream.seek(size)
     if problems:
         raise FormatError(f"the repaired file is not sound: {problems[0].message}")
@@ -209,7 +210,10 @@ class _Repairer(Copier):
         self._skeletons: dict[bytes, bytes] = {}  # the payload that stands for each id
 
     def name_of(self, cut: ClipCut) -> str:
-        return cut.name if isinstance(cut, _Run) else cut.clip.name
+        name = cut.name if isinstance(cut, _Run) else cut.clip.name
+        while isinstance(cut, _Run) and name in self.file.clips:
+            name += "+"
+        return name
 
     def skeletons(self) -> None:
         for kind, id_ in self.container.directory.shared:
