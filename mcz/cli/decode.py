@@ -12,11 +12,12 @@ from mcz.cli.common import (
     Exit,
     Failure,
     binary_output,
+    echo,
     opened,
     plain_name,
     print_json,
-    printable,
     say,
+    text_output,
     to_frames,
     to_rate,
     write_output,
@@ -292,7 +293,8 @@ def _deliver(
 ) -> None:
     """Write the outputs where they belong and say so."""
     if output == "-":
-        binary_output().write(outputs[0][2])
+        data = outputs[0][2]
+        (binary_output if b"\0" in data else text_output)().write(data)
         return
     folder = Path() if file == "-" else Path(file).parent
     if output is not None:
@@ -307,4 +309,4 @@ def _deliver(
         print_json({"outputs": rows, **facts})
     else:
         for row in rows:
-            click.echo(printable(f"{row['path']}  {row['bytes']:,} bytes"))
+            echo(f"{row['path']}  {row['bytes']:,} bytes")

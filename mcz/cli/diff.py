@@ -15,10 +15,10 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
+    echo,
     existing,
     opened,
     print_json,
-    printable,
     to_frames,
 )
 from mcz.cli.figures import figure_lines
@@ -83,10 +83,10 @@ def command(
         return Exit.FINE
     for number, document in enumerate(documents):
         for line in ([""] if number else []) + list(_lines(a, b, document)):
-            click.echo(printable(line))
+            echo(line)
     for key, found in only.items():
         for name in found:
-            click.echo(printable(f"only in {a if key == 'only_in_a' else b}: {name}"))
+            echo(f"only in {a if key == 'only_in_a' else b}: {name}")
     return Exit.FINE
 
 

@@ -12,10 +12,10 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
+    echo,
     existing,
     plural,
     print_json,
-    printable,
     say,
     to_frames,
 )
@@ -83,7 +83,7 @@ def command(
         print_json({"output": output, **asdict(found)})
         return Exit.FINE
     for line in _lines(output, found):
-        click.echo(printable(line))
+        echo(line)
     for text in found.left_out:
         say(f"left out: {text}")
     return Exit.FINE

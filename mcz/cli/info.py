@@ -12,16 +12,16 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
+    echo,
     opened,
     plural,
     print_json,
-    printable,
     run,
     say,
     table,
 )
 from mcz.cli.figures import figure_lines
-from mcz.cli.options import decoded_option, json_option
+from mcz.cli.options import decoded_option, json_option, version_option
 from mcz.cli.verify import is_unsound
 
 DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
@@ -64,7 +64,7 @@ def command(
     elif as_json:
         print_json(document)
     else:
-        click.echo("\n".join(printable(line) for line in lines(file, document)))
+        echo(*lines(file, document))
     return Exit.FINE
 
 
@@ -89,7 +89,7 @@ def _say_problems(file: str, size: int, problems: list[Any], as_json: bool) -> E
         rows = [{"offset": p.offset, "heading": p.heading, "message": p.message} for p in problems]
         print_json({"valid": not problems, "problems": rows})
     elif not problems:
-        click.echo(printable(f"{file}: valid, {size:,} bytes"))
+        echo(f"{file}: valid, {size:,} bytes")
     else:
         for p in problems:
             say(f'{file}: at {p.offset}: {p.message} (SPEC.md, "{p.heading}")')
@@ -100,8 +100,8 @@ def _print_layout(parts: list[tuple[int, int, str]], as_json: bool) -> None:
     if as_json:
         print_json([{"offset": at, "bytes": n, "meaning": text} for at, n, text in parts])
         return
-    rows = [[f"{at}", f"{n}", printable(text)] for at, n, text in parts]
-    click.echo(table([["offset", "bytes", "meaning"], *rows], "rrl"))
+    rows = [[f"{at}", f"{n}", text] for at, n, text in parts]
+    echo(*table([["offset", "bytes", "meaning"], *rows], "rrl").split("\n"))
 
 
 def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
@@ -255,7 +255,7 @@ def _percent(part: int, total: int) -> str:
 
 
 def main() -> None:
-    sys.exit(run(command, "mcz-info"))
+    sys.exit(run(version_option(command), "mcz-info"))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,18 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import click
 import numpy as np
 
-from mcz.cli.common import Exit, Failure, about, binary_output, existing, plural, say, to_rate
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    binary_output,
+    existing,
+    plural,
+    printable,
+    say,
+    text_output,
+    to_rate,
+)
 from mcz.cli.piped import NAME, standard_input
 from mcz.cli.rows import NUMBER, STATE
 
@@ -137,14 +148,14 @@ class _Binary:
 
 def _csv(cells: list[str]) -> bytes:
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(cells)
+    csv.writer(text, lineterminator="\n").writerow(map(printable, cells))
     return text.getvalue().encode("utf-8", "surrogateescape")
 
 
 def _print_all(reader: LiveReader, printer: _Text | _Binary) -> None:
     from mcz.cli.export import channel_names
 
-    output = binary_output()
+    output = binary_output() if isinstance(printer, _Binary) else text_output()
     clip: LiveClip | None = None
     names: list[str] | None = None
     for frame in reader:

@@ -14,9 +14,9 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
+    echo,
     existing,
     plural,
-    printable,
     say,
     to_rate,
 )
@@ -100,7 +100,7 @@ def command(
             held = _encode(sink, None, skeleton, binary, **options)
     if output not in (None, "-"):
         size = Path(str(output)).stat().st_size
-        click.echo(printable(f"{output}: {held}, live; {size:,} bytes"))
+        echo(f"{output}: {held}, live; {size:,} bytes")
     return Exit.FINE
 
 
