@@ -101,10 +101,19 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
         return Exit.FINE
     except (Failure, click.ClickException, MczError, OSError, MemoryError) as error:
         return _failed(error, as_json="--json" in given)
+    except ImportError as error:
+        if not _is_starved(error):
+            raise
+        return _failed(MemoryError(), as_json="--json" in given)
     except _Terminated:
         say("terminated")
         return Exit.TERMINATED
     return int(result or Exit.FINE)
+
+
+def _is_starved(error: ImportError) -> bool:
+    """Whether a library could not be loaded for want of memory, as loaders word it."""
+    return "failed to map segment" in str(error) or "annot allocate memory" in str(error)
 
 
 def _failed(error: Exception, *, as_json: bool) -> Exit:
