@@ -13,9 +13,6 @@ if TYPE_CHECKING:
     from mcz.editing.archive import Outcome, Report
 
 
-TOLD = ("skipped", "verbatim", "salvaged", "dropped")  # results whose reason is said
-
-
 def _table(report: Report) -> Iterator[str]:
     """What became of the files of each kind, where there is more than one kind."""
     kinds: dict[str, list[Outcome]] = {}
@@ -46,7 +43,7 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
         held = f"{plural(len(report.outcomes), 'file')}, {size:,} bytes"
         echo(f"{target}: {held}" + (f" ({shown})" if shown else ""), *_table(report))
         for outcome in report.outcomes:
-            if outcome.result in TOLD and outcome.message:
+            if outcome.message and outcome not in report.failures:
                 say(f"{outcome.path}: {outcome.result}: {outcome.message}")
     for failure in report.failures:
         named = failure.path in failure.message

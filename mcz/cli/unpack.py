@@ -13,14 +13,29 @@ from mcz.cli.progress import Progress
 @click.command(short_help="Every source file out of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@click.option(
+    "--names",
+    type=click.Choice(("stored", "portable", "strict")),
+    default="stored",
+    show_default=True,
+    help="Of names that some systems cannot hold, or not beside another: write them as stored "
+    "where this system can, write portable ones instead, or refuse them.",
+)
 @decoded_option
 @force_option
 @json_option
-def command(file: str, folder: str, max_decoded: int | None, force: bool, as_json: bool) -> Exit:
-    """Write every source file and attachment of FILE.mcz below DIR, under the path it had."""
+def command(
+    file: str, folder: str, names: str, max_decoded: int | None, force: bool, as_json: bool
+) -> Exit:
+    """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
+
+    No link that lies in DIR is followed, and no file replaces another of FILE.mcz.
+    """
     import mcz
 
     existing(file)
     with about(file), Progress() as progress:
-        report = mcz.unpack(file, folder, force=force, max_decoded=max_decoded, progress=progress)
+        report = mcz.unpack(
+            file, folder, force=force, names=names, max_decoded=max_decoded, progress=progress
+        )
     return conclude(report, folder, as_json)
