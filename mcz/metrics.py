@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.angles import without_turns
+from mcz.brief import brief
 from mcz.errors import MczError, MotionError
 from mcz.kinematics import point_names, point_set, points_and_markers_of, positions_of
 from mcz.motion import POSITION_KINDS, Motion, Signal, Skeleton
@@ -52,6 +53,8 @@ class Comparison:
     virtual_marker_max_cm: Number = None
     signals: Mapping[str, Number] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     @property
     def mean_position_error_cm(self) -> Number:

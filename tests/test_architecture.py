@@ -19,13 +19,14 @@ PACKAGE = Path(mcz.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # What a part may import; a part is the first name after ``mcz.``. Each may import itself.
-GROUND = {"errors", "schema", "numbers"}
+GROUND = {"brief", "errors", "schema", "numbers"}
 MODEL = GROUND | {"motion"}
 # Where motion, codec and container meet: what each of the doors below needs of the layers.
 JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
 DOORS = {"reading", "writing", "editing", "live", "conversion"}
 ALLOWED = {
     "jit": set(),
+    "brief": set(),
     "errors": set(),
     "schema": {"errors"},
     "numbers": {"errors", "schema"},

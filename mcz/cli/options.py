@@ -51,6 +51,14 @@ def decoded_option(function: Function) -> Function:
     )(function)
 
 
+token_option = click.option(
+    "--token",
+    metavar="TEXT",
+    envvar="MCZ_TOKEN",
+    help="What a client sends before it gets anything; MCZ_TOKEN in the environment keeps it out "
+    "of the list of processes. It encrypts nothing.",
+)
+
 param_option = click.option(
     "--param",
     "params",

@@ -25,6 +25,7 @@ from mcz.cli.common import (
     text_output,
     to_rate,
 )
+from mcz.cli.options import token_option
 from mcz.cli.piped import NAME, standard_input
 from mcz.cli.rows import NUMBER, STATE
 
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 @click.option(
     "--connect", metavar="HOST:PORT", help="Read from there over TCP; --join goes with it."
 )
+@token_option
 @click.option(
     "--lost",
     type=click.Choice(("refuse", "missing", "hold", "linear")),
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
 def command(
     file: str,
     connect: str | None,
+    token: str | None,
     lost: Lost,
     join: bool,
     post_filter: bool,
@@ -88,7 +91,7 @@ def command(
     from mcz.live.generators import stream_decode
 
     where = connect or (NAME if file == "-" else file)
-    with about(where), _stream(file, connect) as stream:
+    with about(where), _stream(file, connect, token) as stream:
         join = join or connect is not None
         reader = stream_decode(stream, lost=lost, join=join, post_filter=post_filter, rate=rate)
         try:
@@ -106,11 +109,11 @@ def command(
 
 
 @contextmanager
-def _stream(file: str, connect: str | None) -> Iterator[BinaryIO]:
+def _stream(file: str, connect: str | None, token: str | None) -> Iterator[BinaryIO]:
     if connect is not None:
         from mcz.cli.tcp import connected
 
-        with connected(connect) as stream:
+        with connected(connect, token) as stream:
             yield stream
     elif file == "-":
         yield standard_input()

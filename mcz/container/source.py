@@ -6,9 +6,9 @@ import io
 import os
 from collections.abc import Iterable
 from threading import Lock
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
-from mcz.errors import OptionError, TruncatedError
+from mcz.errors import AccessError, MczError, OptionError, TruncatedError
 
 
 class ByteSource:
@@ -70,6 +70,13 @@ class ByteSource:
         with self._lock:
             if getattr(self._stream, "closed", False):
                 raise OptionError(f"{self.name} is closed")
+            data = self._read_stream(offset, size)
+        self.n_requests += 1
+        self.n_bytes += size
+        return data
+
+    def _read_stream(self, offset: int, size: int) -> bytes:
+        try:
             self._stream.seek(offset)
             data: bytes = self._stream.read(size)
             while len(data) < size:  # raw streams may return less than was asked for
@@ -77,8 +84,14 @@ class ByteSource:
                 if not more:
                     raise TruncatedError(f"the file ended at {offset + len(data)} while read")
                 data += more
-        self.n_requests += 1
-        self.n_bytes += size
+        except MczError as error:
+            if self.remote and isinstance(error, TruncatedError):
+                raise AccessError(f"{self.name}: {error}") from None
+            raise
+        except Exception as error:
+            if not self.remote and not isinstance(error, OSError):
+                raise
+            raise _no_access(self.name, error) from None
         return data
 
     def close(self) -> None:
@@ -117,16 +130,32 @@ def open_source(target: Any) -> ByteSource:
             return ByteSource(io.BytesIO(target.read()), name=name)
         return ByteSource(target, remote=_is_remote(target), name=name)
     if "://" in str(target):
-        import fsspec
-
-        try:
-            stream = fsspec.open(str(target), "rb", cache_type="none").open()
-        except (ValueError, ImportError) as error:  # no such protocol, or not installed
-            raise OptionError(f"{target}: {error}") from None
-        return ByteSource(stream, remote=_is_remote(stream), name=str(target))
+        return _remote_source(str(target))
     if not isinstance(target, (str, os.PathLike)):
         raise OptionError(f"cannot open {target!r}: neither a path nor a binary stream")
     return ByteSource(open(target, "rb"), name=os.fspath(target))
+
+
+def _remote_source(target: str) -> ByteSource:
+    if target.lower().startswith(("http://", "https://")):
+        from mcz.container.http import HttpFile
+
+        return ByteSource(cast(BinaryIO, HttpFile(target)), remote=True, name=target)
+    import fsspec
+
+    try:
+        stream = fsspec.open(target, "rb", cache_type="none").open()
+        return ByteSource(stream, remote=_is_remote(stream), name=target)
+    except (ValueError, ImportError) as error:  # no such protocol, or not installed
+        raise OptionError(f"{target}: {error}") from None
+    except Exception as error:  # each file system has its own errors
+        raise _no_access(target, error) from None
+
+
+def _no_access(name: str, error: Exception) -> AccessError:
+    """That a file cannot be read, whatever its file system calls that."""
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return AccessError(text if name and name in text else f"{name}: {text}")
 
 
 def _is_remote(stream: Any) -> bool:

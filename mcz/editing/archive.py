@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from mcz.brief import brief
 from mcz.codecs import DEFAULT
 from mcz.container import payloads
 from mcz.container.reader import Container
@@ -45,12 +46,16 @@ class Outcome:
     size: int = 0
     message: str = ""
 
+    __repr__ = brief
+
 
 @dataclass(slots=True)
 class Report:
     """The outcomes of a command over many files."""
 
     outcomes: list[Outcome] = field(default_factory=list)
+
+    __repr__ = brief
 
     @property
     def failures(self) -> list[Outcome]:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from mcz.brief import brief
 from mcz.codecs.basis_models import name_of
 from mcz.container import payloads
 from mcz.container.chunks import CRC, FOOT, HEADER, SIGNATURE, Chunk
@@ -31,6 +32,8 @@ class Problem:
     offset: int
     heading: str
     message: str
+
+    __repr__ = brief
 
 
 def info(file: File) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from mcz.brief import brief
 from mcz.container.directory import ClipRow, Directory
 
 
@@ -14,6 +15,8 @@ class WrittenClip:
     name: str
     n_frames: int
     n_channels: int
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,8 @@ class Written:
     n_skeletons: int
     n_attachments: int
     decoded_bytes: int
+
+    __repr__ = brief
 
 
 def written(directory: Directory, size: int) -> Written:
