@@ -253,10 +253,11 @@ def _common_unit(a: Skeleton, b: Skeleton, notes: list[str]) -> tuple[Number, fl
     if a.unit_cm is not None and b.unit_cm is not None:
         return a.unit_cm, b.unit_cm / a.unit_cm
     if a.unit_cm is None and b.unit_cm is None:
-        notes.append("the length unit is unknown: no figures in cm")
+        notes.append("the length unit is unknown: no figures in cm (--unit says it)")
     else:
         notes.append(
-            "one side does not say its length unit: taken as the other's, no figures in cm"
+            "one side does not say its length unit: taken as the other's, no figures in cm "
+            "(--unit says it)"
         )
     return None, 1.0
 

@@ -20,6 +20,7 @@ from mcz.cli.common import (
     print_json,
     say,
 )
+from mcz.cli.figures import reached
 from mcz.cli.options import chosen, encoding_options, force_option, json_option
 from mcz.cli.progress import Progress
 
@@ -136,6 +137,9 @@ def _tell(target: str, written: Written, source_size: int, as_json: bool) -> Non
         say(f"{target}: reading it takes --max-decoded {needed}, the default is {allowed}")
     if not as_json:
         echo(summary(target, written, source_size))
+        for clip in written.clips:
+            if clip.quality is not None:
+                echo(f"  {reached(clip.quality)}")
         return
     from mcz.reading.report import info
 

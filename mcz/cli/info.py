@@ -12,7 +12,9 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
+    about,
     echo,
+    existing,
     opened,
     plural,
     print_json,
@@ -36,7 +38,7 @@ RATIOS = (
 
 
 @click.command(short_help="What a file holds and what it costs.", epilog=EXIT_CODES)
-@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @json_option
 @click.option("--layout", "show_layout", is_flag=True, help="What every range of bytes means.")
 @click.option(
@@ -45,13 +47,28 @@ RATIOS = (
     is_flag=True,
     help="Check everything; name the offset and SPEC.md's heading of each fault.",
 )
+@click.option(
+    "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of an AMC."
+)
 @decoded_option
 def command(
-    file: str, as_json: bool, show_layout: bool, check: bool, max_decoded: int | None
+    file: str,
+    as_json: bool,
+    show_layout: bool,
+    check: bool,
+    skeleton: str | None,
+    max_decoded: int | None,
 ) -> Exit:
-    """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz."""
-    from mcz.reading import report
+    """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz.
 
+    Of a source file (.bvh, .amc, .asf, .c3d) it shows the skeleton and the clip.
+    """
+    from mcz.reading import report, source_report
+
+    if source_report.is_source(file) and not (show_layout or check):
+        return _of_source(file, skeleton, as_json)
+    if skeleton is not None:
+        raise Failure("--skeleton is the ASF of an AMC", Exit.USAGE)
     if check:
         return _validate(file, max_decoded, as_json)
     with opened(file, max_decoded=max_decoded) as held:
@@ -65,6 +82,20 @@ def command(
         print_json(document)
     else:
         echo(*lines(file, document))
+    return Exit.FINE
+
+
+def _of_source(file: str, skeleton: str | None, as_json: bool) -> Exit:
+    from mcz.cli.source_text import source_lines
+    from mcz.reading.source_report import source_info
+
+    existing(file)
+    with about(file):
+        document = source_info(file, skeleton)
+    if as_json:
+        print_json(document)
+    else:
+        echo(*source_lines(file, document, _skeleton, _rate))
     return Exit.FINE
 
 
@@ -137,8 +168,9 @@ def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:
         f"angles in {skeleton['angle_unit'] or 'an unknown unit'}",
     ]
     name = f" {skeleton['name']}" if skeleton["name"] else ""
-    yield f"skeleton{name} ({skeleton['id'][:8]}): {', '.join(facts)}"
-    if skeleton["base"]:
+    id_ = f" ({skeleton['id'][:8]})" if "id" in skeleton else ""
+    yield f"skeleton{name}{id_}: {', '.join(facts)}"
+    if skeleton.get("base"):
         yield f"  derived from {skeleton['base'][:8]}"
     yield from _tree(skeleton["joints"])
 

@@ -80,7 +80,7 @@ def marker_distance(skeleton: Skeleton) -> float:
     if skeleton.unit_cm is None:
         raise OptionError(
             f"skeleton {skeleton.name!r}: its length unit is unknown, and virtual markers lie 3 cm "
-            "off its joints; give the unit"
+            "off its joints; give the unit (--unit)"
         )
     return MARKER_DISTANCE_CM / skeleton.unit_cm
 

@@ -128,10 +128,7 @@ def test_errors_are_json_where_it_is_asked_for(
     cut.write_bytes(data)
     found = document("decode", cut, "--to", "csv")
     assert (found["class"], found["exit_code"]) == ("ChecksumError", 1)
-    assert found["offset"] is not None
-    cut.write_bytes(data)
-    again = tmp_path / "again.mcz"
-    again.write_bytes(b"")
+    assert "offset" in found
     (tmp_path / "walk.bvh").write_bytes(b"HIERARCHY")
     assert document("sample", tmp_path)["class"] == "ExistsError"
 
