@@ -35,6 +35,7 @@ ALLOWED = {
     "angles": MODEL,
     "metrics": MODEL | {"angles", "kinematics"},
     "bjontegaard": GROUND,
+    "joint_errors": MODEL | {"kinematics"},
     "units": MODEL,
     "annexes": set(),
     "coding": GROUND | {"annexes"},
@@ -49,7 +50,7 @@ ALLOWED = {
     "editing": JOINT | {"metrics", "reading", "writing"},
     "live": JOINT | {"reading", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
-    "cli": MODEL | {"units", "kinematics", "metrics", "sample", "training"} | DOORS,
+    "cli": MODEL | {"units", "kinematics", "metrics", "joint_errors", "sample", "training"} | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
     "": MODEL | {"kinematics", "metrics"} | DOORS,  # mcz/__init__.py

@@ -99,7 +99,7 @@ def test_validate_names_a_fault_once(tmp_path: Path, of: str) -> None:
     [
         (
             ["--unit", "cm"],
-            "error of positions: mean 0.0462925 cm, greatest 0.461326 cm (frame 239",
+            "error of positions: mean 0.0462925 cm, greatest 0.461326 cm",
         ),
         ([], " units; --unit gives centimeters"),
     ],
