@@ -13,12 +13,13 @@ from mcz.cli.common import (
     Failure,
     binary_output,
     damage_of,
+    echo,
     opened,
     plain_name,
     plural,
     print_json,
-    printable,
     say,
+    text_output,
     to_frames,
     to_rate,
     write_output,
@@ -302,7 +303,8 @@ def _deliver(
 ) -> None:
     """Write the outputs where they belong and say so."""
     if output == "-":
-        binary_output().write(outputs[0][2])
+        data = outputs[0][2]
+        (binary_output if b"\0" in data else text_output)().write(data)
         return
     folder = Path() if file == "-" else Path(file).parent
     if output is not None:
@@ -317,4 +319,4 @@ def _deliver(
         print_json({"outputs": rows, **facts})
     else:
         for row in rows:
-            click.echo(printable(f"{row['path']}  {row['bytes']:,} bytes"))
+            echo(f"{row['path']}  {row['bytes']:,} bytes")

@@ -21,4 +21,21 @@ def lazy_group(prefix: str, names: Sequence[str]) -> type[click.Group]:
             command: click.Command = import_module(prefix + cmd_name).command
             return command
 
+        def resolve_command(
+            self, ctx: click.Context, args: list[str]
+        ) -> tuple[str | None, click.Command | None, list[str]]:
+            if args and args[0] not in names and not args[0].startswith("-"):
+                ctx.fail(unknown(args[0], names))
+            return super().resolve_command(ctx, args)
+
     return Commands
+
+
+def unknown(name: str, names: Sequence[str]) -> str:
+    """That there is no such command, and which are called nearly so."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name.lower(), names, 3, 0.7)
+    near += [known for known in names if known.startswith(name) and known not in near][:3]
+    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(names)}"
+    return f"no command {name!r}; {hint}"

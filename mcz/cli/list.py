@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from mcz.cli.common import Exit, damage_of, opened, print_json, printable, table
+from mcz.cli.common import Exit, damage_of, echo, opened, print_json, table
 from mcz.cli.options import json_option, salvage_option
 
 
@@ -34,7 +34,7 @@ def command(file: str, salvage: bool, as_json: bool) -> Exit:
         return damage_of(file, damage)
     rows = [
         [
-            printable(str(clip["name"])),
+            str(clip["name"]),
             str(clip["codec"]),
             f"{clip['n_frames']:,}",
             f"{clip['n_channels']}",
@@ -43,9 +43,9 @@ def command(file: str, salvage: bool, as_json: bool) -> Exit:
         for clip in clips
     ]
     if rows:
-        click.echo(table([["clip", "codec", "frames", "channels", "rate"], *rows], "llrrr"))
+        echo(*table([["clip", "codec", "frames", "channels", "rate"], *rows], "llrrr").split("\n"))
     for attachment in attachments:
-        click.echo(printable(f"{attachment['name']}  attachment, {attachment['bytes']:,} bytes"))
+        echo(f"{attachment['name']}  attachment, {attachment['bytes']:,} bytes")
     for alias in aliases:
-        click.echo(printable(f"{alias}  same content as another"))
+        echo(f"{alias}  same content as another")
     return damage_of(file, damage)

@@ -7,15 +7,10 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
-import click
-
-from mcz.cli.common import Exit, plural, print_json, printable, say
+from mcz.cli.common import Exit, echo, plural, print_json, say
 
 if TYPE_CHECKING:
     from mcz.editing.archive import Outcome, Report
-
-
-TOLD = ("skipped", "verbatim", "salvaged", "dropped", "damaged")  # results whose reason is said
 
 
 def _table(report: Report) -> Iterator[str]:
@@ -49,16 +44,10 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
         counts = Counter(outcome.result for outcome in report.outcomes)
         shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
         size = sum(outcome.size for outcome in report.outcomes)
-        click.echo(
-            printable(
-                f"{target}: {plural(len(report.outcomes), 'file')}, {size:,} bytes"
-                + (f" ({shown})" if shown else "")
-            )
-        )
-        for line in _table(report):
-            click.echo(printable(line))
+        held = f"{plural(len(report.outcomes), 'file')}, {size:,} bytes"
+        echo(f"{target}: {held}" + (f" ({shown})" if shown else ""), *_table(report))
         for outcome in report.outcomes:
-            if outcome.result in TOLD and outcome.message:
+            if outcome.message and outcome not in report.failures:
                 say(f"{outcome.path}: {outcome.result}: {outcome.message}")
     for failure in report.failures:
         named = failure.path in failure.message

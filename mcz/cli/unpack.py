@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from mcz.cli.common import Exit, about, existing, hinted
+from mcz.cli.common import Exit, about, existing
+from mcz.cli.damage import hinted
 from mcz.cli.options import decoded_option, force_option, json_option, salvage_option
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
@@ -14,15 +15,30 @@ from mcz.cli.progress import Progress
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @salvage_option
+@click.option(
+    "--names",
+    type=click.Choice(("stored", "portable", "strict")),
+    default="stored",
+    show_default=True,
+    help="Of names that some systems cannot hold, or not beside another: write them as stored "
+    "where this system can, write portable ones instead, or refuse them.",
+)
 @decoded_option
 @force_option
 @json_option
 def command(
-    file: str, folder: str, salvage: bool, max_decoded: int | None, force: bool, as_json: bool
+    file: str,
+    folder: str,
+    names: str,
+    salvage: bool,
+    max_decoded: int | None,
+    force: bool,
+    as_json: bool,
 ) -> Exit:
     """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
 
-    With --salvage those of a damaged file that are whole; each is checked as in a sound one.
+    No link that lies in DIR is followed, and no file replaces another of FILE.mcz. With --salvage
+    those of a damaged file that are whole are written; each is checked as in a sound one.
     """
     import mcz
 
@@ -33,6 +49,7 @@ def command(
             folder,
             salvage=salvage,
             force=force,
+            names=names,
             max_decoded=max_decoded,
             progress=progress,
         )

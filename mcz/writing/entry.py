@@ -52,6 +52,7 @@ class Entry:
     def __init__(self, path: Path, name: str, terms: Terms) -> None:
         self.path, self.name, self.terms = path, name, terms
         self.reason = ""  # why it was kept verbatim
+        self.quality: dict[str, str] | None = None  # of a lossy clip what its record says
 
     def write(self, draft: Draft, progress: Progress | None = None) -> str:
         """Write the file; return how: "skeleton", "parsed", "present" or "verbatim"."""
@@ -100,7 +101,7 @@ class Entry:
         name = clip_name(self.name, writer.directory)
         motion = replace(motion, name=name)
         codec, params = by_name(self.terms.codec), self.terms.params or {}
-        write_tuned(writer, motion, codec, params, progress)
+        self.quality = write_tuned(writer, motion, codec, params, progress)
         return "parsed"
 
     def _based(self, writer: Writer, motion: Motion, skeleton: Skeleton) -> Motion:

@@ -43,9 +43,9 @@ def write(
     with replacing(target, force=force) as stream:
         writer = Writer(stream, profile=profile_of(archive))
         name_skeleton(writer, motion.skeleton)
-        write_tuned(writer, motion, by_name(codec), params, progress)
+        quality = write_tuned(writer, motion, by_name(codec), params, progress)
         writer.finish()
-    return written(writer.directory, writer.offset)
+    return written(writer.directory, writer.offset, quality)
 
 
 def profile_of(archive: bool) -> Profile:
@@ -75,6 +75,7 @@ def encode(
     terms = Terms(codec, params, skeleton, rate, unit, verbatim, keep_skeleton=True)
     with replacing(target, force=force) as stream:
         draft = Draft(stream, profile_of(archive), hold=verbatim)
-        Entry(path, path.name, terms).write(draft, progress)
+        entry = Entry(path, path.name, terms)
+        entry.write(draft, progress)
         draft.finish()
-    return written(draft.writer.directory, draft.writer.offset)
+    return written(draft.writer.directory, draft.writer.offset, entry.quality)
