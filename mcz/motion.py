@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from itertools import pairwise
 from operator import itemgetter
 from typing import Any, Protocol
 
@@ -19,6 +18,9 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError
 from mcz.numbers import Grid, GridKind
+from mcz.numbers.blocks import grid_blocks as grid_blocks
+from mcz.numbers.exceptions import Exceptions as Exceptions
+from mcz.numbers.scaling import Scaling
 
 Vector = tuple[float, float, float]
 ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -194,22 +196,6 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Exceptions:
-    """Tokens of a text source that their grid does not print, sorted by row, then channel."""
-
-    rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    channels: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    texts: tuple[bytes, ...] = ()
-
-    def __post_init__(self) -> None:
-        if not len(self.rows) == len(self.channels) == len(self.texts):
-            raise MotionError("exceptions: rows, channels and texts differ in number")
-
-    def __len__(self) -> int:
-        return len(self.texts)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Signal:
     """Values of some channels over time.
 
@@ -217,6 +203,10 @@ class Signal:
     int64 where every grid is INTEGER. ``grids`` has one grid a channel; ``grid_changes`` lists
     (row, channel, grid) from that row on. ``mask`` (bool, same shape) is True where the value is
     valid; None means valid everywhere. Stored coordinates are kept beneath an invalid mark.
+
+    Where the file stores other numbers than it means (words of a converter), ``scaling`` says what
+    they mean, ``values`` are binary64 in units, and ``stored`` are the numbers of the file, which
+    grids, grid changes, exceptions and ordinals speak of. Elsewhere ``stored`` are the values.
     """
 
     values: NDArray[Any]
@@ -228,23 +218,29 @@ class Signal:
     grid_changes: tuple[tuple[int, int, Grid], ...] = ()
     channels: tuple[Channel, ...] | None = None  # None: those of the skeleton
     ordinals: NDArray[np.int64] | None = None  # on their grids; see ``to_ordinals``
+    scaling: Scaling | None = None
+    stored: NDArray[Any] = None  # type: ignore[assignment]  # set below where it is not given
 
     def __post_init__(self) -> None:
         if self.values.ndim != 2:
             raise MotionError(f"signal {self.name!r}: values of shape {self.values.shape}, not 2-D")
+        if self.scaling is None or self.stored is None:
+            object.__setattr__(self, "stored", self.values)
+        if self.stored.shape != self.values.shape:
+            raise MotionError(f"signal {self.name!r}: stored numbers do not match the values")
         if self.values.dtype not in (np.float64, np.int64):
             raise MotionError(f"signal {self.name!r}: values of type {self.values.dtype}")
         if not self.grids:
-            kind = GridKind.BINARY64 if self.values.dtype == np.float64 else GridKind.INTEGER
+            kind = GridKind.BINARY64 if self.stored.dtype == np.float64 else GridKind.INTEGER
             object.__setattr__(self, "grids", (Grid(kind),) * self.n_channels)
         if len(self.grids) != self.n_channels:
             raise MotionError(
                 f"signal {self.name!r}: {len(self.grids)} grids, {self.n_channels} channels"
             )
         integers = self.n_channels > 0 and all(g.kind == GridKind.INTEGER for g in self.grids)
-        if integers != (self.values.dtype == np.int64):
+        if integers != (self.stored.dtype == np.int64):
             raise MotionError(
-                f"signal {self.name!r}: {self.values.dtype} values on {self.grids[:1]}"
+                f"signal {self.name!r}: {self.stored.dtype} values on {self.grids[:1]}"
             )
         if self.samples_per_frame < 1 or len(self.values) % self.samples_per_frame:
             raise MotionError(
@@ -308,7 +304,22 @@ class Signal:
             ),
             grid_changes=tuple(changes),
             ordinals=None if self.ordinals is None else self.ordinals[first:last],
+            stored=self.stored[first:last],
         )
+
+    def in_units(self, scaling: Scaling | None) -> Signal:
+        """The same with ``values`` that mean what ``scaling`` says of the stored numbers."""
+        if scaling is None:
+            return self
+        values = scaling.values(self.stored)
+        return replace(self, values=values, stored=self.stored, scaling=scaling)
+
+    def as_stored(self) -> Signal:
+        """The same with the stored numbers as its values: what codecs and formats want."""
+        if self.scaling is None:
+            return self
+        stored = self.scaling.stored(self.values, self.stored)
+        return replace(self, values=stored, stored=stored, scaling=None)
 
     def to_ordinals(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """The ordinal of every value, and whether it gives exactly this value back.
@@ -316,6 +327,8 @@ class Signal:
         A binary grid has many NaNs, of which ``values`` shows only that they are NaN: where
         ``ordinals`` are given and still mean the value that is there, they are taken.
         """
+        if self.scaling is not None:
+            return self.as_stored().to_ordinals()
         ordinals = np.empty(self.values.shape, np.int64)
         exact = np.empty(self.values.shape, np.bool_)
         for rows, columns, grid in self.grid_blocks():
@@ -336,21 +349,6 @@ class Signal:
         if self.mask is None:
             return self.values
         return np.where(self.mask, self.values, np.nan)
-
-
-def grid_blocks(
-    n_rows: int, grids: Sequence[Grid], changes: Sequence[tuple[int, int, Grid]]
-) -> Iterator[tuple[slice, list[int], Grid]]:
-    """Blocks (rows, columns, grid) that cover ``n_rows``; see ``Signal.grid_changes``."""
-    cuts = sorted({0, n_rows, *(row for row, _, _ in changes)})
-    current = list(grids)
-    ordered = sorted(changes, key=lambda change: change[0])
-    for start, stop in pairwise(cuts):
-        for row, channel, grid in ordered:
-            if row == start:
-                current[channel] = grid
-        for grid in dict.fromkeys(current):
-            yield slice(start, stop), [c for c, g in enumerate(current) if g == grid], grid
 
 
 def _positive(rate: Any, name: str) -> Fraction:

@@ -223,7 +223,7 @@ class Copier:
             self.found.left_out.append(f"clip {cut.clip.name}: its source file, as joints were cut")
         elif held:
             motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
-            hashes = [value_hash(signal.values, signal.mask) for signal in motion.signals]
+            hashes = [value_hash(signal.stored, signal.mask) for signal in motion.signals]
             assert motion.source is not None
             try:
                 data = FORMATS[motion.source.format].write(motion)

@@ -18,8 +18,10 @@ from mcz.codecs.contract import Codec, Layout
 from mcz.container import payloads
 from mcz.container.masks import build_mask
 from mcz.errors import MotionError
+from mcz.formats import recording_of
 from mcz.motion import Exceptions, Motion, Signal, Skeleton
 from mcz.numbers import Grid, values_of_texts
+from mcz.numbers.scaling import Scaling
 from mcz.schema import build
 
 MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
@@ -102,6 +104,40 @@ class MemorySource:
             return []
         blocks = (mask[:, list(group)] for group in self.layout.groups)
         return [b"" if block.all() else build_mask(block) for block in blocks]
+
+
+def as_stored(motion: Motion) -> Motion:
+    """``motion`` with the numbers that a file holds, of which its source says what they mean.
+
+    Where it does not, the values are stored as they are, in their units.
+    """
+    if all(signal.scaling is None for signal in motion.signals):
+        return motion
+    told = recording_of(motion.source)
+    scaling = None if told is None else told.scaling
+    signals = tuple(
+        signal.as_stored() if _same(signal.scaling, scaling) else _in_units(signal)
+        for signal in motion.signals
+    )
+    return replace(motion, signals=signals)
+
+
+def _same(own: Scaling | None, told: Scaling | None) -> bool:
+    if own is None or told is None:
+        return own is None
+    pairs = ((own.offsets, told.offsets), (own.scales, told.scales))
+    return own.general == told.general and all(np.array_equal(*pair) for pair in pairs)
+
+
+def _in_units(signal: Signal) -> Signal:
+    """The signal with its values as what is stored, binary64."""
+    return Signal(
+        signal.values,
+        name=signal.name,
+        samples_per_frame=signal.samples_per_frame,
+        mask=signal.mask,
+        channels=signal.channels,
+    )
 
 
 def settle(signal: Signal) -> Block:
