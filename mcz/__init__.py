@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from mcz.reading.file import Attachment, File, open
     from mcz.reading.post_filtering import post_filter
     from mcz.reading.read import read
+    from mcz.reading.recording import Event, ForcePlatform, Recording, recording
     from mcz.reading.report import Problem, verify
     from mcz.reading.source_files import read_skeleton
     from mcz.writing.file import encode, write
@@ -70,6 +71,7 @@ _HOMES = {
     "mcz.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.reading.file": ("Attachment", "File", "open"),
     "mcz.reading.read": ("read",),
+    "mcz.reading.recording": ("Event", "ForcePlatform", "Recording", "recording"),
     "mcz.writing.file": ("encode", "write"),
     "mcz.reading.post_filtering": ("post_filter",),
     "mcz.kinematics.marker_motion": ("in_positions",),
@@ -92,12 +94,14 @@ __all__ = [
     "ChecksumError",
     "Clip",
     "Comparison",
+    "Event",
     "Exceptions",
     "ExistsError",
     "ExtractedClip",
     "Extraction",
     "File",
     "Fit",
+    "ForcePlatform",
     "FormatError",
     "Joint",
     "LimitError",
@@ -111,6 +115,7 @@ __all__ = [
     "OptionError",
     "Outcome",
     "Problem",
+    "Recording",
     "Replacement",
     "Report",
     "Signal",
@@ -134,6 +139,7 @@ __all__ = [
     "post_filter",
     "read",
     "read_skeleton",
+    "recording",
     "replace",
     "stream_decode",
     "stream_encode",

@@ -6,14 +6,16 @@ in parameters of POINT. Here they are apart, as the signal ``outputs``.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.errors import MotionError
 from mcz.formats.c3d_parameters import Parameters
-from mcz.motion import Channel
+from mcz.motion import Channel, Signal
 
 NAME = "outputs"
 UNITS_OF = {  # parameters of POINT that list outputs, and the one that holds their unit
@@ -24,6 +26,12 @@ UNITS_OF = {  # parameters of POINT that list outputs, and the one that holds th
     "SCALARS": "SCALAR_UNITS",
 }
 PARTS = ("x", "y", "z")
+USUAL = (  # units, and the list in which they usually are
+    (r"(?i)deg|rad|°", "ANGLES"),
+    (r"N.?m", "MOMENTS"),
+    (r"N\b", "FORCES"),
+    (r"k?W\b", "POWERS"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +92,44 @@ def unit_of(parameters: Parameters, groups: Sequence[str]) -> str:
     texts = [next(iter(parameters.texts("POINT", UNITS_OF[group])), b"") for group in groups]
     units = {text.decode("latin-1") for text in texts}
     return units.pop() if len(units) == 1 else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """The labels of outputs, and under the name of each list its labels and their unit."""
+
+    labels: tuple[str, ...]
+    groups: dict[str, tuple[list[str], str]]
+
+
+def described(outputs: Signal | None) -> Listed:
+    """Labels and lists that say what ``outputs``, channels ``NAME x``, ``NAME y``, ``NAME z``, are.
+
+    The unit of an output tells its list. Where there are more units than lists, the last list says
+    none. Raises MotionError for other channels.
+    """
+    channels = outputs.channels or () if outputs is not None else ()
+    labels: list[str] = []
+    groups: dict[str, tuple[list[str], str]] = {}
+    for first in range(0, len(channels), len(PARTS)):
+        three = channels[first : first + len(PARTS)]
+        label, unit = three[0].name.removesuffix(f" {PARTS[0]}"), three[0].unit
+        if [channel.name for channel in three] != [f"{label} {part}" for part in PARTS]:
+            raise MotionError(f"C3D has outputs of x, y and z, and {three[0].name!r} is none")
+        group = _list_of(unit, groups)
+        listed, held = groups.get(group, ([], unit))
+        groups[group] = ([*listed, *({label} - {*listed})], unit if held == unit else "")
+        labels.append(label)
+    return Listed(tuple(labels), groups)
+
+
+def _list_of(unit: str, groups: dict[str, tuple[list[str], str]]) -> str:
+    """The list for outputs of a unit: where it is usual, else one that has it or is free."""
+    usual = [name for pattern, name in USUAL if re.match(pattern, unit)]
+    for group in [*usual, *reversed(UNITS_OF)]:
+        if groups.get(group, ([], unit))[1] == unit:
+            return group
+    return next(reversed(UNITS_OF))
 
 
 def output_channels(parameters: Parameters, names: Sequence[str]) -> tuple[Channel, ...]:

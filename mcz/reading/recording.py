@@ -8,12 +8,24 @@ from typing import Any
 from mcz.container.reader import Container
 from mcz.errors import FormatError, OptionError, UnsupportedError
 from mcz.formats import format_by_id, recording_of
-from mcz.formats.c3d_recording import Recording
-from mcz.motion import Source
+from mcz.formats.c3d_events import Event as Event
+from mcz.formats.c3d_recording import ForcePlatform as ForcePlatform
+from mcz.formats.c3d_recording import Recording as Recording
+from mcz.motion import Motion, Source
 from mcz.numbers.scaling import Scaling
 from mcz.reading.signal_info import SignalInfo
 
 ANALOG = "analog"  # the signal whose stored numbers a source may have a meaning for
+
+
+def recording(motion: Motion) -> Recording | None:
+    """What the source of ``motion`` says beside all numbers; None where it says nothing.
+
+    Of a C3D: events, force platforms, units and descriptions. ``Clip.recording`` is that of a clip.
+    Raises FormatError on bad bytes.
+    """
+    found: Recording | None = recording_of(motion.source)
+    return found
 
 
 def read_recording(container: Container, fields: Any) -> Recording | None:
