@@ -22,6 +22,7 @@ from mcz.cli.common import (
 )
 from mcz.cli.figures import figure_lines
 from mcz.cli.options import decoded_option, json_option
+from mcz.cli.recording import recording_lines
 from mcz.cli.verify import is_unsound
 
 DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
@@ -135,6 +136,7 @@ def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:
         plural(skeleton["n_channels"], "channel"),
         "unit unknown" if unit is None else f"1 unit = {unit:.6g} cm",
         f"angles in {skeleton['angle_unit'] or 'an unknown unit'}",
+        f"{skeleton['up_axis']} up" if skeleton["up_axis"] else "up axis unknown",
     ]
     name = f" {skeleton['name']}" if skeleton["name"] else ""
     yield f"skeleton{name} ({skeleton['id'][:8]}): {', '.join(facts)}"
@@ -173,6 +175,7 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
         known = f"{model['name']}, well known" if model["name"] else "in the file"
         yield f"  model      {model['id'][:8]} ({known})"
     yield from _source(clip)
+    yield from recording_lines(clip["recording"])
     for key, value in clip["metadata"].items():
         yield f"  {key}  {value[:80]}"
     if clip["quality"]:

@@ -215,14 +215,14 @@ def _platforms(parameters: Parameters) -> Iterator[ForcePlatform]:
     used = parameters.count("FORCE_PLATFORM", "USED") or 0
     widths = {"TYPE": 1, "CORNERS": 12, "ORIGIN": 3}
     described = max(len(numbers[name]) // width for name, width in widths.items())
-    n_channels = _first_dimension(parameters, "CHANNEL")
-    rows = _first_dimension(parameters, "CAL_MATRIX")
+    n_channels, _ = _dimensions(parameters, "CHANNEL")
+    rows, columns = _dimensions(parameters, "CAL_MATRIX")
     for number in range(min(used, described)):
         type_ = _item(numbers["TYPE"], number, 1)
         corners = _vectors(_item(numbers["CORNERS"], number, 12))
         origin = _vectors(_item(numbers["ORIGIN"], number, 3))
         channels = _item(numbers["CHANNEL"], number, n_channels)
-        matrix = _item(numbers["CAL_MATRIX"], number, rows * rows)
+        matrix = _item(numbers["CAL_MATRIX"], number, rows * columns)
         yield ForcePlatform(
             _whole(type_[0]) if type_ else None,
             corners,
@@ -236,9 +236,11 @@ def _whole(number: float) -> int:
     return int(number) if np.isfinite(number) else 0
 
 
-def _first_dimension(parameters: Parameters, name: str) -> int:
+def _dimensions(parameters: Parameters, name: str) -> tuple[int, int]:
+    """The first two dimensions of a parameter of platforms, 0 where it has none."""
     parameter = parameters.get("FORCE_PLATFORM", name)
-    return parameter.dims[0] if parameter and parameter.dims else 0
+    dims = (*(parameter.dims if parameter else ()), 0, 0)
+    return dims[0], dims[1]
 
 
 def _item(numbers: Sequence[float], index: int, size: int) -> Sequence[float]:

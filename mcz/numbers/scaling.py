@@ -24,6 +24,17 @@ class Scaling:
     scales: Floats
     general: float = 1.0
 
+    def says(self, other: Scaling | None) -> bool:
+        """Whether both say the same."""
+        if other is None:
+            return False
+        pairs = (
+            (self.offsets, other.offsets),
+            (self.scales, other.scales),
+            ([self.general], [other.general]),
+        )
+        return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
+
     def values(self, stored: NDArray[Any], channels: slice | list[int] = slice(None)) -> Floats:
         """Stored numbers, (n_rows, n_channels), in units; ``channels`` says which these are."""
         with np.errstate(over="ignore", invalid="ignore"):  # files say what they like

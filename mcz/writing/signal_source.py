@@ -21,7 +21,6 @@ from mcz.errors import MotionError
 from mcz.formats import recording_of
 from mcz.motion import Exceptions, Motion, Signal, Skeleton
 from mcz.numbers import Grid, values_of_texts
-from mcz.numbers.scaling import Scaling
 from mcz.schema import build
 
 MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
@@ -109,28 +108,26 @@ class MemorySource:
 def as_stored(motion: Motion) -> Motion:
     """``motion`` with the numbers that a file holds, of which its source says what they mean.
 
-    Where it does not, the values are stored as they are, in their units.
+    Without a source that says so, the values are stored as they are, in their units. Raises
+    MotionError where the source says something else than a signal.
     """
     if all(signal.scaling is None for signal in motion.signals):
         return motion
     told = recording_of(motion.source)
-    scaling = None if told is None else told.scaling
-    signals = tuple(
-        signal.as_stored() if _same(signal.scaling, scaling) else _in_units(signal)
-        for signal in motion.signals
-    )
-    return replace(motion, signals=signals)
-
-
-def _same(own: Scaling | None, told: Scaling | None) -> bool:
-    if own is None or told is None:
-        return own is None
-    pairs = ((own.offsets, told.offsets), (own.scales, told.scales))
-    return own.general == told.general and all(np.array_equal(*pair) for pair in pairs)
+    if told is None:
+        return replace(motion, signals=tuple(map(_in_units, motion.signals)))
+    for signal in motion.signals:
+        if signal.scaling is not None and not signal.scaling.says(told.scaling):
+            raise MotionError(
+                f"signal {signal.name!r}: its source has another scaling; leave out one of the two"
+            )
+    return replace(motion, signals=tuple(signal.as_stored() for signal in motion.signals))
 
 
 def _in_units(signal: Signal) -> Signal:
     """The signal with its values as what is stored, binary64."""
+    if signal.scaling is None:
+        return signal
     return Signal(
         signal.values,
         name=signal.name,
