@@ -224,7 +224,7 @@ def _of_clip(held: File, wanted: _Wanted) -> tuple[list[Output], Fit | None]:
     else:
         outputs = [_export(clip, target, part, wanted)]
     if wanted.with_skeleton and target != "amc":
-        outputs.append(_skeleton(held, clip.skeleton_id))
+        outputs.append(_skeleton(held, _sourced(held, clip)))
     return outputs, fit
 
 
@@ -297,6 +297,14 @@ def _export(clip: Clip, target: str, part: Part, wanted: _Wanted) -> Output:
 def _stem(clip: Clip | Motion) -> str:
     """The clip's name without folders, which must not lead out of the output's folder."""
     return PurePosixPath(clip.name).name.strip(".") or "clip"
+
+
+def _sourced(held: File, clip: Clip) -> bytes:
+    """The skeleton of the clip, or its base where that alone has a file of its own."""
+    base = clip.base_skeleton
+    own = held.skeleton(clip.skeleton_id, with_source=True).source
+    has_file = own is None and base is not None and base.source is not None
+    return clip.skeleton.base if has_file and clip.skeleton.base else clip.skeleton_id
 
 
 def _skeleton(held: File, wanted: bytes) -> Output:
