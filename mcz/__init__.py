@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from mcz.conversion import Fit, convert, from_positions
     from mcz.editing.archive import Outcome, Report, append, pack, unpack
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
+    from mcz.editing.repair import Repair, repair
     from mcz.editing.replacing import Replacement, replace
     from mcz.errors import (
         AccessError,
@@ -53,6 +54,7 @@ _HOMES = {
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions"),
+    "mcz.editing.repair": ("Repair", "repair"),
     "mcz.editing.replacing": ("Replacement", "replace"),
     "mcz.errors": (
         "AccessError",
@@ -116,6 +118,7 @@ __all__ = [
     "Outcome",
     "Problem",
     "Recording",
+    "Repair",
     "Replacement",
     "Report",
     "Signal",
@@ -140,6 +143,7 @@ __all__ = [
     "read",
     "read_skeleton",
     "recording",
+    "repair",
     "replace",
     "stream_decode",
     "stream_encode",

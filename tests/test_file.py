@@ -81,15 +81,6 @@ def test_range_outside_the_clip(frames: tuple[int, int]) -> None:
         file.clips["smooth"].read(frames)
 
 
-def test_partial_read_is_counted_as_unverified() -> None:
-    with mcz.open(written(smooth(40), segment_frames=10)) as file:
-        clip = file.clips["smooth"]
-        clip.read((0, 10))
-        assert file.container.unverified == 0
-        clip.read((0, 10), joints=["knee"])
-        assert file.container.unverified == 1
-
-
 def test_invalid_values_are_nan_and_kept_beneath() -> None:
     motion = smooth(10)
     mask = np.ones((10, 10), bool)

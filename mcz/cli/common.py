@@ -7,7 +7,7 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
 from fractions import Fraction
@@ -17,7 +17,15 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import click
 
-from mcz.errors import AccessError, ExistsError, MczError, OptionError
+from mcz.errors import (
+    AccessError,
+    ExistsError,
+    FormatError,
+    LimitError,
+    MczError,
+    OptionError,
+    UnsupportedError,
+)
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
@@ -183,8 +191,11 @@ def existing(path: str) -> None:
 
 
 @contextmanager
-def opened(path: str, *, salvage: bool = False, max_decoded: int | None = None) -> Iterator[File]:
-    """The MCZ file at ``path``, or on standard input where that is ``-``; errors name it."""
+def opened(path: str, **options: Any) -> Iterator[File]:
+    """The MCZ file at ``path``, or on standard input where that is ``-``; errors name it.
+
+    ``options`` are those of ``mcz.open``.
+    """
     import mcz
 
     target: str | bytes = path
@@ -194,8 +205,51 @@ def opened(path: str, *, salvage: bool = False, max_decoded: int | None = None) 
         target = sys.stdin.buffer.read()
     else:
         existing(path)
-    with about(path), mcz.open(target, salvage=salvage, max_decoded=max_decoded) as file:
+    with about(path), hinted(target, options), mcz.open(target, **options) as file:
+        if file.grows:
+            say(f"{path}: another process is appending to it; this is what it held before")
         yield file
+
+
+@contextmanager
+def hinted(target: str | bytes, options: Mapping[str, Any]) -> Iterator[None]:
+    """Add to the error about a damaged file what is whole in it, and how to get that."""
+    try:
+        yield
+    except (UnsupportedError, LimitError):
+        raise
+    except FormatError as error:
+        whole = None if options.get("salvage") else _whole(target)
+        if whole is not None:
+            error.args = (f"{error}; {whole}",)
+        raise
+
+
+def _whole(target: str | bytes) -> str | None:
+    """What is whole in a damaged file on this machine; None where nothing is."""
+    import mcz
+
+    if isinstance(target, str) and "://" in target:
+        return None  # all of it would have to be read
+    try:
+        with mcz.open(target, salvage=True) as file:
+            rows = file.container.directory.clips.values()
+            clips = sum(row.cend is not None and not row.damage for row in rows)
+            damaged, attachments = len(rows) - clips, len(file.attachments)
+    except MczError:
+        return None
+    counts = ((clips, "whole clip"), (damaged, "damaged clip"), (attachments, "attachment"))
+    found = [plural(count, what) for count, what in counts if count]
+    if not found:
+        return None
+    return f"it holds {', '.join(found)}: --salvage reads them, mcz repair writes a sound file"
+
+
+def damage_of(path: str, damage: Sequence[str]) -> Exit:
+    """Print what salvage found wrong; the exit code that it makes."""
+    for line in damage:
+        say(f"{path}: salvage: {line}")
+    return Exit.SALVAGED if damage else Exit.FINE
 
 
 def binary_output() -> BinaryIO:

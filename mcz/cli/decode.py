@@ -12,8 +12,10 @@ from mcz.cli.common import (
     Exit,
     Failure,
     binary_output,
+    damage_of,
     opened,
     plain_name,
+    plural,
     print_json,
     printable,
     say,
@@ -22,7 +24,13 @@ from mcz.cli.common import (
     write_output,
 )
 from mcz.cli.fits import facts_of, told
-from mcz.cli.options import decoded_option, force_option, json_option, up_option
+from mcz.cli.options import (
+    decoded_option,
+    force_option,
+    json_option,
+    salvage_option,
+    up_option,
+)
 from mcz.cli.parts import Filtered, Part, Preview
 
 if TYPE_CHECKING:
@@ -122,7 +130,12 @@ class _Wanted(NamedTuple):
     help="Fit the skeleton of a clip of positions to them (with --to amc or bvh).",
 )
 @click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
-@click.option("--salvage", is_flag=True, help="Write what a damaged file still holds.")
+@salvage_option
+@click.option(
+    "--unverified",
+    is_flag=True,
+    help="Read no more than the part that is wanted: fewer bytes, but no checksum covers them.",
+)
 @decoded_option
 @force_option
 @json_option
@@ -130,6 +143,7 @@ def command(
     file: str,
     output: str | None,
     salvage: bool,
+    unverified: bool,
     max_decoded: int | None,
     force: bool,
     as_json: bool,
@@ -142,10 +156,11 @@ def command(
     wanted = _Wanted(**options)
     _check_options(wanted, salvage)
     _check_signal(wanted)
+    _refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
     if output == "-" and (as_json or wanted.with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
     fit: Fit | None = None
-    with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
+    with opened(file, salvage=salvage, max_decoded=max_decoded, unverified=unverified) as held:
         if held.clips:
             outputs, fit = _of_clip(held, wanted)
         elif wanted.target is not None or wanted.frames is not None or wanted.filtered:
@@ -155,14 +170,15 @@ def command(
             )
         else:
             outputs = [_other(held, wanted.name)]
-        damage = list(held.damage)
-    facts = {"damage": damage} if fit is None else {"damage": damage, "fit": facts_of(fit)}
+        facts: dict[str, Any] = {"damage": held.damage, "unverified_segments": held.unverified}
+    if fit is not None:
+        facts["fit"] = facts_of(fit)
     _deliver(file, output, outputs, force, as_json, facts)
+    if facts["unverified_segments"]:
+        say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")
     if fit is not None:
         say(f"{file}: {told(fit)}")
-    for line in damage:
-        say(f"{file}: salvage: {line}")
-    return Exit.SALVAGED if damage else Exit.FINE
+    return damage_of(file, facts["damage"])
 
 
 def _check_options(wanted: _Wanted, salvage: bool) -> None:

@@ -13,13 +13,14 @@ from mcz.cli.common import (
     Failure,
     about,
     existing,
+    hinted,
     plural,
     print_json,
     printable,
     say,
     to_frames,
 )
-from mcz.cli.options import decoded_option, force_option, json_option
+from mcz.cli.options import decoded_option, force_option, json_option, salvage_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     "--frames", metavar="A:B", callback=to_frames, help="Keep frames A <= f < B, counted from 0."
 )
 @click.option("--clip", "name", metavar="NAME", help="Take out this clip alone. Default: all.")
+@salvage_option
 @decoded_option
 @force_option
 @json_option
@@ -53,6 +55,7 @@ def command(
     joints: str | None,
     frames: tuple[int, int | None] | None,
     name: str | None,
+    salvage: bool,
     max_decoded: int | None,
     force: bool,
     as_json: bool,
@@ -60,14 +63,15 @@ def command(
     """Cut frames, joints or the finest resolutions out of IN.mcz, without re-encoding.
 
     Streams are copied byte for byte, so the values of OUT.mcz are those that IN.mcz gives for the
-    same frames, joints and resolution. Its quality record says what was cut.
+    same frames, joints and resolution. Its quality record says what was cut. With --salvage IN.mcz
+    may be damaged, if not in what is cut out; mcz repair takes out all that is whole.
     """
     import mcz
 
     if "-" in (file, output):
         raise Failure("extract reads and writes files, not standard streams", Exit.USAGE)
     existing(file)
-    with about(file, output), Progress() as progress:
+    with about(file, output), hinted(file, {"salvage": salvage}), Progress() as progress:
         found = mcz.extract(
             file,
             output,
@@ -75,6 +79,7 @@ def command(
             joints=None if joints is None else [joint.strip() for joint in joints.split(",")],
             frames=frames,
             clip=name,
+            salvage=salvage,
             force=force,
             max_decoded=max_decoded,
             progress=progress,

@@ -12,6 +12,7 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
+    damage_of,
     opened,
     plural,
     print_json,
@@ -21,7 +22,7 @@ from mcz.cli.common import (
     table,
 )
 from mcz.cli.figures import figure_lines
-from mcz.cli.options import decoded_option, json_option
+from mcz.cli.options import decoded_option, json_option, salvage_option
 from mcz.cli.recording import recording_lines
 from mcz.cli.verify import is_unsound
 
@@ -46,27 +47,34 @@ RATIOS = (
     is_flag=True,
     help="Check everything; name the offset and SPEC.md's heading of each fault.",
 )
+@salvage_option
 @decoded_option
 def command(
-    file: str, as_json: bool, show_layout: bool, check: bool, max_decoded: int | None
+    file: str,
+    as_json: bool,
+    show_layout: bool,
+    check: bool,
+    salvage: bool,
+    max_decoded: int | None,
 ) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz."""
     from mcz.reading import report
 
     if check:
         return _validate(file, max_decoded, as_json)
-    with opened(file, max_decoded=max_decoded) as held:
+    with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
         if show_layout:
             parts = report.layout(held)
         else:
             document = report.info(held)
+        damage = list(held.damage)
     if show_layout:
         _print_layout(parts, as_json)
     elif as_json:
         print_json(document)
     else:
         click.echo("\n".join(printable(line) for line in lines(file, document)))
-    return Exit.FINE
+    return damage_of(file, damage)
 
 
 def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import click
 
-from mcz.cli.common import Exit, opened, print_json, printable, table
-from mcz.cli.options import json_option
+from mcz.cli.common import Exit, damage_of, opened, print_json, printable, table
+from mcz.cli.options import json_option, salvage_option
 
 
 @click.command(short_help="Names of clips, from the index alone.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@salvage_option
 @json_option
-def command(file: str, as_json: bool) -> Exit:
+def command(file: str, salvage: bool, as_json: bool) -> Exit:
     """List the clips and attachments of FILE.mcz; only its index is read."""
-    with opened(file) as held:
+    with opened(file, salvage=salvage) as held:
         clips = [
             {
                 "name": clip.name,
@@ -26,10 +27,11 @@ def command(file: str, as_json: bool) -> Exit:
             for clip in held.clips.values()
         ]
         attachments = [{"name": a.name, "bytes": a.size} for a in held.attachments.values()]
-        aliases = sorted(held.aliases)
+        aliases, damage = sorted(held.aliases), list(held.damage)
     if as_json:
-        print_json({"clips": clips, "attachments": attachments, "aliases": aliases})
-        return Exit.FINE
+        document = {"clips": clips, "attachments": attachments, "aliases": aliases}
+        print_json(document | ({"damage": damage} if salvage else {}))
+        return damage_of(file, damage)
     rows = [
         [
             printable(str(clip["name"])),
@@ -46,4 +48,4 @@ def command(file: str, as_json: bool) -> Exit:
         click.echo(printable(f"{attachment['name']}  attachment, {attachment['bytes']:,} bytes"))
     for alias in aliases:
         click.echo(printable(f"{alias}  same content as another"))
-    return Exit.FINE
+    return damage_of(file, damage)

@@ -15,6 +15,7 @@ COMMANDS = (
     "decode",
     "info",
     "verify",
+    "repair",
     "pack",
     "append",
     "unpack",

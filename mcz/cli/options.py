@@ -23,6 +23,13 @@ def force_option(function: Function) -> Function:
     return click.option("--force", is_flag=True, help="Overwrite what exists.")(function)
 
 
+def salvage_option(function: Function) -> Function:
+    """``--salvage``, as the argument ``salvage`` of ``mcz.open``."""
+    return click.option(
+        "--salvage", is_flag=True, help="Of a damaged file use what is whole; say what is not."
+    )(function)
+
+
 def decoded_option(function: Function) -> Function:
     """``--max-decoded``, as the argument ``max_decoded`` of ``mcz.open``."""
     return click.option(

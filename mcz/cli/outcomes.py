@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from mcz.editing.archive import Outcome, Report
 
 
-TOLD = ("skipped", "verbatim", "salvaged", "dropped")  # results whose reason is said
+TOLD = ("skipped", "verbatim", "salvaged", "dropped", "damaged")  # results whose reason is said
 
 
 def _table(report: Report) -> Iterator[str]:
@@ -33,6 +33,10 @@ def _table(report: Report) -> Iterator[str]:
         yield f"  {kind:<8} {len(outcomes):>7,} {size:>15,}  {results}"
 
 
+def _damage(report: Report) -> dict[str, list[str]]:
+    return {"damage": report.damage} if report.damage else {}
+
+
 def conclude(report: Report, target: str, as_json: bool) -> Exit:
     """Print what became of the files; the errors last, one line each on standard error."""
     if as_json:
@@ -40,7 +44,7 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
             {"path": o.path, "result": o.result, "bytes": o.size, "message": o.message}
             for o in report.outcomes
         ]
-        print_json({"target": target, "files": rows})
+        print_json({"target": target, "files": rows} | _damage(report))
     else:
         counts = Counter(outcome.result for outcome in report.outcomes)
         shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
@@ -63,4 +67,7 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
         return Exit.BAD_INPUT
     if report.failures:
         return Exit.USAGE
-    return Exit.SALVAGED if report.count("salvaged") else Exit.FINE
+    for line in report.damage:
+        say(f"salvage: {line}")
+    lost = report.damage or report.count("salvaged") or report.count("damaged")
+    return Exit.SALVAGED if lost else Exit.FINE

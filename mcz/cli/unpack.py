@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from mcz.cli.common import Exit, about, existing
-from mcz.cli.options import decoded_option, force_option, json_option
+from mcz.cli.common import Exit, about, existing, hinted
+from mcz.cli.options import decoded_option, force_option, json_option, salvage_option
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
@@ -13,14 +13,27 @@ from mcz.cli.progress import Progress
 @click.command(short_help="Every source file out of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@salvage_option
 @decoded_option
 @force_option
 @json_option
-def command(file: str, folder: str, max_decoded: int | None, force: bool, as_json: bool) -> Exit:
-    """Write every source file and attachment of FILE.mcz below DIR, under the path it had."""
+def command(
+    file: str, folder: str, salvage: bool, max_decoded: int | None, force: bool, as_json: bool
+) -> Exit:
+    """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
+
+    With --salvage those of a damaged file that are whole; each is checked as in a sound one.
+    """
     import mcz
 
     existing(file)
-    with about(file), Progress() as progress:
-        report = mcz.unpack(file, folder, force=force, max_decoded=max_decoded, progress=progress)
+    with about(file), hinted(file, {"salvage": salvage}), Progress() as progress:
+        report = mcz.unpack(
+            file,
+            folder,
+            salvage=salvage,
+            force=force,
+            max_decoded=max_decoded,
+            progress=progress,
+        )
     return conclude(report, folder, as_json)

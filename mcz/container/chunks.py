@@ -117,6 +117,14 @@ def read_chunk(source: ByteSource, offset: int) -> Chunk:
     return chunk
 
 
+def named_chunk(source: ByteSource, offset: int) -> Chunk | None:
+    """The chunk that the header at ``offset`` names, however much of it is there."""
+    try:
+        return parse_header(source.read(offset, HEADER.size), offset)
+    except FormatError:
+        return None
+
+
 def read_payload(source: ByteSource, chunk: Chunk, limit: int) -> bytes:
     """The checked payload of ``chunk``; raises ChecksumError, or LimitError beyond ``limit``."""
     if chunk.length is None:

@@ -5,7 +5,7 @@ SPEC.md, "INDX", is normative.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -106,6 +106,14 @@ class ClipRow:
     ancillary: list[Chunk] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
 
+    def frames_found(self, stops: Sequence[int]) -> int:
+        """The frames that it shows without CEND: up to the last segment of each signal."""
+        found = 0
+        for stop, row in zip(stops, self.signals, strict=True):
+            most = self.n_frames if row.skip or row.spare else stop  # those after are spare
+            found = max(found, min(stop - row.skip, most))
+        return found
+
 
 @dataclass(slots=True)
 class AttachmentRow:
@@ -150,6 +158,8 @@ class Found:
     feet: list[int] = field(default_factory=list)  # offsets of the FOOTs
     damage: list[str] = field(default_factory=list)
     ends: dict[int, int] = field(default_factory=dict)  # of open DATA chunks, by their offsets
+    # What salvage could not take in: its offset, and the chunk where its header is sound.
+    broken: list[tuple[int, Chunk | None]] = field(default_factory=list)
 
 
 def build_index(directory: Directory) -> bytes:

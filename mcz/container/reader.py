@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from typing import Any
+from weakref import finalize
 
 from mcz.container import payloads
 from mcz.container.chunks import (
@@ -63,23 +64,43 @@ TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a
 
 
 class Container:
-    """An open file. ``unverified`` counts chunks of which only a part was read and checked."""
+    """An open file. ``unverified`` counts the segments of which only a part was read.
+
+    That happens where ``reads_parts`` allows it, and never otherwise.
+    """
 
     def __init__(
-        self, source: ByteSource, *, salvage: bool = False, max_decoded: int | None = None
+        self,
+        source: ByteSource,
+        *,
+        salvage: bool = False,
+        max_decoded: int | None = None,
+        reads_parts: bool = False,
     ) -> None:
         self.source = source
         self.salvage = salvage
+        self.reads_parts = reads_parts and not salvage
         self.max_decoded = output_limit(source.size) if max_decoded is None else max_decoded
         self.damage: list[str] = []
+        self.broken: list[tuple[int, Chunk | None]] = []
+        self.feet: list[int] = []  # offsets of FOOTs, as far as salvage found them
         self.unverified = 0
         self.index: Foot | None = None
         self.directory = self._salvage() if salvage else self._open()
         self.profile: Profile = parse_head(self.directory.head)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _reopened, (self.source, self.salvage, self.max_decoded, self.reads_parts)
+
+    def strictly(self) -> Container:
+        """The same file, of which what is read is checked as in a sound one."""
+        other = Container.__new__(Container)
+        other.__dict__.update(self.__dict__ | {"salvage": False})
+        return other
+
     def _salvage(self) -> Directory:
         found = scan(self.source, salvage=True)
-        self.damage = found.damage
+        self.damage, self.broken, self.feet = found.damage, found.broken, found.feet
         if not found.chunks:
             raise FormatError("nothing can be salvaged: no chunk is whole")
         return found.directory
@@ -178,7 +199,10 @@ class Container:
             n_frames = row.n_frames
         found = (fields.name, fields.skeleton, n_frames, *rate, signals)
         listed = (row.name, row.skeleton, row.n_frames, row.rate_numerator, row.rate_denominator)
-        if found != (*listed, row.signals) and not (self.salvage and row.damage):
+        differs = found != (*listed, row.signals)
+        if differs and row.damage and not self.salvage:
+            raise FormatError(f"clip {row.name!r}: {row.damage[0]}")
+        if differs and not row.damage:
             raise FormatError(f"clip {row.name!r} is {found}, but the index says {listed}")
         return fields
 
@@ -241,16 +265,16 @@ class Container:
         wanted: Sequence[int] | None,
         table: StreamTable | None = None,
     ) -> tuple[StreamTable, dict[int, bytes]]:
-        """The streams with the indices ``wanted`` (None: all), read together where they are near.
+        """At least the streams with the indices ``wanted`` (None: all) of a segment.
 
         ``table`` is that of the segment where it was read before.
-        A chunk that is read whole is checked by its crc; otherwise it counts as unverified.
+        All that holds the segment is read and checked (CHUNK-03), unless parts may be.
         """
         self._check_row(row)
-        if wanted is None or self.source.remote:
+        if wanted is None or not self.in_part(row):
             return self._all_streams(row, counts)
         table = table or self.table(row, counts)
-        self.unverified += 1
+        self.unverified += 1  # CHUNK-07
         got: dict[int, bytes] = {}
         for run in _runs(table, sorted(wanted), self.source.gap):
             start = table.offsets[run[0]]
@@ -260,6 +284,10 @@ class Container:
                 at = table.offsets[index] - start
                 got[index] = data[at : at + table.lengths[index]]
         return table, got
+
+    def in_part(self, row: SegmentRow) -> bool:
+        """Whether less than the whole segment may be read: not where one request gets it all."""
+        return self.reads_parts and row.size > self.source.gap
 
     def _all_streams(
         self, row: SegmentRow, counts: StreamCounts
@@ -300,6 +328,20 @@ class Container:
             raise FormatError(f"a segment is said to lie at {row.offset}, past the end of the file")
         limit = self.profile.packet_bytes if row.packet else self.profile.chunk_bytes
         check(f"DATA at {row.offset}: bytes", row.size, limit)
+
+
+def _reopened(source: ByteSource, *options: Any) -> Container:
+    """What a pickled Container becomes: the same file, opened anew, closed when it is let go."""
+    salvage, max_decoded, reads_parts = options
+    try:
+        container = Container(
+            source, salvage=salvage, max_decoded=max_decoded, reads_parts=reads_parts
+        )
+    except BaseException:
+        source.close()
+        raise
+    finalize(container, source.close)
+    return container
 
 
 def _check_table(table: StreamTable, row: SegmentRow) -> None:

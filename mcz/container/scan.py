@@ -7,7 +7,6 @@ valid chunk and goes on. SPEC.md, "Grammar" and "Salvage", are normative.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 from mcz.container import payloads, strict
 from mcz.container.chunks import (
@@ -22,6 +21,7 @@ from mcz.container.chunks import (
     check_signature,
     chunks_in,
     is_foot_at,
+    named_chunk,
     parse_foot,
     read_chunk,
     read_payload,
@@ -100,6 +100,7 @@ class Walker:
                     error.offset = begin
                     raise
                 self._note(error)  # SALV-03
+                self.found.broken.append((begin, named_chunk(self.source, begin)))
                 at = self._skip(begin, at)  # SALV-01, SALV-02, SALV-04
         self._finish()
 
@@ -230,15 +231,8 @@ class Walker:
             raise FormatError(f"chunk {chunk.label}: a second alias {fields.name!r}")
         if self.strict:
             strict.check_path(fields.name, chunk.label)
-            self._check_target(chunk, fields)
+            strict.check_target(fields, chunk.label, self.sourced)
         self.found.directory.aliases[fields.name] = (fields.of, fields.target)
-
-    def _check_target(self, chunk: Chunk, fields: Any) -> None:
-        """Whether what an alias stands for is there before it, and can be restored."""
-        if (fields.of, bytes(fields.target)) not in self.sourced:  # GRAM-04
-            raise FormatError(
-                f"chunk {chunk.label}: nothing before it with a source is {fields.target!r}"
-            )
 
     def _begin_clip(self, chunk: Chunk) -> None:
         self._outside(chunk)
@@ -319,7 +313,7 @@ class Walker:
         clip, self.clip = self.clip, None
         if clip.cend is None:
             clip.damage.append(f"clip {clip.name!r} has no CEND")
-            clip.n_frames = self._frames_found(clip)
+            clip.n_frames = clip.frames_found(self.first)
         for signal, (frames, row) in enumerate(zip(self.first, clip.signals, strict=True)):
             stored = row.stored(clip.n_frames)
             if frames != stored:
@@ -330,14 +324,6 @@ class Walker:
                     raise error
                 clip.damage.append(str(error))
         self.found.directory.clips[clip.name] = clip
-
-    def _frames_found(self, clip: ClipRow) -> int:
-        """The frames that a clip without CEND shows: up to its last segment."""
-        found = 0
-        for stop, row in zip(self.first, clip.signals, strict=True):
-            most = clip.n_frames if row.skip or row.spare else stop  # those after are spare
-            found = max(found, min(stop - row.skip, most))
-        return found
 
     def _index(self, chunk: Chunk) -> None:
         self._outside(chunk)

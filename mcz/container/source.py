@@ -5,14 +5,20 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Iterable
+from pathlib import Path
 from threading import Lock
 from typing import Any, BinaryIO
 
+from mcz.container.locks import is_locked
 from mcz.errors import OptionError, TruncatedError
 
 
 class ByteSource:
     """Reads ranges of a seekable binary stream and counts what it read.
+
+    Threads may share it, and processes after a fork: a file on disk is read at a position of the
+    read's own, a connection is opened anew. With ``target``, what ``open_source`` takes, it can be
+    pickled.
 
     ``gap``: two wanted ranges that lie at most this far apart are read as one. Zero suits a disk;
     over a network a request costs more than the bytes between. ``tail``: how many bytes at the end
@@ -20,10 +26,19 @@ class ByteSource:
     """
 
     def __init__(
-        self, stream: BinaryIO, *, remote: bool = False, name: str = "", size: int | None = None
+        self,
+        stream: BinaryIO,
+        *,
+        remote: bool = False,
+        name: str = "",
+        size: int | None = None,
+        target: str | bytes | None = None,
     ) -> None:
         self._stream = stream
+        self._positioned = _is_plain_file(stream)
         self._lock = Lock()  # seek and read belong together, whoever else reads
+        self._process = os.getpid()
+        self.target = target
         self.gap = 64 * 1024 if remote else 0
         self.block = 64 * 1024 if remote else 8 * 1024
         self.tail = 128 * 1024 if remote else 512
@@ -67,19 +82,52 @@ class ByteSource:
             self._held.append((start, self._request(start, stop - start)))
 
     def _request(self, offset: int, size: int) -> bytes:
-        with self._lock:
-            if getattr(self._stream, "closed", False):
-                raise OptionError(f"{self.name} is closed")
-            self._stream.seek(offset)
-            data: bytes = self._stream.read(size)
-            while len(data) < size:  # raw streams may return less than was asked for
-                more = self._stream.read(size - len(data))
-                if not more:
-                    raise TruncatedError(f"the file ended at {offset + len(data)} while read")
-                data += more
+        if self._process != os.getpid():
+            self._forked()
+        if getattr(self._stream, "closed", False):
+            raise OptionError(f"{self.name} is closed")
+        data = self._read_at(offset, size)
+        while len(data) < size:  # raw streams may return less than was asked for
+            more = self._read_at(offset + len(data), size - len(data))
+            if not more:
+                raise TruncatedError(f"the file ended at {offset + len(data)} while read")
+            data += more
         self.n_requests += 1
         self.n_bytes += size
         return data
+
+    def _read_at(self, offset: int, size: int) -> bytes:
+        if self._positioned:
+            return os.pread(self._stream.fileno(), size, offset)
+        with self._lock:
+            self._stream.seek(offset)
+            data: bytes = self._stream.read(size)
+            return data
+
+    def _forked(self) -> None:
+        """Let this process have what a fork would share: a connection, and a lock perhaps held."""
+        self._process, self._lock = os.getpid(), Lock()
+        if self.remote and isinstance(self.target, str):
+            self._stream = _remote_stream(self.target)
+
+    def grows(self) -> bool:
+        """Whether another process is appending to the file."""
+        return self._positioned and is_locked(self._stream)
+
+    def size_now(self) -> int:
+        """The size of the file, which may have changed since it was opened."""
+        return os.fstat(self._stream.fileno()).st_size if self._positioned else self.size
+
+    def up_to(self, size: int) -> ByteSource:
+        """The first ``size`` bytes, as a source of their own of the same stream."""
+        return ByteSource(self._stream, name=self.name, size=size, target=self.target)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.target is None:
+            raise OptionError(
+                f"{self.name} was opened as a stream and cannot be pickled; open a path"
+            )
+        return open_source, (self.target,)
 
     def close(self) -> None:
         self._stream.close()
@@ -104,29 +152,41 @@ class Forward:
         return self._block[first:stop]
 
 
+def _is_plain_file(stream: Any) -> bool:
+    """Whether positions of ``stream`` are those of a file on disk, which can be read at any."""
+    raw = stream.raw if isinstance(stream, io.BufferedReader) else stream
+    return isinstance(raw, io.FileIO) and hasattr(os, "pread")
+
+
 def open_source(target: Any) -> ByteSource:
     """A ByteSource of a path, an fsspec target such as "https://...", or a binary stream.
 
     A stream that cannot seek is read to its end first.
     """
     if isinstance(target, (bytes, bytearray, memoryview)):
-        return ByteSource(io.BytesIO(target), name="bytes")
+        data = bytes(target)
+        return ByteSource(io.BytesIO(data), name="bytes", target=data)
     if hasattr(target, "read"):
         name = str(getattr(target, "name", "stream"))
         if not target.seekable():
             return ByteSource(io.BytesIO(target.read()), name=name)
         return ByteSource(target, remote=_is_remote(target), name=name)
     if "://" in str(target):
-        import fsspec
-
-        try:
-            stream = fsspec.open(str(target), "rb", cache_type="none").open()
-        except (ValueError, ImportError) as error:  # no such protocol, or not installed
-            raise OptionError(f"{target}: {error}") from None
-        return ByteSource(stream, remote=_is_remote(stream), name=str(target))
+        stream = _remote_stream(str(target))
+        return ByteSource(stream, remote=_is_remote(stream), name=str(target), target=str(target))
     if not isinstance(target, (str, os.PathLike)):
         raise OptionError(f"cannot open {target!r}: neither a path nor a binary stream")
-    return ByteSource(open(target, "rb"), name=os.fspath(target))
+    path = str(Path(target).absolute())  # holds wherever the process goes
+    return ByteSource(open(target, "rb"), name=os.fspath(target), target=path)
+
+
+def _remote_stream(target: str) -> Any:
+    import fsspec
+
+    try:
+        return fsspec.open(target, "rb", cache_type="none").open()
+    except (ValueError, ImportError) as error:  # no such protocol, or not installed
+        raise OptionError(f"{target}: {error}") from None
 
 
 def _is_remote(stream: Any) -> bool:

@@ -5,7 +5,7 @@ What only decoding shows is checked where clips are decoded. SPEC.md, "Strict re
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -93,6 +93,12 @@ def check_clip(fields: Any, where: str, directory: Directory, templates: Templat
 def _refer(directory: Directory, kind: bytes, id_: bytes, where: str) -> None:
     if (kind, bytes(id_)) not in directory.shared:
         raise FormatError(f"{where}: no {kind.decode()} before it has the id {bytes(id_).hex()}")
+
+
+def check_target(fields: Any, where: str, sourced: Collection[tuple[int, bytes]]) -> None:
+    """Check that what an alias stands for is there before it, and can be restored."""
+    if (fields.of, bytes(fields.target)) not in sourced:  # GRAM-04
+        raise FormatError(f"chunk {where}: nothing before it with a source is {fields.target!r}")
 
 
 def check_index(payload: bytes, chunk: Chunk, directory: Directory, limit: int) -> None:

@@ -6,10 +6,8 @@ SPEC.md, "FOOT", says what follows the FOOT of a file that grew.
 from __future__ import annotations
 
 import builtins
-import errno
 import io
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +16,7 @@ from typing import BinaryIO
 
 from mcz.container import payloads
 from mcz.container.chunks import FOOT, SIGNATURE, Chunk, read_payload
+from mcz.container.locks import lock
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
@@ -29,9 +28,6 @@ from mcz.errors import (
     UnsupportedError,
 )
 from mcz.schema import parse
-
-BUSY = (errno.EACCES, errno.EAGAIN)  # what a lock says that another process holds
-FAR = 2**62  # Windows locks bytes; no file has one here
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,30 +65,14 @@ def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
     except (OSError, ValueError) as error:
         raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     with stream:
-        lock(stream, path)
+        if not lock(stream):
+            raise AccessError(f"{path}: another process is appending to it")
         container, tail = _whole_part(stream, path, salvage, force)
         end = container.directory.end  # the writer moves it
         added = io.BytesIO()
         yield Growth(container, added, tail)
         _check_place(stream, path)
         _write(stream, end, added.getbuffer())
-
-
-def lock(stream: BinaryIO, path: Path) -> None:
-    """Take the file for this process until ``stream`` closes; not every file system can."""
-    try:
-        if sys.platform == "win32":
-            import msvcrt
-
-            stream.seek(FAR)
-            msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl
-
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno in BUSY:
-            raise AccessError(f"{path}: another process is appending to it") from None
 
 
 def _check_place(stream: BinaryIO, path: Path) -> None:

@@ -34,7 +34,7 @@ class Outcome:
 
     ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
     "present" (the target has it already), "restored", "skipped", "exists" (it may not be replaced)
-    or "failed"; of a file that was cut short also "salvaged" or "dropped".
+    or "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage "damaged".
     """
 
     path: str
@@ -45,9 +45,10 @@ class Outcome:
 
 @dataclass(slots=True)
 class Report:
-    """The outcomes of a command over many files."""
+    """The outcomes of a command over many files; ``damage`` is what salvage found wrong."""
 
     outcomes: list[Outcome] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
 
     @property
     def failures(self) -> list[Outcome]:
@@ -241,6 +242,7 @@ def unpack(
     target: Any,
     directory: str | os.PathLike[str],
     *,
+    salvage: bool = False,
     force: bool = False,
     max_decoded: int | None = None,
     progress: Progress | None = None,
@@ -248,10 +250,13 @@ def unpack(
     """Write every source file and attachment of an MCZ file below ``directory``.
 
     Each file appears under its name only when it is whole and its hash is right. Clips without
-    a source are reported as skipped.
+    a source are reported as skipped. With ``salvage`` the file may be damaged: what is whole is
+    written, the rest is reported as damaged.
     """
     root, report = Path(directory), Report()
-    with open(target, max_decoded=max_decoded) as file:
+    with open(target, salvage=salvage, max_decoded=max_decoded) as opened:
+        file = File(opened.container.strictly())
+        report.damage += opened.damage
         jobs = list(named_files(file))
         written: set[Path] = set()
         for done, (name, restore) in enumerate(jobs):
@@ -267,25 +272,42 @@ def unpack(
                 report.outcomes.append(Outcome(name, "restored", len(data)))
             except (MczError, OSError) as error:
                 result = "exists" if isinstance(error, ExistsError) else "failed"
+                if salvage and isinstance(error, FormatError):
+                    result = "damaged"
                 report.outcomes.append(Outcome(name, result, 0, f"{name}: {error}"))
             if progress is not None:
                 progress(done + 1, len(jobs), name)
-        for clip in file.clips.values():
+        report.outcomes += _without_file(file)
+    return report
+
+
+def _without_file(file: File) -> Iterator[Outcome]:
+    """The clips that have no source file, or one without a name."""
+    for clip in file.clips.values():
+        with suppress(FormatError):  # it has failed already
             if clip.source is None or not clip.source.path:
                 text = "it has no source file" if clip.source is None else "its file has no name"
-                report.outcomes.append(Outcome(clip.name, "skipped", 0, text))
-    return report
+                yield Outcome(clip.name, "skipped", 0, text)
 
 
 def named_files(file: File, *, clips: bool = True) -> Iterator[tuple[str, Any]]:
     """Path and restoring function of every file that the archive holds under a name."""
     for clip in file.clips.values() if clips else ():
-        if clip.source is not None and clip.source.path:
-            yield clip.source.path, clip.source_bytes
+        try:
+            source = clip.source
+        except FormatError as error:  # damage of one clip is no other's
+            yield clip.name, partial(_fail, error)
+            continue
+        if source is not None and source.path:
+            yield source.path, clip.source_bytes
     for attachment in file.attachments.values():
         yield attachment.name, attachment.read
     for name, (of, target) in file.aliases.items():
         yield name, _alias_reader(file, name, of, target)
+
+
+def _fail(error: FormatError) -> bytes:
+    raise error
 
 
 def _alias_reader(file: File, name: str, of: int, target: bytes) -> Any:

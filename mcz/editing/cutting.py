@@ -201,7 +201,8 @@ def add_note(metadata: dict[str, str], key: str, text: str) -> None:
 def _signal_fields(part: SignalCut, fields: Any) -> dict[str, Any]:
     info = part.info
     header = info.header
-    stored_all = len(part.rows) == len(info.rows) and part.has_all_groups
+    n_stored = sum(row.header.n_frames for row in part.rows)
+    stored_all = n_stored == info.layout.n_frames and part.has_all_groups
     if not stored_all and info.codec.cut is not None:
         stop = part.rows[-1].header.stop if part.rows else part.base
         header = info.codec.cut(header, info.layout, part.base, stop, part.groups)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
@@ -81,6 +81,7 @@ def extract(
     joints: Sequence[int | str] | None = None,
     frames: tuple[int, int | None] | None = None,
     clip: str | None = None,
+    salvage: bool = False,
     force: bool = False,
     max_decoded: int | None = None,
     progress: Progress | None = None,
@@ -90,13 +91,15 @@ def extract(
     ``resolution``: the number of finest resolutions to leave out. ``joints``: those whose channels
     are kept; all joints stay in the skeleton. ``frames``: a <= f < b, b None for the end.
     ``clip``: take out this clip alone; otherwise all clips are cut alike, and attachments kept.
+    ``salvage``: the file may be damaged, but not in what is taken out.
     ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
     Raises OptionError or MotionError for what cannot be cut so, FormatError for bad bytes; nothing
     is left under the target's name then.
     """
     if not resolution and joints is None and frames is None and clip is None:
         raise OptionError("nothing to extract: give a resolution, joints, frames or a clip")
-    with open(source, max_decoded=max_decoded) as file:
+    with open(source, salvage=salvage, max_decoded=max_decoded) as opened:
+        file = File(opened.container.strictly())
         clips = [file.only_clip(clip)] if clip is not None else list(file.clips.values())
         if not clips:
             raise OptionError(f"{file.name} has no clip to extract from")
@@ -120,29 +123,41 @@ class Copier:
 
     def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> Extraction:
         self.total = sum(len(part.rows) for cut in cuts for part in cut.signals)
-        for (kind, id_), chunk in self.container.directory.shared.items():
+        for (kind, _), chunk in self.container.directory.shared.items():
             if kind == b"MODL":  # which one a clip needs, its codec alone knows
                 self.writer.shared(kind, self.container.payload(chunk))
-            elif kind == b"SKEL" and not alone:
-                self.skeleton(id_)
         if not alone:
-            for chunk in self._before_clips():
+            self.skeletons()
+            for chunk in self.before_clips():
                 self.ancillary(chunk)
-            for name, row in self.container.directory.attachments.items():
-                parts = [self.container.payload(part) for part in row.parts]
-                self.writer.attachment_parts(name, row.size, parts)
+            self.attachments()
         for cut in cuts:
             self.clip(cut)
-        self._aliases({cut.clip.name: cut for cut in cuts}, alone)
+        self.aliases({cut.clip.name: cut for cut in cuts}, alone)
         self.writer.finish()
         self.found.size = self.writer.offset
         return self.found
 
+    def skeletons(self) -> None:
+        """Copy every skeleton, also those that no clip has."""
+        for kind, id_ in self.container.directory.shared:
+            if kind == b"SKEL":
+                self.skeleton(id_)
+
+    def attachments(self) -> None:
+        for name in self.container.directory.attachments:
+            self.attachment(name)
+
+    def attachment(self, name: str) -> None:
+        row = self.container.directory.attachments[name]
+        parts = [self.container.payload(part) for part in row.parts]
+        self.writer.attachment_parts(name, row.size, parts)
+
     def skeleton(self, id_: bytes) -> bytes:
         """Copy a SKEL after its bases and their templates; return its payload."""
-        chain = [(id_, self._shared(b"SKEL", id_))]
+        chain = [(id_, self.stored(b"SKEL", id_))]
         while base := parse(payloads.SKEL, chain[-1][1], "SKEL").base:
-            chain.append((bytes(base[0]), self._shared(b"SKEL", bytes(base[0]))))
+            chain.append((bytes(base[0]), self.stored(b"SKEL", bytes(base[0]))))
         for _, payload in reversed(chain):
             for source in parse(payloads.SKEL, payload, "SKEL").source:
                 self.template(bytes(source.template))
@@ -150,9 +165,10 @@ class Copier:
         return chain[0][1]
 
     def template(self, id_: bytes) -> None:
-        self.writer.shared(b"SRCE", self._shared(b"SRCE", id_))
+        self.writer.shared(b"SRCE", self.stored(b"SRCE", id_))
 
-    def _shared(self, kind: bytes, id_: bytes) -> bytes:
+    def stored(self, kind: bytes, id_: bytes) -> bytes:
+        """The payload of the SKEL or SRCE with this id."""
         chunk = self.container.directory.shared.get((kind, id_))
         if chunk is None:
             raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
@@ -161,10 +177,11 @@ class Copier:
             raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
         return payload
 
-    def _before_clips(self) -> Iterator[Chunk]:
+    def before_clips(self) -> Iterator[Chunk]:
         """The ancillary chunks before the first clip, to which they do not belong."""
         source, at = self.container.source, len(SIGNATURE)
-        end = min(row.clip.offset for row in self.container.directory.clips.values())
+        clips = self.container.directory.clips.values()
+        end = min((row.clip.offset for row in clips), default=at)
         while at < end:
             if is_foot_at(source, at):
                 at += FOOT.size
@@ -182,13 +199,15 @@ class Copier:
         """Write one clip."""
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
         fields = self.container.clip(row)
-        skeleton = clip.skeleton_id
-        payload = self.skeleton(skeleton)
+        payload = self.skeleton(clip.skeleton_id)
+        skeleton = payload_id(payload)
         if cut.joints is not None:
             payload = cut_skeleton(payload, skeleton, cut.joints)
             skeleton = self.writer.shared(b"SKEL", payload)
-        new = dict(fields) if cut.is_whole else clip_fields(cut, skeleton, fields)
-        source, hashes = self._finish_fields(cut, new)
+        whole = dict(fields) | {"skeleton": skeleton}
+        new = whole if cut.is_whole else clip_fields(cut, skeleton, fields)
+        source, hashes = self.finish_fields(cut, new)
+        new["name"] = self.name_of(cut)
         n_channels = [
             sum(len(part.info.layout.groups[group]) for group in part.groups)
             for part in cut.signals
@@ -197,14 +216,19 @@ class Copier:
         self.inside(row)
         self._segments(cut, noted=bool(new["source"]))
         cend = self.container.cend(row)
-        self.writer.end_clip(cut.n_frames, source, hashes, bytes(cend.extension))
+        extension = b"" if cend is None else bytes(cend.extension)
+        self.writer.end_clip(cut.n_frames, source, hashes, extension)
         self._quality(cut, row)
         self._note(cut)
 
-    def _finish_fields(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
+    def name_of(self, cut: ClipCut) -> str:
+        """What the clip is called from now on."""
+        return cut.clip.name
+
+    def finish_fields(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
         """Source and metadata of the new CLIP; return the hashes of the source and the signals."""
-        cend = self.container.cend(self.container.directory.clips[cut.clip.name])
         if cut.is_whole:
+            cend = self.container.cend(self.container.directory.clips[cut.clip.name])
             source, hashes = b"".join(map(bytes, cend.source_sha256)), list(cend.value_sha256)
         else:
             source, hashes = self._decoded(cut, new)
@@ -293,7 +317,7 @@ class Copier:
             self.found.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
 
     def _note(self, cut: ClipCut) -> None:
-        written = self.writer.directory.clips[cut.clip.name].segments
+        written = self.writer.directory.clips[self.name_of(cut)].segments
         rows = [row for part in cut.signals for row in part.rows]
         before = [row for part in cut.signals for row in part.info.rows]
         part = cut.signals[0]
@@ -310,7 +334,7 @@ class Copier:
             )
         )
 
-    def _aliases(self, cuts: dict[str, ClipCut], alone: bool) -> None:
+    def aliases(self, cuts: Mapping[str, ClipCut], alone: bool) -> None:
         """Copy the aliases of what is here and as it was."""
         for name, (of, target) in self.file.aliases.items():
             if of == payloads.OF_CLIP:

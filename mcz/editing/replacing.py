@@ -18,9 +18,9 @@ from typing import Any, BinaryIO
 from mcz.container import payloads
 from mcz.container.chunks import read_chunk
 from mcz.container.directory import ClipRow, SegmentRow
+from mcz.container.locks import lock
 from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
-from mcz.editing.appending import lock
 from mcz.editing.cutting import ClipCut, add_note, cut_segment, plan_cut
 from mcz.editing.extraction import Copier
 from mcz.editing.recoding import Recoded, recode
@@ -99,7 +99,8 @@ def _locked(source: Any, stack: ExitStack) -> Path:
             held = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the stack
         except (OSError, ValueError) as error:
             raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
-        lock(stack.enter_context(held), path)
+        if not lock(stack.enter_context(held)):
+            raise AccessError(f"{path}: another process is appending to it")
     return path
 
 

@@ -181,7 +181,3 @@ class Arrays(Emitter):
 
     def _product(self, one: str, other: str) -> str:
         return self.op(f"mul i64 {one}, {other}")
-
-    def keep(self, address: str) -> None:
-        """Note memory that is given back at the end."""
-        raise NotImplementedError

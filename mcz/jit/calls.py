@@ -50,7 +50,6 @@ class Calls(Expressions):
         super().__init__(function, checked)
         self.program = program
         self.depth = 0  # of loops around
-        self.kept: list[str] = []  # slots of memory to be given back
 
     def of_Call(self, node: ast.Call) -> Value:  # noqa: N802
         called = self.fixed(node.func)
@@ -96,12 +95,6 @@ class Calls(Expressions):
         if item is None:
             raise LoopError(f"{ast.unparse(node)}: arrays of int64, float64, uint8, bool_")
         return self.make(item, shape.items() if isinstance(shape.type, Tuple) else [shape], filled)
-
-    def keep(self, address: str) -> None:
-        slot = self._new()
-        self.slots += [f"{slot} = alloca ptr", f"store ptr null, ptr {slot}"]
-        self.do(f"store ptr {address}, ptr {slot}")
-        self.kept.append(slot)
 
     def least_or_greatest(self, values: list[Value], order: str) -> Value:
         """As ``min`` and ``max``: of equals the first, and what is not a number only if first."""

@@ -35,12 +35,20 @@ class Emitter:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.slots: list[str] = []  # lines that make them, in front of all others
+        self.kept: list[str] = []  # slots of memory to be given back
         self._count = 0
         self._closed = False  # the block has its last line
 
     def _new(self) -> str:
         self._count += 1
         return f"%v{self._count}"
+
+    def keep(self, address: str) -> None:
+        """Note memory that is given back where the function ends."""
+        slot = self._new()
+        self.slots += [f"{slot} = alloca ptr", f"store ptr null, ptr {slot}"]
+        self.do(f"store ptr {address}, ptr {slot}")
+        self.kept.append(slot)
 
     def do(self, line: str) -> None:
         """A line without a result."""

@@ -43,6 +43,9 @@ class Clip:
         self.name = row.name
         self.n_frames = row.n_frames
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _reopened, (self.container, self.name)
+
     def __repr__(self) -> str:
         return f"<Clip {self.name!r}: {self.n_frames} frames, {self.n_channels} channels>"
 
@@ -216,10 +219,7 @@ class Clip:
             self.check_hash(info, values, mask)
 
     def find_signal(self, signal: int | str) -> int:
-        """The index of a signal given by index or name; the first of a name counts.
-
-        Raises OptionError where there is no such signal.
-        """
+        """The index of a signal given by index or name, the first of its name; OptionError."""
         return signal if isinstance(signal, int) else index_of(self.signals, signal, self.name)
 
     @cached_property
@@ -231,10 +231,7 @@ class Clip:
         return read_recording(self.container, self._fields)
 
     def scaling(self, signal: int) -> Scaling | None:
-        """What the stored numbers of a signal mean; None where they are the values themselves.
-
-        Raises FormatError on bad bytes.
-        """
+        """What the stored numbers of a signal mean; None where they are the values; FormatError."""
         return scaling_of(self.signals, signal, lambda: self.recording)
 
     def _info(self, signal: int) -> SignalInfo:
@@ -412,3 +409,11 @@ class Clip:
                 f"clip {self.name!r}: the restored {info.path} has {len(data)} bytes and hash "
                 f"{digest.hex()}, stored are {info.size} and {info.sha256.hex()}"
             )
+
+
+def _reopened(container: Container, name: str) -> Clip:
+    """What a pickled Clip becomes; raises OptionError where the file has changed meanwhile."""
+    row = container.directory.clips.get(name)
+    if row is None:
+        raise OptionError(f"{container.source.name}: the clip {name!r} is no longer there")
+    return Clip(container, row)

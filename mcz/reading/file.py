@@ -14,8 +14,16 @@ from typing import Any
 from mcz.container import payloads
 from mcz.container.directory import AttachmentRow
 from mcz.container.reader import Container
-from mcz.container.source import open_source
-from mcz.errors import AccessError, ChecksumError, FormatError, MczError, MotionError, OptionError
+from mcz.container.source import ByteSource, open_source
+from mcz.errors import (
+    AccessError,
+    ChecksumError,
+    FormatError,
+    MczError,
+    MotionError,
+    OptionError,
+    TruncatedError,
+)
 from mcz.formats import FORMATS
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
@@ -36,10 +44,15 @@ class Attachment:
 
 
 class File:
-    """An open MCZ file: its clips, skeletons and attachments by name, nothing decoded yet."""
+    """An open MCZ file: its clips, skeletons and attachments by name, nothing decoded yet.
+
+    Threads may share it, and processes after a fork. A File and what is taken from it, opened by
+    path, URL or from bytes, can be pickled: what is unpickled opens the same file anew.
+    """
 
     def __init__(self, container: Container) -> None:
         self.container = container
+        self.grows = False  # another process was appending: this is the file up to its last end
         rows = container.directory
         self.clips: Mapping[str, Clip] = {
             name: Clip(container, row) for name, row in rows.clips.items()
@@ -47,6 +60,9 @@ class File:
         self.attachments: Mapping[str, Attachment] = {
             name: Attachment(container, row) for name, row in rows.attachments.items()
         }
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return File, (self.container,)
 
     def __enter__(self) -> File:
         return self
@@ -83,7 +99,7 @@ class File:
 
     @property
     def unverified(self) -> int:
-        """Chunks of which so far only a part was read, and checked by its own table alone."""
+        """Segments of which so far only a part was read: nothing vouches for its numbers."""
         return self.container.unverified
 
     @cached_property
@@ -137,11 +153,19 @@ class File:
         return next(iter(self.clips.values()))
 
 
-def open(target: Any, salvage: bool = False, max_decoded: int | None = None) -> File:
+def open(
+    target: Any,
+    salvage: bool = False,
+    max_decoded: int | None = None,
+    unverified: bool = False,
+) -> File:
     """Open an MCZ file lazily: a path, an fsspec target, bytes or a binary stream.
 
     ``salvage`` reads what a damaged file still holds and lists the rest in ``File.damage``.
     ``max_decoded`` replaces the limit of decoded bytes, max(64 MiB, 4096 x file size).
+    ``unverified`` reads no more of a segment than what is asked for (joints, a resolution), so that
+    its checksum cannot be checked and a damaged file may give wrong numbers; ``File.unverified``
+    counts such segments. It saves bytes where segments are large, and does nothing in salvage.
     Raises FormatError, in particular TruncatedError where there is no FOOT at the end, and
     AccessError where the file cannot be read.
     """
@@ -150,8 +174,9 @@ def open(target: Any, salvage: bool = False, max_decoded: int | None = None) -> 
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
         text = getattr(error, "strerror", None) or error
         raise AccessError(f"{target}: {text}") from None
+    options = {"salvage": salvage, "max_decoded": max_decoded, "reads_parts": unverified}
     try:
-        return File(Container(source, salvage=salvage, max_decoded=max_decoded))
+        return _opened(source, options)
     except MczError as error:
         source.close()
         error.args = (f"{source.name}: {error}",)
@@ -159,3 +184,23 @@ def open(target: Any, salvage: bool = False, max_decoded: int | None = None) -> 
     except BaseException:
         source.close()
         raise
+
+
+def _opened(source: ByteSource, options: Mapping[str, Any]) -> File:
+    """The file; while another process appends to it, the file up to its last end."""
+    while True:
+        try:
+            return File(Container(source, **options))
+        except TruncatedError as error:
+            size = source.size_now()
+            if source.grows():
+                if error.last_foot is None:
+                    raise
+                end = error.last_foot
+                break
+            if size == source.size:  # nobody is at it, or has been meanwhile
+                raise
+            source = source.up_to(size)
+    file = File(Container(source.up_to(end), **options))
+    file.grows = True
+    return file

@@ -144,7 +144,7 @@ class SignalReader:
         self.container.source.read_ahead(
             (info.rows[i].chunk().offset, info.rows[i].chunk().size)
             for i in covering
-            if not info.rows[i].packet
+            if not info.rows[i].packet and not self.container.in_part(info.rows[i])
         )
         return info.spans
 
@@ -170,6 +170,21 @@ class SignalReader:
         salvage(spans, self.info.covering(start, stop), (start, stop), rescue, self._complain)
         return values, mask
 
+    def whole_runs(self, start: int, stop: int) -> list[tuple[int, int]]:
+        """The runs of the stored frames start <= f < stop that can be decoded."""
+        spans, found = self._prepare(start, stop), []
+
+        def rescue(a: int, b: int) -> None:
+            self._finish(self._decode(spans, a, b), a, b)
+            found.append((a, b))
+
+        salvage(spans, self.info.covering(start, stop), (start, stop), rescue, lambda *_: None)
+        runs: list[tuple[int, int]] = []
+        for a, b in sorted(found):
+            joined = bool(runs) and runs[-1][1] == a
+            runs[-1:] = [(runs[-1][0], b)] if joined else [*runs[-1:], (a, b)]
+        return runs
+
     def _complain(self, start: int, stop: int, reason: object) -> None:
         self.container.damage.append(f"clip {self.name!r}, frames {start}:{stop}: {reason}")
 
@@ -188,7 +203,7 @@ class SignalReader:
             row, counts = self.info.rows[segment], self.info.counts
             everything = len(self.groups) == counts.n_groups and not self.resolution
             table = wanted = None
-            if not everything:
+            if not everything and self.container.in_part(row):
                 table = self.container.table(row, counts)
                 wanted = self._wanted(table)
             self._cache[segment] = self.container.streams(row, counts, wanted, table)

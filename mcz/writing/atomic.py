@@ -12,8 +12,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from mcz.container.locks import is_abandoned, lock
 from mcz.errors import AccessError, ExistsError, OptionError
 
+SUFFIX = ".part"
 SHOWN = 48  # characters of a name in that of its temporary file: 192 bytes of 255 at most
 FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)  # errors that only writing has
 
@@ -78,21 +80,21 @@ def _in_place(path: Path) -> Iterator[BinaryIO]:
 
 @contextmanager
 def _temporary(path: Path, force: bool) -> Iterator[BinaryIO]:
+    prefix = f".{path.name[:SHOWN]}."
+    _clear(path.parent, prefix)
+    stream, name = _locked_file(path, prefix)
     try:
-        handle, name = tempfile.mkstemp(
-            prefix=f".{path.name[:SHOWN]}.", suffix=".part", dir=path.parent
-        )
-    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
-        raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
-    try:
-        with os.fdopen(handle, "wb") as stream:
+        with stream:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, 0o666 & ~umask)  # mkstemp made it private
-        _give_name(name, path, force)
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(name, 0o666 & ~umask)  # mkstemp made it private
+            if os.name == "posix":  # elsewhere nothing can be renamed that is open
+                _give_name(name, path, force)
+        if os.name != "posix":
+            _give_name(name, path, force)
         _sync_directory(path.parent)
     except BaseException as error:
         with suppress(OSError):
@@ -100,6 +102,31 @@ def _temporary(path: Path, force: bool) -> Iterator[BinaryIO]:
         if isinstance(error, OSError) and error.errno in FULL and error.filename is None:
             raise AccessError(f"{path}: {error.strerror}") from error
         raise
+
+
+def _locked_file(path: Path, prefix: str) -> tuple[BinaryIO, str]:
+    """A temporary file for ``path`` that no other writer takes for a leftover."""
+    while True:
+        try:
+            handle, name = tempfile.mkstemp(prefix=prefix, suffix=SUFFIX, dir=path.parent)
+        except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
+            raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+        stream = os.fdopen(handle, "w+b")
+        if lock(stream) and Path(name).exists():  # else one has cleared it away just now
+            return stream, name
+        stream.close()
+
+
+def _clear(folder: Path, prefix: str) -> None:
+    """Take away what writers of this name have left that were killed: nobody has locked it."""
+    with suppress(OSError, ValueError):
+        for entry in os.scandir(folder):
+            named = entry.name.startswith(prefix) and entry.name.endswith(SUFFIX)
+            if not (named and entry.is_file(follow_symlinks=False)):
+                continue
+            with suppress(OSError), open(entry.path, "r+b") as leftover:
+                if is_abandoned(leftover):
+                    os.unlink(entry.path)
 
 
 def _give_name(name: str, path: Path, force: bool) -> None:

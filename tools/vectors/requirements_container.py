@@ -26,6 +26,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
         "invalid/shared/ALIA-of",
         "invalid/clip/groups-kind",
     ),
+    "CHUNK-03": ("invalid/parts/*",),
     "CHUNK-05": ("invalid/chunks/length-*", "invalid/grammar/truncated*"),
     "CHUNK-11": ("uncommon/container/unknown-critical*",),
     "CHUNK-12": ("uncommon/container/unknown-ancillary*", "valid/*/ancillary"),
@@ -119,6 +120,8 @@ _LIVE_TESTS = {
 ARGUED: dict[str, str] = {
     "CONV-11": _REWRITER + "test_extract.py::test_listed_groups_and_extensions",
     "CHUNK-04": "a file that breaks it has more than 2 GiB, or ends before the chunk (CHUNK-05)",
+    "CHUNK-07": "of what a reader tells its caller where that asked for unverified parts: shown by "
+    "tests/test_parts.py::test_the_command_says_what_is_unverified",
     "CHUNK-13": _REWRITER + "test_extract.py::test_all_clips_are_cut_alike_and_the_rest_is_kept",
     "CHUNK-14": _REWRITER + "test_stream.py::test_rewriting_drops_it",
     "SALV-01": _SALVAGE + "test_container.py::test_one_bad_byte_costs_one_segment",

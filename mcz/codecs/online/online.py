@@ -164,7 +164,7 @@ def decode(
         return out
     for first, unit in _needed(spans, request, fetch):
         coder.skip(first - coder.at)
-        block = coder.decode(unit)
+        block = coder.decode(unit)  # ONLINE-28
         begin, stop = max(first, request.start), min(coder.at, request.stop)
         if begin < stop:
             out[begin - request.start : stop - request.start] = block[begin - first : stop - first]

@@ -113,7 +113,7 @@ class OnlineDecoder {
       }
       let frame = firstFrame;
       for (const unit of units) {
-        frames.unit(unit, frame, Math.min(unit.n, to - frame));
+        frames.unit(unit, frame);
         frame += unit.n;
         if (frame >= to) return out;
       }
@@ -143,8 +143,8 @@ class OnlineFrames {
     this.model = null;
   }
 
-  /** The first frames of a unit, `wanted` of them; with all of them its data end. */
-  unit({ kind, n, distance, data }, frame, wanted) {
+  /** All frames of a unit: its data end with them. */
+  unit({ kind, n, distance, data }, frame) {
     const what = `${name}: unit of frame ${frame}`;
     if (kind === LTR && distance !== frame - this.referenceFrame) {
       throw new Refused(`${what}: a distance of ${distance} to frame ${this.referenceFrame}`);
@@ -156,12 +156,12 @@ class OnlineFrames {
       this.present = 0;
     }
     const rc = new RangeDecoder(data);
-    for (let f = 0; f < wanted; f++) {
+    for (let f = 0; f < n; f++) {
       this.frame(rc, f === 0 ? kind : STR);
-      const row = frame + f - this.from;
-      if (row >= 0) this.out.set(this.v, row * this.v.length);
+      const at = (frame + f - this.from) * this.v.length;
+      if (at >= 0 && at < this.out.length) this.out.set(this.v, at);
     }
-    if (wanted === n) rc.finish(what);
+    rc.finish(what);
   }
 
   frame(rc, kind) {

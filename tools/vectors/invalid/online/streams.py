@@ -48,6 +48,7 @@ def add(shelf: Broken) -> None:
     _bits(shelf)
     _values(shelf)
     _wrapped_step(shelf)
+    _rest_of_unit(shelf)
 
 
 def _steps(shelf: Broken) -> None:
@@ -188,6 +189,19 @@ def _shortened(plan: Plan, at: int) -> bytes:
         except FormatError:
             break
     return build_units(units)
+
+
+def _rest_of_unit(shelf: Broken) -> None:
+    """Faults behind the frames that are asked for, in the unit that holds these."""
+    parts = ((("--frames", "0:2"), ()), (("--frames", "1:2"), ()))
+    for coder, end, how in ((MIXED, "", ""), (GOLOMB, "-golomb", ", Golomb")):
+        plan = Plan(("I6 L6",), coder=coder, fill=_loud)
+        purpose = f"A byte behind the bits of a unit of six frames, two asked for{how}."
+        data = with_stream(plan, _behind(plan, b"\xff")(0))
+        shelf.add(f"rest-byte-behind{end}", HEADING, purpose, data, parts=parts)
+        steps = replace(plan, units=("I6",), steps=numbered((511, 511, 511, 511, 512, 511)))
+        purpose = f"A step of 512 in the fifth frame of a unit, two asked for{how}."
+        shelf.add(f"rest-step{end}", HEADING, purpose, file_with(steps), parts=parts)
 
 
 def _loud(number: int, n_rows: int, n: int) -> Ints:

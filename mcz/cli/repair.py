@@ -1,0 +1,58 @@
+"""``mcz repair``: a sound file of all that is whole in a damaged one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+import click
+
+from mcz.cli.common import Exit, Failure, about, existing, plural, print_json, printable, say
+from mcz.cli.options import decoded_option, force_option, json_option
+from mcz.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from mcz.editing.repair import Repair
+
+
+@click.command(short_help="A sound file of what is whole in a damaged one.")
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.option("-o", "--output", metavar="OUT.mcz", required=True, help="The file to write.")
+@decoded_option
+@force_option
+@json_option
+def command(file: str, output: str, max_decoded: int | None, force: bool, as_json: bool) -> Exit:
+    """Write all that is whole in FILE.mcz to OUT.mcz, a sound file; FILE.mcz stays as it is.
+
+    Of a clip that has lost frames, each run of frames that is whole becomes a clip called
+    NAME.A-B. Nothing is coded anew and nothing is made up: what is lost is named, and the exit
+    code is 4; it is 0 where nothing is lost.
+    """
+    import mcz
+
+    if "-" in (file, output):
+        raise Failure("repair reads and writes files, not standard streams", Exit.USAGE)
+    existing(file)
+    with about(file, output), Progress() as progress:
+        found = mcz.repair(file, output, force=force, max_decoded=max_decoded, progress=progress)
+    if as_json:
+        print_json({"output": output, **asdict(found)})
+    else:
+        click.echo("\n".join(map(printable, _lines(output, found))))
+    for text in found.damage:
+        say(f"{file}: {text}")
+    for text in found.lost:
+        say(f"lost: {text}")
+    return Exit.SALVAGED if found.lost else Exit.FINE
+
+
+def _lines(output: str, found: Repair) -> Iterator[str]:
+    counts = [plural(len(found.clips), "whole clip"), plural(len(found.attachments), "attachment")]
+    if found.runs:
+        counts.insert(1, f"parts of {plural(len(found.runs), 'clip')}")
+    yield f"{output}: {', '.join(counts)}, {found.size:,} bytes"
+    for name, runs in found.runs.items():
+        spans = ", ".join(f"{start}:{stop}" for start, stop in runs)
+        yield f"  {name}: frames {spans}"
+    yield "something was lost" if found.lost else "nothing was lost"

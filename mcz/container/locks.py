@@ -1,0 +1,74 @@
+"""Who writes to a file: one process at a time, and others can tell that one is at it.
+
+A lock is advice, which not every file system takes; where none can be had, all goes on without.
+"""
+
+from __future__ import annotations
+
+import errno
+import sys
+import time
+from typing import BinaryIO
+
+BUSY = (errno.EACCES, errno.EAGAIN)  # what a lock says that another process holds
+FAR = 2**62  # Windows locks bytes; no file has one here
+PATIENCE, PAUSE = 0.2, 0.01  # seconds: a reader that looks holds the lock for an instant
+
+
+def lock(stream: BinaryIO) -> bool:
+    """Take the file of ``stream`` until that closes; False where another process has it."""
+    until = time.monotonic() + PATIENCE
+    while _take(stream) is False:
+        if time.monotonic() > until:
+            return False
+        time.sleep(PAUSE)
+    return True
+
+
+def is_locked(stream: BinaryIO) -> bool:
+    """Whether another process has taken the file of ``stream``."""
+    taken = _take(stream)
+    if taken:
+        _release(stream)
+    return taken is False
+
+
+def is_abandoned(stream: BinaryIO) -> bool:
+    """Whether no process has taken the file, of which one did once; this one has it then."""
+    return _take(stream) is True
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _take(stream: BinaryIO) -> bool | None:
+        """Whether the file could be taken; None where there are no locks."""
+        return _lock_far(stream, msvcrt.LK_NBLCK)
+
+    def _release(stream: BinaryIO) -> None:
+        _lock_far(stream, msvcrt.LK_UNLCK)
+
+    def _lock_far(stream: BinaryIO, mode: int) -> bool | None:
+        at = stream.tell()
+        try:
+            stream.seek(FAR)
+            msvcrt.locking(stream.fileno(), mode, 1)
+        except OSError as error:
+            return False if error.errno in BUSY else None
+        finally:
+            stream.seek(at)
+        return True
+
+else:
+    import fcntl
+
+    def _take(stream: BinaryIO) -> bool | None:
+        """Whether the file could be taken; None where there are no locks."""
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            return False if error.errno in BUSY else None
+        return True
+
+    def _release(stream: BinaryIO) -> None:
+        fcntl.flock(stream, fcntl.LOCK_UN)
