@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from mcz.reading.file import Attachment, File, open
     from mcz.reading.post_filtering import post_filter
     from mcz.reading.read import read
+    from mcz.reading.recording import Event, ForcePlatform, Recording, recording
     from mcz.reading.report import Problem, verify
     from mcz.reading.source_files import read_skeleton
     from mcz.writing.file import encode, write
@@ -72,6 +73,7 @@ _HOMES = {
     "mcz.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.reading.file": ("Attachment", "File", "open"),
     "mcz.reading.read": ("read",),
+    "mcz.reading.recording": ("Event", "ForcePlatform", "Recording", "recording"),
     "mcz.writing.file": ("encode", "write"),
     "mcz.reading.post_filtering": ("post_filter",),
     "mcz.kinematics.marker_motion": ("in_positions",),
@@ -94,12 +96,14 @@ __all__ = [
     "ChecksumError",
     "Clip",
     "Comparison",
+    "Event",
     "Exceptions",
     "ExistsError",
     "ExtractedClip",
     "Extraction",
     "File",
     "Fit",
+    "ForcePlatform",
     "FormatError",
     "Joint",
     "LimitError",
@@ -113,6 +117,7 @@ __all__ = [
     "OptionError",
     "Outcome",
     "Problem",
+    "Recording",
     "Repair",
     "Replacement",
     "Report",
@@ -137,6 +142,7 @@ __all__ = [
     "post_filter",
     "read",
     "read_skeleton",
+    "recording",
     "repair",
     "replace",
     "stream_decode",

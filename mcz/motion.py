@@ -1,17 +1,16 @@
-"""The data model: Joint, Skeleton, Signal, Source and Motion, checked on creation.
+"""The data model: Signal, Source and Motion, and what they are of, checked on creation.
 
-Nothing here reads or writes files. SPEC.md, "SKEL" and "CLIP", have the stored form.
+Nothing here reads or writes files. SPEC.md, "CLIP", has the stored form.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from operator import itemgetter
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,200 +19,19 @@ from mcz import brief
 from mcz.errors import MotionError
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.blocks import grid_blocks as grid_blocks
-
-Vector = tuple[float, float, float]
-ORIGIN: Vector = (0.0, 0.0, 0.0)
-
-POSITION_KINDS = ("tx", "ty", "tz")
-ROTATION_KINDS = ("rx", "ry", "rz")
-CHANNEL_KINDS = (
-    *POSITION_KINDS,
-    *ROTATION_KINDS,
-    *("sx", "sy", "sz"),
-    "length",
-    *("qw", "qx", "qy", "qz"),
-)
-
-
-@dataclass(frozen=True, slots=True)
-class Channel:
-    """One scalar signal over time.
-
-    ``kind`` is a name of ``CHANNEL_KINDS``, or "" for a plain scalar, which then has a ``name``
-    and perhaps a ``unit`` of its own and takes no part in kinematics.
-    """
-
-    kind: str
-    name: str = ""
-    unit: str = ""
-
-    def __post_init__(self) -> None:
-        if self.kind and self.kind not in CHANNEL_KINDS:
-            raise MotionError(f"channel kind {self.kind!r} is not in the registry; use kind ''")
-
-    @property
-    def label(self) -> str:
-        return self.name or self.kind
-
-
-@dataclass(frozen=True, slots=True)
-class Joint:
-    """A node of the skeleton.
-
-    ``offset`` leads from the parent's origin to the joint's own, in length units, along the
-    parent's axes. ``tails`` are the ends of bones without a joint of their own: the ASF bone's
-    vector, or BVH end sites, along the joint's axes. ``axis`` are the Euler angles that orient the
-    local axes (ASF ``axis``), applied in ``axis_order``, first letter first, about fixed axes.
-    ``adds_to_offset``: position channels add to the offset; otherwise they replace it.
-    """
-
-    name: str
-    parent: int = -1
-    offset: Vector = ORIGIN
-    tails: tuple[Vector, ...] = ()
-    axis: Vector = ORIGIN
-    axis_order: str = "XYZ"
-    channels: tuple[Channel, ...] = ()
-    adds_to_offset: bool = True
-
-    def __post_init__(self) -> None:
-        vectors = (self.offset, self.axis, *self.tails)
-        if not all(map(_is_vector, vectors)):
-            raise MotionError(f"joint {self.name!r}: not three finite numbers among {vectors}")
-        if sorted(self.axis_order) != ["X", "Y", "Z"]:
-            raise MotionError(f"joint {self.name!r}: axis order {self.axis_order!r}")
-
-
-def _is_vector(vector: Any) -> bool:
-    with suppress(TypeError):
-        return len(vector) == 3 and all(map(math.isfinite, vector))  # SKEL-08
-    return False
-
-
-@dataclass(frozen=True, slots=True)
-class Skeleton:
-    """The joints of a clip, parents before children, and what their numbers mean.
-
-    ``unit_cm`` is the length of one unit in centimeters, None while unknown; ``angle_unit`` is
-    "deg", "rad" or "" (unknown); ``up_axis`` is "x", "y", "z" or "" (unknown).
-    ``intrinsic``: the rotation channels of a joint apply about the axes that turn with it, as
-    listed (BVH); otherwise about fixed axes (Acclaim).
-    ``base`` is the id of the skeleton that this one was derived from.
-    """
-
-    joints: tuple[Joint, ...]
-    name: str = ""
-    unit_cm: float | None = None
-    angle_unit: str = "deg"
-    up_axis: str = ""
-    intrinsic: bool = True
-    base: bytes | None = None
-    source: Source | None = field(default=None, compare=False, repr=False)
-
-    __repr__ = brief.skeleton_text
-
-    def __post_init__(self) -> None:
-        for index, joint in enumerate(self.joints):
-            if not -1 <= joint.parent < index:  # SKEL-05
-                raise MotionError(
-                    f"joint {index} ({joint.name!r}): parent {joint.parent} is not before it"
-                )
-        if self.unit_cm is not None and not 0 < self.unit_cm < math.inf:  # SKEL-01
-            raise MotionError(f"unit of {self.unit_cm} cm")
-        if self.angle_unit not in ("deg", "rad", ""):
-            raise MotionError(f"angle unit {self.angle_unit!r}")
-        if self.up_axis not in ("x", "y", "z", ""):
-            raise MotionError(f"up axis {self.up_axis!r}")
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """All channels, in column order."""
-        return tuple(channel for joint in self.joints for channel in joint.channels)
-
-    @property
-    def n_joints(self) -> int:
-        return len(self.joints)
-
-    @property
-    def n_channels(self) -> int:
-        return sum(len(joint.channels) for joint in self.joints)
-
-    @property
-    def parents(self) -> NDArray[np.int64]:
-        return np.array([joint.parent for joint in self.joints], dtype=np.int64)
-
-    def columns(self, joint: int) -> range:
-        """The columns of joint ``joint``."""
-        start = sum(len(j.channels) for j in self.joints[:joint])  # SKEL-06
-        return range(start, start + len(self.joints[joint].channels))
-
-    def addresses(self) -> list[str]:
-        """The name of every joint, made unique: ``name#n`` from the second of a name on."""
-        seen: dict[str, int] = {}
-        names = []
-        for joint in self.joints:
-            seen[joint.name] = n = seen.get(joint.name, -1) + 1
-            names.append(joint.name if n == 0 else f"{joint.name}#{n}")
-        return names
-
-    def find(self, joint: int | str) -> int:
-        """The index of a joint given by index or by name, ``name[#n]`` where a name repeats.
-
-        Raises MotionError where there is no such joint.
-        """
-        if isinstance(joint, str):
-            addresses = self.addresses()
-            if joint in addresses:
-                return addresses.index(joint)
-            if joint.isascii() and joint.isdigit() and len(joint) < 10:
-                joint = int(joint)
-        if isinstance(joint, (int, np.integer)) and 0 <= joint < self.n_joints:
-            return int(joint)
-        raise MotionError(f"no joint {joint!r} among {', '.join(self.addresses()) or 'no joints'}")
-
-
-class FrameNotes(Protocol):
-    """What a source says about each frame beside its values; a source format defines it."""
-
-    def cut(self, start: int, stop: int) -> bytes:
-        """The notes of frames start <= f < stop as bytes of a segment, b"" where all is usual."""
-
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """What is needed, beside the values, to restore a source file byte for byte.
-
-    ``template`` is shared by clips that were printed alike; ``detail`` belongs to this clip;
-    ``notes`` holds what is said frame by frame. All three are defined by the source format.
-    """
-
-    format: str
-    template: bytes = field(repr=False)
-    detail: bytes = b""
-    notes: FrameNotes | None = field(default=None, repr=False)
-    path: str = ""
-    size: int = 0
-    sha256: bytes = b""
-
-    __repr__ = brief.source_text
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Exceptions:
-    """Tokens of a text source that their grid does not print, sorted by row, then channel."""
-
-    rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    channels: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    texts: tuple[bytes, ...] = ()
-
-    __repr__ = brief.exceptions_text
-
-    def __post_init__(self) -> None:
-        if not len(self.rows) == len(self.channels) == len(self.texts):
-            raise MotionError("exceptions: rows, channels and texts differ in number")
-
-    def __len__(self) -> int:
-        return len(self.texts)
+from mcz.numbers.exceptions import Exceptions as Exceptions
+from mcz.numbers.scaling import Scaling
+from mcz.skeleton import CHANNEL_KINDS as CHANNEL_KINDS
+from mcz.skeleton import ORIGIN as ORIGIN
+from mcz.skeleton import POSITION_KINDS as POSITION_KINDS
+from mcz.skeleton import ROTATION_KINDS as ROTATION_KINDS
+from mcz.skeleton import Channel as Channel
+from mcz.skeleton import Joint as Joint
+from mcz.skeleton import Skeleton as Skeleton
+from mcz.skeleton import Vector as Vector
+from mcz.skeleton import joint_columns as joint_columns
+from mcz.source import FrameNotes as FrameNotes
+from mcz.source import Source as Source
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,6 +42,10 @@ class Signal:
     int64 where every grid is INTEGER. ``grids`` has one grid a channel; ``grid_changes`` lists
     (row, channel, grid) from that row on. ``mask`` (bool, same shape) is True where the value is
     valid; None means valid everywhere. Stored coordinates are kept beneath an invalid mark.
+
+    Where the file stores other numbers than it means (words of a converter), ``scaling`` says what
+    they mean, ``values`` are binary64 in units, and ``stored`` are the numbers of the file, which
+    grids, grid changes, exceptions and ordinals speak of. Elsewhere ``stored`` are the values.
     """
 
     values: NDArray[Any]
@@ -235,25 +57,31 @@ class Signal:
     grid_changes: tuple[tuple[int, int, Grid], ...] = ()
     channels: tuple[Channel, ...] | None = None  # None: those of the skeleton
     ordinals: NDArray[np.int64] | None = None  # on their grids; see ``to_ordinals``
+    scaling: Scaling | None = None
+    stored: NDArray[Any] = None  # type: ignore[assignment]  # set below where it is not given
 
     __repr__ = brief.signal_text
 
     def __post_init__(self) -> None:
         if self.values.ndim != 2:
             raise MotionError(f"signal {self.name!r}: values of shape {self.values.shape}, not 2-D")
+        if self.scaling is None or self.stored is None:
+            object.__setattr__(self, "stored", self.values)
+        if self.stored.shape != self.values.shape:
+            raise MotionError(f"signal {self.name!r}: stored numbers do not match the values")
         if self.values.dtype not in (np.float64, np.int64):
             raise MotionError(f"signal {self.name!r}: values of type {self.values.dtype}")
         if not self.grids:
-            kind = GridKind.BINARY64 if self.values.dtype == np.float64 else GridKind.INTEGER
+            kind = GridKind.BINARY64 if self.stored.dtype == np.float64 else GridKind.INTEGER
             object.__setattr__(self, "grids", (Grid(kind),) * self.n_channels)
         if len(self.grids) != self.n_channels:
             raise MotionError(
                 f"signal {self.name!r}: {len(self.grids)} grids, {self.n_channels} channels"
             )
         integers = self.n_channels > 0 and all(g.kind == GridKind.INTEGER for g in self.grids)
-        if integers != (self.values.dtype == np.int64):
+        if integers != (self.stored.dtype == np.int64):
             raise MotionError(
-                f"signal {self.name!r}: {self.values.dtype} values on {self.grids[:1]}"
+                f"signal {self.name!r}: {self.stored.dtype} values on {self.grids[:1]}"
             )
         if self.samples_per_frame < 1 or len(self.values) % self.samples_per_frame:
             raise MotionError(
@@ -317,7 +145,22 @@ class Signal:
             ),
             grid_changes=tuple(changes),
             ordinals=None if self.ordinals is None else self.ordinals[first:last],
+            stored=self.stored[first:last],
         )
+
+    def in_units(self, scaling: Scaling | None) -> Signal:
+        """The same with ``values`` that mean what ``scaling`` says of the stored numbers."""
+        if scaling is None:
+            return self
+        values = scaling.values(self.stored)
+        return replace(self, values=values, stored=self.stored, scaling=scaling)
+
+    def as_stored(self) -> Signal:
+        """The same with the stored numbers as its values: what codecs and formats want."""
+        if self.scaling is None:
+            return self
+        stored = self.scaling.stored(self.values, self.stored)
+        return replace(self, values=stored, stored=stored, scaling=None)
 
     def to_ordinals(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """The ordinal of every value, and whether it gives exactly this value back.
@@ -325,6 +168,8 @@ class Signal:
         A binary grid has many NaNs, of which ``values`` shows only that they are NaN: where
         ``ordinals`` are given and still mean the value that is there, they are taken.
         """
+        if self.scaling is not None:
+            return self.as_stored().to_ordinals()
         ordinals = np.empty(self.values.shape, np.int64)
         exact = np.empty(self.values.shape, np.bool_)
         for rows, columns, grid in self.grid_blocks():
@@ -409,8 +254,3 @@ class Motion:
         signal = replace(self.signals[0], values=np.asarray(values, dtype=np.float64))
         source = self.source and replace(self.source, size=0, sha256=b"")  # of no known file
         return replace(self, signals=(signal, *self.signals[1:]), source=source)
-
-
-def joint_columns(skeleton: Skeleton, joints: Sequence[int | str]) -> list[int]:
-    """The columns of the named joints, in the order given."""
-    return [c for joint in joints for c in skeleton.columns(skeleton.find(joint))]

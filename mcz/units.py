@@ -1,4 +1,4 @@
-"""Length units by name, in centimeters."""
+"""Length units by name, in centimeters, and axes that point up: what a caller may say of a file."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from mcz.errors import OptionError
 from mcz.motion import Skeleton
 
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48}
+UP_AXES = ("x", "y", "z")
 
 
 def unit_cm_of(unit: str) -> float:
@@ -20,3 +21,15 @@ def unit_cm_of(unit: str) -> float:
 def in_unit(skeleton: Skeleton, unit: str | None) -> Skeleton:
     """``skeleton`` in the length unit of that name, None: as it is; raises OptionError."""
     return skeleton if unit is None else replace(skeleton, unit_cm=unit_cm_of(unit))
+
+
+def facing(skeleton: Skeleton, up: str | None) -> Skeleton:
+    """``skeleton`` with the axis of that name pointing up, None: as it is; raises OptionError.
+
+    Where that is another axis than before, it is no longer the skeleton of its own source file.
+    """
+    if up is None or up == skeleton.up_axis:
+        return skeleton
+    if up not in UP_AXES:
+        raise OptionError(f"up axis {up!r} is not one of {', '.join(UP_AXES)}")
+    return replace(skeleton, up_axis=up, source=None)

@@ -20,7 +20,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # What a part may import; a part is the first name after ``mcz.``. Each may import itself.
 GROUND = {"brief", "errors", "schema", "numbers"}
-MODEL = GROUND | {"motion"}
+MODEL = GROUND | {"motion", "skeleton", "source"}
 # Where motion, codec and container meet: what each of the doors below needs of the layers.
 JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
 DOORS = {"reading", "writing", "editing", "live", "conversion"}
@@ -29,8 +29,10 @@ ALLOWED = {
     "brief": set(),
     "errors": set(),
     "schema": {"errors"},
-    "numbers": {"errors", "schema"},
-    "motion": GROUND,
+    "numbers": {"brief", "errors", "schema"},
+    "source": GROUND,
+    "skeleton": GROUND | {"source"},
+    "motion": GROUND | {"skeleton", "source"},
     "kinematics": MODEL,
     "angles": MODEL,
     "metrics": MODEL | {"angles", "kinematics"},

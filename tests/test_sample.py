@@ -18,7 +18,7 @@ SHA256 = {
     "walk.asf": "a5b003043808847baa715e5fa81004882edc8f81ed5154d8e02a0160b7de584a",
     "walk.amc": "2d49b636d6f50ff1a170d403eaa665938e4b88950f3bf27e566312e164201da3",
     "walk.bvh": "a6e486a9c552992490e6bd9c5e2df769acc04ccfefdf1e86a4dc3fb35cfd913e",
-    "walk.c3d": "1eaf3b2279527bb58d1ba1385bee0b1766981e0b7cebc46dfaa9dbc709f3670d",
+    "walk.c3d": "998a58d890556986e9b0bd96728f8f94df6d014af3cc08888f818178a20bc865",
 }
 BVH_OF = {"head": "Head", "lfoot": "LeftFoot", "rtoes": "RightToes", "lhand": "LeftHand"}
 

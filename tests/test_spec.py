@@ -66,7 +66,7 @@ def test_codec_registry() -> None:
 
 
 def test_source_format_registry() -> None:
-    found = re.findall(r"^\| (\d+) \| (\w+) \| ([.\w ]+) \| a (?:clip|skeleton) \|$", SPEC, re.M)
+    found = re.findall(r"^\| (\d+) \| ([\w-]+) \| ([.\w ]+) \| a (?:clip|skeleton) \|$", SPEC, re.M)
     assert found == [(str(f.id), f.name, " ".join(f.suffixes)) for f in FORMATS.values()]
 
 

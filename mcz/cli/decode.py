@@ -25,7 +25,13 @@ from mcz.cli.common import (
     write_output,
 )
 from mcz.cli.fits import facts_of, told
-from mcz.cli.options import decoded_option, force_option, json_option, salvage_option
+from mcz.cli.options import (
+    decoded_option,
+    force_option,
+    json_option,
+    salvage_option,
+    up_option,
+)
 from mcz.cli.parts import Filtered, Part, Preview
 
 if TYPE_CHECKING:
@@ -52,6 +58,9 @@ class _Wanted(NamedTuple):
     rate: Fraction | None
     solve: bool
     with_skeleton: bool
+    up: str | None
+    signal: str | None
+    stored: bool
 
     @property
     def is_converted(self) -> bool:
@@ -101,6 +110,15 @@ class _Wanted(NamedTuple):
     help="Numbers, or the motion as another format, instead of the source file.",
 )
 @click.option(
+    "--signal",
+    metavar="NAME",
+    help="The numbers of another signal, such as analog or outputs (with --to csv or npz).",
+)
+@click.option(
+    "--stored", is_flag=True, help="Its words as they are stored, not in units (with --signal)."
+)
+@up_option("Axis that points up, where the clip does not know it (with --to c3d).")
+@click.option(
     "--rate",
     metavar="R",
     callback=to_rate,
@@ -138,6 +156,7 @@ def command(
     """
     wanted = _Wanted(**options)
     _check_options(wanted, salvage)
+    _check_signal(wanted)
     _refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
     if output == "-" and (as_json or wanted.with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
@@ -183,6 +202,19 @@ def _check_options(wanted: _Wanted, salvage: bool) -> None:
     )
 
 
+def _check_signal(wanted: _Wanted) -> None:
+    """Raise Failure for options that do not go with a signal that is not the motion."""
+    numbers = wanted.target is not None and not wanted.is_converted
+    _refuse(wanted.signal is not None and not numbers, "--signal needs --to csv or --to npz")
+    _refuse(wanted.stored and wanted.signal is None, "--stored needs --signal")
+    other = wanted.joints is not None or wanted.preview or wanted.filtered
+    _refuse(
+        wanted.signal is not None and other,
+        "--signal goes with none of --joints --preview --post-filter",
+    )
+    _refuse(wanted.up is not None and wanted.target != "c3d", "--up needs --to c3d")
+
+
 def _refuse(wrong: bool, reason: str) -> None:
     if wrong:
         raise Failure(reason, Exit.USAGE)
@@ -190,6 +222,8 @@ def _refuse(wrong: bool, reason: str) -> None:
 
 def _of_clip(held: File, wanted: _Wanted) -> tuple[list[Output], Fit | None]:
     """The outputs of the clip that is wanted, and how well a skeleton fits where one is fitted."""
+    from mcz.reading.source_files import with_facts
+
     clip, target, fit = held.only_clip(wanted.name), wanted.target, None
     part = _part(clip, wanted)
     if target is None:
@@ -200,12 +234,14 @@ def _of_clip(held: File, wanted: _Wanted) -> tuple[list[Output], Fit | None]:
             motion, fit = _solved(clip, motion)
         elif target in ("amc", "bvh"):
             _check_moves(clip)
+        if wanted.up is not None:
+            motion = with_facts(motion, None, None, wanted.up)
         rate = None if wanted.filtered else wanted.rate
         outputs = _converted(motion, target, rate, wanted.with_skeleton)
     else:
-        outputs = [_export(clip, target, part, wanted.joints)]
+        outputs = [_export(clip, target, part, wanted)]
     if wanted.with_skeleton and target != "amc":
-        outputs.append(_skeleton(held, clip.skeleton_id))
+        outputs.append(_skeleton(held, _sourced(held, clip)))
     return outputs, fit
 
 
@@ -257,11 +293,18 @@ def _converted(
     return [(kinds.get(s, s), f"{_stem(motion)}.{s}", data) for s, data in files.items()]
 
 
-def _export(clip: Clip, target: str, part: Part, joints: str | None) -> Output:
-    from mcz.cli.export import EXPORTS, channel_names
+def _export(clip: Clip, target: str, part: Part, wanted: _Wanted) -> Output:
+    from mcz.cli.export import EXPORTS, channel_names, channel_units
 
+    joints = wanted.joints
     chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]
-    names = channel_names(clip.skeleton, clip.signals[0].channels)
+    signal = 0 if wanted.signal is None else clip.find_signal(wanted.signal)
+    channels = clip.signals[signal].channels
+    names = channel_names(clip.skeleton, channels)
+    if wanted.signal is not None:
+        units = channel_units(clip.skeleton, channels)
+        table = part.of_signal(signal, wanted.stored, names, units)
+        return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
     if chosen is not None:
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
@@ -271,6 +314,14 @@ def _export(clip: Clip, target: str, part: Part, joints: str | None) -> Output:
 def _stem(clip: Clip | Motion) -> str:
     """The clip's name without folders, which must not lead out of the output's folder."""
     return PurePosixPath(clip.name).name.strip(".") or "clip"
+
+
+def _sourced(held: File, clip: Clip) -> bytes:
+    """The skeleton of the clip, or its base where that alone has a file of its own."""
+    base = clip.base_skeleton
+    own = held.skeleton(clip.skeleton_id, with_source=True).source
+    has_file = own is None and base is not None and base.source is not None
+    return clip.skeleton.base if has_file and clip.skeleton.base else clip.skeleton_id
 
 
 def _skeleton(held: File, wanted: bytes) -> Output:

@@ -7,6 +7,7 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ class Table:
     mask: NDArray[np.bool_]
     frame_numbers: NDArray[np.int64]
     frame_rate: Fraction | None
+    units: Sequence[str] = ()  # of the columns, "" where unknown; none: those of the skeleton
 
 
 def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> list[str]:
@@ -44,15 +46,22 @@ def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> l
     ]
 
 
+def channel_units(skeleton: Skeleton, own: Sequence[Channel] | None) -> list[str]:
+    """The unit of every column, "" where the channel does not say it."""
+    return [channel.unit for channel in (skeleton.channels if own is None else own)]
+
+
 def to_csv(table: Table) -> bytes:
     """UTF-8 text: a header row, then a row a frame; an invalid value is an empty cell.
 
-    What would steer a terminal is escaped in the names, as text it is often printed on one.
-    Values are the shortest decimals that read back as the same binary64.
+    Units follow the names, in brackets. What would steer a terminal is escaped in both, as text it
+    is often printed on one. Values are the shortest decimals that read back as the same binary64.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["frame", *map(printable, table.names)])
+    units = table.units or [""] * len(table.names)
+    heads = [f"{n} [{u}]" if u else n for n, u in zip(table.names, units, strict=True)]
+    writer.writerow(["frame", *map(printable, heads)])
     rows = zip(
         table.frame_numbers.tolist(), table.values.tolist(), table.mask.tolist(), strict=True
     )
@@ -63,8 +72,10 @@ def to_csv(table: Table) -> bytes:
 
 
 def to_npz(table: Table) -> bytes:
-    """A NumPy archive of values, mask, frame_numbers, frame_rate and names, without pickles."""
+    """A NumPy archive of values, mask, frame_numbers, frame_rate, names and, where they are known,
+    units; without pickles."""
     rate = table.frame_rate
+    more: dict[str, Any] = {"units": np.array(table.units, np.str_)} if table.units else {}
     buffer = io.BytesIO()
     np.savez_compressed(
         buffer,
@@ -76,6 +87,7 @@ def to_npz(table: Table) -> bytes:
             [0, 1] if rate is None else [rate.numerator, rate.denominator], np.int64
         ),
         names=np.array(table.names, dtype=np.str_),
+        **more,
     )
     return buffer.getvalue()
 

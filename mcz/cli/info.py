@@ -25,6 +25,7 @@ from mcz.cli.common import (
 )
 from mcz.cli.figures import figure_lines
 from mcz.cli.options import decoded_option, json_option, salvage_option, version_option
+from mcz.cli.recording import recording_lines
 from mcz.cli.verify import is_unsound
 
 DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
@@ -170,6 +171,7 @@ def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:
         plural(skeleton["n_channels"], "channel"),
         "unit unknown" if unit is None else f"1 unit = {unit:.6g} cm",
         f"angles in {skeleton['angle_unit'] or 'an unknown unit'}",
+        f"{skeleton['up_axis']} up" if skeleton["up_axis"] else "up axis unknown",
     ]
     name = f" {skeleton['name']}" if skeleton["name"] else ""
     id_ = f" ({skeleton['id'][:8]})" if "id" in skeleton else ""
@@ -209,6 +211,7 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
         known = f"{model['name']}, well known" if model["name"] else "in the file"
         yield f"  model      {model['id'][:8]} ({known})"
     yield from _source(clip)
+    yield from recording_lines(clip["recording"])
     for key, value in clip["metadata"].items():
         yield f"  {key}  {value[:80]}"
     if clip["quality"]:

@@ -76,8 +76,13 @@ param_option = click.option(
 )
 
 
+def up_option(what: str) -> Callable[[Function], Function]:
+    """``--up``, as the argument ``up``; ``what`` is its help."""
+    return click.option("--up", type=click.Choice(("x", "y", "z")), help=what)
+
+
 def encoding_options(function: Function) -> Function:
-    """``--codec --param --rate --unit --verbatim --archive``, as the arguments of those names."""
+    """``--codec --param --rate --unit --up ...``, as the arguments of those names."""
     options = (
         click.option("--codec", metavar="NAME", help="Default: the best lossless codec there is."),
         param_option,
@@ -88,6 +93,7 @@ def encoding_options(function: Function) -> Function:
             help="Frames a second (120, 29.97, 30000/1001). An AMC does not say its own.",
         ),
         click.option("--unit", type=click.Choice(UNITS), help="Length unit of the source."),
+        up_option("Axis of the source that points up. BVH and AMC do not say theirs."),
         click.option("--verbatim", is_flag=True, help="Keep what cannot be parsed as attachment."),
         click.option("--archive", is_flag=True, help="Use the profile of large limits."),
     )

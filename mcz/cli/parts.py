@@ -37,19 +37,40 @@ class Part:
 
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
         """The channels of ``joints``, which are called ``names``."""
+        return self._table(*self._rows(joints), 0, names)
+
+    def of_signal(self, signal: int, stored: bool, names: list[str], units: list[str]) -> Table:
+        """All channels of another signal, in their units, or as they are ``stored``."""
+        values, mask = self.clip.read_masked(self.frames, None, self.resolution, signal=signal)
+        scaling = self.clip.scaling(signal)
+        if scaling is not None:
+            if stored:
+                units = [""] * len(units)
+            else:
+                values = scaling.values(values)
+        return self._table(values, mask, signal, names, units)
+
+    def _table(
+        self,
+        values: NDArray[Any],
+        mask: NDArray[np.bool_] | None,
+        signal: int,
+        names: list[str],
+        units: Sequence[str] = (),
+    ) -> Table:
         from mcz.cli.export import Table
         from mcz.reading.decimation import decimated_rows
 
         clip = self.clip
-        values, mask = self._rows(joints)
         mask = np.ones(values.shape, np.bool_) if mask is None else mask
         start, stop = self.frames or (0, clip.n_frames)
         numbers, rate = clip.frame_numbers[start:stop], self.rate or clip.frame_rate
         if self.decimate:
-            step, per_frame = 2**self.resolution, clip.signals[0].layout.samples_per_frame
+            step, per_frame = 2**self.resolution, clip.signals[signal].layout.samples_per_frame
             values, mask = (decimated_rows(rows, per_frame, step) for rows in (values, mask))
             numbers, rate = numbers[::step], rate and rate / step
-        return Table(names, _floats(values), mask, _repeated(numbers, len(values)), rate)
+        frames = _repeated(numbers, len(values))
+        return Table(names, _floats(values), mask, frames, rate, units)
 
     def _rows(self, joints: Sequence[int | str] | None) -> Masked:
         return self.clip.read_masked(self.frames, joints, self.resolution)

@@ -20,7 +20,7 @@ from mcz.cli.common import (
     say,
     to_rate,
 )
-from mcz.cli.options import UNITS, force_option, param_option, token_option
+from mcz.cli.options import UNITS, force_option, param_option, token_option, up_option
 from mcz.cli.piped import NAME, live_output, standard_input
 from mcz.cli.rows import Rows, skeleton_in
 
@@ -51,6 +51,7 @@ Entry = Callable[[], int | None]
 @param_option
 @click.option("--rate", metavar="R", callback=to_rate, help="Frames a second.")
 @click.option("--unit", type=click.Choice(UNITS), help="Length unit of the numbers.")
+@up_option("Axis of the numbers that points up.")
 @click.option("--name", metavar="NAME", default="live", help="Of the clip.  [default: live]")
 @click.option(
     "--skeleton",
@@ -114,6 +115,7 @@ def _encode(
     *,
     rate: Fraction | None,
     unit: str | None,
+    up: str | None,
     **live: Any,
 ) -> str:
     """Write the stream; returns what it holds in words. ``tell`` is told where one can join.
@@ -122,7 +124,7 @@ def _encode(
     """
     from mcz.live.generators import markers
     from mcz.live.writer import LiveWriter
-    from mcz.units import in_unit
+    from mcz.units import facing, in_unit
 
     known = None if skeleton is None else skeleton_in(skeleton)
     n_channels = None if known is None else known.n_channels
@@ -130,7 +132,7 @@ def _encode(
     if known is None:
         known = markers(rows.names or [])
     rows.expect(known.n_channels)
-    writer = LiveWriter(sink, in_unit(known, unit), frame_rate=rate, **live)
+    writer = LiveWriter(sink, facing(in_unit(known, unit), up), frame_rate=rate, **live)
     if tell is not None:
         tell(lambda: writer.entry)
     with writer:

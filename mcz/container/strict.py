@@ -18,7 +18,8 @@ from mcz.errors import FormatError
 from mcz.schema import inflate, parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
-OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset({2, 3, 4})  # the registry's source formats
+# The source formats of the registry, by what they are sources of.
+OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset({2, 3, 4, 5})
 
 
 def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:

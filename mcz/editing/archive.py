@@ -82,6 +82,7 @@ def pack(
     params: Mapping[str, Any] | None = None,
     rate: float | None = None,
     unit: str | None = None,
+    up: str | None = None,
     verbatim: bool = False,
     keep_all: bool = False,
     force: bool = False,
@@ -100,7 +101,8 @@ def pack(
     known = {suffix for source_format in FORMATS.values() for suffix in source_format.suffixes}
     if not keep_all:
         paths = [path for path in paths if path.suffix.lower() in known]
-    terms = Terms(codec, params, rate=rate, unit=unit, verbatim=verbatim or keep_all)
+    verbatim = verbatim or keep_all
+    terms = Terms(codec, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
     with replacing(target, force=force) as stream:
         draft = Draft(stream, profile_of(archive))
@@ -151,6 +153,7 @@ def append(
     skeleton: str | os.PathLike[str] | None = None,
     rate: float | None = None,
     unit: str | None = None,
+    up: str | None = None,
     verbatim: bool = False,
     root: str | os.PathLike[str] | None = None,
     salvage: bool = False,
@@ -168,7 +171,7 @@ def append(
     them. Where its end is damaged, one of the two has to be given. Raises AccessError while another
     process is appending.
     """
-    terms = Terms(codec, params, skeleton, rate, unit, verbatim)
+    terms = Terms(codec, params, skeleton, rate, unit, verbatim, up=up)
     entries = [Entry(Path(s), _name_below(s, root), terms) for s in sources]
     with growing(Path(target), salvage=salvage, force=force) as growth:
         container = growth.container

@@ -238,11 +238,22 @@ class Copier:
             source, hashes = b"".join(map(bytes, cend.source_sha256)), list(cend.value_sha256)
         else:
             source, hashes = self._decoded(cut, new)
+            if not new["source"]:
+                self._without_units(cut, new)
             pairs = new["metadata"]
             new["metadata"] = [{"key": key, "value": pairs[key]} for key in sorted(pairs)]
         for held in new["source"]:
             self.template(bytes(held["template"]))
         return source, hashes
+
+    def _without_units(self, cut: ClipCut, new: dict[str, Any]) -> None:
+        """Words whose meaning only the source told are words, and not in the unit of that."""
+        for info, fields in zip(cut.clip.signals, new["signals"], strict=True):
+            if cut.clip.scaling(info.index) is not None:
+                fields["channels"] = [dict(own) | {"unit": ""} for own in fields["channels"]]
+                add_note(new["metadata"], "source-note", f"{info.name}: words as they were stored")
+                said = f"what the words of its signal {info.name} mean, as its source file was cut"
+                self.found.left_out.append(f"clip {cut.clip.name}: {said}")
 
     def _decoded(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
         """The hashes of what is left, decoded once, and the source file that it has now."""
@@ -253,7 +264,7 @@ class Copier:
             self.found.left_out.append(f"clip {cut.clip.name}: its source file, as joints were cut")
         elif held:
             motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
-            hashes = [value_hash(signal.values, signal.mask) for signal in motion.signals]
+            hashes = [value_hash(signal.stored, signal.mask) for signal in motion.signals]
             assert motion.source is not None
             try:
                 data = FORMATS[motion.source.format].write(motion)

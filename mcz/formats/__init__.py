@@ -16,9 +16,9 @@ from mcz.errors import FormatError, SourceError, UnsupportedError
 from mcz.formats.find import find_asf
 from mcz.formats.line_by_line import Arriving
 from mcz.formats.notes import join_notes
-from mcz.motion import FrameNotes
+from mcz.motion import FrameNotes, Source
 
-__all__ = ["FORMATS", "Format", "find_asf", "format_by_id", "format_of", "sniffed"]
+__all__ = ["FORMATS", "Format", "find_asf", "format_by_id", "format_of", "recording_of", "sniffed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +30,8 @@ class Format:
     inverse; it raises MotionError or FormatError. ``join_notes`` is the inverse of the notes' cut.
     ``arrive(lines, skeleton)`` reads what comes line by line, None where the format cannot.
     ``states_rate``: the template holds the frame rate, so that it does not suit another.
+    ``recording(name, template, detail)`` is what the source says beside all numbers, None where it
+    says nothing; see ``mcz.Recording``.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Format:
     wants_skeleton: bool = False
     states_rate: bool = False
     arrive: Callable[..., Arriving] | None = None
+    recording: Callable[[str, bytes, bytes], Any] | None = None
 
 
 def _of(module: str, name: str) -> Callable[..., Any]:
@@ -77,7 +80,24 @@ FORMATS: dict[str, Format] = {
             states_rate=True,
             arrive=_of("bvh", "arrive"),
         ),
-        Format("c3d", 4, (".c3d",), _of("c3d", "read"), _of("c3d", "write"), states_rate=True),
+        Format(
+            "c3d",
+            4,
+            (".c3d",),
+            _of("c3d", "read"),
+            _of("c3d", "write"),
+            states_rate=True,
+            recording=_of("c3d_recording", "recording"),
+        ),
+        Format(
+            "c3d-outputs",  # a C3D whose points are not all points; the table gives c3d for .c3d
+            5,
+            (".c3d",),
+            _of("c3d", "read"),
+            _of("c3d", "write"),
+            states_rate=True,
+            recording=_of("c3d_recording", "recording"),
+        ),
     )
 }
 
@@ -88,7 +108,7 @@ def format_of(path: str | Path) -> Format:
     for source_format in FORMATS.values():
         if suffix in source_format.suffixes:
             return source_format
-    known = ", ".join(s for f in FORMATS.values() for s in f.suffixes)
+    known = ", ".join(dict.fromkeys(s for f in FORMATS.values() for s in f.suffixes))
     raise SourceError(f"{Path(path).name}: no source format has the suffix {suffix!r}, but {known}")
 
 
@@ -102,6 +122,17 @@ def sniffed(data: bytes) -> str | None:
     if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", data):
         return "asf"
     return "amc" if _of("amc", "is_amc")(data) else None
+
+
+def recording_of(source: Source | None) -> Any:
+    """What ``source`` says of a recording beside all numbers, a ``mcz.Recording``; None: nothing.
+
+    Raises FormatError on bad bytes.
+    """
+    read = FORMATS[source.format].recording if source is not None else None
+    if source is None or read is None:
+        return None
+    return read(source.format, source.template, source.detail)
 
 
 def format_by_id(format_id: int, *, of_skeleton: bool = False) -> Format:

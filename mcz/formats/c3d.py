@@ -1,30 +1,42 @@
 """C3D: bytes -> Motion, and back.
 
 SPEC.md, "Source reconstruction", is normative for the way back. Every point is a joint without a
-parent; its fourth word, the residual, and the analog samples are signals of their own, all of them
-raw as the file stores them.
+parent; its fourth word, the residual, the outputs of models and the analog samples are signals of
+their own. Stored is what the file holds; the values of analog samples are in their units.
 """
 
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.formats.c3d_layout import Kind, Layout, ordered_fields
-from mcz.formats.c3d_parameters import FLOAT, INTEGER, Parameters, find_parameters, parse_parameters
+from mcz.formats.c3d_layout import FORMAT, OUTPUTS_FORMAT, Kind, Layout, ordered_fields
+from mcz.formats.c3d_outputs import NAME as OUTPUTS
+from mcz.formats.c3d_outputs import Split, find_outputs, output_channels
+from mcz.formats.c3d_parameters import (
+    FLOAT,
+    INTEGER,
+    Parameters,
+    decoded,
+    find_parameters,
+    names_of,
+    parse_parameters,
+)
 from mcz.formats.c3d_plain import plain
+from mcz.formats.c3d_recording import is_unsigned, recording_of
 from mcz.formats.c3d_restore import restore
 from mcz.formats.c3d_shape import ROTATION_WORDS, WORD_OF_FIRST, WORD_OF_LAST, Shape, find_shape
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, Source
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.rules import MAX_SCALE, MIN_SCALE
+from mcz.numbers.scaling import Scaling
 
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54}
-UNSIGNED = b"UNSIGNED"
 POSITION = tuple(Channel(kind) for kind in POSITION_KINDS)
 FIELDS = (  # parameters that follow the number of frames: group, name, type, size, kind
     ("POINT", "FRAMES", INTEGER, 2, Kind.COUNT),
@@ -40,16 +52,20 @@ FIELDS = (  # parameters that follow the number of frames: group, name, type, si
 def read(data: bytes, name: str = "motion") -> Motion:
     """The motion in a C3D file; ``name`` becomes its name.
 
-    Raises SourceError, with the offset at fault. Signals: the points, their residuals, analog,
-    rotations; all but the first only where the file has some.
+    Raises SourceError, with the offset at fault. Signals: the points, their residuals, outputs,
+    analog, rotations; all but the first only where the file has some.
     """
     order, start = find_parameters(data)
     parameters = parse_parameters(data, order, start)
     shape = find_shape(data, parameters)
-    points, encoding = _texts(parameters.texts("POINT", "LABELS"))
-    names = _names(points, shape.n_points, "point")
-    joints = tuple(Joint(label, channels=POSITION) for label in names)
-    skeleton = Skeleton(joints, unit_cm=_unit_cm(parameters), angle_unit="")
+    split = find_outputs(parameters, shape.n_points)
+    layout = _layout(data, parameters, shape, split)
+    said = recording_of(layout)
+    points, encoding = decoded(parameters.texts("POINT", "LABELS"))
+    names = names_of(points, shape.n_points, "point")
+    joints = tuple(Joint(names[number], channels=POSITION) for number in split.points)
+    unit_cm = _unit_cm(parameters)
+    skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="", up_axis=said.up_axis)
     rate, exact = _rate(data, parameters)
     numbers = np.arange(shape.first, shape.first + shape.n_frames, dtype=np.int64)
     scale, note = _scale(data, parameters) if shape.word == 2 and shape.n_points else (1.0, "")
@@ -59,32 +75,21 @@ def read(data: bytes, name: str = "motion") -> Motion:
     metadata = {"source-note": "; ".join(notes)} if notes else {}
     if encoding != "utf-8":
         metadata["name-encoding"] = encoding
+    grid = Grid(GridKind.SCALED, scale=scale)
+    signals = [
+        *_point_signals(data, parameters, shape, grid, [names[n] for n in split.order], split),
+        *_other_signals(data, parameters, shape, said.scaling),
+    ]
     return Motion(
         skeleton,
-        tuple(_signals(data, parameters, shape, Grid(GridKind.SCALED, scale=scale), names)),
+        tuple(signals),
         rate,
         exact,
         name,
         metadata,
-        _source(data, parameters, shape),
+        _source(data, layout),
         None if shape.first == 1 or not shape.n_frames else numbers,
     )
-
-
-def _texts(texts: list[bytes]) -> tuple[list[str], str]:
-    """Texts and their encoding: "utf-8" where all of them are, otherwise "latin-1"."""
-    encoding = "utf-8"
-    try:
-        b"".join(texts).decode(encoding)
-        return [text.decode(encoding) for text in texts], encoding
-    except UnicodeDecodeError:
-        return [text.decode("latin-1") for text in texts], "latin-1"
-
-
-def _names(labels: list[str], n: int, what: str) -> list[str]:
-    """``n`` names: the labels, and ``what`` with a number from 1 for those that lack one."""
-    labels = labels[:n] + [""] * (n - len(labels))
-    return [label or f"{what} {number}" for number, label in enumerate(labels, 1)]
 
 
 def _unit_cm(parameters: Parameters) -> float | None:
@@ -119,31 +124,62 @@ def _scale(data: bytes, parameters: Parameters) -> tuple[float, str]:
     return 1.0, "no scale that can be used: coordinates are the integers of the file"
 
 
-def _signals(
-    data: bytes, parameters: Parameters, shape: Shape, grid: Grid, names: list[str]
-) -> list[Signal]:
-    """The signals; ``grid`` is that of integer coordinates."""
-    order, end = parameters.order, 4 * shape.n_points
-    n_words = shape.n_frames * shape.frame_words
+def _words(data: bytes, parameters: Parameters, shape: Shape) -> NDArray[Any]:
+    """The data section, a row a frame."""
     kind = "i2" if shape.word == 2 else "u4"
-    words = np.frombuffer(data, f"{order.prefix}{kind}", n_words, shape.start)
-    words = words.reshape(shape.n_frames, shape.frame_words)
-    raw = Grid(GridKind.INTEGER)
+    n_words = shape.n_frames * shape.frame_words
+    words = np.frombuffer(data, f"{parameters.order.prefix}{kind}", n_words, shape.start)
+    return words.reshape(shape.n_frames, shape.frame_words)
+
+
+def _point_signals(
+    data: bytes,
+    parameters: Parameters,
+    shape: Shape,
+    grid: Grid,
+    names: list[str],
+    split: Split,
+) -> list[Signal]:
+    """Points, residuals, outputs; ``grid`` is that of integer coordinates.
+
+    ``names`` are those of all points in the order of their residuals.
+    """
+    words, raw = _words(data, parameters, shape), Grid(GridKind.INTEGER)
     if shape.word == 4:
-        grid = raw = order.grid
-    columns = np.delete(np.arange(end), np.s_[3::4])
-    points = _signal("motion", words[:, columns], grid)
-    found = [points]
-    if shape.n_points:
-        labels = tuple(Channel("", name) for name in names)
-        residuals = _signal("residuals", words[:, 3:end:4], raw, labels)
-        found = [_masked(points, residuals), residuals]
+        grid = raw = parameters.order.grid
+    points = _signal("motion", words[:, _columns(split.points)], grid)
+    if not shape.n_points:
+        return [points]
+    n_points = len(split.points)
+    labels = tuple(Channel("", name) for name in names)
+    residuals = _signal("residuals", words[:, 4 * split.order + 3], raw, labels)
+    found = [_masked(points, residuals.values[:, :n_points]), residuals]
+    if len(split.outputs):
+        channels = output_channels(parameters, names[n_points:])
+        outputs = _signal(OUTPUTS, words[:, _columns(split.outputs)], grid, channels)
+        found.append(_masked(outputs, residuals.values[:, n_points:]))
+    return found
+
+
+def _columns(points: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The words of a frame that hold the coordinates of these points."""
+    return (4 * points[:, None] + np.arange(3)).ravel()
+
+
+def _other_signals(
+    data: bytes, parameters: Parameters, shape: Shape, scaling: Scaling | None
+) -> list[Signal]:
+    """Analog samples, whose words mean what ``scaling`` says, and rotations."""
+    order, raw, found = parameters.order, Grid(GridKind.INTEGER), []
     if shape.n_channels:
-        samples = words[:, end:].reshape(-1, shape.n_channels)
-        if shape.word == 2 and _unsigned(parameters):
+        words = _words(data, parameters, shape)
+        samples = words[:, 4 * shape.n_points :].reshape(-1, shape.n_channels)
+        if shape.word == 2 and is_unsigned(parameters):
             samples = samples.astype(np.int64) & 0xFFFF
         channels = _channels(parameters, shape)
-        found.append(_signal("analog", samples, raw, channels, shape.subframes))
+        grid = order.grid if shape.word == 4 else raw
+        analog = _signal("analog", samples, grid, channels, shape.subframes)
+        found.append(analog.in_units(scaling))
     if shape.n_rotations:
         n_words = shape.n_frames * shape.rotations_size // 4
         words = np.frombuffer(data, f"{order.prefix}u4", n_words, shape.rotations_at)
@@ -171,45 +207,36 @@ def _signal(
     )
 
 
-def _masked(points: Signal, residuals: Signal) -> Signal:
+def _masked(points: Signal, residuals: NDArray[Any]) -> Signal:
     """The points with their mask: valid where the residual is not negative and nothing is NaN."""
-    valid = residuals.values >= 0
+    valid = residuals >= 0
     if points.values.dtype == np.float64:
         nan = np.isnan(points.values)
         if nan.any():
             valid &= ~nan.reshape(*valid.shape, 3).any(axis=2)
-    if valid.all():
-        return points
-    return Signal(
-        points.values, points.grids, mask=np.repeat(valid, 3, axis=1), ordinals=points.ordinals
-    )
-
-
-def _unsigned(parameters: Parameters) -> bool:
-    texts = parameters.texts("ANALOG", "FORMAT")
-    return bool(texts) and texts[0].upper() == UNSIGNED
+    return points if valid.all() else replace(points, mask=np.repeat(valid, 3, axis=1))
 
 
 def _channels(parameters: Parameters, shape: Shape) -> tuple[Channel, ...]:
     """The analog channels. Names and units that are no UTF-8 are read as Latin-1."""
-    labels, _ = _texts(parameters.texts("ANALOG", "LABELS"))
-    units, _ = _texts(parameters.texts("ANALOG", "UNITS"))
+    labels, _ = decoded(parameters.texts("ANALOG", "LABELS"))
+    units, _ = decoded(parameters.texts("ANALOG", "UNITS"))
     units += [""] * (shape.n_channels - len(units))
-    names = _names(labels, shape.n_channels, "channel")
+    names = names_of(labels, shape.n_channels, "channel")
     return tuple(Channel("", name, unit) for name, unit in zip(names, units, strict=False))
 
 
 def _rotation_channels(parameters: Parameters, shape: Shape) -> tuple[Channel, ...]:
     """Of every rotation the elements of its matrix, column after column, and its reliability."""
-    labels, _ = _texts(parameters.texts("ROTATION", "LABELS"))
+    labels, _ = decoded(parameters.texts("ROTATION", "LABELS"))
     elements = [f"m{row}{column}" for column in range(1, 5) for row in range(1, 5)]
     parts = (*elements, "reliability")
     assert len(parts) == ROTATION_WORDS
-    names = _names(labels, shape.n_rotations, "rotation")
+    names = names_of(labels, shape.n_rotations, "rotation")
     return tuple(Channel("", f"{name} {part}") for name in names for part in parts)
 
 
-def _source(data: bytes, parameters: Parameters, shape: Shape) -> Source:
+def _layout(data: bytes, parameters: Parameters, shape: Shape, split: Split) -> Layout:
     """All that lies around the data, and which fields count frames."""
     fields = [(WORD_OF_FIRST, Kind.FIRST), (WORD_OF_LAST, Kind.LAST)]
     for group, name, type_, size, kind in FIELDS:
@@ -221,13 +248,13 @@ def _source(data: bytes, parameters: Parameters, shape: Shape) -> Source:
     if shape.n_rotations:
         gap = data[shape.stop : shape.rotations_at]
         tail = data[shape.rotations_at + shape.n_frames * shape.rotations_size :]
-    layout = Layout(
+    return Layout(
         parameters.order,
         shape.word,
         shape.n_points,
         shape.n_channels,
         shape.subframes if shape.n_channels else 1,
-        shape.word == 2 and _unsigned(parameters),
+        shape.word == 2 and is_unsigned(parameters),
         shape.n_frames,
         shape.first,
         data[: shape.start],
@@ -236,10 +263,14 @@ def _source(data: bytes, parameters: Parameters, shape: Shape) -> Source:
         shape.ratio,
         gap,
         tail,
+        split.runs,
     )
+
+
+def _source(data: bytes, layout: Layout) -> Source:
     template, detail = layout.build()
     digest = hashlib.sha256(data).digest()
-    return Source("c3d", template, detail, size=len(data), sha256=digest)
+    return Source(layout.format, template, detail, size=len(data), sha256=digest)
 
 
 def write(motion: Motion) -> bytes:
@@ -247,7 +278,7 @@ def write(motion: Motion) -> bytes:
 
     Raises MotionError for what C3D cannot say; see ``plain``.
     """
-    if motion.source is None or motion.source.format != "c3d":
+    if motion.source is None or motion.source.format not in (FORMAT, OUTPUTS_FORMAT):
         motion = plain(motion)
     assert motion.source is not None
     return restore(motion, motion.source)

@@ -1,7 +1,7 @@
 """What a C3D file holds beside its data, as a template and a detail.
 
-SPEC.md, "Source reconstruction", is normative and has the tables of C3D_TEMPLATE, C3D_DETAIL and
-C3D_FIELD.
+SPEC.md, "Source reconstruction", is normative and has the tables of C3D_TEMPLATE, C3D_DETAIL,
+C3D_FIELD and C3D_OUTPUTS_TEMPLATE.
 """
 
 from __future__ import annotations
@@ -13,10 +13,12 @@ from enum import IntEnum
 from construct import ExprValidator, Int8ul, OneOf, Struct
 
 from mcz.errors import FormatError, LimitError
+from mcz.formats.c3d_outputs import Split, split_of
 from mcz.formats.c3d_parameters import DEC, INTEL, SGI, Order
-from mcz.formats.c3d_shape import COUNTED
+from mcz.formats.c3d_shape import COUNTED, ROTATION_WORDS
 from mcz.schema import SIZED, UVARINT, build, counted, parse
 
+FORMAT, OUTPUTS_FORMAT = "c3d", "c3d-outputs"  # names in the registry of source formats
 MAX_ZEROS = 2**20  # that a detail counts instead of holding them
 MAX_SHARED_TAIL = 512  # bytes behind the data that are the clip's own; more go into the template
 
@@ -60,6 +62,10 @@ C3D_TEMPLATE = Struct(
     "gap" / SIZED * "bytes between the data section and the rotations; empty without rotations",
     "tail" / SIZED * "bytes behind the data",
 )
+C3D_OUTPUTS_TEMPLATE = Struct(
+    "outputs" / counted(UVARINT) * "points that are points, then outputs, and so on in turn",
+    "file" / C3D_TEMPLATE * "the file",
+)
 C3D_DETAIL = Struct(
     "n_frames" / UVARINT * "frames of the source file",
     "first" / UVARINT * "number of its first frame",
@@ -73,7 +79,8 @@ C3D_DETAIL = Struct(
 class Layout:
     """A template and a detail, parsed; see C3D_TEMPLATE and C3D_DETAIL.
 
-    ``head`` here has the fields in place; ``tail`` is all that lies behind the data.
+    ``head`` here has the fields in place; ``tail`` is all that lies behind the data; ``outputs`` is
+    that of C3D_OUTPUTS_TEMPLATE, () where all points are points.
     """
 
     order: Order
@@ -90,6 +97,24 @@ class Layout:
     ratio: int = 1
     gap: bytes = b""
     tail: bytes = b""
+    outputs: tuple[int, ...] = ()
+
+    @property
+    def split(self) -> Split:
+        """Which points are outputs."""
+        return split_of(self.outputs, self.n_points)
+
+    @property
+    def behind(self) -> int:
+        """Where the tail begins in the file."""
+        rotations = self.n_rotations * self.ratio * ROTATION_WORDS * 4 * self.n_frames
+        words = 4 * self.n_points + self.n_channels * self.subframes
+        return len(self.head) + self.n_frames * words * self.word + len(self.gap) + rotations
+
+    @property
+    def format(self) -> str:
+        """The source format that has a place for all of it."""
+        return OUTPUTS_FORMAT if self.outputs else FORMAT
 
     def build(self) -> tuple[bytes, bytes]:
         """The bytes of the template and of the detail."""
@@ -122,15 +147,32 @@ class Layout:
             "tail": b"" if shared else tail,
             "zeros": len(self.tail) - len(tail),
         }
+        schema = C3D_TEMPLATE
+        if self.outputs:
+            schema, template = C3D_OUTPUTS_TEMPLATE, {"outputs": self.outputs, "file": template}
         return (
-            build(C3D_TEMPLATE, template, "source template"),
+            build(schema, template, "source template"),
             build(C3D_DETAIL, detail, "source detail"),
         )
 
 
-def parse_layout(template: bytes, detail: bytes) -> Layout:
-    """The layout of a clip; raises FormatError on bad bytes."""
-    shared = parse(C3D_TEMPLATE, template, "source template")
+def parse_layout(source_format: str, template: bytes, detail: bytes) -> Layout:
+    """The layout of a clip whose source is ``FORMAT`` or ``OUTPUTS_FORMAT``.
+
+    Raises FormatError on bad bytes.
+    """
+    outputs: tuple[int, ...] = ()
+    if source_format == OUTPUTS_FORMAT:
+        parsed = parse(C3D_OUTPUTS_TEMPLATE, template, "source template")
+        shared, outputs = parsed.file, tuple(parsed.outputs)
+        if 0 in outputs[1:]:  # C3D-17
+            raise FormatError("source template: a run of no points")
+        if sum(outputs) != shared.points:  # C3D-18
+            raise FormatError(
+                f"source template: runs of {sum(outputs)} points, but there are {shared.points}"
+            )
+    else:
+        shared = parse(C3D_TEMPLATE, template, "source template")
     own = parse(C3D_DETAIL, detail, "source detail")
     if own.zeros > MAX_ZEROS:  # C3D-13
         raise LimitError(f"source detail: {own.zeros} zeros, limit {MAX_ZEROS}")
@@ -166,6 +208,7 @@ def parse_layout(template: bytes, detail: bytes) -> Layout:
         shared.ratio,
         shared.gap,
         shared.tail + own.tail + bytes(own.zeros),
+        outputs,
     )
 
 

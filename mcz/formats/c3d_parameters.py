@@ -116,6 +116,21 @@ class Parameters:
             texts += [parameter.data[k : k + width].rstrip(b"\0 ").lstrip(b" ") for k in rows]
             number += 1
 
+    def numbers(self, group: str, name: str) -> list[float]:
+        """The numbers of a parameter and of those that go on with it, integers with a sign."""
+        numbers: list[float] = []
+        count = 1
+        while True:
+            parameter = self.get(group, name if count == 1 else f"{name}{count}")
+            if parameter is None or parameter.type == TEXT:
+                return numbers
+            if parameter.type == FLOAT:
+                numbers += self.order.reals(parameter.data).tolist()
+            else:
+                kind = f"{self.order.prefix}i2" if parameter.type == INTEGER else "u1"
+                numbers += map(float, np.frombuffer(parameter.data, kind))
+            count += 1
+
     @cached_property
     def first_frame(self) -> int | None:
         """TRIAL:ACTUAL_START_FIELD."""
@@ -133,6 +148,22 @@ class Parameters:
             return None
         low, high = (self.order.integer(parameter.data, at) for at in (0, 2))
         return low + (high << 16)
+
+
+def decoded(texts: list[bytes]) -> tuple[list[str], str]:
+    """Texts and their encoding: "utf-8" where all of them are, otherwise "latin-1"."""
+    encoding = "utf-8"
+    try:
+        b"".join(texts).decode(encoding)
+        return [text.decode(encoding) for text in texts], encoding
+    except UnicodeDecodeError:
+        return [text.decode("latin-1") for text in texts], "latin-1"
+
+
+def names_of(labels: list[str], n: int, what: str) -> list[str]:
+    """``n`` names: the labels, and ``what`` with a number from 1 for those that lack one."""
+    labels = labels[:n] + [""] * (n - len(labels))
+    return [label or f"{what} {number}" for number, label in enumerate(labels, 1)]
 
 
 def find_parameters(data: bytes) -> tuple[Order, int]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import FormatError, MotionError
 from mcz.formats.c3d_layout import Kind, Layout, parse_layout
+from mcz.formats.c3d_outputs import NAME as OUTPUTS
 from mcz.formats.c3d_parameters import BLOCK, Order
 from mcz.formats.c3d_shape import COUNTED, ROTATION_WORDS
 from mcz.motion import Motion, Signal, Source
@@ -30,7 +31,7 @@ def restore(motion: Motion, source: Source) -> bytes:
     FormatError where the source does not belong to such a motion, MotionError for a range of
     frames that the file cannot have.
     """
-    layout = parse_layout(source.template, source.detail)
+    layout = parse_layout(source.format, source.template, source.detail)
     data = _section(motion, layout)
     rotations = b""
     if layout.n_rotations:
@@ -91,19 +92,10 @@ def field_bytes(order: Order, kind: Kind, first: int, n_frames: int, rotations_a
 
 def _section(motion: Motion, layout: Layout) -> bytes:
     """The data section: of every frame the points, then the samples of the analog channels."""
-    n_frames, n_points = motion.n_frames, layout.n_points
+    n_frames, end = motion.n_frames, 4 * layout.n_points
     n_analog = layout.n_channels * layout.subframes
-    end = 4 * n_points
     words = np.empty((n_frames, end + n_analog), f"{layout.order.prefix}u{layout.word}")
-    points = _checked(motion.signals[0], 3 * n_points, 1)
-    if n_points:
-        residuals = _residuals(motion, layout)
-        words[:, 3:end:4] = _words(residuals, layout)
-        if layout.order.grid.kind == GridKind.BINARY32 and layout.word == 4:
-            points = _with_gaps(points, residuals)
-    positions = _words(points, layout)
-    for axis in range(3):
-        words[:, axis:end:4] = positions[:, axis::3]
+    _fill_points(words, motion, layout)
     if n_analog:
         analog = _signal(motion, "analog", layout.n_channels, layout.subframes)
         samples = _words(analog, layout, layout.unsigned)
@@ -111,11 +103,37 @@ def _section(motion: Motion, layout: Layout) -> bytes:
     return words.tobytes()
 
 
+def _fill_points(words: NDArray[Any], motion: Motion, layout: Layout) -> None:
+    """The words of all points, which are the first of each row."""
+    parts = _parts(motion, layout)
+    if not layout.n_points:
+        return
+    residuals = _residuals(motion, layout, [signal for signal, _ in parts])
+    words[:, 4 * layout.split.order + 3] = _words(residuals, layout)
+    at = 0
+    for signal, points in parts:
+        if layout.order.grid.kind == GridKind.BINARY32 and layout.word == 4:
+            signal = _with_gaps(signal, residuals.values[:, at : at + len(points)])
+        positions = _words(signal, layout)
+        for axis in range(3):
+            words[:, 4 * points + axis] = positions[:, axis::3]
+        at += len(points)
+
+
+def _parts(motion: Motion, layout: Layout) -> list[tuple[Signal, NDArray[np.int64]]]:
+    """The signals of the points, checked, and the numbers of their points in the file."""
+    split = layout.split
+    parts = [(_checked(motion.signals[0], 3 * len(split.points), 1), split.points)]
+    if len(split.outputs):
+        parts.append((_signal(motion, OUTPUTS, 3 * len(split.outputs), 1), split.outputs))
+    return parts
+
+
 def _signal(motion: Motion, name: str, n_channels: int, per_frame: int) -> Signal:
     """The signal of a name, checked; raises FormatError."""
     for signal in motion.signals[1:]:
         if signal.name == name:
-            return _checked(signal, n_channels, per_frame)
+            return _checked(signal.as_stored(), n_channels, per_frame)
     raise FormatError(f"source template: it needs a signal {name!r}, which the clip has not")
 
 
@@ -128,21 +146,27 @@ def _checked(signal: Signal, n_channels: int, per_frame: int) -> Signal:
     return signal
 
 
-def _residuals(motion: Motion, layout: Layout) -> Signal:
-    """The residual words; where the motion has none, 0 for valid points and -1 for others."""
+def _residuals(motion: Motion, layout: Layout, parts: list[Signal]) -> Signal:
+    """The residual words of the points of all ``parts``, one part after the other.
+
+    Where the motion has none, 0 for valid points and -1 for others.
+    """
     if any(signal.name == "residuals" for signal in motion.signals[1:]):
         return _signal(motion, "residuals", layout.n_points, 1)
     shape = motion.n_frames, layout.n_points
-    valid = valid_points(motion.signals[0])
     residuals = np.zeros(shape, np.int64)
-    if valid is not None:
-        residuals[~valid] = -1
+    at = 0
+    for signal in parts:
+        n_points, valid = signal.n_channels // 3, valid_points(signal)
+        if valid is not None:
+            residuals[:, at : at + n_points][~valid] = -1
+        at += n_points
     if layout.word == 2:
         return Signal(residuals, (Grid(GridKind.INTEGER),) * layout.n_points)
     return Signal(residuals.astype(np.float64), (layout.order.grid,) * layout.n_points)
 
 
-def _with_gaps(points: Signal, residuals: Signal) -> Signal:
+def _with_gaps(points: Signal, residuals: NDArray[Any]) -> Signal:
     """The points, NaN where they are invalid and neither they nor their residuals say so.
 
     A lossy codec fills such gaps, which the file would then no longer have.
@@ -151,7 +175,7 @@ def _with_gaps(points: Signal, residuals: Signal) -> Signal:
     if valid is None:
         return points
     values = points.values.reshape(*valid.shape, 3)  # either may be 0
-    lost = ~valid & (residuals.values >= 0) & ~np.isnan(values).any(axis=2)
+    lost = ~valid & (residuals >= 0) & ~np.isnan(values).any(axis=2)
     if not lost.any():
         return points
     gapped = np.where(lost[:, :, None], np.nan, values)

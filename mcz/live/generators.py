@@ -20,7 +20,7 @@ from mcz.live.reader_with_losses import FramesWithLosses, StreamSummary
 from mcz.live.strict_reader import StrictFrames
 from mcz.live.writer import LiveWriter
 from mcz.motion import POSITION_KINDS, Channel, Joint, Skeleton
-from mcz.units import in_unit
+from mcz.units import facing, in_unit
 
 if TYPE_CHECKING:
     from mcz.transforms.post_filter import PostFilter
@@ -37,6 +37,7 @@ def stream_encode(
     params: Mapping[str, Any] = MappingProxyType({}),
     frame_rate: Fraction | None = None,
     unit: str | None = None,
+    up: str | None = None,
     name: str = "live",
     metadata: Mapping[str, str] = MappingProxyType({}),
     repeat: int = 1,
@@ -53,7 +54,7 @@ def stream_encode(
     known = skeleton if isinstance(skeleton, Skeleton) else markers(skeleton)
     writer = LiveWriter(
         sink,
-        in_unit(known, unit),
+        facing(in_unit(known, unit), up),
         codec,
         params,
         frame_rate=frame_rate,

@@ -14,7 +14,7 @@ from mcz.formats.line_by_line import Arriving
 from mcz.live.writer import LiveWriter
 from mcz.motion import Skeleton
 from mcz.reading.source_files import read_skeleton
-from mcz.units import in_unit
+from mcz.units import facing, in_unit
 from mcz.writing.entry import Terms
 
 NOTE = "coded live, frame by frame, from {format} text, which was not kept"
@@ -42,7 +42,7 @@ def encode_live(
     notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
     writer = LiveWriter(
         sink,
-        in_unit(arriving.skeleton, terms.unit),
+        facing(in_unit(arriving.skeleton, terms.unit), terms.up),
         terms.codec,
         terms.params or {},
         frame_rate=arriving.frame_rate if terms.rate is None else Fraction(terms.rate),

@@ -85,7 +85,7 @@ class LiveWriter:
         self._decoded: Floats | None = None
         if base is not None:
             name_skeleton(self._writer, base)
-            if skeleton.base is not None:
+            if skeleton.base is not None or skeleton.up_axis != base.up_axis:
                 skeleton = replace(skeleton, base=write_skeleton(self._writer, base))
         self.skeleton, self._n_channels = skeleton, skeleton.n_channels
         self._positions = wants_positions(self.codec, self.options, skeleton)

@@ -1,4 +1,4 @@
-"""Blocks of a signal, each on one grid."""
+"""The parts of a signal that have one grid each."""
 
 from __future__ import annotations
 

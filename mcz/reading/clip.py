@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from mcz.brief import shown
 from mcz.codecs import by_id
-from mcz.codecs.contract import Layout
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
 from mcz.container.frame_numbers import parse_frame_numbers
@@ -23,11 +22,14 @@ from mcz.container.reader import Container
 from mcz.container.value_hash import value_hash
 from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
 from mcz.formats import FORMATS, format_by_id
+from mcz.formats.c3d_recording import Recording
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
+from mcz.numbers.scaling import Scaling
 from mcz.reading.decimation import decimated, decimated_rows
 from mcz.reading.joints import Joints, joint_list
 from mcz.reading.preview import Preview, preview
-from mcz.reading.signal_info import SignalInfo, read_signal
+from mcz.reading.recording import index_of, read_recording, scaling_of
+from mcz.reading.signal_info import SignalInfo, groups_of, read_signal
 from mcz.reading.signal_reader import SignalReader
 from mcz.reading.source_info import SourceInfo, of_no_file, read_source, sourced_skeleton
 from mcz.reading.views import ClipValues
@@ -167,17 +169,22 @@ class Clip:
         resolution: int = 0,
         *,
         decimate: bool = False,
-        signal: int = 0,
+        signal: int | str = 0,
     ) -> NDArray[Any]:
         """The values of frames a <= f < b of some joints, NaN where invalid.
 
         Shape (rows, channels of the joints in the order given), binary64 in source units.
-        ``resolution`` leaves out that many of the finest details; with ``decimate`` only the rows
-        of every 2^resolution-th frame are returned; ``motion`` also gives their numbers. Raises
-        OptionError for a range outside the clip and FormatError for bad bytes; a full read also
-        checks the value hash.
+        ``signal`` is one of ``signals`` by index or name; analog samples are in the units of their
+        channels, while ``read_masked`` gives the stored words. ``resolution`` leaves out that many
+        of the finest details; with ``decimate`` only the rows of every 2^resolution-th frame are
+        returned; ``motion`` also gives their numbers. Raises OptionError for a range outside the
+        clip and FormatError for bad bytes; a full read also checks the value hash.
         """
+        signal = self.find_signal(signal)
         values, mask = self.read_masked(frames, joints, resolution, signal=signal)
+        scaling = self.scaling(signal)
+        if scaling is not None:
+            values = scaling.values(values)
         if mask is not None:
             values = np.where(mask, values, np.nan)
         if not decimate:
@@ -191,10 +198,10 @@ class Clip:
         joints: Joints = None,
         resolution: int = 0,
         *,
-        signal: int = 0,
+        signal: int | str = 0,
     ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-        """The values with the stored coordinates beneath the mask, and the mask."""
-        info = self._info(signal)
+        """The numbers as they are stored, those beneath the mask and analog words too; the mask."""
+        info = self._info(self.find_signal(signal))
         start, stop = self.checked_range(frames)
         self._check_resolution(info, resolution)
         groups, columns = self.groups_of(info, joints)
@@ -212,6 +219,22 @@ class Clip:
     ) -> None:
         if not self.container.salvage:
             self.check_hash(info, values, mask)
+
+    def find_signal(self, signal: int | str) -> int:
+        """The index of a signal given by index or name, the first of its name; OptionError."""
+        return signal if isinstance(signal, int) else index_of(self.signals, signal, self.name)
+
+    @cached_property
+    def recording(self) -> Recording | None:
+        """What the source says beside all numbers: events, force platforms, units, descriptions.
+
+        None where it says nothing of the kind: only C3D does. Raises FormatError on bad bytes.
+        """
+        return read_recording(self.container, self._fields)
+
+    def scaling(self, signal: int) -> Scaling | None:
+        """What the stored numbers of a signal mean; None where they are the values; FormatError."""
+        return scaling_of(self.signals, signal, lambda: self.recording)
 
     def _info(self, signal: int) -> SignalInfo:
         if not 0 <= signal < len(self.signals):
@@ -236,7 +259,7 @@ class Clip:
 
     def groups_of(self, info: SignalInfo, joints: Joints) -> tuple[tuple[int, ...], list[int]]:
         """The groups that hold the channels of these joints, and where each is among theirs."""
-        return _groups_of(info.layout, self._columns(info, joints))
+        return groups_of(info.layout, self._columns(info, joints))
 
     def _columns(self, info: SignalInfo, joints: Joints) -> list[int]:
         if joints is None:
@@ -281,7 +304,10 @@ class Clip:
         source then is left out where its text states the rate.
         """
         motion = self._motion(frames, resolution, decimate)
-        return replace(motion, skeleton=self._sourced_skeleton)
+        scalings = [self.scaling(info.index) for info in self.signals]
+        pairs = zip(motion.signals, scalings, strict=True)
+        signals = tuple(signal.in_units(scaling) for signal, scaling in pairs)
+        return replace(motion, skeleton=self._sourced_skeleton, signals=signals)
 
     @cached_property
     def _sourced_skeleton(self) -> Skeleton:
@@ -389,11 +415,3 @@ def _reopened(container: Container, name: str) -> Clip:
     if row is None:
         raise OptionError(f"{container.source.name}: the clip {name!r} is no longer there")
     return Clip(container, row)
-
-
-def _groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...], list[int]]:
-    """The groups that hold ``columns``, and where each column is among theirs."""
-    group_of = {c: g for g, group in enumerate(layout.groups) for c in group}
-    groups = tuple(dict.fromkeys(sorted(group_of[c] for c in columns)))
-    column = {c: i for i, c in enumerate(c for g in groups for c in layout.groups[g])}
-    return groups, [column[c] for c in columns]

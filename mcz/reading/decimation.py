@@ -57,6 +57,7 @@ def _decimated_signal(signal: Signal, step: int) -> Signal:
     return replace(
         signal,
         values=thin(signal.values),
+        stored=thin(signal.stored),
         mask=thin(signal.mask),
         ordinals=thin(signal.ordinals),
         exceptions=Exceptions(

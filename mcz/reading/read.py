@@ -19,14 +19,16 @@ def read(
     skeleton: str | os.PathLike[str] | Skeleton | None = None,
     rate: Fraction | float | None = None,
     unit: str | None = None,
+    up: str | None = None,
     clip: str | None = None,
     max_decoded: int | None = None,
 ) -> Motion:
     """The motion in a BVH, AMC, C3D or MCZ file.
 
     An AMC finds its ASF beside it, or takes ``skeleton``, a path or a Skeleton. ``rate`` in frames
-    a second and ``unit`` (a key of ``UNIT_CM``) say what the file does not. Of an MCZ file ``clip``
-    is read, with ``max_decoded`` as in ``open``. Raises SourceError, FormatError or OptionError.
+    a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up ("x", "y", "z"),
+    say what the file does not. Of an MCZ file ``clip`` is read, with ``max_decoded`` as in
+    ``open``. Raises SourceError, FormatError or OptionError.
     """
     path = Path(path)
     if path.suffix.lower() == ".mcz":
@@ -37,4 +39,4 @@ def read(
         if source_format.is_skeleton:
             raise OptionError(f"{path}: a skeleton without motion (mcz.read_skeleton reads it)")
         motion = read_source(path, source_format, skeleton_of(path, source_format, skeleton))
-    return with_facts(motion, rate, unit)
+    return with_facts(motion, rate, unit, up)

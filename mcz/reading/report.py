@@ -21,6 +21,7 @@ from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.layout import layout as layout
+from mcz.reading.recording_report import document_of
 from mcz.reading.sizes import Sizes, clip_sizes, models_used
 from mcz.schema import parse
 
@@ -97,12 +98,15 @@ def _model_info(container: Container, id_: bytes) -> dict[str, Any]:
 def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
     rate = clip.frame_rate
     sizes = clip_sizes(file.container, clip)
+    unread: list[str] = []
     document = {
         "name": clip.name,
         "codec": clip.codec,
         "codecs": [
             {
                 "signal": s.name,
+                "channels": s.layout.n_channels,
+                "samples_per_frame": s.layout.samples_per_frame,
                 "id": s.codec_id,
                 "version": s.codec_version,
                 "header": s.header.hex(),
@@ -135,11 +139,21 @@ def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
             for id_ in models_used(signal)
         ],
         **_source_info(clip),
+        "recording": _recording(clip, unread),
         **exceptions_info(file.container, clip),
         "quality": clip.quality,
-        "damage": list(clip.damage),
+        "damage": [*clip.damage, *unread],
     }
     return document | _ratios(file, clip, sizes)
+
+
+def _recording(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
+    """The recording; where the template is at fault, ``unread`` says so and the rest is shown."""
+    try:
+        return document_of(clip.recording)
+    except FormatError as error:
+        unread.append(f"recording: {error}")
+        return None
 
 
 def _source_info(clip: Clip) -> dict[str, Any]:

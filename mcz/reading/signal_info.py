@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -178,3 +179,11 @@ def parse_grids(runs: Any, n_channels: int, where: str) -> tuple[Grid, ...]:
     if len(grids) != n_channels:  # CLIP-07
         raise FormatError(f"{where}: grids for {len(grids)} of {n_channels} channels")
     return tuple(grids)
+
+
+def groups_of(layout: Layout, columns: Sequence[int]) -> tuple[tuple[int, ...], list[int]]:
+    """The groups that hold ``columns``, and where each column is among theirs."""
+    group_of = {c: g for g, group in enumerate(layout.groups) for c in group}
+    groups = tuple(dict.fromkeys(sorted(group_of[c] for c in columns)))
+    column = {c: i for i, c in enumerate(c for g in groups for c in layout.groups[g])}
+    return groups, [column[c] for c in columns]

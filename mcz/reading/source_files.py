@@ -11,7 +11,7 @@ from typing import Any
 from mcz.errors import MczError, OptionError, SourceError
 from mcz.formats import Format, find_asf, format_of
 from mcz.motion import Motion, Skeleton
-from mcz.units import in_unit
+from mcz.units import facing, in_unit
 
 
 def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
@@ -65,7 +65,13 @@ def read_bytes(path: Path) -> bytes:
         raise SourceError(f"{path}: {error.strerror or error}") from None
 
 
-def with_facts(motion: Motion, rate: Fraction | float | None, unit: str | None) -> Motion:
+def with_facts(
+    motion: Motion, rate: Fraction | float | None, unit: str | None, up: str | None = None
+) -> Motion:
+    """``motion`` with a frame rate, a length unit and an axis that points up, None: as they are.
+
+    Raises OptionError.
+    """
     if rate is not None:
         try:
             exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))
@@ -77,4 +83,6 @@ def with_facts(motion: Motion, rate: Fraction | float | None, unit: str | None) 
         motion = replace(motion, frame_rate=value, frame_rate_exact=True)
     if unit is not None:
         motion = replace(motion, skeleton=in_unit(motion.skeleton, unit))
+    if up is not None:
+        motion = replace(motion, skeleton=facing(motion.skeleton, up))
     return motion

@@ -27,7 +27,7 @@ from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.schema import MAX_COUNT, build
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
-from mcz.writing.signal_source import MemorySource, settle
+from mcz.writing.signal_source import MemorySource, as_stored, settle
 
 Progress = Callable[[int, int, str], None]
 
@@ -80,7 +80,7 @@ def write_clip(
     options = codec.options(params)
     if codec.dial and asked(options) and options[codec.dial.parameter] is None:
         raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
-    motion = _with_source_hash(motion)
+    motion = _with_source_hash(as_stored(motion))
     for signal in motion.signals:
         check(f"signal {signal.name!r}: channels", signal.n_channels, writer.profile.channels)
     coded = [

@@ -16,7 +16,7 @@ from mcz.errors import LimitError, MotionError, SourceError
 from mcz.formats import format_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.source_files import read_bytes, read_skeleton, read_source, skeleton_of, with_facts
-from mcz.units import in_unit, unit_cm_of
+from mcz.units import facing, in_unit, unit_cm_of
 from mcz.writing.clip_writer import Progress, write_skeleton
 from mcz.writing.draft import Draft
 from mcz.writing.names import alias_once, check_name, clip_name
@@ -27,9 +27,10 @@ from mcz.writing.tuning import write_tuned
 class Terms:
     """On which terms source files are taken: how they are coded, and what is said of them.
 
-    ``skeleton`` is the ASF of an AMC, ``rate`` in frames a second and ``unit`` what the file does
-    not say. ``verbatim``: one that cannot be parsed is kept as an attachment. ``keep_skeleton``: an
-    ASF is restored as well, under its own name. Raises OptionError for an unknown codec or unit.
+    ``skeleton`` is the ASF of an AMC. ``rate`` in frames a second, ``unit`` and ``up``, the axis
+    that points up, say what the file does not. ``verbatim``: one that cannot be parsed is kept as
+    an attachment. ``keep_skeleton``: an ASF is restored as well, under its own name. Raises
+    OptionError for an unknown codec, unit or axis.
     """
 
     codec: str = DEFAULT
@@ -39,11 +40,13 @@ class Terms:
     unit: str | None = None
     verbatim: bool = False
     keep_skeleton: bool = False
+    up: str | None = None
 
     def __post_init__(self) -> None:
         by_name(self.codec)
         if self.unit is not None:
             unit_cm_of(self.unit)
+        facing(Skeleton(()), self.up)
 
 
 class Entry:
@@ -93,7 +96,7 @@ class Entry:
         if skeleton is not None:
             skeleton = in_unit(skeleton, self.terms.unit)
         motion = read_source(self.path, source_format, skeleton, data)
-        motion = with_facts(motion, self.terms.rate, self.terms.unit)
+        motion = with_facts(motion, self.terms.rate, self.terms.unit, self.terms.up)
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
         if skeleton is not None:
@@ -105,11 +108,14 @@ class Entry:
         return "parsed"
 
     def _based(self, writer: Writer, motion: Motion, skeleton: Skeleton) -> Motion:
-        """``motion`` after its ASF was written; a derived skeleton names it as its base."""
+        """``motion`` after its ASF was written; a derived skeleton names it as its base.
+
+        One that faces up otherwise than the ASF says is derived, too: the ASF stays as it is.
+        """
         id_ = write_skeleton(writer, skeleton)
         if self.terms.keep_skeleton:
             path = skeleton.source.path if skeleton.source is not None else ""
             alias_once(writer, path or f"{skeleton.name}.asf", id_)
-        if motion.skeleton.base is None:
+        if motion.skeleton.base is None and motion.skeleton.up_axis == skeleton.up_axis:
             return motion
         return replace(motion, skeleton=replace(motion.skeleton, base=id_))

@@ -15,6 +15,7 @@ from typing import Any
 from mcz.codecs import DEFAULT, by_name
 from mcz.container.limits import ARCHIVE, BASE, Profile
 from mcz.container.writer import Writer
+from mcz.errors import OptionError
 from mcz.motion import Motion
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
@@ -61,6 +62,7 @@ def encode(
     skeleton: str | os.PathLike[str] | None = None,
     rate: Fraction | float | None = None,
     unit: str | None = None,
+    up: str | None = None,
     verbatim: bool = False,
     force: bool = False,
     archive: bool = False,
@@ -68,11 +70,14 @@ def encode(
 ) -> Written:
     """Turn one ASF, AMC, BVH or C3D file into an MCZ file.
 
-    ``verbatim`` keeps a file that cannot be parsed as an attachment. Raises SourceError,
-    OptionError, MotionError or LimitError; nothing is left under the final name then.
+    ``verbatim`` keeps a file that cannot be parsed as an attachment. ``up`` is the axis that points
+    up ("x", "y", "z"). Raises SourceError, OptionError, MotionError or LimitError; nothing is left
+    under the final name then.
     """
     path = Path(source)
-    terms = Terms(codec, params, skeleton, rate, unit, verbatim, keep_skeleton=True)
+    if up is not None and path.suffix.lower() == ".asf":
+        raise OptionError(f"{path}: a skeleton alone is kept as it is; say the up axis of its AMC")
+    terms = Terms(codec, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up)
     with replacing(target, force=force) as stream:
         draft = Draft(stream, profile_of(archive), hold=verbatim)
         entry = Entry(path, path.name, terms)

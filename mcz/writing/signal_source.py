@@ -18,6 +18,7 @@ from mcz.codecs.contract import Codec, Layout
 from mcz.container import payloads
 from mcz.container.masks import build_mask
 from mcz.errors import MotionError
+from mcz.formats import recording_of
 from mcz.motion import Exceptions, Motion, Signal, Skeleton
 from mcz.numbers import Grid, values_of_texts
 from mcz.schema import build
@@ -102,6 +103,38 @@ class MemorySource:
             return []
         blocks = (mask[:, list(group)] for group in self.layout.groups)
         return [b"" if block.all() else build_mask(block) for block in blocks]
+
+
+def as_stored(motion: Motion) -> Motion:
+    """``motion`` with the numbers that a file holds, of which its source says what they mean.
+
+    Without a source that says so, the values are stored as they are, in their units. Raises
+    MotionError where the source says something else than a signal.
+    """
+    if all(signal.scaling is None for signal in motion.signals):
+        return motion
+    told = recording_of(motion.source)
+    if told is None:
+        return replace(motion, signals=tuple(map(_in_units, motion.signals)))
+    for signal in motion.signals:
+        if signal.scaling is not None and not signal.scaling.says(told.scaling):
+            raise MotionError(
+                f"signal {signal.name!r}: its source has another scaling; leave out one of the two"
+            )
+    return replace(motion, signals=tuple(signal.as_stored() for signal in motion.signals))
+
+
+def _in_units(signal: Signal) -> Signal:
+    """The signal with its values as what is stored, binary64."""
+    if signal.scaling is None:
+        return signal
+    return Signal(
+        signal.values,
+        name=signal.name,
+        samples_per_frame=signal.samples_per_frame,
+        mask=signal.mask,
+        channels=signal.channels,
+    )
 
 
 def settle(signal: Signal) -> Block:

@@ -8,6 +8,7 @@ const SOURCE_FORMATS = new Map([
   [2, { name: "amc", of: "clip" }],
   [3, { name: "bvh", of: "clip" }],
   [4, { name: "c3d", of: "clip" }],
+  [5, { name: "c3d-outputs", of: "clip" }],
 ]);
 
 /** Names of the source formats that this decoder restores. */

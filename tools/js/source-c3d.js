@@ -24,10 +24,13 @@ const ROTATIONS_BLOCK = 6;
 
 const ELEMENTS_OF_A_ROTATION = 17;
 
+/** Id of the source format whose template says which points are outputs. */
+const WITH_OUTPUTS = 5;
+
 /**
  * Restores a C3D file.
  *
- * @param {object} source of CLIP: template.data, detail
+ * @param {object} source of CLIP: format, template.data, detail
  * @param {object[]} signals of the clip, decoded: see sources.js
  * @param {number} n frames of the clip
  * @param {bigint} firstNumber number of its first frame; has no meaning without frames
@@ -36,7 +39,7 @@ const ELEMENTS_OF_A_ROTATION = 17;
  * @throws {Refused}
  */
 export function restoreC3d(source, signals, n, firstNumber, maxBytes) {
-  const template = readC3dTemplate(source.template.data);
+  const template = readTemplate(source.template.data, source.format);
   const detail = readC3dDetail(source.detail, template);
   const file = new File(template, signals, n, maxBytes);
   const first = n > 0 ? firstNumber : BigInt(detail.first);
@@ -103,8 +106,29 @@ function filledHead(template, detail) {
 
 // Structures
 
-function readC3dTemplate(bytes) {
+function readTemplate(bytes, format) {
   const reader = new ByteReader(bytes, "a C3D template");
+  const runs = format === WITH_OUTPUTS ? reader.counted(() => reader.varint()) : null;
+  const template = readC3dTemplate(reader);
+  reader.end();
+  return { ...template, ...placesOf(runs ?? [template.points], template.points, reader) };
+}
+
+/** Where the words of each point are: in the outputs or not, the how manyth there, its residual. */
+function placesOf(runs, points, reader) {
+  if (runs.indexOf(0, 1) > 0) reader.refuse("a run of no points");
+  const total = runs.reduce((sum, size) => sum + size, 0);
+  if (total !== points) reader.refuse(`runs of ${total} points, but there are ${points}`);
+  const places = [];
+  const counts = [0, 0]; // points that are points, outputs
+  runs.forEach((size, run) => {
+    for (let k = 0; k < size; k++) places.push({ isOutput: run % 2 === 1, k: counts[run % 2]++ });
+  });
+  for (const place of places) place.residual = place.k + (place.isOutput ? counts[0] : 0);
+  return { places, nOutputs: counts[1] };
+}
+
+function readC3dTemplate(reader) {
   const processor = reader.u8();
   const word = reader.u8();
   const [points, channels, subframes] = [reader.varint(), reader.varint(), reader.varint()];
@@ -114,7 +138,6 @@ function readC3dTemplate(bytes) {
   const fields = readFields(reader, head.length);
   const gap = reader.sized();
   const tail = reader.sized();
-  reader.end();
   if (![INTEL, DEC, SGI].includes(processor)) reader.refuse(`processor ${processor}`);
   if (word !== 2 && word !== 4) reader.refuse(`words of ${word} bytes`);
   if (unsigned > 1 || (unsigned === 1 && word === 4)) reader.refuse(`unsigned is ${unsigned}`);
@@ -174,11 +197,15 @@ class File {
     this.template = template;
     this.n = n;
     this.maxBytes = maxBytes;
-    const { points, channels, subframes, rotations, ratio } = template;
+    const { points, nOutputs, channels, subframes, rotations, ratio } = template;
     const [motion, ...others] = signals;
     const named = (name) => others.find(({ signal }) => signal.name === name);
     this.floats = new Grid(template.processor === DEC ? VAX_F : BINARY32, 0, 0, 1);
-    this.motion = this.fitting(motion, "motion", 3 * points, 1);
+    this.motion = this.fitting(motion, "motion", 3 * (points - nOutputs), 1);
+    this.outputs = null;
+    if (nOutputs > 0) {
+      this.outputs = this.fitting(named("outputs"), "outputs", 3 * nOutputs, 1);
+    }
     const residuals = points > 0 ? named("residuals") : undefined;
     this.residuals = residuals ? this.fitting(residuals, "residuals", points, 1) : null;
     this.analog = null;
@@ -190,7 +217,6 @@ class File {
       const elements = ELEMENTS_OF_A_ROTATION * rotations;
       this.turns = this.fitting(named("rotations"), "rotations", elements, ratio);
     }
-    this.mask = motion.mask;
   }
 
   fitting(decoded, name, nChannels, samplesPerFrame) {
@@ -262,31 +288,34 @@ class File {
   }
 
   putPoint(view, at, frame, p, put) {
-    const { word } = this.template;
-    const i = 3 * (frame * this.template.points + p);
-    const valid = !this.mask || (this.mask[i] && this.mask[i + 1] && this.mask[i + 2]);
-    const residual = this.residual(frame, p, valid);
-    const gap = !valid && this.becomesNaN(i, residual);
-    for (let k = 0; k < 3; k++) {
-      put(view, at + k * word, gap ? NAN_32 : this.motion.ordinal(frame, 3 * p + k));
+    const { word, places } = this.template;
+    const place = places[p];
+    const signal = place.isOutput ? this.outputs : this.motion;
+    const { mask, nChannels } = signal;
+    const i = frame * nChannels + 3 * place.k;
+    const valid = !mask || (mask[i] && mask[i + 1] && mask[i + 2]);
+    const residual = this.residual(frame, place.residual, valid);
+    const gap = !valid && this.becomesNaN(signal.values.subarray(i, i + 3), residual);
+    for (let axis = 0; axis < 3; axis++) {
+      put(view, at + axis * word, gap ? NAN_32 : signal.ordinal(frame, 3 * place.k + axis));
     }
     put(view, at + 3 * word, residual.ordinal);
   }
 
   /** The fourth word of a point: its ordinal, and whether that is a number below 0. */
-  residual(frame, p, valid) {
+  residual(frame, column, valid) {
     if (this.residuals) {
-      const ordinal = this.residuals.ordinal(frame, p);
-      return { ordinal, value: this.residuals.value(frame, p) };
+      const ordinal = this.residuals.ordinal(frame, column);
+      return { ordinal, value: this.residuals.value(frame, column) };
     }
     const value = valid ? 0 : -1;
     return { ordinal: this.template.word === 2 ? value : this.ofFloat(value), value };
   }
 
   /** A lossy codec fills gaps; where no word of a point says that it is one, they become NaN. */
-  becomesNaN(i, residual) {
+  becomesNaN(coordinates, residual) {
     if (this.floats.kind !== BINARY32 || this.template.word !== 4) return false;
-    return residual.value >= 0 && !this.motion.values.subarray(i, i + 3).some(Number.isNaN);
+    return residual.value >= 0 && !coordinates.some(Number.isNaN);
   }
 
   /** Ordinal of a number among the floats of the file. */
@@ -319,9 +348,10 @@ class File {
 
 /** The ordinals of a signal: those that were stored, or those of "Value to ordinal". */
 class Words {
-  constructor({ signal, parts, values, ordinals }) {
+  constructor({ signal, parts, values, ordinals, mask }) {
     this.nChannels = signal.channels.length;
     this.values = values;
+    this.mask = mask;
     this.halves = ordinals ? halvesOf(ordinals) : null;
     this.parts = parts;
     this.part = 0;

@@ -27,7 +27,7 @@ export function restoreClip({ clip, signals, numbers, sourceSha256, maxBytes }) 
   const { source } = clip;
   const format = sourceFormatName(source.format);
   const bytes =
-    format === "c3d"
+    format === "c3d" || format === "c3d-outputs"
       ? restoreC3d(source, signals, clip.nFrames, numbers[0].number, maxBytes)
       : restoreText(source, signals[0], numbers, maxBytes);
   if (signals.every(({ ordinals }) => ordinals !== null)) {

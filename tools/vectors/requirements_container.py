@@ -90,7 +90,9 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "AMC-06": ("valid/sources/bvh-*", "valid/sources/amc*"),
     "C3D-05": ("invalid/sources/c3d-template-*-many",),
     "C3D-12": ("invalid/sources/c3d-detail-values-*",),
-    "C3D-14": ("invalid/sources/c3d-signals-*",),
+    "C3D-14": ("invalid/sources/c3d-signals-*", "invalid/sources/c3d-outputs-*"),
+    "C3D-17": ("invalid/sources/c3d-outputs-run-of-none-last",),
+    "C3D-18": ("invalid/sources/c3d-outputs-many",),
     "C3D-15": ("valid/sources/c3d-*",),
     "REG-01": ("invalid/clip/frame-numbers-*", "valid/container/frame-numbers"),
 }

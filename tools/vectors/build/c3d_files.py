@@ -42,6 +42,19 @@ def c3d_file(
     return Made(points, analog, processor=processor, size=size, **more)
 
 
+def lists(file: Made, **listed: list[str]) -> dict[str, Any]:
+    """Parameters of POINT that list labels, such as ANGLES, and name units, such as ANGLE_UNITS."""
+    return {name: file.texts([text.encode() for text in texts]) for name, texts in listed.items()}
+
+
+def c3d_outputs(n_points: int = 5, **more: Any) -> Made:
+    """Points p0, p1, ..., of which p1 and p3 are an angle and a moment."""
+    file = c3d_file(n_points=n_points, **more)
+    said = lists(file, ANGLES=["p1"], ANGLE_UNITS=["deg"], MOMENTS=["p3"], MOMENT_UNITS=["Nmm"])
+    file.parameters = {"POINT": said}
+    return file
+
+
 def take_c3d(source: bytes, name: str) -> Motion:
     """The motion in a C3D file, its source called after it; it must come back."""
     motion = called(c3d.read(source, name), f"{name}.c3d")

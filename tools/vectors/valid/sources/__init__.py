@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from tools.vectors.build.files import Vector, Whole
-from tools.vectors.valid.sources import c3d, c3d_parts, layouts, lossy, lossy_steps, numbers, text
+from tools.vectors.valid.sources import (
+    c3d,
+    c3d_outputs,
+    c3d_parts,
+    layouts,
+    lossy,
+    lossy_steps,
+    numbers,
+    text,
+)
 
 
 def vectors() -> Iterable[Vector]:
@@ -17,4 +26,5 @@ def vectors() -> Iterable[Vector]:
     lossy_steps.add(shelf)
     c3d.add(shelf)
     c3d_parts.add(shelf)
+    c3d_outputs.add(shelf)
     return shelf.vectors

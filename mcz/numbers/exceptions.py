@@ -1,0 +1,29 @@
+"""Tokens of a text source that no number grid prints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz import brief
+from mcz.errors import MotionError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exceptions:
+    """Tokens of a text source that their grid does not print, sorted by row, then channel."""
+
+    rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    channels: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    texts: tuple[bytes, ...] = ()
+
+    __repr__ = brief.exceptions_text
+
+    def __post_init__(self) -> None:
+        if not len(self.rows) == len(self.channels) == len(self.texts):
+            raise MotionError("exceptions: rows, channels and texts differ in number")
+
+    def __len__(self) -> int:
+        return len(self.texts)

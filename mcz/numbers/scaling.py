@@ -1,0 +1,59 @@
+"""What the stored numbers of a signal mean in its unit: an offset and a factor for each channel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+MAX_INTEGER = 2.0**53  # what a binary64 holds exactly
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scaling:
+    """``(number - offset) * scale * general``, in this order, in binary64.
+
+    ``offsets`` and ``scales`` have shape (n_channels,). Offsets are in stored numbers; scale and
+    general scale together are in units a stored number.
+    """
+
+    offsets: Floats
+    scales: Floats
+    general: float = 1.0
+
+    def says(self, other: Scaling | None) -> bool:
+        """Whether both say the same."""
+        if other is None:
+            return False
+        pairs = (
+            (self.offsets, other.offsets),
+            (self.scales, other.scales),
+            ([self.general], [other.general]),
+        )
+        return all(np.array_equal(a, b, equal_nan=True) for a, b in pairs)
+
+    def values(self, stored: NDArray[Any], channels: slice | list[int] = slice(None)) -> Floats:
+        """Stored numbers, (n_rows, n_channels), in units; ``channels`` says which these are."""
+        with np.errstate(over="ignore", invalid="ignore"):  # files say what they like
+            moved = stored.astype(np.float64) - self.offsets[channels]
+            scaled: Floats = moved * self.scales[channels] * self.general
+        return scaled
+
+    def stored(self, values: Floats, numbers: NDArray[Any]) -> NDArray[Any]:
+        """The stored numbers that mean ``values``: ``numbers``, but where a value is another.
+
+        What is new is the number that means it or, among integers, the nearest one; NaN or 0 where
+        no number means it.
+        """
+        meant = self.values(numbers)
+        same = (meant == values) | (np.isnan(meant) & np.isnan(values))
+        if same.all():
+            return numbers
+        with np.errstate(all="ignore"):
+            new = np.asarray(values, np.float64) / (self.scales * self.general) + self.offsets
+        if numbers.dtype == np.int64:
+            new = np.clip(np.rint(np.nan_to_num(new)), -MAX_INTEGER, MAX_INTEGER)
+        return np.where(same, numbers, new.astype(numbers.dtype))

@@ -1,0 +1,68 @@
+"""What a clip's source says beside all numbers, and what the stored numbers of a signal mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from mcz.container.reader import Container
+from mcz.errors import FormatError, OptionError, UnsupportedError
+from mcz.formats import format_by_id, recording_of
+from mcz.formats.c3d_events import Event as Event
+from mcz.formats.c3d_recording import ForcePlatform as ForcePlatform
+from mcz.formats.c3d_recording import Recording as Recording
+from mcz.motion import Motion, Source
+from mcz.numbers.scaling import Scaling
+from mcz.reading.signal_info import SignalInfo
+
+ANALOG = "analog"  # the signal whose stored numbers a source may have a meaning for
+
+
+def recording(motion: Motion) -> Recording | None:
+    """What the source of ``motion`` says beside all numbers; None where it says nothing.
+
+    Of a C3D: events, force platforms, units and descriptions. ``Clip.recording`` is that of a clip.
+    Raises FormatError on bad bytes.
+    """
+    found: Recording | None = recording_of(motion.source)
+    return found
+
+
+def read_recording(container: Container, fields: Any) -> Recording | None:
+    """The recording that the source of a clip, whose CLIP is ``fields``, tells of."""
+    if not fields.source:
+        return None
+    source = fields.source[0]
+    try:
+        name = format_by_id(source.format).name
+    except UnsupportedError:  # nothing is known of it
+        return None
+    template = container.template(source.template, source.format)
+    found: Recording | None = recording_of(Source(name, template, bytes(source.detail)))
+    return found
+
+
+def scaling_of(
+    signals: Sequence[SignalInfo], index: int, recording: Callable[[], Recording | None]
+) -> Scaling | None:
+    """What the stored numbers of a signal mean; None where they are the values themselves."""
+    analog = next((info for info in signals[1:] if info.name == ANALOG), None)
+    if analog is None or analog.index != index:
+        return None
+    told = recording()
+    scaling = None if told is None else told.scaling
+    n_channels = analog.layout.n_channels
+    if scaling is not None and len(scaling.scales) != n_channels:
+        raise FormatError(
+            f"source template: {len(scaling.scales)} analog channels, but signal {ANALOG!r} has "
+            f"{n_channels}"
+        )
+    return scaling
+
+
+def index_of(signals: Sequence[SignalInfo], name: str, clip: str) -> int:
+    """The index of the first signal of a name; raises OptionError where the clip has none."""
+    names = [info.name for info in signals]
+    if name not in names:
+        raise OptionError(f"clip {clip!r} has no signal {name!r}, but {', '.join(names)}")
+    return names.index(name)

@@ -1,0 +1,171 @@
+"""Joints and their channels, in the order of a file. SPEC.md, "SKEL", has the stored form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz import brief
+from mcz.errors import MotionError
+from mcz.source import Source
+
+Vector = tuple[float, float, float]
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+
+POSITION_KINDS = ("tx", "ty", "tz")
+ROTATION_KINDS = ("rx", "ry", "rz")
+CHANNEL_KINDS = (
+    *POSITION_KINDS,
+    *ROTATION_KINDS,
+    *("sx", "sy", "sz"),
+    "length",
+    *("qw", "qx", "qy", "qz"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One scalar signal over time.
+
+    ``kind`` is a name of ``CHANNEL_KINDS``, or "" for a plain scalar, which then has a ``name``
+    and perhaps a ``unit`` of its own and takes no part in kinematics.
+    """
+
+    kind: str
+    name: str = ""
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind and self.kind not in CHANNEL_KINDS:
+            raise MotionError(f"channel kind {self.kind!r} is not in the registry; use kind ''")
+
+    @property
+    def label(self) -> str:
+        return self.name or self.kind
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A node of the skeleton.
+
+    ``offset`` leads from the parent's origin to the joint's own, in length units, along the
+    parent's axes. ``tails`` are the ends of bones without a joint of their own: the ASF bone's
+    vector, or BVH end sites, along the joint's axes. ``axis`` are the Euler angles that orient the
+    local axes (ASF ``axis``), applied in ``axis_order``, first letter first, about fixed axes.
+    ``adds_to_offset``: position channels add to the offset; otherwise they replace it.
+    """
+
+    name: str
+    parent: int = -1
+    offset: Vector = ORIGIN
+    tails: tuple[Vector, ...] = ()
+    axis: Vector = ORIGIN
+    axis_order: str = "XYZ"
+    channels: tuple[Channel, ...] = ()
+    adds_to_offset: bool = True
+
+    def __post_init__(self) -> None:
+        vectors = (self.offset, self.axis, *self.tails)
+        if not all(map(_is_vector, vectors)):
+            raise MotionError(f"joint {self.name!r}: not three finite numbers among {vectors}")
+        if sorted(self.axis_order) != ["X", "Y", "Z"]:
+            raise MotionError(f"joint {self.name!r}: axis order {self.axis_order!r}")
+
+
+def _is_vector(vector: Any) -> bool:
+    with suppress(TypeError):
+        return len(vector) == 3 and all(map(math.isfinite, vector))  # SKEL-08
+    return False
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """The joints of a clip, parents before children, and what their numbers mean.
+
+    ``unit_cm`` is the length of one unit in centimeters, None while unknown; ``angle_unit`` is
+    "deg", "rad" or "" (unknown); ``up_axis`` is "x", "y", "z" or "" (unknown).
+    ``intrinsic``: the rotation channels of a joint apply about the axes that turn with it, as
+    listed (BVH); otherwise about fixed axes (Acclaim).
+    ``base`` is the id of the skeleton that this one was derived from.
+    """
+
+    joints: tuple[Joint, ...]
+    name: str = ""
+    unit_cm: float | None = None
+    angle_unit: str = "deg"
+    up_axis: str = ""
+    intrinsic: bool = True
+    base: bytes | None = None
+    source: Source | None = field(default=None, compare=False, repr=False)
+
+    __repr__ = brief.skeleton_text
+
+    def __post_init__(self) -> None:
+        for index, joint in enumerate(self.joints):
+            if not -1 <= joint.parent < index:  # SKEL-05
+                raise MotionError(
+                    f"joint {index} ({joint.name!r}): parent {joint.parent} is not before it"
+                )
+        if self.unit_cm is not None and not 0 < self.unit_cm < math.inf:  # SKEL-01
+            raise MotionError(f"unit of {self.unit_cm} cm")
+        if self.angle_unit not in ("deg", "rad", ""):
+            raise MotionError(f"angle unit {self.angle_unit!r}")
+        if self.up_axis not in ("x", "y", "z", ""):
+            raise MotionError(f"up axis {self.up_axis!r}")
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """All channels, in column order."""
+        return tuple(channel for joint in self.joints for channel in joint.channels)
+
+    @property
+    def n_joints(self) -> int:
+        return len(self.joints)
+
+    @property
+    def n_channels(self) -> int:
+        return sum(len(joint.channels) for joint in self.joints)
+
+    @property
+    def parents(self) -> NDArray[np.int64]:
+        return np.array([joint.parent for joint in self.joints], dtype=np.int64)
+
+    def columns(self, joint: int) -> range:
+        """The columns of joint ``joint``."""
+        start = sum(len(j.channels) for j in self.joints[:joint])  # SKEL-06
+        return range(start, start + len(self.joints[joint].channels))
+
+    def addresses(self) -> list[str]:
+        """The name of every joint, made unique: ``name#n`` from the second of a name on."""
+        seen: dict[str, int] = {}
+        names = []
+        for joint in self.joints:
+            seen[joint.name] = n = seen.get(joint.name, -1) + 1
+            names.append(joint.name if n == 0 else f"{joint.name}#{n}")
+        return names
+
+    def find(self, joint: int | str) -> int:
+        """The index of a joint given by index or by name, ``name[#n]`` where a name repeats.
+
+        Raises MotionError where there is no such joint.
+        """
+        if isinstance(joint, str):
+            addresses = self.addresses()
+            if joint in addresses:
+                return addresses.index(joint)
+            if joint.isascii() and joint.isdigit() and len(joint) < 10:
+                joint = int(joint)
+        if isinstance(joint, (int, np.integer)) and 0 <= joint < self.n_joints:
+            return int(joint)
+        raise MotionError(f"no joint {joint!r} among {', '.join(self.addresses()) or 'no joints'}")
+
+
+def joint_columns(skeleton: Skeleton, joints: Sequence[int | str]) -> list[int]:
+    """The columns of the named joints, in the order given."""
+    return [c for joint in joints for c in skeleton.columns(skeleton.find(joint))]
