@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import reprlib
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any
 
 WIDEST = 60  # characters of a name
+MOST_LISTED = 40  # names in a message
+NEAR = 0.6  # of 1, how alike a suggested name is
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, WIDEST, 160
 _SHORT.maxtuple = _SHORT.maxlist = _SHORT.maxdict = 3
@@ -27,6 +30,29 @@ def counted(number: int, word: str) -> str:
     ('1 joint', '31 joints')
     """
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def among(names: Sequence[str], missed: object) -> str:
+    """Names as a message lists them, and which of them are like the one that was ``missed``.
+
+    >>> among(["hips", "head"], "haed")
+    "hips, head; did you mean 'head'?"
+    """
+    more = f" ... ({len(names)} in all)" if len(names) > MOST_LISTED else ""
+    near = nearest(missed, names) if isinstance(missed, str) else ""
+    hint = f"; did you mean {near}?" if near else ""
+    return f"{', '.join(names[:MOST_LISTED]) or 'no joints'}{more}{hint}"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The names most like ``name``, as a message has them; "" where none is."""
+    from difflib import get_close_matches
+
+    by_lower: dict[str, str] = {}
+    for one in known:
+        by_lower.setdefault(one.lower(), one)
+    found = get_close_matches(name.lower(), list(by_lower), 3, NEAR)
+    return " or ".join(repr(by_lower[one]) for one in found)
 
 
 def brief(thing: Any) -> str:

@@ -163,7 +163,7 @@ class Skeleton:
                 joint = int(joint)
         if isinstance(joint, (int, np.integer)) and 0 <= joint < self.n_joints:
             return int(joint)
-        raise MotionError(f"no joint {joint!r} among {', '.join(self.addresses()) or 'no joints'}")
+        raise MotionError(f"no joint {joint!r} among {brief.among(self.addresses(), joint)}")
 
 
 def joint_columns(skeleton: Skeleton, joints: Sequence[int | str]) -> list[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,11 +13,13 @@ import pytest
 from hypothesis import given
 
 import mcz
+from mcz.annexes import annex_bytes
 from mcz.container.frame_numbers import frame_number_metadata, parse_frame_numbers
 from mcz.container.value_hash import canonical
 from mcz.motion import Signal
 from mcz.numbers import Grid, GridKind
 from mcz.reading.report import info
+from mcz.writing.names import METADATA_KEYS
 from tests.motions import motions, skeleton, smooth
 
 
@@ -254,3 +257,27 @@ def test_threads_may_share_a_file(tmp_path: Path) -> None:
             starts, pool.map(lambda s: clip.read((s, s + 20)), starts), strict=True
         ):
             np.testing.assert_array_equal(part, motion.values[start : start + 20])
+
+
+@pytest.mark.parametrize("key", ["weather", "", "Subject", "X-a", "x"])
+def test_metadata_that_nobody_registered_are_refused(key: str, tmp_path: Path) -> None:
+    motion = smooth(3, metadata={"subject": "7", key: "fair"})
+    with pytest.raises(mcz.MotionError) as found:
+        mcz.write(motion, tmp_path / "a.mcz")
+    said = str(found.value)
+    assert repr(key) in said and "rights, credit" in said and "begin with 'x-'" in said
+    assert not (tmp_path / "a.mcz").exists()
+    with pytest.raises(mcz.MotionError, match="is not registered"):
+        mcz.LiveWriter(io.BytesIO(), motion.skeleton, "online", metadata={key: "fair"})
+
+
+def test_metadata_that_are_registered_or_private_are_kept(tmp_path: Path) -> None:
+    registered = json.loads(annex_bytes("registry.json"))["metadata_keys"]
+    assert [row["key"] for row in registered] == list(METADATA_KEYS)
+    keys = [*METADATA_KEYS[1:], "x-", "x-weather"]
+    metadata = {key: f"of {key}" for key in keys}
+    mcz.write(smooth(3, metadata=metadata), tmp_path / "a.mcz")
+    with mcz.open(tmp_path / "a.mcz") as file:
+        assert file.only_clip().metadata == metadata
+    with pytest.raises(mcz.MotionError, match="is not text to text"):
+        mcz.write(smooth(3, metadata={"subject": 7}), tmp_path / "b.mcz")

@@ -137,6 +137,16 @@ def test_one_joint_by_its_name(clip: mcz.Clip, tmp_path: Path) -> None:
         clip.read(joints="nobody")
 
 
+def test_a_joint_of_nearly_this_name_is_suggested(samples: Path) -> None:
+    skeleton = mcz.read(samples / "walk.bvh").skeleton
+    with pytest.raises(mcz.MotionError, match=r"no joint 'hed' among Hips, .*did you mean 'Head'"):
+        skeleton.find("hed")
+    many = replace(skeleton, joints=tuple(mcz.Joint(f"j{n}") for n in range(500)))
+    with pytest.raises(mcz.MotionError, match=r"among j0, .*j39 \.\.\. \(500 in all\)") as found:
+        many.find("xyz")
+    assert len(str(found.value)) < 400
+
+
 def public_things(folder: Path) -> Iterator[object]:
     """One of everything public that holds much, each with far too much in it."""
     long = "n" * 5000

@@ -29,9 +29,10 @@ class Format:
     None as a third argument where ``wants_skeleton``; it raises SourceError. ``write`` is its
     inverse; it raises MotionError or FormatError. ``join_notes`` is the inverse of the notes' cut.
     ``arrive(lines, skeleton)`` reads what comes line by line, None where the format cannot.
-    ``states_rate``: the template holds the frame rate, so that it does not suit another.
-    ``recording(name, template, detail)`` is what the source says beside all numbers, None where it
-    says nothing; see ``mcz.Recording``.
+    ``has_more_joints(data, most)`` says after a quick look whether a file surely has more, None
+    where nobody can. ``states_rate``: the template holds the frame rate, so that it does not suit
+    another. ``recording(name, template, detail)`` is what the source says beside all numbers, None
+    where it says nothing; see ``mcz.Recording``.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Format:
     states_rate: bool = False
     arrive: Callable[..., Arriving] | None = None
     recording: Callable[[str, bytes, bytes], Any] | None = None
+    has_more_joints: Callable[..., bool] | None = None
 
 
 def _of(module: str, name: str) -> Callable[..., Any]:
@@ -79,6 +81,7 @@ FORMATS: dict[str, Format] = {
             join_notes,
             states_rate=True,
             arrive=_of("bvh", "arrive"),
+            has_more_joints=_of("hierarchy", "has_more_joints"),
         ),
         Format(
             "c3d",

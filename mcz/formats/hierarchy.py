@@ -183,11 +183,23 @@ def _refuse_early(reader: _Reader) -> None:
 
     That takes moments; only joints that begin a line are counted.
     """
-    lines = islice(_JOINT_LINE.finditer(reader.data), MOST_JOINTS + 1)
-    last = next(islice(lines, MOST_JOINTS, None), None)
-    if last is not None and _MOTION_LINE.search(reader.data, 0, last.start()) is None:
-        reader.at = last.start()
+    at = _joint_line(reader.data, MOST_JOINTS)
+    if at is not None:
+        reader.at = at
         reader.check("joints", MOST_JOINTS + 1, MOST_JOINTS)
+
+
+def has_more_joints(data: bytes, most: int) -> bool:
+    """Whether a BVH surely has more joints than ``most``, by a quick look."""
+    return _joint_line(data, most) is not None
+
+
+def _joint_line(data: bytes, number: int) -> int | None:
+    """Where the line of a joint begins that so many others precede; None where there is none."""
+    line = next(islice(_JOINT_LINE.finditer(data), number, None), None)
+    if line is None or _MOTION_LINE.search(data, 0, line.start()) is not None:
+        return None
+    return line.start()
 
 
 def write_hierarchy(skeleton: Skeleton) -> tuple[str, list[int]]:

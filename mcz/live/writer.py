@@ -29,7 +29,7 @@ from mcz.kinematics.single import FramePositions
 from mcz.motion import Motion, Signal, Skeleton
 from mcz.schema import build
 from mcz.writing.clip_writer import asked, open_clip, write_skeleton
-from mcz.writing.names import name_skeleton
+from mcz.writing.names import check_metadata, name_skeleton
 from mcz.writing.positions import wants_positions
 from mcz.writing.quality import CHUNK, texts_of
 from mcz.writing.signal_source import MemorySource
@@ -81,6 +81,7 @@ class LiveWriter:
         self._outlet = _Outlet(sink)
         self._writer = Writer(self._outlet)
         self._is_open = self._has_data = self._is_stuck = False
+        check_metadata(metadata, name)
         self._written: tuple[bytes, bool, Mask | None, Floats] | None = None
         self._decoded: Floats | None = None
         if base is not None:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from difflib import get_close_matches
 from pathlib import PurePosixPath
 
+from mcz.brief import nearest
 from mcz.container import payloads
 from mcz.errors import FormatError, OptionError
 from mcz.reading.clip import Clip
 
 FEW = 8  # names that a message lists
-NEAR = 0.6  # of 1, how alike a suggested name is
 Aliases = Mapping[str, tuple[int, bytes]]  # name -> (of, target)
 Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
 
@@ -64,15 +63,6 @@ def _last_parts(names: Named) -> Named:
 def _suggestion(clips: Iterable[str], name: str) -> str:
     near = nearest(name, [*clips, *(clip.rpartition("/")[2] for clip in clips)])
     return f"did you mean {near}?" if near else f"there are: {listed(clips) or 'none'}"
-
-
-def nearest(name: str, known: Iterable[str]) -> str:
-    """The names most like ``name``, as a message has them; "" where none is."""
-    by_lower: dict[str, str] = {}
-    for one in known:
-        by_lower.setdefault(one.lower(), one)
-    found = get_close_matches(name.lower(), list(by_lower), 3, NEAR)
-    return " or ".join(repr(by_lower[one]) for one in found)
 
 
 def listed(names: Iterable[str]) -> str:

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from mcz.codecs import DEFAULT, by_name
+from mcz.container.limits import BASE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError
-from mcz.formats import format_of
+from mcz.formats import Format, format_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.source_files import read_bytes, read_skeleton, read_source, skeleton_of, with_facts
 from mcz.units import facing, in_unit, unit_cm_of
@@ -92,6 +93,7 @@ class Entry:
             id_ = write_skeleton(writer, in_unit(read_skeleton(self.path), self.terms.unit))
             alias_once(writer, self.name, id_)
             return "skeleton"
+        _refuse_early(source_format, data, writer.profile)
         skeleton = skeleton_of(self.path, source_format, given)
         if skeleton is not None:
             skeleton = in_unit(skeleton, self.terms.unit)
@@ -119,3 +121,10 @@ class Entry:
         if motion.skeleton.base is None and motion.skeleton.up_axis == skeleton.up_axis:
             return motion
         return replace(motion, skeleton=replace(motion.skeleton, base=id_))
+
+
+def _refuse_early(source_format: Format, data: bytes, profile: Profile) -> None:
+    """Raise LimitError for more joints than the profile has, before any of them is read."""
+    if source_format.has_more_joints and source_format.has_more_joints(data, profile.joints):
+        hint = "; --archive allows more" if profile is BASE else ""
+        raise LimitError(f"joints: there are more than the limit of {profile.joints}{hint}")

@@ -21,7 +21,7 @@ from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry, Terms
-from mcz.writing.names import name_skeleton
+from mcz.writing.names import check_metadata, name_skeleton
 from mcz.writing.tuning import write_tuned
 from mcz.writing.written import Written, written
 
@@ -39,8 +39,10 @@ def write(
     """Write ``motion`` to a new MCZ file: a path, an fsspec target or a binary stream.
 
     ``params`` are the codec's; ``archive`` chooses the profile of large limits. Raises
-    OptionError, MotionError, or LimitError where the profile is too small.
+    OptionError, MotionError, or LimitError where the profile is too small; MotionError also for a
+    key of the metadata that SPEC.md does not register, unless it is private (``x-...``).
     """
+    check_metadata(motion.metadata, motion.name)
     with replacing(target, force=force) as stream:
         writer = Writer(stream, profile=profile_of(archive))
         name_skeleton(writer, motion.skeleton)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from itertools import chain, count
 from pathlib import Path
 
@@ -39,6 +40,26 @@ def check_name(path: str) -> None:
         ) from None
     if not is_plain_path(path):
         raise MotionError(f"source path {path!r} is not relative and plain; rename the file")
+
+
+# SPEC.md's registry; ``frame-numbers`` is written from the frame numbers of a motion.
+METADATA_KEYS = (
+    *("frame-numbers", "name-encoding", "skeleton-note", "source-note", "subject", "scene"),
+    *("start-time", "rights", "credit"),
+)
+PRIVATE = "x-"
+
+
+def check_metadata(metadata: Mapping[str, str], name: str) -> None:
+    """Raise MotionError for a key that neither SPEC.md's registry has nor is private."""
+    for key, value in metadata.items():
+        if not isinstance(key, str) or not isinstance(value, str):
+            raise MotionError(f"motion {name!r}: metadata {key!r}: {value!r} is not text to text")
+        if key not in METADATA_KEYS and not key.startswith(PRIVATE):
+            raise MotionError(
+                f"motion {name!r}: metadata key {key!r} is not registered; registered are "
+                f"{', '.join(METADATA_KEYS)}, and private keys begin with {PRIVATE!r}"
+            )
 
 
 def clip_name(path: str, directory: Directory) -> str:

@@ -352,6 +352,22 @@ def test_a_million_joints_take_no_memory() -> None:
     assert peak < 4 * len(data)
 
 
+def test_what_a_profile_cannot_hold_is_refused_before_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.bvh"
+    joints = b"JOINT j\n{\n}\n" * BASE.joints
+    path.write_bytes(b"HIERARCHY\nROOT r\n{\n%s}\nMOTION\nFrames: 0\nFrame Time: 1\n" % joints)
+    monkeypatch.setattr(hierarchy, "_Node", None)  # none is looked at
+    with pytest.raises(mcz.LimitError, match="more than the limit of 4096; --archive allows more"):
+        mcz.encode(path, tmp_path / "a.mcz")
+    monkeypatch.undo()
+    assert mcz.encode(path, tmp_path / "a.mcz", archive=True).clips[0].n_channels == 0
+    assert not hierarchy.has_more_joints(path.read_bytes(), BASE.joints + 1)
+    after = b"HIERARCHY\nROOT r\n{\n}\nMOTION\n" + joints
+    assert not hierarchy.has_more_joints(after, 10)
+
+
 def test_joints_lie_only_so_deep() -> None:
     with pytest.raises(SourceError, match="line 8195: more than 4,096 joints inside each other"):
         bvh.read(chain(5000))
