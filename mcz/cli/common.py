@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import sys
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
@@ -24,6 +25,7 @@ from mcz.errors import (
     LimitError,
     MczError,
     OptionError,
+    SkeletonWarning,
     UnsupportedError,
 )
 
@@ -69,7 +71,7 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
     """
     _prepare_streams()
     try:
-        with _ended_by_signals():
+        with _ended_by_signals(), _warnings_said():
             result = command.main(arguments, prog_name=prog, standalone_mode=False)
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -98,6 +100,23 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
         say("terminated")
         return Exit.TERMINATED
     return int(result or Exit.FINE)
+
+
+@contextmanager
+def _warnings_said() -> Iterator[None]:
+    """Let what the library warns of become lines on standard error, each once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("once", SkeletonWarning)
+        show = warnings.showwarning
+
+        def said(message: Warning | str, category: type[Warning], *where: Any, **to: Any) -> None:
+            if issubclass(category, SkeletonWarning):
+                say(str(message))
+            else:
+                show(message, category, *where, **to)
+
+        warnings.showwarning = said
+        yield
 
 
 class _Terminated(BaseException):
@@ -261,7 +280,7 @@ def binary_output() -> BinaryIO:
 
 def check_new(path: Path, force: bool) -> None:
     """Raise Failure for a file that is there already, before work on it begins."""
-    if path.exists() and not force:
+    if os.path.lexists(path) and not force:
         raise Failure(f"{path}: exists; --force overwrites it", Exit.USAGE)
 
 

@@ -20,7 +20,8 @@ class WrittenClip:
 class Written:
     """What ``write`` and ``encode`` have written.
 
-    ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal.
+    ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal. ``notes``: what
+    is odd about the source file.
     """
 
     size: int
@@ -28,9 +29,10 @@ class Written:
     n_skeletons: int
     n_attachments: int
     decoded_bytes: int
+    notes: tuple[str, ...] = ()
 
 
-def written(directory: Directory, size: int) -> Written:
+def written(directory: Directory, size: int, notes: tuple[str, ...] = ()) -> Written:
     """What the file of ``size`` bytes with this directory holds."""
     return Written(
         size=size,
@@ -41,6 +43,7 @@ def written(directory: Directory, size: int) -> Written:
         n_skeletons=sum(kind == b"SKEL" for kind, _ in directory.shared),
         n_attachments=len(directory.attachments),
         decoded_bytes=max(map(_decoded_bytes, directory.clips.values()), default=0),
+        notes=notes,
     )
 
 
