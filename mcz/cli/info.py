@@ -22,11 +22,14 @@ from mcz.cli.common import (
     table,
 )
 from mcz.cli.figures import figure_lines
-from mcz.cli.options import decoded_option, json_option, salvage_option
+from mcz.cli.options import clips_option, decoded_option, json_option, salvage_option
+from mcz.cli.repeats import Once
 from mcz.cli.verify import is_unsound
 
 DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
 FEW = 4  # clips that are shown in full; more are shown as a table
+WIDEST = 200  # characters that are shown of a value of metadata
+NOTES = ("source-note", "skeleton-note")
 PARTS = ("payload", "overhead", "model", "source_chunk", "hash", "quality")
 RATIOS = (
     ("cr_source", "source file"),
@@ -36,7 +39,7 @@ RATIOS = (
 )
 
 
-@click.command(short_help="What a file holds and what it costs.", epilog=EXIT_CODES)
+@click.command(cls=Once, short_help="What a file holds and what it costs.", epilog=EXIT_CODES)
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @json_option
 @click.option("--layout", "show_layout", is_flag=True, help="What every range of bytes means.")
@@ -46,6 +49,7 @@ RATIOS = (
     is_flag=True,
     help="Check everything; name the offset and SPEC.md's heading of each fault.",
 )
+@clips_option
 @salvage_option
 @decoded_option
 def command(
@@ -53,19 +57,22 @@ def command(
     as_json: bool,
     show_layout: bool,
     check: bool,
+    clips: tuple[str, ...],
     salvage: bool,
     max_decoded: int | None,
 ) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz."""
     from mcz.reading import report
 
+    if clips and (show_layout or check):
+        raise Failure("--layout and --validate are of the whole file, without --clip", Exit.USAGE)
     if check:
         return _validate(file, max_decoded, as_json)
     with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
         if show_layout:
             parts = report.layout(held)
         else:
-            document = report.info(held)
+            document = report.info(held, clips or None)
         damage = list(held.damage)
     if show_layout:
         _print_layout(parts, as_json)
@@ -131,6 +138,7 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
             yield from _clip(clip)
     else:
         yield from ("", *_clips(document["clips"]).split("\n"))
+        yield from _notes(document["clips"])
     for attachment in document["attachments"]:
         yield f"\nattachment {attachment['name']}: {attachment['bytes']:,} bytes, verbatim"
 
@@ -182,7 +190,7 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
         yield f"  model      {model['id'][:8]} ({known})"
     yield from _source(clip)
     for key, value in clip["metadata"].items():
-        yield f"  {key}  {value[:80]}"
+        yield f"  {key}  {value[:WIDEST]}"
     if clip["quality"]:
         yield "  quality"
         yield from (f"    {line}" for line in figure_lines(clip["quality"]))
@@ -256,6 +264,20 @@ def _rate(clip: dict[str, Any]) -> str:
         return "at an unknown rate"
     about = "" if clip["frame_rate_exact"] else "about "
     return f"at {about}{rate:g} Hz ({clip['n_frames'] / rate:.2f} s)"
+
+
+def _notes(clips: list[dict[str, Any]]) -> Iterator[str]:
+    """What was noticed about the sources of clips and their skeletons, each text once."""
+    named: dict[str, list[str]] = {}
+    for clip in clips:
+        for key in NOTES:
+            if text := clip["metadata"].get(key):
+                named.setdefault(f"{key}  {text[:WIDEST]}", []).append(clip["name"])
+    if named:
+        yield ""
+    for note, names in named.items():
+        more = f" and {len(names) - FEW:,} more" if len(names) > FEW else ""
+        yield f"{note}: {', '.join(names[:FEW])}{more}"
 
 
 def _percent(part: int, total: int) -> str:

@@ -40,6 +40,14 @@ def decoded_option(function: Function) -> Function:
     )(function)
 
 
+clips_option = click.option(
+    "--clip",
+    "clips",
+    metavar="NAME",
+    multiple=True,
+    help="This clip alone; may be repeated. Default: all.",
+)
+
 param_option = click.option(
     "--param",
     "params",

@@ -5,7 +5,13 @@ from __future__ import annotations
 import click
 
 from mcz.cli.common import Exit, about, existing, hinted
-from mcz.cli.options import decoded_option, force_option, json_option, salvage_option
+from mcz.cli.options import (
+    clips_option,
+    decoded_option,
+    force_option,
+    json_option,
+    salvage_option,
+)
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
@@ -13,16 +19,24 @@ from mcz.cli.progress import Progress
 @click.command(short_help="Every source file out of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@clips_option
 @salvage_option
 @decoded_option
 @force_option
 @json_option
 def command(
-    file: str, folder: str, salvage: bool, max_decoded: int | None, force: bool, as_json: bool
+    file: str,
+    folder: str,
+    clips: tuple[str, ...],
+    salvage: bool,
+    max_decoded: int | None,
+    force: bool,
+    as_json: bool,
 ) -> Exit:
     """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
 
-    With --salvage those of a damaged file that are whole; each is checked as in a sound one.
+    With --clip those of the clips alone, with their skeletons. With --salvage those of a damaged
+    file that are whole; each is checked as in a sound one.
     """
     import mcz
 
@@ -31,6 +45,7 @@ def command(
         report = mcz.unpack(
             file,
             folder,
+            clips=clips or None,
             salvage=salvage,
             force=force,
             max_decoded=max_decoded,
