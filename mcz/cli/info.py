@@ -132,7 +132,8 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
     for skeleton in document["skeletons"][:FEW]:
         yield from _skeleton(skeleton)
     if len(document["skeletons"]) > FEW:
-        yield f"\n{len(document['skeletons']) - FEW:,} more skeletons; --json lists them"
+        yield ""
+        yield f"{len(document['skeletons']) - FEW:,} more skeletons; --json lists them"
     if len(document["clips"]) <= FEW:
         for clip in document["clips"]:
             yield from _clip(clip)
@@ -140,7 +141,8 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
         yield from ("", *_clips(document["clips"]).split("\n"))
         yield from _notes(document["clips"])
     for attachment in document["attachments"]:
-        yield f"\nattachment {attachment['name']}: {attachment['bytes']:,} bytes, verbatim"
+        yield ""
+        yield f"attachment {attachment['name']}: {attachment['bytes']:,} bytes, verbatim"
 
 
 def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:

@@ -415,12 +415,15 @@ def test_encode_and_append_pass_on_what_was_noticed(folder: Path, call: Call) ->
 
 
 def test_info_of_many_clips_passes_it_on(folder: Path, call: Call) -> None:
+    (folder / "notes.txt").write_text("left foot first")
     for number in range(4):
         (folder / f"s{number}.bvh").write_text((SLOPPY % 2).replace("3\n", f"3{number}\n"))
     call("pack", folder, folder / "all.mcz")
     shown = call("info", folder / "all.mcz")[1]
     assert "source-note  2 frames are declared, 3 are there: s0, s1, s2, s3" in shown
     assert "skeleton-note  ASF of the name of the take: walk" in shown
+    call("pack", folder, folder / "all.mcz", "--keep-all", "--force")
+    assert "\\n" not in call("info", folder / "all.mcz")[1]
 
 
 def test_an_amc_without_any_asf_is_told(folder: Path, call: Call) -> None:
