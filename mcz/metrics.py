@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.angles import without_turns
+from mcz.brief import brief
 from mcz.errors import MczError, MotionError
 from mcz.kinematics import point_names, point_set, points_and_markers_of, positions_of
 from mcz.motion import POSITION_KINDS, Motion, Signal, Skeleton
@@ -52,6 +53,8 @@ class Comparison:
     virtual_marker_max_cm: Number = None
     signals: Mapping[str, Number] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     @property
     def mean_position_error_cm(self) -> Number:
@@ -250,10 +253,11 @@ def _common_unit(a: Skeleton, b: Skeleton, notes: list[str]) -> tuple[Number, fl
     if a.unit_cm is not None and b.unit_cm is not None:
         return a.unit_cm, b.unit_cm / a.unit_cm
     if a.unit_cm is None and b.unit_cm is None:
-        notes.append("the length unit is unknown: no figures in cm")
+        notes.append("the length unit is unknown: no figures in cm (--unit says it)")
     else:
         notes.append(
-            "one side does not say its length unit: taken as the other's, no figures in cm"
+            "one side does not say its length unit: taken as the other's, no figures in cm "
+            "(--unit says it)"
         )
     return None, 1.0
 

@@ -10,15 +10,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from itertools import pairwise
 from operator import itemgetter
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz import brief
 from mcz.errors import MotionError
 from mcz.numbers import Grid, GridKind
+from mcz.numbers.blocks import grid_blocks as grid_blocks
 
 Vector = tuple[float, float, float]
 ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -109,6 +110,8 @@ class Skeleton:
     base: bytes | None = None
     source: Source | None = field(default=None, compare=False, repr=False)
 
+    __repr__ = brief.skeleton_text
+
     def __post_init__(self) -> None:
         for index, joint in enumerate(self.joints):
             if not -1 <= joint.parent < index:  # SKEL-05
@@ -192,6 +195,8 @@ class Source:
     size: int = 0
     sha256: bytes = b""
 
+    __repr__ = brief.source_text
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exceptions:
@@ -200,6 +205,8 @@ class Exceptions:
     rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     channels: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     texts: tuple[bytes, ...] = ()
+
+    __repr__ = brief.exceptions_text
 
     def __post_init__(self) -> None:
         if not len(self.rows) == len(self.channels) == len(self.texts):
@@ -228,6 +235,8 @@ class Signal:
     grid_changes: tuple[tuple[int, int, Grid], ...] = ()
     channels: tuple[Channel, ...] | None = None  # None: those of the skeleton
     ordinals: NDArray[np.int64] | None = None  # on their grids; see ``to_ordinals``
+
+    __repr__ = brief.signal_text
 
     def __post_init__(self) -> None:
         if self.values.ndim != 2:
@@ -338,21 +347,6 @@ class Signal:
         return np.where(self.mask, self.values, np.nan)
 
 
-def grid_blocks(
-    n_rows: int, grids: Sequence[Grid], changes: Sequence[tuple[int, int, Grid]]
-) -> Iterator[tuple[slice, list[int], Grid]]:
-    """Blocks (rows, columns, grid) that cover ``n_rows``; see ``Signal.grid_changes``."""
-    cuts = sorted({0, n_rows, *(row for row, _, _ in changes)})
-    current = list(grids)
-    ordered = sorted(changes, key=lambda change: change[0])
-    for start, stop in pairwise(cuts):
-        for row, channel, grid in ordered:
-            if row == start:
-                current[channel] = grid
-        for grid in dict.fromkeys(current):
-            yield slice(start, stop), [c for c, g in enumerate(current) if g == grid], grid
-
-
 def _positive(rate: Any, name: str) -> Fraction:
     """A frame rate as a Fraction, the nearest one to a number of another kind."""
     with suppress(TypeError, ValueError, OverflowError):  # no number, NaN, infinite
@@ -380,6 +374,8 @@ class Motion:
     metadata: Mapping[str, str] = field(default_factory=dict)
     source: Source | None = None
     frame_numbers: NDArray[np.int64] | None = None
+
+    __repr__ = brief.motion_text
 
     def __post_init__(self) -> None:
         if not self.signals:

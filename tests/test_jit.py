@@ -401,3 +401,25 @@ def test_the_store_without_a_home(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Path, "home", homeless)
     store.save("name", b"code")
     assert store.load("name") is None
+
+
+def test_a_compiler_that_finds_no_memory_is_no_reason_to_run_for_minutes() -> None:
+    """As under ``ulimit -v``: the library of LLVM cannot be mapped."""
+    code = (
+        "import resource, sys, numpy as np\n"
+        "from mcz.transforms import lsdt_kernels\n"
+        "from mcz.jit import calling\n"
+        "used = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (used + 2**25, resource.RLIM_INFINITY))\n"
+        "try:\n"
+        "    calling._has_compiler()\n"
+        "except MemoryError as error:\n"
+        "    print(error)\n"
+    )
+    if not Path("/proc/self/statm").exists():
+        pytest.skip("no limit of memory that could be set")
+    environment = {**os.environ, "MCZ_LOOPS": "compiled"}
+    shown = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True, env=environment
+    )
+    assert shown.stdout == "the compiler of loops cannot be loaded\n"

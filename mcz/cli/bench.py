@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, existing, print_json, printable, say, table
+from mcz.cli.common import Exit, Failure, about, echo, existing, print_json, say, table
 from mcz.cli.options import UNITS, json_option
 from mcz.cli.progress import Progress
 
@@ -100,11 +100,11 @@ def show(outcome: Outcome, out: Path | None, *, as_json: bool) -> None:
         print_json(document)
         return
     for line in _lines(outcome):
-        click.echo(printable(line))
+        echo(line)
     for note in outcome.notes:
         say(note)
     for path in document["files"]:
-        click.echo(printable(path))
+        echo(path)
 
 
 def _sample(folder: str) -> str:

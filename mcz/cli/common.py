@@ -2,32 +2,30 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import signal
 import sys
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
 from fractions import Fraction
 from pathlib import Path
 from threading import current_thread, main_thread
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.errors import (
-    AccessError,
-    ExistsError,
-    FormatError,
-    LimitError,
-    MczError,
-    OptionError,
-    SkeletonWarning,
-    UnsupportedError,
-)
+from mcz.cli.damage import hinted
+from mcz.cli.terminal import binary_output as binary_output
+from mcz.cli.terminal import echo as echo
+from mcz.cli.terminal import print_json as print_json
+from mcz.cli.terminal import printable as printable
+from mcz.cli.terminal import say as say
+from mcz.cli.terminal import say_json
+from mcz.cli.terminal import text_output as text_output
+from mcz.errors import AccessError, ExistsError, MczError, OptionError, SkeletonWarning
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
@@ -57,31 +55,45 @@ Exit codes:
 
 
 class Failure(Exception):
-    """An error as the user sees it: one line and an exit code."""
+    """An error as the user sees it: one line and an exit code.
 
-    def __init__(self, message: str, code: Exit = Exit.BAD_INPUT) -> None:
+    ``path`` is the file that it is about, ``kind`` what ``--json`` calls it: the class of the error
+    behind it where there is one.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        code: Exit = Exit.BAD_INPUT,
+        *,
+        path: str | None = None,
+        kind: str | None = None,
+    ) -> None:
         super().__init__(message)
-        self.code = code
+        self.code, self.path = code, path
+        self.kind = kind or ("UsageError" if code == Exit.USAGE else "InputError")
+
+
+OUT_OF_MEMORY = "out of memory: this takes more than the process may have"
 
 
 def run(command: click.Command, prog: str, arguments: Sequence[str] | None = None) -> int:
     """Run ``command`` with ``arguments`` (default: those of the process); return the exit code.
 
-    Every expected error becomes one line on standard error; any other is a bug and a traceback.
+    Every expected error becomes one line on standard error, which is JSON with ``--json``; any
+    other is a bug and a traceback.
     """
     _prepare_streams()
+    given = sys.argv[1:] if arguments is None else list(arguments)
     try:
         with _ended_by_signals(), _warnings_said():
-            result = command.main(arguments, prog_name=prog, standalone_mode=False)
+            result = command.main(
+                given, prog_name=prog, standalone_mode=False, help_option_names=["-h", "--help"]
+            )
         if sys.stdout is not None:
             sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         error.show()
-        return Exit.USAGE
-    except click.ClickException as error:
-        context = getattr(error, "ctx", None)
-        hint = f"; see {context.command_path} --help" if context else ""
-        say(error.format_message().rstrip(".") + hint)
         return Exit.USAGE
     except (KeyboardInterrupt, click.Abort):
         say("interrupted")
@@ -89,13 +101,12 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
     except BrokenPipeError:  # the reader of our output has seen enough
         _give_up_output()
         return Exit.FINE
-    except Failure as failure:
-        say(str(failure))
-        return failure.code
-    except (MczError, OSError) as error:
-        say(reason(error))
-        _give_up_output()
-        return code_of(error)
+    except (Failure, click.ClickException, MczError, OSError, MemoryError) as error:
+        return _failed(error, as_json="--json" in given)
+    except ImportError as error:
+        if not _is_starved(error):
+            raise
+        return _failed(MemoryError(), as_json="--json" in given)
     except _Terminated:
         say("terminated")
         return Exit.TERMINATED
@@ -117,6 +128,50 @@ def _warnings_said() -> Iterator[None]:
 
         warnings.showwarning = said
         yield
+
+
+def _is_starved(error: ImportError) -> bool:
+    """Whether a library could not be loaded for want of memory, as loaders word it."""
+    return "failed to map segment" in str(error) or "annot allocate memory" in str(error)
+
+
+def _failed(error: Exception, *, as_json: bool) -> Exit:
+    """Say what went wrong; return the exit code."""
+    failure = _failure_of(error)
+    if as_json and "--json" not in str(failure):  # that it is refused is said in words
+        say_json({"error": _facts(failure)})
+    else:
+        say(str(failure))
+    _give_up_output()
+    return failure.code
+
+
+def _failure_of(error: Exception) -> Failure:
+    if isinstance(error, Failure):
+        return error
+    if isinstance(error, click.ClickException):
+        context = getattr(error, "ctx", None)
+        hint = f"; see {context.command_path} --help" if context else ""
+        return Failure(error.format_message().rstrip(".") + hint, Exit.USAGE)
+    if isinstance(error, MemoryError):
+        return Failure(OUT_OF_MEMORY, kind="MemoryError")
+    failure = Failure(reason(error), code_of(error), kind=type(error).__name__)
+    failure.__cause__ = error
+    return failure
+
+
+def _facts(failure: Failure) -> dict[str, Any]:
+    """What ``--json`` says of an error; docs/scripts.md lists the keys."""
+    message = " ".join(str(failure).split())
+    line = re.search(r"\bline ([0-9]{1,15})\b", message)
+    return {
+        "exit_code": int(failure.code),
+        "class": failure.kind,
+        "message": message,
+        "file": failure.path,
+        "line": int(line[1]) if line else None,
+        "offset": getattr(failure.__cause__, "offset", None),
+    }
 
 
 class _Terminated(BaseException):
@@ -161,20 +216,6 @@ def _give_up_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def say(message: str) -> None:
-    """Print one line on standard error."""
-    click.echo(f"mcz: {printable(' '.join(message.split()))}", err=True)
-
-
-def printable(text: str) -> str:
-    r"""``text`` with control characters escaped: names in files must not steer a terminal.
-
-    >>> print(printable("a\x1b[2Jb"))
-    a\x1b[2Jb
-    """
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-
-
 def reason(error: Exception) -> str:
     """What an error says, on one line, without Python's decorations."""
     if isinstance(error, OSError) and error.strerror:
@@ -199,14 +240,17 @@ def about(path: str, *others: str) -> Iterator[None]:
     except (MczError, OSError) as error:
         text = reason(error)
         named = text if any(name in text for name in (path, *others)) else f"{path}: {text}"
-        raise Failure(named, code_of(error)) from error
+        kind = type(error).__name__
+        raise Failure(named, code_of(error), path=path, kind=kind) from error
+    except MemoryError as error:
+        raise Failure(f"{path}: {OUT_OF_MEMORY}", path=path, kind="MemoryError") from error
 
 
 def existing(path: str) -> None:
     """Raise Failure where a local ``path`` is no file."""
     if path != "-" and "://" not in path and not Path(path).is_file():
         what = "not a file" if Path(path).exists() else "no such file"
-        raise Failure(f"{path or repr(path)}: {what}")
+        raise Failure(f"{path or repr(path)}: {what}", path=path, kind="AccessError")
 
 
 @contextmanager
@@ -230,40 +274,6 @@ def opened(path: str, **options: Any) -> Iterator[File]:
         yield file
 
 
-@contextmanager
-def hinted(target: str | bytes, options: Mapping[str, Any]) -> Iterator[None]:
-    """Add to the error about a damaged file what is whole in it, and how to get that."""
-    try:
-        yield
-    except (UnsupportedError, LimitError):
-        raise
-    except FormatError as error:
-        whole = None if options.get("salvage") else _whole(target)
-        if whole is not None:
-            error.args = (f"{error}; {whole}",)
-        raise
-
-
-def _whole(target: str | bytes) -> str | None:
-    """What is whole in a damaged file on this machine; None where nothing is."""
-    import mcz
-
-    if isinstance(target, str) and "://" in target:
-        return None  # all of it would have to be read
-    try:
-        with mcz.open(target, salvage=True) as file:
-            rows = file.container.directory.clips.values()
-            clips = sum(row.cend is not None and not row.damage for row in rows)
-            damaged, attachments = len(rows) - clips, len(file.attachments)
-    except MczError:
-        return None
-    counts = ((clips, "whole clip"), (damaged, "damaged clip"), (attachments, "attachment"))
-    found = [plural(count, what) for count, what in counts if count]
-    if not found:
-        return None
-    return f"it holds {', '.join(found)}: --salvage reads them, mcz repair writes a sound file"
-
-
 def damage_of(path: str, damage: Sequence[str]) -> Exit:
     """Print what salvage found wrong; the exit code that it makes."""
     for line in damage:
@@ -271,17 +281,16 @@ def damage_of(path: str, damage: Sequence[str]) -> Exit:
     return Exit.SALVAGED if damage else Exit.FINE
 
 
-def binary_output() -> BinaryIO:
-    """Standard output as bytes; raises Failure where it is closed."""
-    if sys.stdout is None:
-        raise Failure("standard output is closed")
-    return sys.stdout.buffer
+def exists(path: Path) -> Failure:
+    """That a file is there, and nobody said that it may be replaced."""
+    text = f"{path}: exists; --force overwrites it"
+    return Failure(text, Exit.USAGE, path=str(path), kind="ExistsError")
 
 
 def check_new(path: Path, force: bool) -> None:
     """Raise Failure for a file that is there already, before work on it begins."""
     if os.path.lexists(path) and not force:
-        raise Failure(f"{path}: exists; --force overwrites it", Exit.USAGE)
+        raise exists(path)
 
 
 def write_output(path: Path, data: bytes, force: bool) -> None:
@@ -293,7 +302,7 @@ def write_output(path: Path, data: bytes, force: bool) -> None:
             stream.write(data)
     except Failure as failure:
         if isinstance(failure.__cause__, ExistsError):
-            raise Failure(f"{path}: exists; --force overwrites it", Exit.USAGE) from None
+            raise exists(path) from None
         raise
 
 
@@ -305,11 +314,6 @@ def plain_name(name: str) -> str:
     """
     name = re.sub(r"[\0/\\]", "_", name)
     return "_" if name in ("", ".", "..") else name
-
-
-def print_json(document: Any) -> None:
-    """Print ``document`` as one JSON document with sorted layout but kept key order."""
-    click.echo(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def plural(count: int, word: str) -> str:
@@ -327,6 +331,7 @@ def table(rows: Sequence[Sequence[str]], right: str = "") -> str:
     name    n
     walk  240
     """
+    rows = [[printable(cell) for cell in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     sides = right.ljust(len(widths), "l")
     lines = (

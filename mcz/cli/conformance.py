@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.errors import LimitError, MczError, UnsupportedError
+from mcz.errors import LimitError, MczError, OptionError, UnsupportedError
 
 if TYPE_CHECKING:
     from mcz.reading.clip import Clip
@@ -115,7 +115,9 @@ def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
     for attachment in file.attachments.values():
         attachment.read()
     clips: Iterable[Clip] = file.clips.values()
-    if given.clip is not None:
+    if given.clip is not None:  # by its name, and no other way
+        if given.clip not in file.clips:
+            raise OptionError(f"no clip {given.clip!r}")
         clips = [file.only_clip(given.clip)]
     lacking: UnsupportedError | None = None
     for clip in clips:

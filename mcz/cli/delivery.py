@@ -7,17 +7,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import click
-
 from mcz.cli.common import (
     Exit,
     Failure,
     about,
     binary_output,
     check_new,
+    echo,
     plain_name,
     print_json,
-    printable,
+    text_output,
     write_output,
 )
 from mcz.cli.suffixes import is_folder
@@ -47,8 +46,9 @@ def deliver(
 
     inputs = (sys.stdin if file == "-" else file,)
     if output == "-":
-        refuse_inputs(binary_output(), inputs)
-        binary_output().write(outputs[0][2])
+        refuse_inputs(sys.stdout, inputs)
+        data = outputs[0][2]
+        (binary_output if b"\0" in data else text_output)().write(data)
         return
     paths = _paths(file, output, outputs)
     for path in paths:
@@ -68,7 +68,7 @@ def deliver(
         print_json({"outputs": rows, **facts})
         return
     for row in rows:
-        click.echo(printable(f"{row['path']}  {row['bytes']:,} bytes"))
+        echo(f"{row['path']}  {row['bytes']:,} bytes")
 
 
 def _paths(file: str, output: str | None, outputs: Sequence[Output]) -> list[Path]:

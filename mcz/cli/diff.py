@@ -15,19 +15,23 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
+    echo,
     existing,
     opened,
+    plural,
     print_json,
-    printable,
     to_frames,
 )
 from mcz.cli.figures import figure_lines
 from mcz.cli.options import UNITS, decoded_option, json_option
+from mcz.errors import MczError
 
 if TYPE_CHECKING:
+    from mcz.metrics import Comparison
     from mcz.motion import Motion
     from mcz.reading.file import File
 
+FEW = 12  # names of joints that are shown
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
 Cut = tuple[int, int | None] | None
 
@@ -86,10 +90,10 @@ def command(
         return Exit.FINE
     for number, document in enumerate(documents):
         for line in ([""] if number else []) + list(_lines(a, b, document)):
-            click.echo(printable(line))
+            echo(line)
     for key, found in only.items():
         for name in found:
-            click.echo(printable(f"only in {a if key == 'only_in_a' else b}: {name}"))
+            echo(f"only in {a if key == 'only_in_a' else b}: {name}")
     return Exit.FINE
 
 
@@ -197,8 +201,44 @@ def _compared(
     if found.where is not None:
         entries["max_position_error_frame"] = found.where[0] + one.start
     document: dict[str, Any] = {"name_a": one.motion.name, "name_b": other.motion.name, **entries}
+    document["joints"] = _by_joints(one.motion, other.motion, found, one.start)
     document |= {"notes": list(found.notes), "ratios_a": one.ratios, "ratios_b": other.ratios}
     return document
+
+
+def _by_joints(a: Motion, b: Motion, found: Comparison, start: int) -> dict[str, Any] | None:
+    """The distances of joints of the same names, of skeletons whose points are not alike."""
+    from mcz.joint_errors import joint_errors
+    from mcz.kinematics import point_set
+
+    if found.points is not None and point_set(a.skeleton) == point_set(b.skeleton):
+        return None
+    try:
+        errors = joint_errors(a, b)
+    except MczError:  # no kinematics, as the notes say
+        return None
+    document = errors.document()
+    if errors.frame is not None:
+        document["frame"] = errors.frame + start
+    return document
+
+
+def _joint_lines(a: str, b: str, found: dict[str, Any]) -> Iterator[str]:
+    n_joints = len(found["joints"])
+    if not n_joints:
+        yield "no joint has the same name in both"
+        return
+    suffix, unit = ("", "units") if found["unit_cm"] is None else ("_cm", "cm")
+    if found["mean"] is not None:
+        mean, most = found[f"mean{suffix}"], found[f"greatest{suffix}"]
+        yield (
+            f"{plural(n_joints, 'joint')} of the same name: mean {mean:.6g} {unit} apart, "
+            f"at most {most:.6g} {unit} (frame {found['frame']}, {found['joint']})"
+        )
+    for path, names in ((a, found["only_in_a"]), (b, found["only_in_b"])):
+        if names:
+            more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
+            yield f"joints of {path} alone: {', '.join(names[:FEW])}{more}"
 
 
 def _lines(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
@@ -207,7 +247,10 @@ def _lines(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
     names = entries.pop("name_a"), entries.pop("name_b")
     notes, ratios = entries.pop("notes"), [entries.pop("ratios_a"), entries.pop("ratios_b")]
     yield f"{a} ({names[0]}) and {b} ({names[1]})"
+    joints = entries.pop("joints")
     yield from (f"  {line}" for line in figure_lines(entries))
+    if joints is not None:
+        yield from (f"  {line}" for line in _joint_lines(a, b, joints))
     for path, found in zip((a, b), ratios, strict=True):
         known = {key: value for key, value in (found or {}).items() if value is not None}
         if known:

@@ -14,13 +14,14 @@ from mcz.cli.common import (
     Failure,
     about,
     binary_output,
+    echo,
     existing,
     opened,
     plural,
     print_json,
-    printable,
     say,
 )
+from mcz.cli.figures import reached
 from mcz.cli.options import chosen, encoding_options, force_option, json_option
 from mcz.cli.progress import Progress
 
@@ -87,7 +88,7 @@ def _encode_piped(
     from mcz.live.text_writer import codes_live
     from mcz.writing.inputs import refuse_inputs
 
-    refuse_inputs(binary_output() if output in (None, "-") else output, (sys.stdin, skeleton))
+    refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
     if options["codec"] is not None and codes_live(options["codec"]):
         if as_json:
             raise Failure("--json: what is coded frame by frame has no document", Exit.USAGE)
@@ -111,16 +112,17 @@ def _encode_file(
     from mcz.writing.inputs import refuse_inputs
 
     if output == "-":
-        refuse_inputs(binary_output(), (source, skeleton))
+        refuse_inputs(sys.stdout, (source, skeleton))
     target = output or str(Path(source).with_suffix(".mcz"))
     unread = output == "-" or _is_special(target)
     if unread and as_json:
         raise Failure(f"-o {target} leaves no room for --json", Exit.USAGE)
+    sink = binary_output() if output == "-" else None
     piped = io.BytesIO()
     with about(source, target), Progress() as progress:
         written = mcz.encode(
             source,
-            piped if output == "-" else target,
+            piped if sink is not None else target,
             skeleton=skeleton,
             force=force,
             progress=progress,
@@ -128,8 +130,8 @@ def _encode_file(
         )
     for note in written.notes:
         say(f"{source}: {note}")
-    if output == "-":
-        binary_output().write(piped.getvalue())
+    if sink is not None:
+        sink.write(piped.getvalue())
     if not unread:
         _tell(target, written, Path(source).stat().st_size, as_json)
     return Exit.FINE
@@ -142,7 +144,10 @@ def _tell(target: str, written: Written, source_size: int, as_json: bool) -> Non
     if needed > allowed:
         say(f"{target}: reading it takes --max-decoded {needed}, the default is {allowed}")
     if not as_json:
-        click.echo(summary(target, written, source_size))
+        echo(summary(target, written, source_size))
+        for clip in written.clips:
+            if clip.quality is not None:
+                echo(f"  {reached(clip.quality)}")
         return
     from mcz.reading.report import info
 
@@ -166,4 +171,4 @@ def summary(target: str, written: Written, source_size: int) -> str:
     held += ["verbatim"] * written.n_attachments
     ratio = f", {source_size / written.size:.2f} : 1" if source_size else ""
     sizes = f"{source_size:,} -> {written.size:,} bytes{ratio}"
-    return printable(f"{target}: {', '.join(held)}; {sizes}")
+    return f"{target}: {', '.join(held)}; {sizes}"

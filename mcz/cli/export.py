@@ -11,6 +11,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.cli.terminal import printable
 from mcz.motion import Channel, Skeleton
 
 
@@ -46,11 +47,12 @@ def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> l
 def to_csv(table: Table) -> bytes:
     """UTF-8 text: a header row, then a row a frame; an invalid value is an empty cell.
 
+    What would steer a terminal is escaped in the names, as text it is often printed on one.
     Values are the shortest decimals that read back as the same binary64.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["frame", *table.names])
+    writer.writerow(["frame", *map(printable, table.names)])
     rows = zip(
         table.frame_numbers.tolist(), table.values.tolist(), table.mask.tolist(), strict=True
     )

@@ -12,14 +12,14 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
+    echo,
     existing,
-    hinted,
     plural,
     print_json,
-    printable,
     say,
     to_frames,
 )
+from mcz.cli.damage import hinted
 from mcz.cli.options import (
     clips_option,
     decoded_option,
@@ -94,7 +94,7 @@ def command(
         print_json({"output": output, **asdict(found)})
         return Exit.FINE
     for line in _lines(output, found):
-        click.echo(printable(line))
+        echo(line)
     for text in found.left_out:
         say(f"left out: {text}")
     return Exit.FINE

@@ -26,6 +26,27 @@ def figure_lines(entries: Mapping[str, Any]) -> Iterator[str]:
         yield from table(rows, "lrlrl").split("\n")
 
 
+def reached(quality: Mapping[str, str]) -> str:
+    """The error of a lossy clip in one line: of its points, or, without any, of its channels."""
+    cm = "mean_position_error_cm" in quality
+    suffix, unit = ("_cm", "cm") if cm else ("", "units")
+    mean, most = (quality.get(f"{key}_position_error{suffix}") for key in ("mean", "max"))
+    if mean is None or most is None:
+        mse = quality.get("mse")
+        text = "error unknown" if mse is None else f"mean squared error of channels {_number(mse)}"
+    else:
+        where = ", ".join(
+            f"{word} {quality[f'max_position_error_{word}']}"
+            for word in ("frame", "point")
+            if f"max_position_error_{word}" in quality
+        )
+        text = f"error of positions: mean {_number(mean)} {unit}, greatest {_number(most)} {unit}"
+        text += f" ({where})" if where else ""
+        text += "" if cm else "; --unit gives centimeters"
+    remark = quality.get("target_remark")
+    return f"{text}; {remark}" if remark else text
+
+
 def _what(held: Mapping[str, str]) -> Iterator[str]:
     """Settings, and how much was compared."""
     if "codec" in held:

@@ -12,17 +12,25 @@ from mcz.cli.common import (
     EXIT_CODES,
     Exit,
     Failure,
+    about,
     damage_of,
+    echo,
+    existing,
     opened,
     plural,
     print_json,
-    printable,
     run,
     say,
     table,
 )
 from mcz.cli.figures import figure_lines
-from mcz.cli.options import clips_option, decoded_option, json_option, salvage_option
+from mcz.cli.options import (
+    clips_option,
+    decoded_option,
+    json_option,
+    salvage_option,
+    version_option,
+)
 from mcz.cli.repeats import Once
 from mcz.cli.verify import is_unsound
 
@@ -40,7 +48,7 @@ RATIOS = (
 
 
 @click.command(cls=Once, short_help="What a file holds and what it costs.", epilog=EXIT_CODES)
-@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @json_option
 @click.option("--layout", "show_layout", is_flag=True, help="What every range of bytes means.")
 @click.option(
@@ -51,6 +59,9 @@ RATIOS = (
 )
 @clips_option
 @salvage_option
+@click.option(
+    "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of an AMC."
+)
 @decoded_option
 def command(
     file: str,
@@ -59,11 +70,19 @@ def command(
     check: bool,
     clips: tuple[str, ...],
     salvage: bool,
+    skeleton: str | None,
     max_decoded: int | None,
 ) -> Exit:
-    """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz."""
-    from mcz.reading import report
+    """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz.
 
+    Of a source file (.bvh, .amc, .asf, .c3d) it shows the skeleton and the clip.
+    """
+    from mcz.reading import report, source_report
+
+    if source_report.is_source(file) and not (show_layout or check):
+        return _of_source(file, skeleton, as_json)
+    if skeleton is not None:
+        raise Failure("--skeleton is the ASF of an AMC", Exit.USAGE)
     if clips and (show_layout or check):
         raise Failure("--layout and --validate are of the whole file, without --clip", Exit.USAGE)
     if check:
@@ -79,8 +98,22 @@ def command(
     elif as_json:
         print_json(document)
     else:
-        click.echo("\n".join(printable(line) for line in lines(file, document)))
+        echo(*lines(file, document))
     return damage_of(file, damage)
+
+
+def _of_source(file: str, skeleton: str | None, as_json: bool) -> Exit:
+    from mcz.cli.source_text import source_lines
+    from mcz.reading.source_report import source_info
+
+    existing(file)
+    with about(file):
+        document = source_info(file, skeleton)
+    if as_json:
+        print_json(document)
+    else:
+        echo(*source_lines(file, document, _skeleton, _rate))
+    return Exit.FINE
 
 
 def _validate(file: str, max_decoded: int | None, as_json: bool) -> Exit:
@@ -104,7 +137,7 @@ def _say_problems(file: str, size: int, problems: list[Any], as_json: bool) -> E
         rows = [{"offset": p.offset, "heading": p.heading, "message": p.message} for p in problems]
         print_json({"valid": not problems, "problems": rows})
     elif not problems:
-        click.echo(printable(f"{file}: valid, {size:,} bytes"))
+        echo(f"{file}: valid, {size:,} bytes")
     else:
         for p in problems:
             say(f'{file}: at {p.offset}: {p.message} (SPEC.md, "{p.heading}")')
@@ -115,8 +148,8 @@ def _print_layout(parts: list[tuple[int, int, str]], as_json: bool) -> None:
     if as_json:
         print_json([{"offset": at, "bytes": n, "meaning": text} for at, n, text in parts])
         return
-    rows = [[f"{at}", f"{n}", printable(text)] for at, n, text in parts]
-    click.echo(table([["offset", "bytes", "meaning"], *rows], "rrl"))
+    rows = [[f"{at}", f"{n}", text] for at, n, text in parts]
+    echo(*table([["offset", "bytes", "meaning"], *rows], "rrl").split("\n"))
 
 
 def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
@@ -155,8 +188,9 @@ def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:
         f"angles in {skeleton['angle_unit'] or 'an unknown unit'}",
     ]
     name = f" {skeleton['name']}" if skeleton["name"] else ""
-    yield f"skeleton{name} ({skeleton['id'][:8]}): {', '.join(facts)}"
-    if skeleton["base"]:
+    id_ = f" ({skeleton['id'][:8]})" if "id" in skeleton else ""
+    yield f"skeleton{name}{id_}: {', '.join(facts)}"
+    if skeleton.get("base"):
         yield f"  derived from {skeleton['base'][:8]}"
     yield from _tree(skeleton["joints"])
 
@@ -287,7 +321,7 @@ def _percent(part: int, total: int) -> str:
 
 
 def main() -> None:
-    sys.exit(run(command, "mcz-info"))
+    sys.exit(run(version_option(command), "mcz-info"))
 
 
 if __name__ == "__main__":

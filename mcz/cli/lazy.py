@@ -29,9 +29,21 @@ def lazy_group(prefix: str, names: Sequence[str]) -> type[click.Group]:
         def resolve_command(
             self, ctx: click.Context, args: list[str]
         ) -> tuple[str | None, click.Command | None, list[str]]:
+            if args and args[0] not in names and not args[0].startswith("-"):
+                ctx.fail(unknown(args[0], names))
             name, command, rest = super().resolve_command(ctx, args)
             if command is not None and not ctx.resilient_parsing:
                 refuse_repeats(command, name, rest, ctx)
             return name, command, rest
 
     return Commands
+
+
+def unknown(name: str, names: Sequence[str]) -> str:
+    """That there is no such command, and which are called nearly so."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name.lower(), names, 3, 0.7)
+    near += [known for known in names if known.startswith(name) and known not in near][:3]
+    hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(names)}"
+    return f"no command {name!r}; {hint}"

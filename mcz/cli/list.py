@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from mcz.cli.common import Exit, damage_of, opened, print_json, printable, table
+from mcz.cli.common import Exit, damage_of, echo, opened, print_json, table
 from mcz.cli.options import json_option, salvage_option
 
 ALIAS = ("name", "of", "target")
@@ -42,7 +42,7 @@ def command(file: str, salvage: bool, as_json: bool) -> Exit:
         return damage_of(file, damage)
     rows = [
         [
-            printable(str(clip["name"])),
+            str(clip["name"]),
             str(clip["codec"]),
             f"{clip['n_frames']:,}",
             f"{clip['n_channels']}",
@@ -51,11 +51,10 @@ def command(file: str, salvage: bool, as_json: bool) -> Exit:
         for clip in clips
     ]
     if rows:
-        click.echo(table([["clip", "codec", "frames", "channels", "rate"], *rows], "llrrr"))
+        echo(*table([["clip", "codec", "frames", "channels", "rate"], *rows], "llrrr").split("\n"))
     for attachment in attachments:
-        click.echo(printable(f"{attachment['name']}  attachment, {attachment['bytes']:,} bytes"))
+        echo(f"{attachment['name']}  attachment, {attachment['bytes']:,} bytes")
     for name, of, target in aliases:
         same = f"same content as {of} {target}"
-        text = f"the file of skeleton {target[:8]}" if of == "skeleton" else same
-        click.echo(printable(f"{name}  {text}"))
+        echo(f"{name}  {f'the file of skeleton {target[:8]}' if of == 'skeleton' else same}")
     return damage_of(file, damage)

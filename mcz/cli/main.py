@@ -8,6 +8,7 @@ import click
 
 from mcz.cli.common import EXIT_CODES, run
 from mcz.cli.lazy import lazy_group
+from mcz.cli.options import version_option
 
 COMMANDS = (
     "sample",
@@ -26,15 +27,9 @@ COMMANDS = (
     "stream",
     "bench",
     "train",
+    "codecs",
+    "completion",
 )
-
-
-def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
-    if value:
-        from mcz import __version__
-
-        click.echo(f"mcz {__version__}")
-        ctx.exit()
 
 
 @click.command(
@@ -43,14 +38,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
     "Every command has its own --help. Nothing is overwritten without --force.",
     epilog=EXIT_CODES,
 )
-@click.option(
-    "--version",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=_print_version,
-    help="Print the version and leave.",
-)
+@version_option
 def cli() -> None:
     pass
 

@@ -7,10 +7,28 @@ from typing import Any
 
 import click
 
-from mcz.cli.common import to_bytes, to_params, to_rate
+from mcz.cli.common import echo, to_bytes, to_params, to_rate
 
 UNITS = ("mm", "cm", "dm", "m", "in", "ft")
 Function = Callable[..., Any]
+
+
+def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    if value:
+        from mcz import __version__
+
+        echo(f"mcz {__version__}")
+        ctx.exit()
+
+
+version_option = click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Print the version and leave.",
+)
 
 
 def json_option(function: Function) -> Function:
@@ -46,6 +64,14 @@ clips_option = click.option(
     metavar="NAME",
     multiple=True,
     help="This clip alone; may be repeated. Default: all.",
+)
+
+token_option = click.option(
+    "--token",
+    metavar="TEXT",
+    envvar="MCZ_TOKEN",
+    help="What a client sends before it gets anything; MCZ_TOKEN in the environment keeps it out "
+    "of the list of processes. It encrypts nothing.",
 )
 
 param_option = click.option(

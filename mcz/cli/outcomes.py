@@ -7,15 +7,12 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
-import click
-
-from mcz.cli.common import Exit, plural, print_json, printable, say
+from mcz.cli.common import Exit, echo, plural, print_json, say
 
 if TYPE_CHECKING:
     from mcz.editing.archive import Outcome, Report
 
 
-TOLD = ("skipped", "verbatim", "salvaged", "dropped", "damaged")  # results whose reason is said
 HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "restored")
 MANY = 50  # files of one kind that are named for one reason; --json names all
 
@@ -67,7 +64,7 @@ def _say_notes(report: Report) -> None:
     """Say on standard error what was left out and why, and what was noticed about the rest."""
     said: Counter[tuple[str, str, str]] = Counter()
     for outcome in report.outcomes:
-        if outcome.result in TOLD and outcome.message:
+        if outcome.message and outcome not in report.failures:
             kind = PurePosixPath(outcome.path).suffix.lower()
             said[outcome.result, kind, outcome.message] += 1
             if said[outcome.result, kind, outcome.message] <= MANY:
@@ -97,9 +94,7 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
         document = {"target": target, "bytes": report.size, "counts": counts, "files": rows}
         print_json(document | _damage(report))
     else:
-        click.echo(printable(f"{target}: {_summary(report)}"))
-        for line in _table(report):
-            click.echo(printable(line))
+        echo(f"{target}: {_summary(report)}", *_table(report))
     _say_left_out(report, target)
     _say_notes(report)
     for failure in report.failures:

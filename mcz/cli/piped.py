@@ -10,16 +10,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
-import click
-
 from mcz.cli.common import (
     Exit,
     Failure,
     about,
     binary_output,
     check_new,
+    echo,
     plural,
-    printable,
     say,
 )
 
@@ -69,7 +67,7 @@ def encode_lines(
     if target not in (None, "-"):
         size = Path(str(target)).stat().st_size
         held = f"{plural(report.n_frames, 'frame')} of {plural(report.n_channels, 'channel')}"
-        click.echo(printable(f"{target}: {held}, live; {size:,} bytes"))
+        echo(f"{target}: {held}, live; {size:,} bytes")
 
 
 @contextmanager

@@ -7,6 +7,8 @@ import time
 from types import TracebackType
 from typing import Any
 
+from mcz.cli.terminal import printable
+
 PATIENCE = 1.0  # seconds of work before a bar appears
 
 
@@ -27,7 +29,7 @@ class Progress:
             return
         if self.bar is None:
             self._show()
-        self.bar.update(self.task, completed=done, total=total, description=what)
+        self.bar.update(self.task, completed=done, total=total, description=_plain(what))
 
     def _show(self) -> None:
         from rich.console import Console
@@ -48,3 +50,10 @@ class Progress:
     ) -> None:
         if self.bar is not None:
             self.bar.stop()
+
+
+def _plain(what: str) -> str:
+    """A name as a bar may show it: rich would take [words in brackets] for its own."""
+    from rich.markup import escape
+
+    return escape(printable(what))

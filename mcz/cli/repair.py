@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, existing, plural, print_json, printable, say
+from mcz.cli.common import Exit, Failure, about, echo, existing, plural, print_json, say
 from mcz.cli.options import decoded_option, force_option, json_option
 from mcz.cli.progress import Progress
 
@@ -39,7 +39,7 @@ def command(file: str, output: str, max_decoded: int | None, force: bool, as_jso
     if as_json:
         print_json({"output": output, **asdict(found)})
     else:
-        click.echo("\n".join(map(printable, _lines(output, found))))
+        echo(*_lines(output, found))
     for text in found.damage:
         say(f"{file}: {text}")
     for text in found.lost:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from typing import Any
 
 import click
+
+HELP = ["-h", "--help"]
 
 
 def refuse_repeats(
@@ -15,7 +18,8 @@ def refuse_repeats(
     parent: click.Context | None = None,
 ) -> None:
     """Raise UsageError where ``arguments`` give an option twice that does not take a list."""
-    with click.Context(command, parent, name, **command.context_settings) as context:
+    settings: dict[str, Any] = {"help_option_names": HELP, **command.context_settings}
+    with click.Context(command, parent, name, **settings) as context:
         if command.no_args_is_help and not arguments:
             return
         if isinstance(command, click.Group):

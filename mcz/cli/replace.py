@@ -16,6 +16,7 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
+    echo,
     existing,
     plural,
     print_json,
@@ -95,13 +96,13 @@ def command(
         print_json({"output": shown, **asdict(found)})
         return Exit.FINE
     line = f"{shown}: {found.size:,} bytes; {found.joint} of {found.clip}: {found.joint_bytes:,}"
-    click.echo(printable(f"{line} of {found.joint_bytes_before:,} bytes, {found.codec}"))
+    echo(f"{line} of {found.joint_bytes_before:,} bytes, {found.codec}")
     if found.n_exceptions or found.n_exceptions_before:
         before = f"{found.n_exceptions_before:,} before"
         line = f"  {plural(found.n_exceptions, 'number')} of the joint off the grid, {before}"
-        click.echo(f"{line}; --on-grid rounds to it" if found.n_exceptions else line)
+        echo(f"{line}; --on-grid rounds to it" if found.n_exceptions else line)
     if found.recoded:
-        click.echo(printable(f"  coded anew, as they repeated it: {' '.join(found.recoded)}"))
+        echo(f"  coded anew, as they repeated it: {' '.join(found.recoded)}")
     for text in found.left_out:
         say(f"left out: {text}")
     return Exit.FINE
@@ -111,9 +112,12 @@ def read_values(path: str, clip: Clip, joint: str) -> Any:
     """The columns of the joint in a table, NaN where it says invalid; raises Failure."""
     from mcz.cli.export import channel_names
 
+    is_npz = Path(path).suffix.lower() == ".npz"
     all_names = channel_names(clip.skeleton, clip.signals[0].channels)
+    if not is_npz:  # as the CSV export has them
+        all_names = [*map(printable, all_names)]
     wanted = [all_names[column] for column in clip.skeleton.columns(clip.skeleton.find(joint))]
-    reading = _read_npz if Path(path).suffix.lower() == ".npz" else _read_csv
+    reading = _read_npz if is_npz else _read_csv
     try:
         names, values = reading(Path(path))
     except (ValueError, KeyError, OSError, EOFError, csv.Error, zipfile.BadZipFile) as error:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, print_json, write_output
+from mcz.cli.common import Exit, Failure, about, echo, print_json, write_output
 from mcz.cli.options import force_option, json_option
 
 
@@ -36,5 +36,5 @@ def command(folder: Path, force: bool, as_json: bool) -> Exit:
         print_json({"outputs": outputs})
     else:
         for output in outputs:
-            click.echo(f"{output['path']}  {output['bytes']:,} bytes")
+            echo(f"{output['path']}  {output['bytes']:,} bytes")
     return Exit.FINE

@@ -14,7 +14,19 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import click
 import numpy as np
 
-from mcz.cli.common import Exit, Failure, about, binary_output, existing, plural, say, to_rate
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    binary_output,
+    existing,
+    plural,
+    printable,
+    say,
+    text_output,
+    to_rate,
+)
+from mcz.cli.options import token_option
 from mcz.cli.piped import NAME, standard_input
 from mcz.cli.rows import NUMBER, STATE
 
@@ -29,6 +41,7 @@ if TYPE_CHECKING:
 @click.option(
     "--connect", metavar="HOST:PORT", help="Read from there over TCP; --join goes with it."
 )
+@token_option
 @click.option(
     "--lost",
     type=click.Choice(("refuse", "missing", "hold", "linear")),
@@ -55,6 +68,7 @@ if TYPE_CHECKING:
 def command(
     file: str,
     connect: str | None,
+    token: str | None,
     lost: Lost,
     join: bool,
     post_filter: bool,
@@ -79,10 +93,10 @@ def command(
     from mcz.writing.inputs import refuse_inputs
 
     if connect is None:
-        refuse_inputs(binary_output(), (sys.stdin if file == "-" else file,))
+        refuse_inputs(sys.stdout, (sys.stdin if file == "-" else file,))
 
     where = connect or (NAME if file == "-" else file)
-    with about(where), _stream(file, connect) as stream:
+    with about(where), _stream(file, connect, token) as stream:
         join = join or connect is not None
         reader = stream_decode(stream, lost=lost, join=join, post_filter=post_filter, rate=rate)
         try:
@@ -100,11 +114,11 @@ def command(
 
 
 @contextmanager
-def _stream(file: str, connect: str | None) -> Iterator[BinaryIO]:
+def _stream(file: str, connect: str | None, token: str | None) -> Iterator[BinaryIO]:
     if connect is not None:
         from mcz.cli.tcp import connected
 
-        with connected(connect) as stream:
+        with connected(connect, token) as stream:
             yield stream
     elif file == "-":
         yield standard_input()
@@ -142,14 +156,14 @@ class _Binary:
 
 def _csv(cells: list[str]) -> bytes:
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(cells)
+    csv.writer(text, lineterminator="\n").writerow(map(printable, cells))
     return text.getvalue().encode("utf-8", "surrogateescape")
 
 
 def _print_all(reader: LiveReader, printer: _Text | _Binary) -> None:
     from mcz.cli.export import channel_names
 
-    output = binary_output()
+    output = binary_output() if isinstance(printer, _Binary) else text_output()
     clip: LiveClip | None = None
     names: list[str] | None = None
     for frame in reader:

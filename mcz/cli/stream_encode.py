@@ -15,14 +15,13 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
-    binary_output,
+    echo,
     existing,
     plural,
-    printable,
     say,
     to_rate,
 )
-from mcz.cli.options import UNITS, force_option, param_option
+from mcz.cli.options import UNITS, force_option, param_option, token_option
 from mcz.cli.piped import NAME, live_output, standard_input
 from mcz.cli.rows import Rows, skeleton_in
 
@@ -48,6 +47,7 @@ Entry = Callable[[], int | None]
     default=0,
     help="Wait for N clients before the first row is read (with --listen).",
 )
+@token_option
 @click.option("--codec", metavar="NAME", default="online", show_default=True)
 @param_option
 @click.option("--rate", metavar="R", callback=to_rate, help="Frames a second.")
@@ -73,6 +73,7 @@ def command(
     output: str | None,
     listen: str | None,
     clients: int,
+    token: str | None,
     skeleton: str | None,
     binary: bool,
     force: bool,
@@ -95,18 +96,18 @@ def command(
     if skeleton is not None:
         existing(skeleton)
     if listen is None:
-        refuse_inputs(binary_output() if output in (None, "-") else output, (sys.stdin, skeleton))
+        refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
     others = tuple(name for name in (output, skeleton) if name not in (None, "-"))
     with about(NAME, *map(str, others)):
         if listen is not None:
-            with _listening(listen, clients) as (sink, tell):
+            with _listening(listen, clients, token) as (sink, tell):
                 _encode(sink, tell, skeleton, binary, **options)
             return Exit.FINE
         with live_output(output, force) as sink:
             held = _encode(sink, None, skeleton, binary, **options)
     if output not in (None, "-"):
         size = Path(str(output)).stat().st_size
-        click.echo(printable(f"{output}: {held}, live; {size:,} bytes"))
+        echo(f"{output}: {held}, live; {size:,} bytes")
     return Exit.FINE
 
 
@@ -151,13 +152,19 @@ def _push_all(rows: Rows, writer: LiveWriter) -> None:
 
 
 @contextmanager
-def _listening(where: str, n_clients: int) -> Iterator[tuple[Any, Callable[[Entry], None]]]:
+def _listening(
+    where: str, n_clients: int, token: str | None
+) -> Iterator[tuple[Any, Callable[[Entry], None]]]:
     """A sink that sends to clients, and what it is told of the places where one can join."""
     from mcz.cli.tcp import Listener
 
     with about(where):
-        listener = Listener(where)
+        listener = Listener(where, token)
     say(f"listening on {listener.address}")
+    if listener.is_open_to_others:
+        who = "everyone who" if token is None else "everyone who has the token and"
+        hint = "; --token asks for one" if token is None else ""
+        say(f"{who} reaches the port can read the stream, which is not encrypted{hint}")
 
     def tell(entry: Entry) -> None:
         listener.entry = entry

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import socket
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from hmac import compare_digest
 from threading import Condition, Thread
 from time import monotonic, sleep
 from typing import BinaryIO
@@ -14,6 +16,7 @@ from mcz.cli.common import Exit, Failure, say
 
 MOST_WAITING = 4 * 2**20  # bytes that a client may be behind
 LINGER = 10.0  # seconds that clients have for the rest, once all is coded
+PATIENCE = 10.0  # seconds in which a client sends its token
 LOOPBACK = "127.0.0.1"
 
 
@@ -35,13 +38,35 @@ def _is_name(host: str) -> bool:
 
 
 @contextmanager
-def connected(text: str) -> Iterator[BinaryIO]:
-    """What comes from ``HOST:PORT``, as a binary stream."""
+def connected(text: str, token: str | None = None) -> Iterator[BinaryIO]:
+    """What comes from ``HOST:PORT``, as a binary stream; ``token`` is what the sender may ask for.
+
+    Raises Failure where the sender closes the connection before it has sent anything.
+    """
     with (
         socket.create_connection(address_of(text)) as connection,
         connection.makefile("rb") as stream,
     ):
+        if token is not None:
+            connection.sendall(line_of(token))
+        if not stream.peek(1):
+            hint = "is the --token right?" if token else "it may ask for a --token"
+            raise Failure(f"{text}: the connection was closed before anything came; {hint}")
         yield stream
+
+
+def line_of(token: str) -> bytes:
+    """The line that a client sends first; raises Failure for what is no token."""
+    if not re.fullmatch("[!-~]{1,200}", token):
+        raise Failure("a token has 1 to 200 characters of ASCII, no blanks", Exit.USAGE)
+    return token.encode() + b"\n"
+
+
+def is_here(host: str) -> bool:
+    """Whether only this machine reaches an address that is listened on."""
+    from ipaddress import ip_address
+
+    return ip_address(host.partition("%")[0]).is_loopback
 
 
 class Listener:
@@ -50,11 +75,13 @@ class Listener:
     The first write is what every client gets first. Later ones are frames: a client that comes
     after the first of them gets those from the next one on for which ``entry`` is not None, which
     says how many bytes before it are not needed there. One that is ``MOST_WAITING`` bytes behind is
-    dropped. Raises OSError where the address cannot be had.
+    dropped. With ``token`` a client gets nothing until it has sent a line that is this token.
+    Raises OSError where the address cannot be had.
     """
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, token: str | None = None) -> None:
         host, port = address_of(text)
+        self._token = None if token is None else line_of(token)
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self._server = socket.create_server((host, port), family=family)
         self.entry: Callable[[], int | None] = lambda: None
@@ -70,6 +97,11 @@ class Listener:
     def address(self) -> str:
         host, port = self._server.getsockname()[:2]
         return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+    @property
+    def is_open_to_others(self) -> bool:
+        """Whether other machines may reach the port."""
+        return not is_here(str(self._server.getsockname()[0]))
 
     def wait_for(self, n_clients: int) -> None:
         """Wait until so many clients have come."""
@@ -108,12 +140,31 @@ class Listener:
                 say(f"a client could not connect: {error.strerror}")
                 sleep(0.1)  # what is short may be there again
                 continue
-            with self._changed:
-                client = _Client(connection, f"{where[0]}:{where[1]}", not self._has_frames)
-                if self._opening is not None:
-                    client.put(self._opening)
-                self._clients.append(client)
-                self._changed.notify_all()
+            name = f"{where[0]}:{where[1]}"
+            if self._token is None:
+                self._admit(connection, name)
+            else:  # one that is silent keeps nobody else waiting
+                Thread(target=self._ask, args=(connection, name), daemon=True).start()
+
+    def _ask(self, connection: socket.socket, name: str) -> None:
+        """Admit a client that knows the token."""
+        assert self._token is not None
+        if compare_digest(_first_line(connection, len(self._token)), self._token):
+            self._admit(connection, name)
+            return
+        say(f"client {name} did not send the token, and is dropped")
+        connection.close()
+
+    def _admit(self, connection: socket.socket, name: str) -> None:
+        with self._changed:
+            if self._is_closed:
+                connection.close()
+                return
+            client = _Client(connection, name, not self._has_frames)
+            if self._opening is not None:
+                client.put(self._opening)
+            self._clients.append(client)
+            self._changed.notify_all()
 
     def close(self) -> None:
         """Take no more clients, and give those that are there a while for the rest."""
@@ -125,6 +176,19 @@ class Listener:
         until = monotonic() + LINGER
         for client in self._clients:
             client.finish(until)
+
+
+def _first_line(connection: socket.socket, size: int) -> bytes:
+    """The first ``size`` bytes, or what came of them until a line ended or the time was over."""
+    line, until = b"", monotonic() + PATIENCE
+    with suppress(OSError):
+        while len(line) < size and not line.endswith(b"\n") and (left := until - monotonic()) > 0:
+            connection.settimeout(left)
+            if not (more := connection.recv(size - len(line))):
+                break
+            line += more
+        connection.settimeout(None)
+    return line
 
 
 class _Client:

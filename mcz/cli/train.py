@@ -13,10 +13,10 @@ from mcz.cli.common import (
     Exit,
     about,
     check_new,
+    echo,
     existing,
     plural,
     print_json,
-    printable,
     table,
     write_output,
 )
@@ -115,7 +115,7 @@ def command(
         print_json(document)
     else:
         for line in _lines(document):
-            click.echo(printable(line))
+            echo(line)
     return Exit.FINE
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from mcz.cli.common import Exit, about, existing, hinted
+from mcz.cli.common import Exit, about, existing
+from mcz.cli.damage import hinted
 from mcz.cli.options import (
     clips_option,
     decoded_option,
@@ -21,6 +22,14 @@ from mcz.cli.progress import Progress
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @clips_option
 @salvage_option
+@click.option(
+    "--names",
+    type=click.Choice(("stored", "portable", "strict")),
+    default="stored",
+    show_default=True,
+    help="Of names that some systems cannot hold, or not beside another: write them as stored "
+    "where this system can, write portable ones instead, or refuse them.",
+)
 @decoded_option
 @force_option
 @json_option
@@ -28,6 +37,7 @@ def command(
     file: str,
     folder: str,
     clips: tuple[str, ...],
+    names: str,
     salvage: bool,
     max_decoded: int | None,
     force: bool,
@@ -35,8 +45,9 @@ def command(
 ) -> Exit:
     """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
 
-    With --clip those of the clips alone, with their skeletons. With --salvage those of a damaged
-    file that are whole; each is checked as in a sound one.
+    With --clip those of the clips alone, with their skeletons. No link that lies in DIR is
+    followed, and no file replaces another of FILE.mcz. With --salvage those of a damaged file that
+    are whole are written; each is checked as in a sound one.
     """
     import mcz
 
@@ -48,6 +59,7 @@ def command(
             clips=clips or None,
             salvage=salvage,
             force=force,
+            names=names,
             max_decoded=max_decoded,
             progress=progress,
         )

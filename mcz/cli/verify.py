@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, existing, opened, print_json, printable, say
+from mcz.cli.common import Exit, Failure, about, echo, existing, opened, print_json, say
 from mcz.cli.options import decoded_option, json_option
 from mcz.cli.progress import Progress
 from mcz.errors import FormatError, LimitError, UnsupportedError
@@ -44,7 +44,7 @@ def command(file: str, source: str | None, max_decoded: int | None, as_json: boo
     if as_json:
         print_json({"verified": not failed, "parts": rows})
     elif not failed:
-        click.echo(printable(f"{file}: verified, {', '.join(_counts(rows))}"))
+        echo(f"{file}: verified, {', '.join(_counts(rows))}")
     for row in failed:
         for problem in row["problems"]:
             say(f"{file}: {row['kind']} {row['name']}: {problem}".replace(" :", ":"))

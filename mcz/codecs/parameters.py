@@ -24,6 +24,11 @@ class Parameter:
     help: str
     parse: Callable[[Any], Any]
 
+    @property
+    def range(self) -> str:
+        """What it may be, in words; "" where its reader does not say."""
+        return str(getattr(self.parse, "range", ""))
+
 
 @dataclass(frozen=True, slots=True)
 class Dial:
@@ -40,6 +45,12 @@ class Dial:
     whole: bool = False
 
 
+def in_range(text: str, parse: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """``parse``, which takes what ``text`` says in words."""
+    parse.range = text  # type: ignore[attr-defined]
+    return parse
+
+
 def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
     """A parser of integers from ``low`` to ``high``."""
 
@@ -54,7 +65,7 @@ def integer(name: str, low: int, high: int) -> Callable[[Any], int]:
             raise OptionError(f"{name} is {value}, not from {low} to {high}")
         return value
 
-    return parse
+    return in_range(f"{low:,} to {high:,}", parse)
 
 
 def number(name: str, low: float, high: float) -> Callable[[Any], float]:
@@ -71,7 +82,7 @@ def number(name: str, low: float, high: float) -> Callable[[Any], float]:
             raise OptionError(f"{name} is {value}, not from {low:g} to {high:g}")
         return value
 
-    return parse
+    return in_range(f"{low:g} to {high:g}", parse)
 
 
 def choice(
@@ -86,7 +97,7 @@ def choice(
             raise OptionError(f"{name} is {text!r}, not one of {', '.join(among)}")
         return str(text)
 
-    return parse
+    return in_range(", ".join(among), parse)
 
 
 # What a caller may ask for instead of setting the dial of a codec; None: not asked for.

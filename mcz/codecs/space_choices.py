@@ -29,7 +29,7 @@ from mcz.codecs.basis_models import (
 )
 from mcz.codecs.contract import Layout, Model, SignalSource, id_of
 from mcz.codecs.gaps import fill_gaps
-from mcz.codecs.parameters import Parameter, choice, integer, number
+from mcz.codecs.parameters import Parameter, choice, in_range, integer, number
 from mcz.codecs.segments import skeleton_of
 from mcz.codecs.space import APART, COSINES, LEARNED, N_COORDINATES, WEIGHTED, columns_of
 from mcz.codecs.steps import code_of, ratio_of
@@ -319,7 +319,7 @@ BASIS = Parameter(
     "basis",
     "auto",
     f"{', '.join(WHICH)}, or a file that mcz train wrote",
-    _which,
+    in_range(f"{', '.join(WHICH)}, a path", _which),
 )
 CODER = Parameter(
     "coder",
@@ -347,7 +347,7 @@ VIRTUAL_MARKERS = Parameter(
     "virtual_markers",
     False,
     "with positions: three virtual markers a joint, too, so that its roll is kept",
-    _flag,
+    in_range("true, false", _flag),
 )
 WINDOW = Parameter(
     "window",

@@ -10,7 +10,7 @@ from threading import Lock
 from typing import Any, BinaryIO
 
 from mcz.container.locks import is_locked
-from mcz.errors import OptionError, TruncatedError
+from mcz.errors import AccessError, MczError, OptionError, TruncatedError
 
 
 class ByteSource:
@@ -86,14 +86,27 @@ class ByteSource:
             self._forked()
         if getattr(self._stream, "closed", False):
             raise OptionError(f"{self.name} is closed")
-        data = self._read_at(offset, size)
-        while len(data) < size:  # raw streams may return less than was asked for
-            more = self._read_at(offset + len(data), size - len(data))
-            if not more:
-                raise TruncatedError(f"the file ended at {offset + len(data)} while read")
-            data += more
+        data = self._read_stream(offset, size)
         self.n_requests += 1
         self.n_bytes += size
+        return data
+
+    def _read_stream(self, offset: int, size: int) -> bytes:
+        try:
+            data = self._read_at(offset, size)
+            while len(data) < size:  # raw streams may return less than was asked for
+                more = self._read_at(offset + len(data), size - len(data))
+                if not more:
+                    raise TruncatedError(f"the file ended at {offset + len(data)} while read")
+                data += more
+        except MczError as error:
+            if self.remote and isinstance(error, TruncatedError):
+                raise AccessError(f"{self.name}: {error}") from None
+            raise
+        except Exception as error:
+            if not self.remote and not isinstance(error, OSError):
+                raise
+            raise _no_access(self.name, error) from None
         return data
 
     def _read_at(self, offset: int, size: int) -> bytes:
@@ -172,23 +185,42 @@ def open_source(target: Any) -> ByteSource:
             return ByteSource(io.BytesIO(target.read()), name=name)
         return ByteSource(target, remote=_is_remote(target), name=name)
     if "://" in str(target):
-        stream = _remote_stream(str(target))
-        return ByteSource(stream, remote=_is_remote(stream), name=str(target), target=str(target))
+        return _remote_source(str(target))
     if not isinstance(target, (str, os.PathLike)):
         raise OptionError(f"cannot open {target!r}: neither a path nor a binary stream")
     path = str(Path(target).absolute())  # holds wherever the process goes
     return ByteSource(open(target, "rb"), name=os.fspath(target), target=path)
 
 
+def _remote_source(target: str) -> ByteSource:
+    stream = _remote_stream(target)
+    return ByteSource(stream, remote=_is_remote(stream), name=target, target=target)
+
+
 def _remote_stream(target: str) -> Any:
+    """What reads ``target``, a URL; raises OptionError or AccessError."""
+    if target.lower().startswith(("http://", "https://")):
+        from mcz.container.http import HttpFile
+
+        return HttpFile(target)
     import fsspec
 
     try:
         return fsspec.open(target, "rb", cache_type="none").open()
     except (ValueError, ImportError) as error:  # no such protocol, or not installed
         raise OptionError(f"{target}: {error}") from None
+    except Exception as error:  # each file system has its own errors
+        raise _no_access(target, error) from None
+
+
+def _no_access(name: str, error: Exception) -> AccessError:
+    """That a file cannot be read, whatever its file system calls that."""
+    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return AccessError(text if name and name in text else f"{name}: {text}")
 
 
 def _is_remote(stream: Any) -> bool:
-    """Whether ``stream`` is an fsspec file whose every read is a request."""
+    """Whether every read of ``stream`` is a request, as of an fsspec file that holds none."""
+    if isinstance(stream, io.RawIOBase) and getattr(stream, "is_remote", False):
+        return True
     return hasattr(stream, "fs") and not isinstance(getattr(stream, "f", None), io.IOBase)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.brief import brief
 from mcz.conversion.hierarchy import PRINTED
 from mcz.errors import MotionError
 from mcz.kinematics import point_names, point_set, points_and_markers_of, positions, positions_of
@@ -37,6 +38,8 @@ class Fit:
     marker_max_error: float | None
     unit_cm: float | None
     unsolved: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     @property
     def mean_error_cm(self) -> float | None:

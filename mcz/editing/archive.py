@@ -6,17 +6,19 @@ import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from mcz.brief import brief
 from mcz.codecs import DEFAULT
 from mcz.container import payloads
 from mcz.container.reader import Container
 from mcz.container.strict import check_path
 from mcz.editing.appending import growing
+from mcz.editing.safe_names import Folder, PortableNames, notes_on
 from mcz.errors import AccessError, ExistsError, FormatError, MczError, OptionError, SourceError
 from mcz.formats import FORMATS
 from mcz.reading.clip import Clip
@@ -29,6 +31,8 @@ from mcz.writing.entry import Entry, Terms
 from mcz.writing.file import profile_of
 from mcz.writing.inputs import refuse_inputs
 from mcz.writing.names import check_name
+
+NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +52,8 @@ class Outcome:
     message: str = ""
     notes: tuple[str, ...] = ()
 
+    __repr__ = brief
+
 
 @dataclass(slots=True)
 class Report:
@@ -60,10 +66,19 @@ class Report:
     damage: list[str] = field(default_factory=list)
     size: int | None = None
 
+    __repr__ = brief
+
     @property
     def failures(self) -> list[Outcome]:
         """The files that failed, those among them that exist and may not be replaced."""
         return [outcome for outcome in self.outcomes if outcome.result in ("failed", "exists")]
+
+    def note(self, notes: Mapping[str, str]) -> None:
+        """Add what is to be said of some paths to their outcomes."""
+        for index, outcome in enumerate(self.outcomes):
+            if (text := notes.get(outcome.path)) and outcome.result not in ("failed", "skipped"):
+                message = f"{outcome.message}; {text}" if outcome.message else text
+                self.outcomes[index] = replace(outcome, message=message)
 
     def count(self, result: str) -> int:
         return sum(outcome.result == result for outcome in self.outcomes)
@@ -105,6 +120,7 @@ def pack(
         refuse_inputs(target, _inputs_of(entries))
         draft.finish()
     report.size = draft.writer.offset
+    report.note(notes_on(entry.name for entry in entries))
     report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
     return report
 
@@ -206,6 +222,7 @@ def append(
         if growth.tail.kept or any(outcome.result != "present" for outcome in report.outcomes):
             draft.finish()
     report.size = Path(target).stat().st_size
+    report.note(notes_on(draft.paths))
     tail = growth.tail
     text = "it lay whole behind the last FOOT of a file whose writing was cut short"
     result = "salvaged" if tail.kept else "dropped"
@@ -283,33 +300,48 @@ def unpack(
     clips: Sequence[str] | None = None,
     salvage: bool = False,
     force: bool = False,
+    names: str = "stored",
     max_decoded: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Write every source file and attachment of an MCZ file below ``directory``.
 
     ``clips``: of these clips alone, and of their skeletons. Each file appears under its name only
-    when it is whole and its hash is right. Clips without a source are reported as skipped. With
+    when it is whole and its hash is right. No symbolic link
+    below ``directory`` is followed. Clips without a source are reported as skipped. With
     ``salvage`` the file may be damaged: what is whole is written, the rest is reported as damaged.
+
+    ``names`` decides about names that some system cannot hold, or not beside another: "stored"
+    writes them as they are, and refuses what this system or disk cannot hold; "portable" gives
+    them others, which the outcomes tell; "strict" refuses them. One file never replaces another of
+    the same archive.
     """
-    root, report = Path(directory), Report()
+    if names not in NAMES:
+        raise OptionError(f"names is {names!r}, not one of {', '.join(NAMES)}")
+    folder, report = Folder(Path(directory)), Report()
     with open(target, salvage=salvage, max_decoded=max_decoded) as opened:
         file = File(opened.container.strictly())
         report.damage += opened.damage
         wanted = list(file.clips.values()) if clips is None else file.clips_called(clips)
         jobs = list(named_files(file) if clips is None else _files_of(file, wanted))
-        written: set[Path] = set()
+        renamed, written, notes = PortableNames(), set[str](), notes_on(name for name, _ in jobs)
         for done, (name, restore) in enumerate(jobs):
             try:
-                path = root / safe_path(name)
-                if path in written:
+                as_name = str(safe_path(name))
+                if names == "portable":
+                    as_name = renamed(as_name)
+                if names == "strict" and name in notes:
+                    raise FormatError(notes[name])
+                if name in written:
                     raise FormatError("another file in the archive has the same path")  # PATH-06
                 data = restore()
-                written.add(path)
-                path.parent.mkdir(parents=True, exist_ok=True)
+                written.add(name)
+                path = folder.place(as_name, force=force)
                 with replacing(path, force=force, inputs=(target,)) as stream:
                     stream.write(data)
-                report.outcomes.append(Outcome(name, "restored", len(data)))
+                folder.note(name, path)
+                text = "" if as_name == name else f"as {as_name}"
+                report.outcomes.append(Outcome(name, "restored", len(data), text))
             except (MczError, OSError) as error:
                 result = "exists" if isinstance(error, ExistsError) else "failed"
                 if salvage and isinstance(error, FormatError):

@@ -17,6 +17,7 @@ from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, Segme
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
+from mcz.reading.joints import Chosen, Joints, joint_list
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build, parse
 
@@ -84,7 +85,7 @@ class ClipCut:
 def plan_cut(
     clip: Clip,
     frames: tuple[int, int | None] | None,
-    joints: Sequence[int | str] | None,
+    joints: Joints,
     resolution: int,
 ) -> ClipCut:
     """What is left of ``clip``; raises OptionError or MotionError where it cannot be cut so."""
@@ -109,13 +110,13 @@ def plan_cut(
     return replace(cut, signals=tuple(signals))
 
 
-def _kept_joints(clip: Clip, joints: Sequence[int | str]) -> frozenset[int] | None:
+def _kept_joints(clip: Clip, joints: Chosen) -> frozenset[int] | None:
     """The joints as indices, None where no joint with channels is left out."""
     skeleton = clip.skeleton
     if clip.signals[0].channels is not None:
         raise OptionError(f"clip {clip.name!r}: its motion has channels of its own, no joints")
     try:
-        kept = frozenset(skeleton.find(joint) for joint in joints)
+        kept = frozenset(skeleton.find(joint) for joint in joint_list(joints))
     except MotionError as error:
         raise MotionError(f"clip {clip.name!r}: {error}") from None
     others = (joint for index, joint in enumerate(skeleton.joints) if index not in kept)

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
+from mcz.brief import brief
 from mcz.container import payloads
 from mcz.container.chunks import (
     CRC,
@@ -42,6 +43,7 @@ from mcz.editing.cutting import (
 from mcz.errors import ChecksumError, FormatError, MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.reading.file import File, open
+from mcz.reading.joints import Joints
 from mcz.reading.signal_reader import SignalReader
 from mcz.schema import build, parse
 from mcz.writing.atomic import replacing
@@ -63,6 +65,8 @@ class ExtractedClip:
     data_bytes: int
     data_bytes_before: int
 
+    __repr__ = brief
+
 
 @dataclass(slots=True)
 class Extraction:
@@ -72,13 +76,15 @@ class Extraction:
     left_out: list[str] = field(default_factory=list)
     size: int = 0
 
+    __repr__ = brief
+
 
 def extract(
     source: Any,
     target: Any,
     *,
     resolution: int = 0,
-    joints: Sequence[int | str] | None = None,
+    joints: Joints = None,
     frames: tuple[int, int | None] | None = None,
     clip: str | Sequence[str] | None = None,
     salvage: bool = False,

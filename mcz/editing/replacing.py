@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from mcz.brief import brief
 from mcz.container import payloads
 from mcz.container.chunks import read_chunk
 from mcz.container.directory import ClipRow, SegmentRow
@@ -58,6 +59,8 @@ class Replacement:
     max_error: float
     left_out: tuple[str, ...]
     size: int
+
+    __repr__ = brief
 
 
 def replace(

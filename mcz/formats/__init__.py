@@ -97,7 +97,7 @@ def format_of(path: str | Path) -> Format:
 
 def sniffed(data: bytes) -> str | None:
     """The name of the format that ``data`` seems to be of, None where it seems to be of none."""
-    start = data.lstrip()[:16].upper()
+    start = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:16].upper()
     if start.startswith(b"HIERARCHY"):
         return "bvh"
     if data[1:2] == b"\x50" and not data[:1].isspace() and not start[:1].isalpha():

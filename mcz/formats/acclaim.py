@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 
 from mcz.errors import MotionError, SourceError
+from mcz.formats.limits import MOST_JOINTS, check
 from mcz.motion import ORIGIN, Channel, Joint, Skeleton, Vector
 
 INCH_UNITS = 0.45  # CMU: a length of 0.45 units is one inch
@@ -94,6 +95,7 @@ class _Reader:
             if not bone.name or bone.name in self.bones or bone.name == "root":
                 raise SourceError(f"a bone without a name of its own: {bone.name!r}")
             self.bones[bone.name] = bone
+            check("bones", len(self.bones), MOST_JOINTS - 1)
             self.bone = None
         elif key == "name":
             bone.name = words[1] if len(words) > 1 else ""

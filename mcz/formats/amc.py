@@ -22,7 +22,7 @@ from mcz.formats.notes import RowNotes
 from mcz.formats.restore import restore
 from mcz.formats.rows import Rows, Token, line_of, read_rows, tail_end
 from mcz.formats.signals import read_signal
-from mcz.formats.text_source import source_of, text_encoding
+from mcz.formats.text_source import check_first_line, check_text, source_of, text_encoding
 from mcz.motion import Motion, Skeleton, Source
 
 _BLANK = rb"[\x00-\x09\x0b-\x20]"
@@ -30,6 +30,7 @@ _FIRST_FRAME = re.compile(rb"(?m)^" + _BLANK + rb"*+[-+]?[0-9]++" + _BLANK + rb"
 _LINES = re.compile(rb"[^\n]+")
 _WORDS = re.compile(rb"[^\x00-\x20]+")
 _NUMBER = re.compile(rb"[-+]?[0-9]+")
+HARMLESS = b"#", b":fully-specified", b":degrees"  # lines that need not be understood
 MOST_DIGITS = 15  # of a frame number, its sign included
 NO_SKELETON = "no ASF: a flat list of bones with plain scalar channels, without kinematics"
 DERIVED = "the channels of the AMC differ from those of its ASF"
@@ -42,6 +43,8 @@ def read(data: bytes, name: str = "motion", skeleton: Skeleton | None = None) ->
     b"", to be replaced with the id of ``skeleton``; the metadata say so. Raises
     SourceError, with the number of the line.
     """
+    check_text(data)
+    check_first_line(data, HARMLESS)
     match = _FIRST_FRAME.search(data)
     if match is None:
         raise SourceError("no line with a frame number; not an AMC file, or without frames")
@@ -178,6 +181,9 @@ def _header(source: Lines) -> tuple[bytes, int | None]:
     """The lines before the first frame, and its number, None where there is none."""
     header = bytearray()
     for line in source:
+        if not header:
+            check_text(line)
+            check_first_line(line, HARMLESS)
         if _FIRST_FRAME.fullmatch(line.rstrip(b"\n")):
             return bytes(header), _frame_number(source, _WORDS.findall(line)[0])
         header += line

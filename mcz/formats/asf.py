@@ -11,7 +11,7 @@ from math import sqrt
 
 from mcz.errors import FormatError, MotionError, SourceError
 from mcz.formats.acclaim import INCH_UNIT_CM, INCH_UNITS, WORDS, dof_channel, read_text
-from mcz.formats.text_source import text_encoding
+from mcz.formats.text_source import check_first_line, check_text, text_encoding
 from mcz.motion import ORIGIN, Channel, Joint, Skeleton, Source, Vector
 
 
@@ -20,6 +20,13 @@ def read(data: bytes, name: str = "skeleton") -> Skeleton:
 
     Joint 0 is the root. Raises SourceError, with the number of the line where there is one.
     """
+    check_text(data)
+    check_first_line(data, (b"#", b":version"))
+    return _read(data, name)
+
+
+def _read(data: bytes, name: str) -> Skeleton:
+    """``read`` as every decoder does it, who takes the text as it is."""
     skeleton = read_text(data.decode(text_encoding(data)), name)
     digest = hashlib.sha256(data).digest()
     return replace(skeleton, source=Source("asf", data, size=len(data), sha256=digest))
@@ -33,7 +40,7 @@ def write(skeleton: Skeleton) -> bytes:
     source = skeleton.source
     if source is not None and source.format == "asf":
         try:
-            original = read(source.template, skeleton.name)
+            original = _read(source.template, skeleton.name)
         except SourceError as error:
             raise FormatError(f"source template: {error}") from None
         if replace(original, unit_cm=skeleton.unit_cm, base=skeleton.base) == skeleton:

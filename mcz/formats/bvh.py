@@ -22,7 +22,7 @@ from mcz.formats.rates import frame_rate, frame_time
 from mcz.formats.restore import restore
 from mcz.formats.rows import Token, line_of, read_rows, tail_end
 from mcz.formats.signals import read_signal
-from mcz.formats.text_source import source_of, text_encoding
+from mcz.formats.text_source import check_text, source_of, text_encoding
 from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton, Source
 
 _FRAMES = re.compile(rb"\s*Frames\s*:\s*([^\s]+)", re.IGNORECASE)
@@ -38,6 +38,7 @@ def read(data: bytes, name: str = "motion") -> Motion:
 
     Length unit and up axis are unknown. Raises SourceError, with the number of the line.
     """
+    check_text(data)
     encoding = text_encoding(data)
     joints, at, n_strays = read_hierarchy(data, encoding)
     n_columns = sum(len(joint.channels) for joint in joints)
@@ -72,6 +73,7 @@ def arrive(lines: Iterator[bytes], skeleton: Skeleton | None = None) -> Arriving
         if _FRAME_TIME.search(header, last) and _MOTION.search(header):
             break
     data = bytes(header)
+    check_text(data)
     encoding = text_encoding(data)
     joints, at, n_strays = read_hierarchy(data, encoding)
     n_columns = sum(len(joint.channels) for joint in joints)

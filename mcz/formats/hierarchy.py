@@ -10,18 +10,23 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from math import isfinite
 
 from mcz.errors import MotionError, SourceError
+from mcz.formats.limits import MOST_CHANNELS, MOST_DEPTH, MOST_JOINTS, check
 from mcz.formats.rows import line_of
+from mcz.formats.text_source import text_start
 from mcz.motion import ORIGIN, Channel, Joint, Skeleton, Vector
 
 _KINDS = {"position": "t", "rotation": "r", "scale": "s"}
 _NAMES = {f"{k}{a}": f"{a.upper()}{name}" for name, k in _KINDS.items() for a in "xyz"}
 _WORD = re.compile(rb"(?:[\x00-\x20]++|#[^\n]*+)*+([{}]|[^\x00-\x20{}]+)")
+_JOINT_LINE = re.compile(rb"(?im)^[\t ]*(?:ROOT|JOINT)\b")
+_MOTION_LINE = re.compile(rb"(?im)^[\t ]*MOTION\b")
 _REST = re.compile(rb"[^\n{]*")
 BLANKS = bytes(range(0x21))
-MAX_INDENT = 64  # tabs; the depth of a joint has no limit
+MAX_INDENT = 64  # tabs; joints may lie deeper
 
 
 @dataclass(slots=True)
@@ -42,6 +47,7 @@ class _Reader:
     at: int = 0
     joints: list[_Node] = field(default_factory=list)
     strays: int = 0
+    n_channels: int = 0
 
     def word(self) -> bytes:
         """The next word or brace, b"" at the end."""
@@ -55,6 +61,13 @@ class _Reader:
     def error(self, message: str) -> SourceError:
         return SourceError(f"line {line_of(self.data, self.at)}: {message}")
 
+    def check(self, what: str, number: int, most: int) -> None:
+        """Raise SourceError, with the number of the line, for more than there may be."""
+        try:
+            check(what, number, most)
+        except SourceError as error:
+            raise self.error(str(error)) from None
+
     def read(self) -> None:
         """Read up to and including the word MOTION."""
         if self.word().upper() != b"HIERARCHY":
@@ -63,10 +76,13 @@ class _Reader:
         while (word := self.word().upper()) != b"MOTION" or open_nodes:
             if word in (b"ROOT", b"JOINT", b"END"):
                 open_nodes.append(self._begin(word, open_nodes[-1][0] if open_nodes else -1))
+                self.check("joints inside each other", len(open_nodes), MOST_DEPTH)
             elif word == b"OFFSET" and open_nodes:
                 open_nodes[-1][1].offset = self._vector()
             elif word == b"CHANNELS" and open_nodes and not open_nodes[-1][1].end:
                 open_nodes[-1][1].channels = tuple(self._channels())
+                self.n_channels += len(open_nodes[-1][1].channels)
+                self.check("channels", self.n_channels, MOST_CHANNELS)
             elif word == b"}" and open_nodes:
                 index, node = open_nodes.pop()
                 if node.end and index >= 0:
@@ -92,6 +108,7 @@ class _Reader:
         if node.end:
             return parent, node
         self.joints.append(node)
+        self.check("joints", len(self.joints), MOST_JOINTS)
         return len(self.joints) - 1, node
 
     def _vector(self) -> Vector:
@@ -145,7 +162,8 @@ def read_hierarchy(data: bytes, encoding: str) -> tuple[list[Joint], int, int]:
     Stray words are alone on their line, remains of another file that was written over. Position
     channels are taken to add to the offset: only the values can tell.
     """
-    reader = _Reader(data)
+    reader = _Reader(data, text_start(data))
+    _refuse_early(reader)
     reader.read()
     joints = [
         Joint(
@@ -158,6 +176,18 @@ def read_hierarchy(data: bytes, encoding: str) -> tuple[list[Joint], int, int]:
         for node in reader.joints
     ]
     return joints, reader.at, reader.strays
+
+
+def _refuse_early(reader: _Reader) -> None:
+    """Raise SourceError for far too many joints before the first one is looked at more closely.
+
+    That takes moments; only joints that begin a line are counted.
+    """
+    lines = islice(_JOINT_LINE.finditer(reader.data), MOST_JOINTS + 1)
+    last = next(islice(lines, MOST_JOINTS, None), None)
+    if last is not None and _MOTION_LINE.search(reader.data, 0, last.start()) is None:
+        reader.at = last.start()
+        reader.check("joints", MOST_JOINTS + 1, MOST_JOINTS)
 
 
 def write_hierarchy(skeleton: Skeleton) -> tuple[str, list[int]]:

@@ -4,9 +4,19 @@ from __future__ import annotations
 
 import hashlib
 
+from mcz.errors import SourceError
 from mcz.formats.layout import Layout
 from mcz.formats.rows import Rows
 from mcz.motion import Source
+
+BOM = b"\xef\xbb\xbf"  # U+FEFF in UTF-8: it may stand at the start of a file, and says nothing
+OTHERS = {  # how files of other encodings begin, longer marks first
+    b"\xff\xfe\0\0": "UTF-32",
+    b"\0\0\xfe\xff": "UTF-32",
+    b"\xff\xfe": "UTF-16",
+    b"\xfe\xff": "UTF-16",
+}
+LOOKED_AT = 64  # bytes in which every other one of UTF-16 is zero
 
 
 def text_encoding(data: bytes) -> str:
@@ -16,6 +26,42 @@ def text_encoding(data: bytes) -> str:
     except UnicodeDecodeError:
         return "latin-1"
     return "utf-8"
+
+
+def _wide_encoding(data: bytes) -> str | None:
+    for mark, name in OTHERS.items():
+        if data.startswith(mark):
+            return name
+    start = data[:LOOKED_AT]
+    for low, high in ((start[::2], start[1::2]), (start[1::2], start[::2])):
+        if len(high) > 7 and not any(high) and 0 not in low:
+            return "UTF-16 without a byte order mark"
+    return None
+
+
+def text_start(data: bytes) -> int:
+    """Where the text begins: after the byte order mark of UTF-8, if there is one."""
+    return len(BOM) if data.startswith(BOM) else 0
+
+
+def check_text(data: bytes) -> None:
+    """Raise SourceError for UTF-16 and UTF-32, whose bytes no template restores."""
+    wide = _wide_encoding(data)
+    if wide is not None:
+        raise SourceError(f"line 1: the text is {wide}; save it as UTF-8 or ASCII")
+
+
+def check_first_line(data: bytes, ignored: tuple[bytes, ...]) -> None:
+    """Raise SourceError where a byte order mark hides a line that means something.
+
+    ``ignored``: how lines begin that do not. In an ASF or AMC the mark belongs to the first word,
+    for every reader, as the skeleton of a file is compared with what its ASF describes.
+    """
+    line = data[len(BOM) :].split(b"\n", 1)[0].strip().lower()
+    if data.startswith(BOM) and line and not line.startswith(ignored):
+        raise SourceError(
+            f"line 1: a byte order mark of UTF-8 hides {line[:40]!r}; save the file without it"
+        )
 
 
 def source_of(

@@ -5,10 +5,12 @@ from __future__ import annotations
 import ctypes
 import functools
 import hashlib
+import mmap
 import operator
 import threading
 import warnings
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -61,11 +63,27 @@ def _has_compiler() -> bool:
     try:
         import llvmlite.binding  # noqa: F401
     except (ImportError, OSError) as error:
+        if lacks_memory_for_compiler():
+            raise MemoryError("the compiler of loops cannot be loaded") from None
         warnings.warn(
             f"loops run as plain Python, very slowly: {error}", RuntimeWarning, stacklevel=3
         )
         return False
     return True
+
+
+def lacks_memory_for_compiler() -> bool:
+    """Whether the process may not have the memory that LLVM's library takes: without it loops would
+    run for minutes that take a moment."""
+    found = find_spec("llvmlite")
+    folders = found.submodule_search_locations or [] if found else []
+    libraries = [path for folder in folders for path in Path(folder, "binding").glob("*llvmlite.*")]
+    try:
+        for path in libraries:
+            mmap.mmap(-1, path.stat().st_size).close()
+    except OSError:
+        return True
+    return False
 
 
 def _spread(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from mcz.kinematics.points import (
     MARKER_DISTANCE_CM,
     depths,
+    origins_of,
     point_names,
     point_set,
     points_and_markers_of,
@@ -22,6 +23,7 @@ from mcz.kinematics.points import (
 __all__ = [
     "MARKER_DISTANCE_CM",
     "depths",
+    "origins_of",
     "point_names",
     "point_set",
     "points_and_markers_of",

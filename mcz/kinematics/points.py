@@ -30,6 +30,16 @@ def positions_of(skeleton: Skeleton, values: Floats) -> Floats:
     return _Positions(skeleton, values, points=True).points
 
 
+def origins_of(skeleton: Skeleton, values: Floats) -> Floats:
+    """Where the joints are, whatever counts as their points, float64 (n_frames, n_joints, 3)."""
+    origins = np.empty((len(values), skeleton.n_joints, 3))
+    for rows, _, pose in chain_of(skeleton).poses(values):
+        for joint, origin in enumerate(pose.origins):
+            origins[rows, joint] = origin.T
+    _forget(origins)
+    return origins
+
+
 def virtual_markers_of(skeleton: Skeleton, values: Floats) -> Floats:
     """Three markers a joint, 3 cm off its point along its local axes x, y and z.
 
@@ -80,7 +90,7 @@ def marker_distance(skeleton: Skeleton) -> float:
     if skeleton.unit_cm is None:
         raise OptionError(
             f"skeleton {skeleton.name!r}: its length unit is unknown, and virtual markers lie 3 cm "
-            "off its joints; give the unit"
+            "off its joints; give the unit (--unit)"
         )
     return MARKER_DISTANCE_CM / skeleton.unit_cm
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.brief import brief
 from mcz.errors import LostFrameError
 
 Floats = NDArray[np.float64]
@@ -35,6 +36,8 @@ class LiveFrame:
     values: NDArray[Any]
     valid: Mask
     state: State = "decoded"
+
+    __repr__ = brief
 
 
 class Concealer:

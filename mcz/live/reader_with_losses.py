@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.brief import brief
 from mcz.container import payloads
 from mcz.container.chunks import REPEAT, Chunk
 from mcz.container.directory import parse_head
@@ -57,6 +58,8 @@ class StreamSummary:
     is_checked: bool = False
     n_faults: int = 0
     remarks: list[str] = field(default_factory=list)
+
+    __repr__ = brief
 
     def count(self, frame: LiveFrame) -> None:
         setattr(self, frame.state, getattr(self, frame.state) + 1)

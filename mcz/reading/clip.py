@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.brief import shown
 from mcz.codecs import by_id
 from mcz.codecs.contract import Layout
 from mcz.container import payloads
@@ -24,6 +25,7 @@ from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
 from mcz.formats import FORMATS, format_by_id
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
 from mcz.reading.decimation import decimated, decimated_rows
+from mcz.reading.joints import Joints, joint_list
 from mcz.reading.preview import Preview, preview
 from mcz.reading.signal_info import SignalInfo, read_signal
 from mcz.reading.signal_reader import SignalReader
@@ -45,7 +47,7 @@ class Clip:
         return _reopened, (self.container, self.name)
 
     def __repr__(self) -> str:
-        return f"<Clip {self.name!r}: {self.n_frames} frames, {self.n_channels} channels>"
+        return f"<Clip {shown(self.name)}: {self.n_frames} frames, {self.n_channels} channels>"
 
     @cached_property
     def _fields(self) -> Any:
@@ -161,7 +163,7 @@ class Clip:
     def read(
         self,
         frames: tuple[int, int] | None = None,
-        joints: Sequence[int | str] | None = None,
+        joints: Joints = None,
         resolution: int = 0,
         *,
         decimate: bool = False,
@@ -186,7 +188,7 @@ class Clip:
     def read_masked(
         self,
         frames: tuple[int, int] | None = None,
-        joints: Sequence[int | str] | None = None,
+        joints: Joints = None,
         resolution: int = 0,
         *,
         signal: int = 0,
@@ -232,18 +234,16 @@ class Clip:
             )
         return start, stop
 
-    def groups_of(
-        self, info: SignalInfo, joints: Sequence[int | str] | None
-    ) -> tuple[tuple[int, ...], list[int]]:
+    def groups_of(self, info: SignalInfo, joints: Joints) -> tuple[tuple[int, ...], list[int]]:
         """The groups that hold the channels of these joints, and where each is among theirs."""
         return _groups_of(info.layout, self._columns(info, joints))
 
-    def _columns(self, info: SignalInfo, joints: Sequence[int | str] | None) -> list[int]:
+    def _columns(self, info: SignalInfo, joints: Joints) -> list[int]:
         if joints is None:
             return list(range(info.layout.n_channels))
         if info.channels is not None:
             raise OptionError(f"signal {info.name!r} has channels of its own, no joints")
-        return joint_columns(self.skeleton, joints)
+        return joint_columns(self.skeleton, joint_list(joints))
 
     def check_hash(
         self, info: SignalInfo, values: NDArray[Any], mask: NDArray[np.bool_] | None
@@ -333,9 +333,7 @@ class Clip:
             return source
         return of_no_file(source)
 
-    def preview(
-        self, joints: Sequence[int | str] | None = None
-    ) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    def preview(self, joints: Joints = None) -> tuple[NDArray[np.int64], NDArray[Any]]:
         """What can be read without decoding the rest: frames, counted from 0, and their values.
 
         The values, of shape (frames, channels of the joints), are those that ``read`` gives for
@@ -345,7 +343,7 @@ class Clip:
         found = self.previewed(joints)
         return found.frames, found.masked()
 
-    def previewed(self, joints: Sequence[int | str] | None = None) -> Preview:
+    def previewed(self, joints: Joints = None) -> Preview:
         """``preview`` with the mask apart, and how far its frames lie from each other."""
         info = self.signals[0]
         groups, columns = self.groups_of(info, joints)

@@ -11,6 +11,7 @@ from functools import cached_property
 from types import TracebackType
 from typing import Any
 
+from mcz.brief import counted, shown
 from mcz.container import payloads
 from mcz.container.directory import AttachmentRow
 from mcz.container.reader import Container
@@ -27,6 +28,7 @@ from mcz.errors import (
 from mcz.formats import FORMATS
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
+from mcz.reading.names import clip_called, listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
 
@@ -37,6 +39,9 @@ class Attachment:
     def __init__(self, container: Container, row: AttachmentRow) -> None:
         self._container, self._row = container, row
         self.name, self.size = row.name, row.size
+
+    def __repr__(self) -> str:
+        return f"<Attachment {shown(self.name)}: {self.size} bytes>"
 
     def read(self) -> bytes:
         """The bytes, their hash checked."""
@@ -63,6 +68,10 @@ class File:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return File, (self.container,)
+
+    def __repr__(self) -> str:
+        held = f"{counted(len(self.clips), 'clip')}, {counted(len(self.attachments), 'attachment')}"
+        return f"<File {shown(self.name)}: {held}, {self.size} bytes>"
 
     def __enter__(self) -> File:
         return self
@@ -153,13 +162,18 @@ class File:
         return data
 
     def only_clip(self, name: str | None = None) -> Clip:
-        """The clip called ``name``, or the only one there is; raises OptionError."""
-        if name is not None and name in self.clips:
-            return self.clips[name]
-        names = ", ".join(list(self.clips)[:8]) + (" ..." if len(self.clips) > 8 else "")
+        """The clip called ``name``, or the only one there is.
+
+        A clip is found by its name, the path of its source or an alias, and by the last part of one
+        of these where only one clip has it. Raises OptionError, which suggests a name.
+        """
         if name is not None:
-            raise OptionError(f"{self.name}: no clip {name!r}; there are: {names or 'none'}")
+            try:
+                return self.clips[clip_called(self.clips, self.aliases, name)]
+            except OptionError as error:
+                raise OptionError(f"{self.name}: {error}") from None
         if len(self.clips) != 1:
+            names = listed(self.clips)
             raise OptionError(f"{self.name} has {len(self.clips)} clips, choose one: {names}")
         return next(iter(self.clips.values()))
 

@@ -9,17 +9,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mcz.brief import brief
 from mcz.codecs.basis_models import name_of
 from mcz.container import payloads
-from mcz.container.chunks import CRC, FOOT, HEADER, SIGNATURE, Chunk
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.container.scan import scan
-from mcz.container.segments import GROUP_NOTES, StreamTable
+from mcz.container.segments import GROUP_NOTES
 from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
+from mcz.reading.layout import layout as layout
 from mcz.reading.sizes import Sizes, clip_sizes, models_used
 from mcz.schema import parse
 
@@ -31,6 +32,8 @@ class Problem:
     offset: int
     heading: str
     message: str
+
+    __repr__ = brief
 
 
 def info(file: File, names: Sequence[str] | None = None) -> dict[str, Any]:
@@ -68,13 +71,20 @@ def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> dict
     return {
         "id": id_.hex(),
         "name": skeleton.name,
+        "base": skeleton.base.hex() if skeleton.base else None,
+        "chunk_bytes": chunk.size,
+        **joint_facts(skeleton),
+    }
+
+
+def joint_facts(skeleton: Skeleton) -> dict[str, Any]:
+    """What ``mcz info`` says of the joints of a skeleton, wherever it comes from."""
+    return {
         "n_joints": skeleton.n_joints,
         "n_channels": skeleton.n_channels,
         "unit_cm": skeleton.unit_cm,
         "angle_unit": skeleton.angle_unit,
         "up_axis": skeleton.up_axis,
-        "base": skeleton.base.hex() if skeleton.base else None,
-        "chunk_bytes": chunk.size,
         "joints": [
             {
                 "name": joint.name,
@@ -211,83 +221,18 @@ def _count(notes: bytes) -> int:
     return len(parse(payloads.GROUP_NOTES, notes, "group notes").exceptions)
 
 
-def layout(file: File) -> list[tuple[int, int, str]]:
-    """(offset, size, meaning) of every byte range of the file, in order, without gaps."""
-    container = file.container
-    found = scan(container.source, salvage=container.salvage)
-    parts: list[tuple[int, int, str]] = [(0, len(SIGNATURE), "signature")]
-    tables = dict(_segment_tables(file))
-    for chunk in found.chunks:
-        parts += _chunk_parts(chunk, tables)
-    parts += [(at, FOOT.size, "FOOT") for at in found.feet]
-    for at, (table, text) in tables.items():
-        if text == "packet":
-            parts += _segment_parts(at, table)
-    return _filled(sorted(parts), file.size)
-
-
-def _filled(parts: list[tuple[int, int, str]], size: int) -> list[tuple[int, int, str]]:
-    """``parts`` with the ranges between them named too."""
-    filled, at = [], 0
-    for offset, length, text in [*parts, (size, 0, "")]:
-        if offset > at:
-            filled.append((at, offset - at, "packet framing or damage"))
-        if length:
-            filled.append((offset, length, text))
-        at = max(at, offset + length)
-    return filled
-
-
-def _segment_tables(file: File) -> Iterator[tuple[int, tuple[StreamTable, str]]]:
-    for clip in file.clips.values():
-        for signal in clip.signals:
-            for row in signal.rows:
-                table = file.container.table(row, signal.counts)
-                yield row.offset, (table, "packet" if row.packet else "chunk")
-
-
-def _chunk_parts(
-    chunk: Chunk, tables: dict[int, tuple[StreamTable, str]]
-) -> Iterator[tuple[int, int, str]]:
-    name = chunk.type.decode("latin-1")
-    yield chunk.offset, HEADER.size, f"{name} header"
-    if chunk.length is None:
-        return
-    if chunk.payload_offset in tables:
-        yield from _segment_parts(chunk.payload_offset, tables[chunk.payload_offset][0])
-    elif chunk.length:
-        yield chunk.payload_offset, chunk.length, f"{name} payload"
-    yield chunk.payload_offset + chunk.length, CRC.size, f"{name} crc"
-
-
-def _segment_parts(at: int, table: StreamTable) -> Iterator[tuple[int, int, str]]:
-    header = table.header
-    what = f"signal {header.signal}, frames {header.first}:{header.stop}"
-    if table.size:
-        yield at, table.size, f"stream table, {what}"
-    names = {table.frame_notes(): "frame notes"}
-    for group in range(table.counts.n_groups):
-        names[table.group_notes(group)] = f"notes of group {group}"
-        names[table.mask(group)] = f"mask of group {group}"
-        for resolution in range(table.counts.n_resolutions):
-            text = f"group {group}"
-            if table.counts.n_resolutions > 1:
-                text += f", stored resolution {resolution}"
-            names[table.codec(resolution, group)] = text
-    for index, (offset, length) in enumerate(zip(table.offsets, table.lengths, strict=True)):
-        if length:
-            yield at + offset, length, names[index]
-
-
 HEADINGS = tuple("HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL REPT INDX".split())
 
 
 def validate(file: File) -> list[Problem]:
-    """Every fault of the file: structure, checksums, values, sources, index."""
+    """Every fault of the file, once: structure, checksums, values, sources, index."""
     problems = structure_problems(file)
     for _, _, found in part_problems(file):
         problems += found
-    return problems
+    first: dict[str, Problem] = {}
+    for problem in problems:  # a chunk that is damaged hurts all that need it
+        first.setdefault(problem.message, problem)
+    return list(first.values())
 
 
 def structure_problems(file: File) -> list[Problem]:

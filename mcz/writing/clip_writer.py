@@ -26,7 +26,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal, Skeleton, Source
 from mcz.schema import MAX_COUNT, build
-from mcz.writing.quality import CHUNK, quality_payload
+from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource, settle
 
 Progress = Callable[[int, int, str], None]
@@ -68,8 +68,10 @@ def write_clip(
     *,
     quality: bool = True,
     remarks: Mapping[str, str] = MappingProxyType({}),
-) -> None:
+) -> dict[str, str] | None:
     """Write one clip: its skeleton and template if new, CLIP, segments, CEND, quality if lossy.
+
+    Returns what the quality record says, None where there is none.
 
     A lossy codec takes the motion alone; further signals stay lossless. ``remarks`` join the
     quality record. Raises OptionError for a bad parameter or a target that nobody has met yet (see
@@ -99,8 +101,10 @@ def write_clip(
     sha256 = motion.source.sha256 if motion.source else b""
     writer.end_clip(motion.n_frames, sha256, hashes)
     if quality and not codec.lossless:
-        payload = quality_payload(motion, decoded, codec.name, options, remarks)
-        writer.ancillary(CHUNK, payload)
+        record = quality_record(motion, decoded, codec.name, options, remarks)
+        writer.ancillary(CHUNK, quality_payload(record))
+        return record
+    return None
 
 
 def open_clip(

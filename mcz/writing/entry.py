@@ -57,6 +57,7 @@ class Entry:
         self.remark = ""  # of the skeleton, where that may be another's
         self.notes: tuple[str, ...] = ()  # what its reader noticed
         self.inputs: list[Path] = [path]  # the files that it was made of
+        self.quality: dict[str, str] | None = None  # of a lossy clip what its record says
 
     def write(self, draft: Draft, progress: Progress | None = None) -> str:
         """Write the file; return how: "skeleton", "parsed", "present" or "verbatim"."""
@@ -103,7 +104,7 @@ class Entry:
         name = clip_name(self.name, writer.directory)
         motion = replace(motion, name=name)
         codec, params = by_name(self.terms.codec), self.terms.params or {}
-        write_tuned(writer, motion, codec, params, progress)
+        self.quality = write_tuned(writer, motion, codec, params, progress)
         return "parsed"
 
     def _note(self, taken: Taken) -> None:

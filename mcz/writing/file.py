@@ -46,9 +46,9 @@ def write(
     with replacing(target, force=force, inputs=params.values()) as stream:
         writer = Writer(stream, profile=profile_of(archive))
         name_skeleton(writer, motion.skeleton)
-        write_tuned(writer, motion, by_name(codec), params, progress)
+        quality = write_tuned(writer, motion, by_name(codec), params, progress)
         writer.finish()
-    return written(writer.directory, writer.offset)
+    return written(writer.directory, writer.offset, quality)
 
 
 def profile_of(archive: bool) -> Profile:
@@ -87,4 +87,4 @@ def encode(
         draft.finish()
     if entry.remark:
         warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=2)
-    return written(draft.writer.directory, draft.writer.offset, entry.notes)
+    return written(draft.writer.directory, draft.writer.offset, entry.quality, entry.notes)

@@ -20,17 +20,22 @@ from mcz.schema import build
 CHUNK = b"QUAL"
 
 
-def quality_payload(
+def quality_record(
     original: Motion,
     decoded: Sequence[NDArray[Any]],
     codec_name: str,
     options: Mapping[str, Any],
     remarks: Mapping[str, str],
-) -> bytes:
-    """The payload of QUAL; ``decoded`` are the values of every signal as a reader has them."""
+) -> dict[str, str]:
+    """What the record says; ``decoded`` are the values of every signal as a reader has them."""
     signals = tuple(map(with_values, original.signals, decoded))
     entries = quality_entries(original, replace(original, signals=signals), codec_name, options)
-    rows = [{"key": key, "value": value} for key, value in (entries | dict(remarks)).items()]
+    return entries | dict(remarks)
+
+
+def quality_payload(entries: Mapping[str, str]) -> bytes:
+    """The payload of QUAL that says this."""
+    rows = [{"key": key, "value": value} for key, value in entries.items()]
     return build(payloads.QUAL, {"entries": rows, "extension": b""}, "quality record")
 
 

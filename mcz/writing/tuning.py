@@ -53,7 +53,7 @@ def write_tuned(
     codec: Codec,
     params: Mapping[str, Any],
     progress: Progress | None = None,
-) -> None:
+) -> dict[str, str] | None:
     """``write_clip``, a size or an error among ``params`` met first.
 
     The quality record says what was reached. Raises OptionError where a target cannot be met or has
@@ -63,8 +63,7 @@ def write_tuned(
     motion = as_codec_wants(writer, motion, codec, options)
     targets = asked(options)
     if not targets or codec.dial is None:
-        write_clip(writer, motion, codec, params, progress)
-        return
+        return write_clip(writer, motion, codec, params, progress)
     target = _target(motion, codec.dial, options, targets)
     trial = _Trials(motion, codec, params, writer)
     setting, reached, ended = search(codec.dial, target, trial)
@@ -75,7 +74,7 @@ def write_tuned(
         remark = f"{target.name} {target.limit:g}: {reached:g} was reached; {why}"
     remarks = {"target_reached": repr(reached)} | ({"target_remark": remark} if remark else {})
     found = dict(params) | {codec.dial.parameter: int(setting) if codec.dial.whole else setting}
-    write_clip(writer, motion, codec, found, progress, remarks=remarks)
+    return write_clip(writer, motion, codec, found, progress, remarks=remarks)
 
 
 def _target(
@@ -87,9 +86,11 @@ def _target(
     if options[dial.parameter] is not None:
         raise OptionError(f"{name} is asked for and {dial.parameter} is given, only one can be")
     if name == "kbps" and not (motion.frame_rate and motion.n_frames):
-        raise OptionError("kbps has no meaning: the frame rate is unknown or there are no frames")
+        raise OptionError(
+            "kbps has no meaning: the frame rate is unknown (--rate says it) or there are no frames"
+        )
     if name.endswith("_cm") and motion.skeleton.unit_cm is None:
-        raise OptionError(f"{name} has no meaning: the length unit is unknown")
+        raise OptionError(f"{name} has no meaning: the length unit is unknown; --unit says it")
     return Target(name, float(limit), falls=not name.endswith("_cm"))
 
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from mcz.brief import brief
 from mcz.container.directory import ClipRow, Directory
 
 
 @dataclass(frozen=True, slots=True)
 class WrittenClip:
-    """Of a clip its name, and the shape of its motion."""
+    """Of a clip its name, the shape of its motion, and of a lossy one its quality record."""
 
     name: str
     n_frames: int
     n_channels: int
+    quality: Mapping[str, str] | None = None
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,13 +36,20 @@ class Written:
     decoded_bytes: int
     notes: tuple[str, ...] = ()
 
+    __repr__ = brief
 
-def written(directory: Directory, size: int, notes: tuple[str, ...] = ()) -> Written:
-    """What the file of ``size`` bytes with this directory holds."""
+
+def written(
+    directory: Directory,
+    size: int,
+    quality: Mapping[str, str] | None = None,
+    notes: tuple[str, ...] = (),
+) -> Written:
+    """What a file of one clip or none holds, with its size and the quality record of that clip."""
     return Written(
         size=size,
         clips=tuple(
-            WrittenClip(row.name, row.n_frames, row.signals[0].n_channels)
+            WrittenClip(row.name, row.n_frames, row.signals[0].n_channels, quality)
             for row in directory.clips.values()
         ),
         n_skeletons=sum(kind == b"SKEL" for kind, _ in directory.shared),

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import click
 import pytest
 
-from mcz.cli.common import Exit, Failure, about, run, table, write_output
+import mcz
+from mcz.cli.common import OUT_OF_MEMORY, Exit, Failure, about, run, table, write_output
+from mcz.cli.main import COMMANDS, cli
 from mcz.cli.progress import Progress
 from mcz.errors import ChecksumError, MczError, OptionError
+from tests.motions import smooth
 
 
 def outcome(capsys: pytest.CaptureFixture[str], error: Exception) -> tuple[int, str]:
@@ -88,3 +94,90 @@ def test_progress_shows_on_a_terminal(
         shown.append(progress.bar.tasks[0].description)
     assert shown == ["walk"]
     capsys.readouterr()
+
+
+def test_errors_are_json_where_it_is_asked_for(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    def document(*arguments: object) -> Any:
+        run(cli, "mcz", [*map(str, arguments), "--json"])
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1
+        return json.loads(captured.err)["error"]
+
+    none = tmp_path / "none.mcz"
+    assert document("info", none) == {
+        "exit_code": 1,
+        "class": "AccessError",
+        "message": f"{none}: no such file",
+        "file": str(none),
+        "line": None,
+        "offset": None,
+    }
+    bad = tmp_path / "bad.bvh"
+    bad.write_bytes(b"HIERARCHY\nROOT a\n{\nOFFSET 0 0 x\n")
+    found = document("encode", bad)
+    assert (found["class"], found["line"], found["file"]) == ("SourceError", 4, str(bad))
+    usage = document("encode", bad, "--nonsense")
+    assert (usage["class"], usage["exit_code"], usage["file"]) == ("UsageError", 2, None)
+    assert document("encod")["message"].startswith("no command 'encod'; did you mean encode")
+    cut = tmp_path / "cut.mcz"
+    mcz.write(smooth(12), cut)
+    data = bytearray(cut.read_bytes())
+    data[40] ^= 1
+    cut.write_bytes(data)
+    found = document("decode", cut, "--to", "csv")
+    assert (found["class"], found["exit_code"]) == ("ChecksumError", 1)
+    assert "offset" in found
+    (tmp_path / "walk.bvh").write_bytes(b"HIERARCHY")
+    assert document("sample", tmp_path)["class"] == "ExistsError"
+
+
+@pytest.mark.parametrize("name", [*COMMANDS, "stream encode", "stream decode", ""])
+def test_h_is_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(cli, "mcz", [*name.split(), "-h"]) == 0
+    assert capsys.readouterr().out.startswith("Usage: mcz")
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("encod", "encode"), ("verfy", "verify"), ("strem", "stream"), ("un", "unpack")],
+)
+def test_a_command_is_suggested(given: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(cli, "mcz", [given]) == 2
+    assert f"no command '{given}'; did you mean {meant}" in capsys.readouterr().err
+
+
+def test_a_command_unlike_all_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(cli, "mcz", ["xyzzy"]) == 2
+    assert "there are: sample, encode" in capsys.readouterr().err
+    assert run(cli, "mcz", ["stream", "decod"]) == 2
+    assert "did you mean decode" in capsys.readouterr().err
+
+
+def test_info_alone_has_a_version() -> None:
+    command = [sys.executable, "-m", "mcz.cli.info", "--version"]
+    shown = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert (shown.stdout, shown.stderr) == (f"mcz {mcz.__version__}\n", "")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_is_a_script_that_asks_mcz(
+    shell: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run(cli, "mcz", ["completion", shell]) == 0
+    assert f"_MCZ_COMPLETE={shell}_complete" in capsys.readouterr().out
+    environment = {"_MCZ_COMPLETE": f"{shell}_complete", "COMP_WORDS": "mcz enc", "COMP_CWORD": "1"}
+    if shell == "fish":
+        environment["COMP_CWORD"] = "enc"
+    for key, value in environment.items():
+        monkeypatch.setenv(key, value)
+    with pytest.raises(SystemExit) as left:
+        run(cli, "mcz", [])
+    assert left.value.code == 0
+    assert "encode" in capsys.readouterr().out
+
+
+def test_out_of_memory_is_a_message(capsys: pytest.CaptureFixture[str]) -> None:
+    code, line = outcome(capsys, MemoryError())  # type: ignore[arg-type]
+    assert (code, line) == (1, f"mcz: walk.mcz: {OUT_OF_MEMORY}\n")

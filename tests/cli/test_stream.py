@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -138,16 +139,22 @@ def test_each_row_is_printed_before_the_next_frame_is_read() -> None:
 
 def test_both_ends_of_a_pipe() -> None:
     with Started("encode", *CODER) as first, Started("decode") as second:
+
+        def pump() -> None:
+            while data := first.stdout.read1(10**6):
+                second.say(data)
+
+        pumping = Thread(target=pump)
+        pumping.start()
         for number, row in enumerate(ROWS):
             first.say((NAMES if not number else b"") + line(row))
-            if not number:
-                second.say(first.stdout.read1(10**6))  # what precedes the frames, and maybe more
-            second.say(first.stdout.read1(10**6))
             if not number:
                 second.stdout.readline()
             found = second.stdout.readline().split(b",")
             assert int(found[0]) == number
             np.testing.assert_allclose(list(map(float, found[1:])), row, atol=0.02)
+        first.stdin.close()
+        pumping.join()
 
 
 def test_a_binary_stream_there_and_back() -> None:

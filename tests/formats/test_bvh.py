@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import io
+import re
+import tracemalloc
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import mcz
+from mcz.container.limits import ARCHIVE, BASE
 from mcz.errors import MotionError, SourceError
-from mcz.formats import bvh
+from mcz.formats import amc, asf, bvh, hierarchy, limits, sniffed
 from mcz.formats.notes import join_notes
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
@@ -313,3 +319,96 @@ def test_what_bvh_cannot_say_is_refused(joint: Joint) -> None:
     motion = plain(Skeleton((joint,)), np.zeros((1, len(joint.channels))))
     with pytest.raises(MotionError):
         bvh.write(motion)
+
+
+def chain(n_joints: int) -> bytes:
+    return b"HIERARCHY\nROOT r\n{\n" + b"JOINT j\n{\n" * n_joints + b"}\n" * (n_joints + 1)
+
+
+def test_far_too_many_joints_are_refused_before_they_are_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A million took 51 seconds and 1.8 GB."""
+    monkeypatch.setattr(hierarchy, "MOST_JOINTS", 100)
+    bvh_of = b"HIERARCHY\nROOT r\n{\n%s}\nMOTION\nFrames: 0\nFrame Time: 1\n"
+    assert bvh.read(bvh_of % (b"JOINT j\n{\n}\n" * 99)).skeleton.n_joints == 100
+    for joints in (b"JOINT j\n{\n}\n" * 100, b"JOINT j { } JOINT k { }\n" * 50):
+        with pytest.raises(SourceError, match=r"line \d+: more than 100 joints"):
+            bvh.read(bvh_of % joints)
+    seen: list[object] = []
+    monkeypatch.setattr(hierarchy, "_Node", lambda *of: seen.append(of))
+    with pytest.raises(SourceError, match="more than 100 joints"):
+        bvh.read(bvh_of % (b"JOINT j\n{\n}\n" * 100))
+    assert not seen
+
+
+def test_a_million_joints_take_no_memory() -> None:
+    data = b"HIERARCHY\nROOT r\n{\n" + b"JOINT j\n{\n}\n" * 10**6
+    tracemalloc.start()
+    with pytest.raises(SourceError, match="more than 262,144 joints"):
+        bvh.read(data)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 4 * len(data)
+
+
+def test_joints_lie_only_so_deep() -> None:
+    with pytest.raises(SourceError, match="line 8195: more than 4,096 joints inside each other"):
+        bvh.read(chain(5000))
+
+
+def test_channels_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hierarchy, "MOST_CHANNELS", 3)
+    with pytest.raises(SourceError, match="line 9: more than 3 channels"):
+        bvh.read(SMALL)
+
+
+def test_limits_are_those_of_the_largest_profile() -> None:
+    assert (ARCHIVE.joints, ARCHIVE.channels) == (limits.MOST_JOINTS, limits.MOST_CHANNELS)
+    assert BASE.joints == limits.MOST_DEPTH
+
+
+@pytest.mark.parametrize("live", [False, True])
+def test_a_byte_order_mark_is_kept(live: bool) -> None:
+    data = b"\xef\xbb\xbf" + SMALL
+    assert sniffed(data) == "bvh"
+    if live:
+        arriving = bvh.arrive(iter(data.splitlines(keepends=True)))
+        assert [joint.name for joint in arriving.skeleton.joints] == ["Hips", "left arm"]
+        return
+    motion = bvh.read(data)
+    assert motion.skeleton == bvh.read(SMALL).skeleton
+    assert bvh.write(motion) == data
+    out = io.BytesIO()
+    mcz.write(motion, out)
+    with mcz.open(out.getvalue()) as file:
+        assert file.only_clip().source_bytes() == data
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_wide_text_is_refused_by_its_name(encoding: str) -> None:
+    data = SMALL.decode().encode(encoding)
+    for read in (bvh.read, amc.read, asf.read):
+        with pytest.raises(SourceError, match=f"the text is {encoding[:6].upper()}.*save it as"):
+            read(data)
+    with pytest.raises(SourceError, match=encoding[:6].upper()):
+        bvh.arrive(iter(data.splitlines(keepends=True)))
+
+
+def test_a_byte_order_mark_before_acclaim_hides_nothing(samples: Path) -> None:
+    mark = b"\xef\xbb\xbf"
+    text = (samples / "walk.asf").read_bytes()
+    commented = mark + b"# of a program\n" + text
+    assert asf.write(asf.read(commented)) == commented
+    assert replace(asf.read(commented), source=None) == replace(asf.read(text), source=None)
+    with pytest.raises(SourceError, match="line 1: a byte order mark of UTF-8 hides b':units"):
+        asf.read(mark + b":units\n" + text)
+    frames = (samples / "walk.amc").read_bytes()
+    first = re.search(rb"(?m)^1\s*$", frames)
+    assert first is not None
+    headless = frames[first.start() :]
+    for hidden in (headless, b":RADIANS\n" + headless):
+        with pytest.raises(SourceError, match="a byte order mark of UTF-8 hides"):
+            amc.read(mark + hidden)
+    motion = amc.read(mark + b"#!OML:ASF\n" + headless)
+    assert amc.write(motion) == mark + b"#!OML:ASF\n" + headless

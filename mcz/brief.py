@@ -1,0 +1,82 @@
+"""Representations that fit on a screen, however much a thing holds."""
+
+from __future__ import annotations
+
+import reprlib
+from dataclasses import fields
+from typing import Any
+
+WIDEST = 60  # characters of a name
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, WIDEST, 160
+_SHORT.maxtuple = _SHORT.maxlist = _SHORT.maxdict = 3
+
+
+def shown(name: str) -> str:
+    """A name in quotes, cut in the middle where it is long.
+
+    >>> shown("walk"), len(shown("x" * 1000))
+    ("'walk'", 60)
+    """
+    return _SHORT.repr_str(str(name), 1)
+
+
+def counted(number: int, word: str) -> str:
+    """
+    >>> counted(1, "joint"), counted(31, "joint")
+    ('1 joint', '31 joints')
+    """
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def brief(thing: Any) -> str:
+    """A dataclass as its fields, of long ones the first items and how many there are."""
+    parts = (f"{f.name}={_value(getattr(thing, f.name))}" for f in fields(thing) if f.repr)
+    return f"{type(thing).__name__}({', '.join(parts)})"
+
+
+def _value(value: Any) -> str:
+    shape = getattr(value, "shape", None)
+    if shape is not None:
+        return f"<{' x '.join(map(str, shape)) or 'scalar'} {value.dtype}>"
+    if isinstance(value, (bytes, bytearray)) and len(value) > 32:
+        return f"<{len(value)} bytes>"
+    text = _SHORT.repr(value)
+    n_items = len(value) if isinstance(value, (tuple, list, dict)) else 0
+    return f"<{n_items}: {text}>" if n_items > 3 else text
+
+
+def skeleton_text(skeleton: Any) -> str:
+    known = skeleton.unit_cm is not None
+    unit = f"1 unit = {skeleton.unit_cm:.6g} cm" if known else "unit unknown"
+    held = f"{counted(skeleton.n_joints, 'joint')}, {counted(skeleton.n_channels, 'channel')}"
+    up = f", {skeleton.up_axis} up" if skeleton.up_axis else ""
+    return f"<Skeleton {shown(skeleton.name)}: {held}, {unit}{up}>"
+
+
+def source_text(source: Any) -> str:
+    return f"<Source {shown(source.path)}: {source.format}, {source.size} bytes>"
+
+
+def exceptions_text(exceptions: Any) -> str:
+    return f"<Exceptions: {counted(len(exceptions), 'token')}>"
+
+
+def signal_text(signal: Any) -> str:
+    held = [counted(signal.n_frames, "frame"), counted(signal.n_channels, "channel")]
+    if signal.samples_per_frame > 1:
+        held.append(f"{signal.samples_per_frame} rows a frame")
+    if signal.mask is not None and not signal.mask.all():
+        held.append(f"{counted(int((~signal.mask).sum()), 'value')} invalid")
+    return f"<Signal {shown(signal.name)}: {', '.join(held)}>"
+
+
+def motion_text(motion: Any) -> str:
+    known = motion.frame_rate is not None
+    rate = f"{float(motion.frame_rate):g} Hz" if known else "an unknown rate"
+    held = [counted(motion.skeleton.n_joints, "joint")]
+    held.append(counted(motion.signals[0].n_channels, "channel"))
+    if len(motion.signals) > 1:
+        held.append(counted(len(motion.signals), "signal"))
+    frames = counted(motion.n_frames, "frame")
+    return f"<Motion {shown(motion.name)}: {frames} at {rate}, {', '.join(held)}>"

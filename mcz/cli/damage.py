@@ -1,0 +1,44 @@
+"""What a command that refuses a damaged file says of the rest of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from mcz.brief import counted
+from mcz.errors import FormatError, LimitError, MczError, UnsupportedError
+
+
+@contextmanager
+def hinted(target: str | bytes, options: Mapping[str, Any]) -> Iterator[None]:
+    """Add to the error about a damaged file what is whole in it, and how to get that."""
+    try:
+        yield
+    except (UnsupportedError, LimitError):
+        raise
+    except FormatError as error:
+        whole = None if options.get("salvage") else _whole(target)
+        if whole is not None:
+            error.args = (f"{error}; {whole}",)
+        raise
+
+
+def _whole(target: str | bytes) -> str | None:
+    """What is whole in a damaged file on this machine; None where nothing is."""
+    import mcz
+
+    if isinstance(target, str) and "://" in target:
+        return None  # all of it would have to be read
+    try:
+        with mcz.open(target, salvage=True) as file:
+            rows = file.container.directory.clips.values()
+            clips = sum(row.cend is not None and not row.damage for row in rows)
+            damaged, attachments = len(rows) - clips, len(file.attachments)
+    except MczError:
+        return None
+    counts = ((clips, "whole clip"), (damaged, "damaged clip"), (attachments, "attachment"))
+    found = [counted(count, what) for count, what in counts if count]
+    if not found:
+        return None
+    return f"it holds {', '.join(found)}: --salvage reads them, mcz repair writes a sound file"

@@ -1,0 +1,40 @@
+"""What ``mcz info`` prints of a source file: the lines, as people read them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from mcz.cli.common import plural
+
+
+def source_lines(
+    file: str,
+    document: dict[str, Any],
+    skeleton_lines: Callable[[dict[str, Any]], Iterator[str]],
+    rate_text: Callable[[dict[str, Any]], str],
+) -> Iterator[str]:
+    """The text of a source file's document, without line ends; the rest as of an MCZ file."""
+    kind = document["format"].upper()
+    yield f"{file}: {kind}, {document['file_bytes']:,} bytes; not yet an .mcz (mcz encode)"
+    for skeleton in document["skeletons"]:
+        yield from skeleton_lines(skeleton)
+    for clip in document["clips"]:
+        yield ""
+        yield (
+            f"clip {clip['name']}: {plural(clip['n_frames'], 'frame')} {rate_text(clip)}, "
+            f"{plural(clip['n_channels'], 'channel')}, {plural(clip['n_joints'], 'joint')}"
+        )
+        if clip["skeleton_file"]:
+            yield f"  skeleton   {clip['skeleton_file']}"
+        for signal in clip["signals"][1:]:
+            rows = plural(signal["samples_per_frame"], "row")
+            held = f"{plural(signal['n_channels'], 'channel')}, {rows} a frame"
+            yield f"  signal     {signal['name']}: {held}"
+        if clip["n_invalid"]:
+            yield f"  invalid    {plural(clip['n_invalid'], 'value')}"
+        yield f"  sha256     {clip['source_sha256']}"
+        share = 100 * clip["exceptions_share"]
+        yield f"  exceptions {clip['n_exceptions']:,} numbers off their grid ({share:.3g} %)"
+        for key, value in clip["metadata"].items():
+            yield f"  {key}  {value[:80]}"

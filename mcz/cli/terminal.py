@@ -1,0 +1,120 @@
+"""The only way to standard output and standard error: nothing there steers a terminal.
+
+Names in files may hold anything, so every command prints through these functions; a test allows no
+other module of the command line to print.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import sys
+from typing import Any, BinaryIO
+
+import click
+
+from mcz.errors import AccessError, OptionError
+
+ODD = re.compile(r"[^ -~]")  # what is looked at more closely; all else is plain
+ENCODING, KEPT = "utf-8", "surrogateescape"  # of text that is printed as bytes
+
+
+def printable(text: str, kept: str = "") -> str:
+    r"""``text`` with characters escaped that are not seen, such as controls, but for ``kept``.
+
+    These are control characters (C0, C1), those that turn the direction of text, line ends of all
+    sorts and blanks but the usual one.
+
+    >>> print(printable("a\x1b[2Jb"), printable("a\u202eb"), printable("V\xe4sa"))
+    a\x1b[2Jb a\u202eb Väsa
+    """
+
+    def escaped(match: re.Match[str]) -> str:
+        letter = match[0]
+        return letter if letter.isprintable() or letter in kept else ascii(letter)[1:-1]
+
+    return ODD.sub(escaped, text)
+
+
+def echo(*lines: str) -> None:
+    """Print lines on standard output."""
+    for line in lines:
+        click.echo(printable(line))
+
+
+def say(message: str) -> None:
+    """Print one line on standard error."""
+    click.echo(f"mcz: {printable(' '.join(message.split()))}", err=True)
+
+
+def say_json(document: Any) -> None:
+    """Print ``document`` as one line of JSON on standard error."""
+    click.echo(json_text(document, indent=None), err=True)
+
+
+def json_text(document: Any, indent: int | None = 2) -> str:
+    r"""``document`` as JSON, whose strings have escapes for what is not seen; see ``printable``.
+
+    >>> print(json_text("a\u202eb \x9b V\xe4sa"))
+    "a\u202eb \u009b Väsa"
+    """
+
+    def escaped(match: re.Match[str]) -> str:
+        letter = match[0]
+        plain = letter.isprintable() or letter == "\n"  # a line end is only between the values
+        return letter if plain else json.dumps(letter)[1:-1]
+
+    return ODD.sub(
+        escaped, json.dumps(document, indent=indent, ensure_ascii=False, allow_nan=False)
+    )
+
+
+def print_json(document: Any) -> None:
+    """Print ``document`` as one JSON document with sorted layout but kept key order."""
+    click.echo(json_text(document))
+
+
+def binary_output() -> BinaryIO:
+    """Standard output as bytes that are no text.
+
+    Raises AccessError where it is closed, OptionError where it is a terminal.
+    """
+    if _stdout().isatty():
+        raise OptionError("binary data are not printed on a terminal; -o FILE or > FILE keeps them")
+    return _buffer()
+
+
+def text_output() -> BinaryIO:
+    """Standard output as bytes of text: as they are, but with escapes on a terminal.
+
+    Raises AccessError where it is closed.
+    """
+    return _Escaping(_buffer()) if _stdout().isatty() else _buffer()
+
+
+def _stdout() -> Any:
+    if sys.stdout is None:
+        raise AccessError("standard output is closed")
+    return sys.stdout
+
+
+def _buffer() -> BinaryIO:
+    buffer: BinaryIO = _stdout().buffer
+    return buffer
+
+
+class _Escaping(io.BytesIO):
+    """Passes text on, what would steer a terminal escaped; lines come whole."""
+
+    def __init__(self, below: BinaryIO) -> None:
+        super().__init__()
+        self._below = below
+
+    def write(self, data: Any, /) -> int:
+        text = bytes(data).decode(ENCODING, KEPT).replace("\r\n", "\n")
+        self._below.write(printable(text, "\n\t").encode(ENCODING, "backslashreplace"))
+        return len(data)
+
+    def flush(self) -> None:
+        self._below.flush()

@@ -1,0 +1,166 @@
+"""Names that not every system can hold, and a folder that is written to without following links."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import unicodedata
+from collections.abc import Iterable
+from pathlib import Path, PurePosixPath
+
+from mcz.errors import AccessError, ExistsError
+
+ODD = re.compile(r'[<>:"|?*\\\x00-\x1f\x7f]')
+DEVICES = re.compile(r"(?i)(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])[ ]*(\..*)?")
+LONGEST = 255  # bytes of UTF-8 that a part of a path may have
+
+
+def fault_of(part: str) -> str:
+    """Why not every system can hold a part of a path; "" where all can."""
+    if odd := ODD.search(part):
+        return f"it has {odd[0]!r}"
+    if DEVICES.fullmatch(part):
+        return "it names a device"
+    if part != part.rstrip(" ."):
+        return f"it ends with {part[-1]!r}"
+    if len(part.encode("utf-8", "surrogatepass")) > LONGEST:
+        return f"it is longer than {LONGEST}"
+    return ""
+
+
+def folded(name: str) -> str:
+    """What names have in common that one disk or another takes for the same."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFKC", name).casefold())
+
+
+def notes_on(names: Iterable[str]) -> dict[str, str]:
+    """Of each path that not every system can hold, or not beside another, why."""
+    notes: dict[str, str] = {}
+    seen: dict[str, str] = {}
+    for name in names:
+        for part in PurePosixPath(name).parts:
+            if fault := fault_of(part):
+                notes.setdefault(name, f"Windows cannot hold the name {part!r}: {fault}")
+        for path in (name, *map(str, PurePosixPath(name).parents)):
+            other = seen.setdefault(folded(path), path)
+            if other != path:
+                text = f"many disks take {path!r} for the same name as {other!r}"
+                notes.setdefault(name, text)
+                break
+    return notes
+
+
+class PortableNames:
+    """Gives paths names that every system can hold, one beside the other."""
+
+    def __init__(self) -> None:
+        self._given: dict[str, str] = {}  # the parts of a path that was given, "/" between -> its
+        self._taken: set[str] = set()
+
+    def __call__(self, path: str) -> str:
+        """The path, or one like it: the same for the same folder, another for another file."""
+        above, _, part = path.rpartition("/")
+        if path not in self._given:
+            folder = f"{self(above)}/" if above else ""
+            self._given[path] = self._free(folder, _portable(part))
+        return self._given[path]
+
+    def _free(self, folder: str, part: str) -> str:
+        stem, dot, suffix = part.rpartition(".") if "." in part[1:] else (part, "", "")
+        name, number = part, 1
+        while folded(folder + name) in self._taken:
+            number += 1
+            name = f"{stem}~{number}{dot}{suffix}"
+        self._taken.add(folded(folder + name))
+        return folder + name
+
+
+def _portable(part: str) -> str:
+    """
+    >>> [_portable(name) for name in ("a:b", "CON", "nul.bvh", "walk. ", "walk.bvh")]
+    ['a_b', 'CON_', 'nul_.bvh', 'walk__', 'walk.bvh']
+    """
+    part = ODD.sub("_", part)
+    bare = part.rstrip(" .")
+    part = bare + "_" * (len(part) - len(bare))
+    if DEVICES.fullmatch(part):
+        stem, dot, rest = part.partition(".")
+        part = f"{stem.rstrip(' ')}_{dot}{rest}"
+    while fault_of(part):  # too long
+        stem, dot, suffix = part.rpartition(".")
+        part = f"{stem[:-1]}{dot}{suffix}" if dot and len(suffix) < 16 else part[:-1]
+    return part
+
+
+class Folder:
+    """A folder in which files appear; no link in it is followed, and no file written twice."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._written: dict[tuple[int, int], str] = {}  # device and number of a file -> its path
+
+    def place(self, path: str, *, force: bool) -> Path:
+        """Where to write the file ``path``; the folders above it are made.
+
+        Raises AccessError where a link, or what is neither file nor folder, stands in the way, and
+        ExistsError for a file that is there, which with ``force`` is one that was just written: the
+        disk takes two names for the same.
+        """
+        parts = PurePosixPath(path).parts
+        if os.name == "nt":
+            for part in parts:
+                if fault := fault_of(part):
+                    raise AccessError(f"this system cannot hold the name {part!r}: {fault}")
+        self._root.mkdir(parents=True, exist_ok=True)
+        place = self._root
+        for part in parts[:-1]:
+            place = place / part
+            found = _found(place)
+            if found is None:
+                place.mkdir(exist_ok=True)
+            elif not stat.S_ISDIR(found.st_mode) or _is_junction(place):
+                raise AccessError(f"{place} is {_kind(found)}, where a folder is needed")
+        place = place / parts[-1]
+        found = _found(place)
+        if found is None:
+            return place
+        if not stat.S_ISREG(found.st_mode):
+            raise AccessError(f"{place} is {_kind(found)}, which is not written to")
+        if (other := self._written.get((found.st_dev, found.st_ino))) is not None:
+            raise ExistsError(
+                f"this disk takes it for the same name as {other!r}, which was just written; "
+                "--names portable keeps both"
+            )
+        if not force:
+            raise ExistsError(f"{place} exists; use force to replace it")
+        return place
+
+    def note(self, path: str, place: Path) -> None:
+        """Remember that the file ``path`` was written."""
+        if (found := _found(place)) is not None:
+            self._written[found.st_dev, found.st_ino] = path
+
+
+def _found(place: Path) -> os.stat_result | None:
+    """What is there itself, not what it leads to; None where there is nothing."""
+    try:
+        return place.lstat()
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        raise AccessError(f"{place}: {getattr(error, 'strerror', None) or error}") from None
+
+
+def _is_junction(place: Path) -> bool:
+    """Whether it is a folder of Windows that leads elsewhere."""
+    attributes = getattr(place.lstat(), "st_file_attributes", 0)
+    return bool(attributes & getattr(stat, "FILE_ATTRIBUTE_REPARSE_POINT", 0))
+
+
+def _kind(found: os.stat_result) -> str:
+    if stat.S_ISLNK(found.st_mode):
+        return "a symbolic link"
+    if stat.S_ISDIR(found.st_mode):
+        return "a folder"
+    return "a file" if stat.S_ISREG(found.st_mode) else "neither a file nor a folder"

@@ -1,0 +1,81 @@
+"""Which clip of a file a name means, as users write it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from difflib import get_close_matches
+from pathlib import PurePosixPath
+
+from mcz.container import payloads
+from mcz.errors import FormatError, OptionError
+from mcz.reading.clip import Clip
+
+FEW = 8  # names that a message lists
+NEAR = 0.6  # of 1, how alike a suggested name is
+Aliases = Mapping[str, tuple[int, bytes]]  # name -> (of, target)
+Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
+
+
+def clip_called(clips: Mapping[str, Clip], aliases: Aliases, name: str) -> str:
+    """The name of the clip that ``name`` means; see ``File.only_clip``. Raises OptionError."""
+    if name in clips:
+        return name
+    for names in _ways(clips, aliases):
+        found = sorted({clip for known, clip in names if known == name})
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise OptionError(f"{name!r} may be {listed(found)}; choose one")
+    raise OptionError(f"no clip {name!r}; {_suggestion(clips, name)}")
+
+
+def _ways(clips: Mapping[str, Clip], aliases: Aliases) -> Iterator[Named]:
+    """What the clips may be called, the plainest way first; the last reads of their sources."""
+    names = [(name, name) for name in clips]
+    others = list(_of_clips(clips, aliases))
+    yield others
+    yield _last_parts([*names, *others])
+    paths = list(_paths(clips))
+    yield paths
+    yield _last_parts(paths)
+
+
+def _of_clips(clips: Mapping[str, Clip], aliases: Aliases) -> Iterator[tuple[str, str]]:
+    """The aliases of clips, which are paths of files, with their suffix and without."""
+    for alias, (of, target) in aliases.items():
+        clip = target.decode("utf-8", "replace")
+        if of == payloads.OF_CLIP and clip in clips:
+            yield alias, clip
+            yield str(PurePosixPath(alias).parent / PurePosixPath(alias).stem), clip
+
+
+def _paths(clips: Mapping[str, Clip]) -> Iterator[tuple[str, str]]:
+    for clip in clips.values():
+        with suppress(FormatError):  # one that is damaged hides no other
+            if clip.source is not None:
+                yield clip.source.path, clip.name
+
+
+def _last_parts(names: Named) -> Named:
+    return [(name.rpartition("/")[2], clip) for name, clip in names]
+
+
+def _suggestion(clips: Iterable[str], name: str) -> str:
+    near = nearest(name, [*clips, *(clip.rpartition("/")[2] for clip in clips)])
+    return f"did you mean {near}?" if near else f"there are: {listed(clips) or 'none'}"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The names most like ``name``, as a message has them; "" where none is."""
+    by_lower: dict[str, str] = {}
+    for one in known:
+        by_lower.setdefault(one.lower(), one)
+    found = get_close_matches(name.lower(), list(by_lower), 3, NEAR)
+    return " or ".join(repr(by_lower[one]) for one in found)
+
+
+def listed(names: Iterable[str]) -> str:
+    """Some names, few of many."""
+    known = list(names)
+    return ", ".join(known[:FEW]) + (" ..." if len(known) > FEW else "")

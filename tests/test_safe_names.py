@@ -1,0 +1,157 @@
+"""What lies in the folder that is unpacked into, and names that not every system can hold."""
+
+from __future__ import annotations
+
+import os
+import unicodedata
+from pathlib import Path
+
+import pytest
+
+import mcz
+from mcz.editing import archive as archive_module
+from mcz.editing import safe_names
+from mcz.editing.archive import NAMES
+from mcz.editing.safe_names import PortableNames, fault_of, folded, notes_on
+from mcz.errors import OptionError
+
+
+def packed(folder: Path, *names: str) -> Path:
+    """An archive of files with these names, each with its own text."""
+    source = folder / "in"
+    for number, name in enumerate(names):
+        path = source / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"%d %s" % (number, name.encode()))
+    mcz.pack(source, folder / "a.mcz", keep_all=True)
+    return folder / "a.mcz"
+
+
+@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize("linked", ["sub", "sub/note.txt"])
+def test_unpack_follows_no_link(tmp_path: Path, linked: str, force: bool) -> None:
+    archive = packed(tmp_path, "sub/note.txt", "other.txt")
+    outside, out = tmp_path / "outside", tmp_path / "out"
+    outside.mkdir()
+    target = outside / "note.txt"
+    if linked != "sub":
+        target.write_bytes(b"mine")
+    (out / linked).parent.mkdir(parents=True)
+    (out / linked).symlink_to(outside if linked == "sub" else target)
+    report = mcz.unpack(archive, out, force=force)
+    assert [o.path for o in report.failures] == ["sub/note.txt"]
+    assert "is a symbolic link" in report.failures[0].message
+    assert (out / "other.txt").exists()
+    assert (target.read_bytes() == b"mine") if linked != "sub" else not any(outside.iterdir())
+    assert (out / linked).is_symlink()
+
+
+def test_unpack_writes_to_no_pipe(tmp_path: Path) -> None:
+    archive, out = packed(tmp_path, "note.txt"), tmp_path / "out"
+    out.mkdir()
+    os.mkfifo(out / "note.txt")
+    report = mcz.unpack(archive, out, force=True)
+    assert "neither a file nor a folder" in report.failures[0].message
+
+
+@pytest.mark.parametrize("names", NAMES)
+def test_unpack_leaves_its_folder_with_no_names(
+    tmp_path: Path, names: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    archive = packed(tmp_path, "note.txt")
+    for name in ("../out.txt", "/out.txt", "a/../../out.txt"):
+        monkeypatch.setattr(archive_module, "named_files", lambda file, of=name: [(of, bytes)])
+        report = mcz.unpack(archive, tmp_path / names, names=names)
+        assert [o.result for o in report.outcomes] == ["failed"]
+        assert "not relative and plain" in report.outcomes[0].message
+
+
+def test_unpack_into_a_folder_that_is_itself_a_link(tmp_path: Path) -> None:
+    """The user named it."""
+    archive = packed(tmp_path, "note.txt")
+    (tmp_path / "real").mkdir()
+    (tmp_path / "out").symlink_to(tmp_path / "real")
+    assert not mcz.unpack(archive, tmp_path / "out").failures
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        *("CON", "con.bvh", "Nul", "COM1.amc", "lpt9", "walk.", "walk ", "a:b", "a\x01"),
+        *('a"b', "a<b", "a|b", "a?", "a*b", "x" * 256, "ä" * 128),
+    ],
+)
+def test_names_that_windows_cannot_hold(part: str) -> None:
+    assert fault_of(part)
+    assert not fault_of(PortableNames()(part))
+    (note,) = notes_on([f"walks/{part}", "walks/fine.bvh"]).values()
+    assert "Windows cannot hold" in note
+
+
+@pytest.mark.parametrize(
+    "part", ["CONSOLE", "walk.bvh", ".hidden", "com10", "a.b.c", "Väsa", "nul1"]
+)
+def test_names_that_all_can_hold(part: str) -> None:
+    assert not fault_of(part) and not notes_on([part])
+    assert PortableNames()(part) == part
+
+
+COMPOSED, APART = "Ä.txt", unicodedata.normalize("NFD", "Ä.txt")
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [("NOTES.TXT", "notes.txt"), ("A/x.bvh", "a/y.bvh"), (COMPOSED, APART), ("straße", "STRASSE")],
+)
+def test_names_that_a_disk_takes_for_the_same(one: str, other: str) -> None:
+    assert list(notes_on([one, other])) == [other]
+    give = PortableNames()
+    given = give(one), give(other)
+    assert given[0] == one and len(set(map(folded, given))) == 2
+    assert give(other) == given[1]
+
+
+def test_pack_notes_and_unpack_gives_a_choice(tmp_path: Path) -> None:
+    names = ("CON", "NOTES.TXT", "fine.txt", "notes.txt")
+    source = tmp_path / "in"
+    source.mkdir()
+    for name in names:
+        (source / name).write_bytes(name.encode())
+    report = mcz.pack(source, tmp_path / "a.mcz", keep_all=True)
+    noted = {o.path for o in report.outcomes if "Windows" in o.message or "disks" in o.message}
+    assert noted == {"CON", "notes.txt"}
+    plain = mcz.unpack(tmp_path / "a.mcz", tmp_path / "stored")
+    assert not plain.failures and sorted(os.listdir(tmp_path / "stored")) == sorted(names)
+    strict = mcz.unpack(tmp_path / "a.mcz", tmp_path / "strict", names="strict")
+    assert {o.path for o in strict.failures} == noted
+    portable = mcz.unpack(tmp_path / "a.mcz", tmp_path / "portable", names="portable")
+    assert not portable.failures
+    found = {p.name: p.read_bytes() for p in (tmp_path / "portable").iterdir()}
+    assert found == {
+        "CON_": b"CON",
+        "NOTES.TXT": b"NOTES.TXT",
+        "fine.txt": b"fine.txt",
+        "notes~2.txt": b"notes.txt",
+    }
+    assert {o.path: o.message for o in portable.outcomes}["notes.txt"] == "as notes~2.txt"
+    with pytest.raises(OptionError, match="not one of stored"):
+        mcz.unpack(tmp_path / "a.mcz", tmp_path / "x", names="any")
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_disk_that_folds_names_loses_nothing(
+    tmp_path: Path, force: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here the disk is made to: the second name leads to the file of the first."""
+    archive, out = packed(tmp_path, "NOTES.TXT", "notes.txt"), tmp_path / "out"
+    note = safe_names.Folder.note
+
+    def folding(self: safe_names.Folder, path: str, place: Path) -> None:
+        note(self, path, place)
+        os.link(place, out / "notes.txt")
+
+    monkeypatch.setattr(safe_names.Folder, "note", folding)
+    report = mcz.unpack(archive, out, force=force)
+    assert [o.path for o in report.failures] == ["notes.txt"]
+    assert "--names portable keeps both" in report.failures[0].message
+    assert (out / "NOTES.TXT").read_bytes() == b"0 NOTES.TXT"
