@@ -15,7 +15,8 @@
         ├── LimitError       they ask for more than the reader is willing to give
         └── LostFrameError   they need a frame that did not come
 
-A message says where (file, chunk, offset, line) and shows the value that was found.
+A message says where (file, chunk, offset, line) and shows the value that was found. What is no
+error but should be known is a warning: SkeletonWarning.
 """
 
 from __future__ import annotations
@@ -80,3 +81,7 @@ class LimitError(FormatError):
 
 class LostFrameError(FormatError):
     """A live frame that needs one that did not come, or came damaged."""
+
+
+class SkeletonWarning(UserWarning):
+    """An AMC was given a skeleton whose name or dofs are not its own."""

@@ -22,7 +22,7 @@ from mcz.codecs.wavelet import mrdwt
 from mcz.conversion import convert
 from mcz.editing.recoding import recorded_options
 from mcz.editing.replacing import edited_quality
-from mcz.errors import AccessError, ExistsError, MotionError, OptionError
+from mcz.errors import AccessError, MotionError, OptionError
 from mcz.motion import Channel, Motion, Signal
 from mcz.numbers import Grid, GridKind
 from mcz.reading.clip import Clip
@@ -441,10 +441,14 @@ def test_in_place(tmp_path: Path) -> None:
     before = path.read_bytes()
     with pytest.raises(MotionError):
         mcz.replace(path, "smooth", "knee", np.zeros(49))
-    with pytest.raises(ExistsError):
+    with pytest.raises(OptionError, match="it is the input itself"):
         mcz.replace(path, "smooth", "knee", np.ones(50), path)
     assert path.read_bytes() == before
-    mcz.replace(path, "smooth", "knee", np.ones(50), path, force=True)
+    for target in (path, link):
+        with pytest.raises(OptionError, match="it is the input itself"):
+            mcz.replace(path, "smooth", "knee", np.ones(50), target, force=True)
+    assert path.read_bytes() == before
+    mcz.replace(path, "smooth", "knee", np.ones(50))
     assert values_of(path.read_bytes(), "knee").all()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.mcz", "link.mcz"]
     with pytest.raises(OptionError, match="in place"):
@@ -566,7 +570,15 @@ def test_command(walk: Path, suffix: str, capsys: pytest.CaptureFixture[str]) ->
     assert run(*arguments, "--force", "--on-grid") == 0
     said = json.loads(capsys.readouterr().out)
     assert said["joint"] == joint and said["max_error"] == 0
-    assert run("replace", walk, walk, "--joint", joint, "--values", table, "--force") == 0
+    before = walk.read_bytes()
+    edit = ("--joint", joint, "--values", table)
+    assert run("replace", walk, walk, *edit, "--force") == 2
+    assert "--in-place" in capsys.readouterr().err
+    assert run("replace", walk, table, *edit, "--force") == 2
+    assert run("replace", walk, *edit) == 2
+    assert run("replace", walk, out, *edit, "--in-place", "--force") == 2
+    assert walk.read_bytes() == before
+    assert run("replace", walk, *edit, "--in-place") == 0
 
 
 def test_command_takes_columns_alone(walk: Path, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, ProcessPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
@@ -20,7 +21,7 @@ from mcz.bench import ladder, measure, peers
 from mcz.bench.cache import Cache
 from mcz.bench.cases import Case, Variant, load, why
 from mcz.codecs import by_name
-from mcz.errors import MczError
+from mcz.errors import MczError, SkeletonWarning
 
 Progress = Callable[[int, int, str], None]
 THREADS = (
@@ -82,7 +83,9 @@ KINDS: Mapping[str, Kind] = {
 def perform(task: Task, kind: Kind) -> Any:
     """The result of a task; ``{"error": ...}`` where the clip or a parameter is refused."""
     try:
-        return kind.work(task)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SkeletonWarning)  # said where the key was made
+            return kind.work(task)
     except MczError as error:
         return {"error": why(error)}
 

@@ -18,7 +18,10 @@ from mcz.cli.progress import Progress
 )
 @click.argument("target", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.option(
-    "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of the AMCs."
+    "--skeleton",
+    metavar="FILE.asf",
+    type=click.Path(readable=False),
+    help="The ASF of the AMCs, or none.",
 )
 @click.option(
     "--root",

@@ -6,6 +6,7 @@ import os
 import re
 import signal
 import sys
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
@@ -24,7 +25,7 @@ from mcz.cli.terminal import printable as printable
 from mcz.cli.terminal import say as say
 from mcz.cli.terminal import say_json
 from mcz.cli.terminal import text_output as text_output
-from mcz.errors import AccessError, ExistsError, MczError, OptionError
+from mcz.errors import AccessError, ExistsError, MczError, OptionError, SkeletonWarning
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
@@ -85,7 +86,7 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
     _prepare_streams()
     given = sys.argv[1:] if arguments is None else list(arguments)
     try:
-        with _ended_by_signals():
+        with _ended_by_signals(), _warnings_said():
             result = command.main(
                 given, prog_name=prog, standalone_mode=False, help_option_names=["-h", "--help"]
             )
@@ -110,6 +111,23 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
         say("terminated")
         return Exit.TERMINATED
     return int(result or Exit.FINE)
+
+
+@contextmanager
+def _warnings_said() -> Iterator[None]:
+    """Let what the library warns of become lines on standard error, each once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("once", SkeletonWarning)
+        show = warnings.showwarning
+
+        def said(message: Warning | str, category: type[Warning], *where: Any, **to: Any) -> None:
+            if issubclass(category, SkeletonWarning):
+                say(str(message))
+            else:
+                show(message, category, *where, **to)
+
+        warnings.showwarning = said
+        yield
 
 
 def _is_starved(error: ImportError) -> bool:
@@ -271,7 +289,7 @@ def exists(path: Path) -> Failure:
 
 def check_new(path: Path, force: bool) -> None:
     """Raise Failure for a file that is there already, before work on it begins."""
-    if path.exists() and not force:
+    if os.path.lexists(path) and not force:
         raise exists(path)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
@@ -11,19 +11,14 @@ import click
 from mcz.cli.common import (
     Exit,
     Failure,
-    binary_output,
     damage_of,
-    echo,
     opened,
-    plain_name,
     plural,
-    print_json,
     say,
-    text_output,
     to_frames,
     to_rate,
-    write_output,
 )
+from mcz.cli.delivery import Output, check_count, deliver
 from mcz.cli.fits import facts_of, told
 from mcz.cli.options import (
     decoded_option,
@@ -33,6 +28,7 @@ from mcz.cli.options import (
     up_option,
 )
 from mcz.cli.parts import Filtered, Part, Preview
+from mcz.cli.suffixes import CONVERSIONS, TARGETS, check_kept, suffix_of, target_of
 
 if TYPE_CHECKING:
     from mcz.conversion import Fit
@@ -40,14 +36,10 @@ if TYPE_CHECKING:
     from mcz.reading.clip import Clip
     from mcz.reading.file import File
 
-Output = tuple[str, str, bytes]  # kind, file name, content
-CONVERSIONS = ("bvh", "amc", "c3d")
-
 
 class _Wanted(NamedTuple):
     """What of a file is wanted, and as what: the options of these names."""
 
-    name: str | None
     frames: tuple[int, int | None] | None
     joints: str | None
     resolution: int
@@ -74,9 +66,16 @@ class _Wanted(NamedTuple):
     "-o",
     "--output",
     metavar="OUT",
-    help="A file, a folder, or - for standard output. Default: the source's name, beside FILE.mcz.",
+    help="A file, whose suffix says what it becomes, a folder, or - for standard output. Default: "
+    "the source's name, beside FILE.mcz.",
 )
-@click.option("--clip", "name", metavar="NAME", help="Which clip; needed where there are several.")
+@click.option(
+    "--clip",
+    "names",
+    metavar="NAME",
+    multiple=True,
+    help="Which clip; needed where there are several, and may be repeated.",
+)
 @click.option(
     "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B, counted from 0."
 )
@@ -106,8 +105,9 @@ class _Wanted(NamedTuple):
 @click.option(
     "--to",
     "target",
-    type=click.Choice(["csv", "npz", *CONVERSIONS]),
-    help="Numbers, or the motion as another format, instead of the source file.",
+    type=click.Choice(TARGETS),
+    help="Numbers, or the motion as another format, instead of the source file. Default: what the "
+    "suffix of OUT says.",
 )
 @click.option(
     "--signal",
@@ -143,6 +143,7 @@ class _Wanted(NamedTuple):
 def command(
     file: str,
     output: str | None,
+    names: tuple[str, ...],
     salvage: bool,
     unverified: bool,
     max_decoded: int | None,
@@ -155,31 +156,67 @@ def command(
     A file without clips gives its skeleton's ASF or its attachment.
     """
     wanted = _Wanted(**options)
-    _check_options(wanted, salvage)
-    _check_signal(wanted)
     _refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
     if output == "-" and (as_json or wanted.with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
-    fit: Fit | None = None
+    if suffix_of(output) not in TARGETS:
+        _check_options(wanted, salvage)
+        _check_signal(wanted)
+    outputs: list[Output] = []
+    fits: dict[str, Fit] = {}
     with opened(file, salvage=salvage, max_decoded=max_decoded, unverified=unverified) as held:
-        if held.clips:
-            outputs, fit = _of_clip(held, wanted)
-        elif wanted.target is not None or wanted.frames is not None or wanted.filtered:
-            raise Failure(
-                f"{file}: it has no clips, so --to, --frames and --post-filter do not apply",
-                Exit.USAGE,
-            )
-        else:
-            outputs = [_other(held, wanted.name)]
+        for clip in _chosen(held, output, names):
+            found, fit = _of_clip(held, clip, _as_named(clip, output, wanted, salvage))
+            outputs += [part for part in found if part not in outputs]  # an ASF that clips share
+            if fit is not None:
+                fits[clip.name] = fit
+        if not held.clips:
+            _check_plain(file, wanted)
+            outputs = [_other(held, names)]
+            check_kept(output, outputs[0][1])
         facts: dict[str, Any] = {"damage": held.damage, "unverified_segments": held.unverified}
-    if fit is not None:
-        facts["fit"] = facts_of(fit)
-    _deliver(file, output, outputs, force, as_json, facts)
+    deliver(file, output, outputs, force, as_json, facts | _facts(fits))
     if facts["unverified_segments"]:
         say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")
-    if fit is not None:
+    for fit in fits.values():
         say(f"{file}: {told(fit)}")
     return damage_of(file, facts["damage"])
+
+
+def _chosen(held: File, output: str | None, names: tuple[str, ...]) -> list[Clip]:
+    """The clips of these names, the only one without a name, or none where the file has none."""
+    if not held.clips:
+        return []
+    clips = held.clips_called(names) if names else [held.only_clip(None)]
+    check_count(output, len(clips))
+    return clips
+
+
+def _as_named(clip: Clip, output: str | None, wanted: _Wanted, salvage: bool) -> _Wanted:
+    """``wanted`` as the suffix of the output says, unless ``--to`` does."""
+    if wanted.target is None:
+        plain = not (wanted.solve or wanted.preview)
+        wanted = wanted._replace(target=target_of(clip, output, plain=plain))
+    _check_options(wanted, salvage)
+    _check_signal(wanted)
+    return wanted
+
+
+def _check_plain(file: str, wanted: _Wanted) -> None:
+    """Raise Failure for options of clips, where the file has none."""
+    if wanted.target is not None or wanted.frames is not None or wanted.filtered:
+        raise Failure(
+            f"{file}: it has no clips, so --to, --frames and --post-filter do not apply",
+            Exit.USAGE,
+        )
+
+
+def _facts(fits: dict[str, Fit]) -> dict[str, Any]:
+    """What ``--json`` says of skeletons that were fitted: of one clip, or by the names of more."""
+    facts = {name: facts_of(fit) for name, fit in fits.items()}
+    if len(facts) == 1:
+        return {"fit": next(iter(facts.values()))}
+    return {"fits": facts} if facts else {}
 
 
 def _check_options(wanted: _Wanted, salvage: bool) -> None:
@@ -220,11 +257,11 @@ def _refuse(wrong: bool, reason: str) -> None:
         raise Failure(reason, Exit.USAGE)
 
 
-def _of_clip(held: File, wanted: _Wanted) -> tuple[list[Output], Fit | None]:
-    """The outputs of the clip that is wanted, and how well a skeleton fits where one is fitted."""
+def _of_clip(held: File, clip: Clip, wanted: _Wanted) -> tuple[list[Output], Fit | None]:
+    """The outputs of a clip as it is wanted, and how well a skeleton fits where one is fitted."""
     from mcz.reading.source_files import with_facts
 
-    clip, target, fit = held.only_clip(wanted.name), wanted.target, None
+    target, fit = wanted.target, None
     part = _part(clip, wanted)
     if target is None:
         outputs = [_source(clip, part)]
@@ -331,9 +368,12 @@ def _skeleton(held: File, wanted: bytes) -> Output:
     return "skeleton", name, held.skeleton_bytes(wanted)
 
 
-def _other(held: File, name: str | None) -> Output:
-    """The attachment called ``name``, or the only thing in a file without clips."""
+def _other(held: File, wanted: tuple[str, ...]) -> Output:
+    """The attachment of the name that is wanted, or the only thing in a file without clips."""
     names = list(held.attachments)
+    if len(wanted) > 1:
+        raise Failure("no clips; of attachments one is decoded, mcz unpack writes all", Exit.USAGE)
+    name = wanted[0] if wanted else None
     if name is None and len(held.skeletons) == 1 and not names:
         return _skeleton(held, held.skeletons[0][0])
     if name is None and len(names) == 1:
@@ -342,32 +382,3 @@ def _other(held: File, name: str | None) -> Output:
         shown = ", ".join(names) or "nothing"
         raise Failure(f"no clips; choose with --clip among {shown}", Exit.USAGE)
     return "attachment", PurePosixPath(name).name, held.attachments[name].read()
-
-
-def _deliver(
-    file: str,
-    output: str | None,
-    outputs: list[Output],
-    force: bool,
-    as_json: bool,
-    facts: dict[str, Any],
-) -> None:
-    """Write the outputs where they belong and say so."""
-    if output == "-":
-        data = outputs[0][2]
-        (binary_output if b"\0" in data else text_output)().write(data)
-        return
-    folder = Path() if file == "-" else Path(file).parent
-    if output is not None:
-        folder = Path(output) if Path(output).is_dir() else Path(output).parent
-    rows = []
-    for number, (kind, name, data) in enumerate(outputs):
-        named = output is not None and not Path(output).is_dir() and number == 0
-        path = Path(str(output)) if named else folder / plain_name(name)
-        write_output(path, data, force)
-        rows.append({"path": str(path), "kind": kind, "bytes": len(data)})
-    if as_json:
-        print_json({"outputs": rows, **facts})
-    else:
-        for row in rows:
-            echo(f"{row['path']}  {row['bytes']:,} bytes")

@@ -51,7 +51,10 @@ Cut = tuple[int, int | None] | None
 )
 @click.option("--unit", type=click.Choice(UNITS), help="Length unit of a file that says none.")
 @click.option(
-    "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of an AMC."
+    "--skeleton",
+    metavar="FILE.asf",
+    type=click.Path(readable=False),
+    help="The ASF of an AMC, or none.",
 )
 @decoded_option
 @json_option

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,8 +41,8 @@ if TYPE_CHECKING:
     "--skeleton",
     metavar="FILE.asf",
     type=click.Path(readable=False),
-    help="The ASF of an AMC. Default: the same stem, the subject's prefix beside it, a sibling "
-    "folder asf/, or the only ASF beside it.",
+    help="The ASF of an AMC, or none. Default: one beside it or in a sibling folder asf/ that has "
+    "the take's name or the subject's, or the only one whose bones fit.",
 )
 @click.option(
     "--format",
@@ -85,7 +86,9 @@ def _encode_piped(
 ) -> Exit:
     from mcz.cli.piped import encode_lines, stored
     from mcz.live.text_writer import codes_live
+    from mcz.writing.inputs import refuse_inputs
 
+    refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
     if options["codec"] is not None and codes_live(options["codec"]):
         if as_json:
             raise Failure("--json: what is coded frame by frame has no document", Exit.USAGE)
@@ -106,7 +109,10 @@ def _encode_file(
     **options: Any,
 ) -> Exit:
     import mcz
+    from mcz.writing.inputs import refuse_inputs
 
+    if output == "-":
+        refuse_inputs(sys.stdout, (source, skeleton))
     target = output or str(Path(source).with_suffix(".mcz"))
     unread = output == "-" or _is_special(target)
     if unread and as_json:
@@ -122,6 +128,8 @@ def _encode_file(
             progress=progress,
             **chosen(**options),
         )
+    for note in written.notes:
+        say(f"{source}: {note}")
     if sink is not None:
         sink.write(piped.getvalue())
     if not unread:

@@ -20,7 +20,13 @@ from mcz.cli.common import (
     to_frames,
 )
 from mcz.cli.damage import hinted
-from mcz.cli.options import decoded_option, force_option, json_option, salvage_option
+from mcz.cli.options import (
+    clips_option,
+    decoded_option,
+    force_option,
+    json_option,
+    salvage_option,
+)
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -43,7 +49,7 @@ if TYPE_CHECKING:
 @click.option(
     "--frames", metavar="A:B", callback=to_frames, help="Keep frames A <= f < B, counted from 0."
 )
-@click.option("--clip", "name", metavar="NAME", help="Take out this clip alone. Default: all.")
+@clips_option
 @salvage_option
 @decoded_option
 @force_option
@@ -54,7 +60,7 @@ def command(
     resolution: int,
     joints: str | None,
     frames: tuple[int, int | None] | None,
-    name: str | None,
+    clips: tuple[str, ...],
     salvage: bool,
     max_decoded: int | None,
     force: bool,
@@ -78,7 +84,7 @@ def command(
             resolution=resolution,
             joints=None if joints is None else [joint.strip() for joint in joints.split(",")],
             frames=frames,
-            clip=name,
+            clip=clips or None,
             salvage=salvage,
             force=force,
             max_decoded=max_decoded,

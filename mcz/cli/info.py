@@ -24,12 +24,21 @@ from mcz.cli.common import (
     table,
 )
 from mcz.cli.figures import figure_lines
-from mcz.cli.options import decoded_option, json_option, salvage_option, version_option
+from mcz.cli.options import (
+    clips_option,
+    decoded_option,
+    json_option,
+    salvage_option,
+    version_option,
+)
 from mcz.cli.recording import recording_lines
+from mcz.cli.repeats import Once
 from mcz.cli.verify import is_unsound
 
 DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
 FEW = 4  # clips that are shown in full; more are shown as a table
+WIDEST = 200  # characters that are shown of a value of metadata
+NOTES = ("source-note", "skeleton-note")
 PARTS = ("payload", "overhead", "model", "source_chunk", "hash", "quality")
 RATIOS = (
     ("cr_source", "source file"),
@@ -39,7 +48,7 @@ RATIOS = (
 )
 
 
-@click.command(short_help="What a file holds and what it costs.", epilog=EXIT_CODES)
+@click.command(cls=Once, short_help="What a file holds and what it costs.", epilog=EXIT_CODES)
 @click.argument("file", metavar="FILE", type=click.Path(readable=False))
 @json_option
 @click.option("--layout", "show_layout", is_flag=True, help="What every range of bytes means.")
@@ -49,6 +58,7 @@ RATIOS = (
     is_flag=True,
     help="Check everything; name the offset and SPEC.md's heading of each fault.",
 )
+@clips_option
 @salvage_option
 @click.option(
     "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of an AMC."
@@ -59,6 +69,7 @@ def command(
     as_json: bool,
     show_layout: bool,
     check: bool,
+    clips: tuple[str, ...],
     salvage: bool,
     skeleton: str | None,
     max_decoded: int | None,
@@ -73,13 +84,15 @@ def command(
         return _of_source(file, skeleton, as_json)
     if skeleton is not None:
         raise Failure("--skeleton is the ASF of an AMC", Exit.USAGE)
+    if clips and (show_layout or check):
+        raise Failure("--layout and --validate are of the whole file, without --clip", Exit.USAGE)
     if check:
         return _validate(file, max_decoded, as_json)
     with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
         if show_layout:
             parts = report.layout(held)
         else:
-            document = report.info(held)
+            document = report.info(held, clips or None)
         damage = list(held.damage)
     if show_layout:
         _print_layout(parts, as_json)
@@ -153,14 +166,17 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
     for skeleton in document["skeletons"][:FEW]:
         yield from _skeleton(skeleton)
     if len(document["skeletons"]) > FEW:
-        yield f"\n{len(document['skeletons']) - FEW:,} more skeletons; --json lists them"
+        yield ""
+        yield f"{len(document['skeletons']) - FEW:,} more skeletons; --json lists them"
     if len(document["clips"]) <= FEW:
         for clip in document["clips"]:
             yield from _clip(clip)
     else:
         yield from ("", *_clips(document["clips"]).split("\n"))
+        yield from _notes(document["clips"])
     for attachment in document["attachments"]:
-        yield f"\nattachment {attachment['name']}: {attachment['bytes']:,} bytes, verbatim"
+        yield ""
+        yield f"attachment {attachment['name']}: {attachment['bytes']:,} bytes, verbatim"
 
 
 def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:
@@ -213,7 +229,7 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
     yield from _source(clip)
     yield from recording_lines(clip["recording"])
     for key, value in clip["metadata"].items():
-        yield f"  {key}  {value[:80]}"
+        yield f"  {key}  {value[:WIDEST]}"
     if clip["quality"]:
         yield "  quality"
         yield from (f"    {line}" for line in figure_lines(clip["quality"]))
@@ -287,6 +303,20 @@ def _rate(clip: dict[str, Any]) -> str:
         return "at an unknown rate"
     about = "" if clip["frame_rate_exact"] else "about "
     return f"at {about}{rate:g} Hz ({clip['n_frames'] / rate:.2f} s)"
+
+
+def _notes(clips: list[dict[str, Any]]) -> Iterator[str]:
+    """What was noticed about the sources of clips and their skeletons, each text once."""
+    named: dict[str, list[str]] = {}
+    for clip in clips:
+        for key in NOTES:
+            if text := clip["metadata"].get(key):
+                named.setdefault(f"{key}  {text[:WIDEST]}", []).append(clip["name"])
+    if named:
+        yield ""
+    for note, names in named.items():
+        more = f" and {len(names) - FEW:,} more" if len(names) > FEW else ""
+        yield f"{note}: {', '.join(names[:FEW])}{more}"
 
 
 def _percent(part: int, total: int) -> str:

@@ -1,4 +1,7 @@
-"""Groups of commands, each of which is loaded when it is called."""
+"""Groups of commands, each of which is loaded when it is called.
+
+No command of theirs takes an option twice, unless that makes a list.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ from collections.abc import Sequence
 from importlib import import_module
 
 import click
+
+from mcz.cli.repeats import refuse_repeats
 
 
 def lazy_group(prefix: str, names: Sequence[str]) -> type[click.Group]:
@@ -26,7 +31,10 @@ def lazy_group(prefix: str, names: Sequence[str]) -> type[click.Group]:
         ) -> tuple[str | None, click.Command | None, list[str]]:
             if args and args[0] not in names and not args[0].startswith("-"):
                 ctx.fail(unknown(args[0], names))
-            return super().resolve_command(ctx, args)
+            name, command, rest = super().resolve_command(ctx, args)
+            if command is not None and not ctx.resilient_parsing:
+                refuse_repeats(command, name, rest, ctx)
+            return name, command, rest
 
     return Commands
 

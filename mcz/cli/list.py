@@ -7,6 +7,8 @@ import click
 from mcz.cli.common import Exit, damage_of, echo, opened, print_json, table
 from mcz.cli.options import json_option, salvage_option
 
+ALIAS = ("name", "of", "target")
+
 
 @click.command(short_help="Names of clips, from the index alone.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
@@ -27,9 +29,15 @@ def command(file: str, salvage: bool, as_json: bool) -> Exit:
             for clip in held.clips.values()
         ]
         attachments = [{"name": a.name, "bytes": a.size} for a in held.attachments.values()]
-        aliases, damage = sorted(held.aliases), list(held.damage)
+        aliases = [(name, *held.alias_of(name)) for name in sorted(held.aliases)]
+        damage = list(held.damage)
     if as_json:
-        document = {"clips": clips, "attachments": attachments, "aliases": aliases}
+        document = {
+            "clips": clips,
+            "attachments": attachments,
+            "aliases": [name for name, *_ in aliases],
+            "alias_targets": [dict(zip(ALIAS, alias, strict=True)) for alias in aliases],
+        }
         print_json(document | ({"damage": damage} if salvage else {}))
         return damage_of(file, damage)
     rows = [
@@ -46,6 +54,7 @@ def command(file: str, salvage: bool, as_json: bool) -> Exit:
         echo(*table([["clip", "codec", "frames", "channels", "rate"], *rows], "llrrr").split("\n"))
     for attachment in attachments:
         echo(f"{attachment['name']}  attachment, {attachment['bytes']:,} bytes")
-    for alias in aliases:
-        echo(f"{alias}  same content as another")
+    for name, of, target in aliases:
+        same = f"same content as {of} {target}"
+        echo(f"{name}  {f'the file of skeleton {target[:8]}' if of == 'skeleton' else same}")
     return damage_of(file, damage)

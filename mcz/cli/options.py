@@ -58,6 +58,14 @@ def decoded_option(function: Function) -> Function:
     )(function)
 
 
+clips_option = click.option(
+    "--clip",
+    "clips",
+    metavar="NAME",
+    multiple=True,
+    help="This clip alone; may be repeated. Default: all.",
+)
+
 token_option = click.option(
     "--token",
     metavar="TEXT",

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from mcz.editing.archive import Outcome, Report
 
 
+HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "restored")
+MANY = 50  # files of one kind that are named for one reason; --json names all
+
+
 def _table(report: Report) -> Iterator[str]:
     """What became of the files of each kind, where there is more than one kind."""
     kinds: dict[str, list[Outcome]] = {}
@@ -32,23 +36,67 @@ def _damage(report: Report) -> dict[str, list[str]]:
     return {"damage": report.damage} if report.damage else {}
 
 
+def _summary(report: Report) -> str:
+    """How many files became what, and the bytes: of an MCZ file against those of its sources."""
+    counts = Counter(outcome.result for outcome in report.outcomes)
+    shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
+    held = [outcome for outcome in report.outcomes if outcome.result in HELD]
+    size = sum(outcome.size for outcome in held)
+    files = plural(len(report.outcomes), "file") + (f" ({shown})" if shown else "")
+    if report.size is None:
+        return f"{files}, {size:,} bytes"
+    return f"{files}; sources {size:,} bytes, the file {report.size:,} bytes"
+
+
+def _say_left_out(report: Report, target: str) -> None:
+    """Say on standard error how many files of which kinds are not in the MCZ file."""
+    kinds = Counter(
+        PurePosixPath(outcome.path).suffix.lower() or "without suffix"
+        for outcome in report.outcomes
+        if outcome.result == "skipped"
+    )
+    if kinds and report.size is not None:
+        shown = ", ".join(f"{count:,} {kind}" for kind, count in sorted(kinds.items()))
+        say(f"{target}: left out {plural(sum(kinds.values()), 'file')}: {shown}")
+
+
+def _say_notes(report: Report) -> None:
+    """Say on standard error what was left out and why, and what was noticed about the rest."""
+    said: Counter[tuple[str, str, str]] = Counter()
+    for outcome in report.outcomes:
+        if outcome.message and outcome not in report.failures:
+            kind = PurePosixPath(outcome.path).suffix.lower()
+            said[outcome.result, kind, outcome.message] += 1
+            if said[outcome.result, kind, outcome.message] <= MANY:
+                say(f"{outcome.path}: {outcome.result}: {outcome.message}")
+        for note in outcome.notes:
+            say(f"{outcome.path}: {note}")
+    for (result, kind, message), count in said.items():
+        if count > MANY:
+            files = plural(count - MANY, f"more {kind} file".replace("  ", " "))
+            say(f"{files} {result}: {message} (--json names them)")
+
+
 def conclude(report: Report, target: str, as_json: bool) -> Exit:
     """Print what became of the files; the errors last, one line each on standard error."""
     if as_json:
         rows = [
-            {"path": o.path, "result": o.result, "bytes": o.size, "message": o.message}
+            {
+                "path": o.path,
+                "result": o.result,
+                "bytes": o.size,
+                "message": o.message,
+                "notes": list(o.notes),
+            }
             for o in report.outcomes
         ]
-        print_json({"target": target, "files": rows} | _damage(report))
-    else:
         counts = Counter(outcome.result for outcome in report.outcomes)
-        shown = ", ".join(f"{n:,} {result}" for result, n in sorted(counts.items()))
-        size = sum(outcome.size for outcome in report.outcomes)
-        held = f"{plural(len(report.outcomes), 'file')}, {size:,} bytes"
-        echo(f"{target}: {held}" + (f" ({shown})" if shown else ""), *_table(report))
-        for outcome in report.outcomes:
-            if outcome.message and outcome not in report.failures:
-                say(f"{outcome.path}: {outcome.result}: {outcome.message}")
+        document = {"target": target, "bytes": report.size, "counts": counts, "files": rows}
+        print_json(document | _damage(report))
+    else:
+        echo(f"{target}: {_summary(report)}", *_table(report))
+    _say_left_out(report, target)
+    _say_notes(report)
     for failure in report.failures:
         named = failure.path in failure.message
         say(failure.message if named else f"{failure.path}: {failure.message}")

@@ -18,6 +18,7 @@ from mcz.cli.common import (
     about,
     echo,
     existing,
+    plural,
     print_json,
     printable,
     say,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Other values for one joint of an .mcz.")
 @click.argument("file", metavar="IN.mcz", type=click.Path(readable=False))
-@click.argument("output", metavar="OUT.mcz", type=click.Path(readable=False))
+@click.argument("output", metavar="[OUT.mcz]", required=False, type=click.Path(readable=False))
 @click.option("--joint", metavar="J", required=True, help="The joint, by name or index.")
 @click.option(
     "--values",
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     help="Its new values, a .csv or .npz as decode --to writes them.",
 )
 @click.option("--clip", "name", metavar="NAME", help="Which clip; needed where there are several.")
+@click.option("--in-place", is_flag=True, help="Write to IN.mcz itself; there is no OUT.mcz then.")
 @click.option(
     "--on-grid", is_flag=True, help="Round to what the source prints. Default: every digit is kept."
 )
@@ -49,10 +51,11 @@ if TYPE_CHECKING:
 @json_option
 def command(
     file: str,
-    output: str,
+    output: str | None,
     joint: str,
     table: str,
     name: str | None,
+    in_place: bool,
     on_grid: bool,
     force: bool,
     as_json: bool,
@@ -60,35 +63,44 @@ def command(
     """Give one joint of a clip other values; all other streams are copied byte for byte.
 
     The table has a row for every frame and the columns of the joint, by their names or nothing
-    else. OUT.mcz may be IN.mcz, with --force.
+    else. IN.mcz itself is changed by --in-place alone.
     """
     import mcz
+    from mcz.writing.inputs import refuse_inputs
 
+    if in_place == (output is not None):
+        raise Failure("name OUT.mcz, or say --in-place to change IN.mcz itself", Exit.USAGE)
+    shown = output or file
     if "-" in (file, output, table):
         raise Failure("replace reads and writes files, not standard streams", Exit.USAGE)
     existing(file)
     existing(table)
-    with about(file, output, table):
+    with about(file, shown, table):
+        if output is not None and Path(output).exists() and Path(output).samefile(file):
+            raise Failure(f"{output}: it is IN.mcz itself; --in-place changes that", Exit.USAGE)
+        refuse_inputs(shown, (table,))
         with mcz.open(file) as held:
             values = read_values(table, held.only_clip(name), joint)
-        in_place = force and Path(output).exists() and Path(output).samefile(file)
-        target = None if in_place else output
         with Progress() as progress:
             found = mcz.replace(
                 file,
                 name,
                 joint,
                 values,
-                target,
+                output,
                 on_grid=on_grid,
                 force=force,
                 progress=progress,
             )
     if as_json:
-        print_json({"output": output, **asdict(found)})
+        print_json({"output": shown, **asdict(found)})
         return Exit.FINE
-    line = f"{output}: {found.size:,} bytes; {found.joint} of {found.clip}: {found.joint_bytes:,}"
+    line = f"{shown}: {found.size:,} bytes; {found.joint} of {found.clip}: {found.joint_bytes:,}"
     echo(f"{line} of {found.joint_bytes_before:,} bytes, {found.codec}")
+    if found.n_exceptions or found.n_exceptions_before:
+        before = f"{found.n_exceptions_before:,} before"
+        line = f"  {plural(found.n_exceptions, 'number')} of the joint off the grid, {before}"
+        echo(f"{line}; --on-grid rounds to it" if found.n_exceptions else line)
     if found.recoded:
         echo(f"  coded anew, as they repeated it: {' '.join(found.recoded)}")
     for text in found.left_out:

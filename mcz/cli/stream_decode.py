@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 import csv
 import io
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -89,6 +90,10 @@ def command(
     if rate is not None and not post_filter:
         raise Failure("--rate needs --post-filter", Exit.USAGE)
     from mcz.live.generators import stream_decode
+    from mcz.writing.inputs import refuse_inputs
+
+    if connect is None:
+        refuse_inputs(sys.stdout, (sys.stdin if file == "-" else file,))
 
     where = connect or (NAME if file == "-" else file)
     with about(where), _stream(file, connect, token) as stream:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
@@ -87,12 +88,16 @@ def command(
     decode --to csv and mcz stream decode print of markers will do, too. A CSV line
     "# set bitrate=4 gof=20" changes parameters of the codec from its next group of frames on.
     """
+    from mcz.writing.inputs import refuse_inputs
+
     if listen is not None and output is not None:
         raise Failure("-o and --listen exclude each other", Exit.USAGE)
     if clients and listen is None:
         raise Failure("--clients needs --listen", Exit.USAGE)
     if skeleton is not None:
         existing(skeleton)
+    if listen is None:
+        refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
     others = tuple(name for name in (output, skeleton) if name not in (None, "-"))
     with about(NAME, *map(str, others)):
         if listen is not None:

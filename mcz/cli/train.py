@@ -101,7 +101,9 @@ def command(
     integers, as SPEC.md, "Bases", has them.
     """
     from mcz.training import Recipe, train
+    from mcz.writing.inputs import refuse_inputs
 
+    refuse_inputs(output, clips)
     check_new(output, force)
     for path in clips:
         existing(path)

@@ -6,7 +6,13 @@ import click
 
 from mcz.cli.common import Exit, about, existing
 from mcz.cli.damage import hinted
-from mcz.cli.options import decoded_option, force_option, json_option, salvage_option
+from mcz.cli.options import (
+    clips_option,
+    decoded_option,
+    force_option,
+    json_option,
+    salvage_option,
+)
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
@@ -14,6 +20,7 @@ from mcz.cli.progress import Progress
 @click.command(short_help="Every source file out of an .mcz.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@clips_option
 @salvage_option
 @click.option(
     "--names",
@@ -29,6 +36,7 @@ from mcz.cli.progress import Progress
 def command(
     file: str,
     folder: str,
+    clips: tuple[str, ...],
     names: str,
     salvage: bool,
     max_decoded: int | None,
@@ -37,8 +45,9 @@ def command(
 ) -> Exit:
     """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
 
-    No link that lies in DIR is followed, and no file replaces another of FILE.mcz. With --salvage
-    those of a damaged file that are whole are written; each is checked as in a sound one.
+    With --clip those of the clips alone, with their skeletons. No link that lies in DIR is
+    followed, and no file replaces another of FILE.mcz. With --salvage those of a damaged file that
+    are whole are written; each is checked as in a sound one.
     """
     import mcz
 
@@ -47,6 +56,7 @@ def command(
         report = mcz.unpack(
             file,
             folder,
+            clips=clips or None,
             salvage=salvage,
             force=force,
             names=names,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -20,6 +21,7 @@ from mcz.editing.appending import growing
 from mcz.editing.safe_names import Folder, PortableNames, notes_on
 from mcz.errors import AccessError, ExistsError, FormatError, MczError, OptionError, SourceError
 from mcz.formats import FORMATS
+from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.source_files import read_bytes
 from mcz.writing.atomic import replacing
@@ -27,6 +29,7 @@ from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Digest, Draft
 from mcz.writing.entry import Entry, Terms
 from mcz.writing.file import profile_of
+from mcz.writing.inputs import refuse_inputs
 from mcz.writing.names import check_name
 
 NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
@@ -39,22 +42,29 @@ class Outcome:
     ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
     "present" (the target has it already), "restored", "skipped", "exists" (it may not be replaced)
     or "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage "damaged".
+    ``notes`` are what was noticed about one that was taken: its reader's, and whose skeleton it
+    got.
     """
 
     path: str
     result: str
     size: int = 0
     message: str = ""
+    notes: tuple[str, ...] = ()
 
     __repr__ = brief
 
 
 @dataclass(slots=True)
 class Report:
-    """The outcomes of a command over many files; ``damage`` is what salvage found wrong."""
+    """The outcomes of a command over many files.
+
+    ``damage`` is what salvage found wrong, ``size`` that of the MCZ file, once it is written.
+    """
 
     outcomes: list[Outcome] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
+    size: int | None = None
 
     __repr__ = brief
 
@@ -92,30 +102,59 @@ def pack(
     """Pack every motion file below ``directory`` into one MCZ file.
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
-    ``keep_all`` also keeps files of other kinds so. Paths are stored relative to ``directory``.
+    ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
+    relative to ``directory``. An earlier MCZ file of the target's name is no part of the new one;
+    any other file that the target would replace is refused, even with ``force``.
     """
     root = Path(directory)
     if not root.is_dir():
         raise OptionError(f"{root}: not a folder")
     paths, others = _files_below(root, target)
-    known = {suffix for source_format in FORMATS.values() for suffix in source_format.suffixes}
     if not keep_all:
-        paths = [path for path in paths if path.suffix.lower() in known]
+        paths, left = _motion_files(paths)
+        others += [_left_out(path, root) for path in left]
     verbatim = verbatim or keep_all
     terms = Terms(codec, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
-    with replacing(target, force=force) as stream:
+    with replacing(target, force=force, inputs=(*paths, *(params or {}).values())) as stream:
         draft = Draft(stream, profile_of(archive))
         report = _write_entries(draft, entries, progress)
+        refuse_inputs(target, _inputs_of(entries))
         draft.finish()
+    report.size = draft.writer.offset
     report.note(notes_on(entry.name for entry in entries))
-    report.outcomes += others
+    report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
     return report
 
 
+def _motion_files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """The files of source formats, and the others."""
+    known = {suffix for source_format in FORMATS.values() for suffix in source_format.suffixes}
+    motions = [path for path in paths if path.suffix.lower() in known]
+    return motions, [path for path in paths if path.suffix.lower() not in known]
+
+
+def _left_out(path: Path, root: Path) -> Outcome:
+    name = path.relative_to(root).as_posix()
+    return Outcome(name, "skipped", _size_of(path), "no motion file; --keep-all keeps it")
+
+
+def _inputs_of(entries: Sequence[Entry]) -> Iterator[Path]:
+    """The files that entries were made of, their skeletons among them."""
+    return chain.from_iterable(entry.inputs for entry in entries)
+
+
+def _size_of(path: Path) -> int:
+    with suppress(OSError, ValueError):
+        return path.stat().st_size
+    return 0
+
+
 def _files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
-    """The files below ``root`` but for ``target`` itself, and what else there is, in order."""
+    """The files below ``root`` but for an earlier ``target``, and what else there is, in order."""
     own = Path(target).resolve() if isinstance(target, (str, os.PathLike)) else None
+    if own is not None and own.suffix.lower() != ".mcz":
+        own = None  # a file to be packed, which may not be replaced
     files: list[Path] = []
     others: list[Outcome] = []
 
@@ -141,7 +180,7 @@ def _files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
         return os.fsencode(name)
 
     files.sort(key=lambda path: key(path.relative_to(root).as_posix()))
-    return files, sorted(others, key=lambda outcome: key(outcome.path))
+    return files, others
 
 
 def append(
@@ -169,8 +208,9 @@ def append(
     A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
     lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
     them. Where its end is damaged, one of the two has to be given. Raises AccessError while another
-    process is appending.
+    process is appending, OptionError where the target is a source itself.
     """
+    refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
     terms = Terms(codec, params, skeleton, rate, unit, verbatim, up=up)
     entries = [Entry(Path(s), _name_below(s, root), terms) for s in sources]
     with growing(Path(target), salvage=salvage, force=force) as growth:
@@ -181,8 +221,10 @@ def append(
         report = _write_entries(draft, entries, progress)
         if report.failures:
             raise SourceError("; ".join(o.message for o in report.failures))
+        refuse_inputs(target, _inputs_of(entries))
         if growth.tail.kept or any(outcome.result != "present" for outcome in report.outcomes):
             draft.finish()
+    report.size = Path(target).stat().st_size
     report.note(notes_on(draft.paths))
     tail = growth.tail
     text = "it lay whole behind the last FOOT of a file whose writing was cut short"
@@ -221,12 +263,11 @@ def _write_entries(draft: Draft, entries: Sequence[Entry], progress: Progress | 
     report = Report()
     seen: dict[bytes, tuple[int, bytes]] = {}
     for done, entry in enumerate(entries):
-        size = 0
-        with suppress(OSError, ValueError):
-            size = entry.path.stat().st_size
+        size = _size_of(entry.path)
         try:
             result = _write_entry(draft, entry, seen)
-            report.outcomes.append(Outcome(entry.name, result, size, entry.reason))
+            notes = tuple(filter(None, (entry.remark, *entry.notes)))
+            report.outcomes.append(Outcome(entry.name, result, size, entry.reason, notes))
         except MczError as error:
             report.outcomes.append(Outcome(entry.name, "failed", size, str(error)))
         if progress is not None:
@@ -259,6 +300,7 @@ def unpack(
     target: Any,
     directory: str | os.PathLike[str],
     *,
+    clips: Sequence[str] | None = None,
     salvage: bool = False,
     force: bool = False,
     names: str = "stored",
@@ -267,7 +309,8 @@ def unpack(
 ) -> Report:
     """Write every source file and attachment of an MCZ file below ``directory``.
 
-    Each file appears under its name only when it is whole and its hash is right. No symbolic link
+    ``clips``: of these clips alone, and of their skeletons. Each file appears under its name only
+    when it is whole and its hash is right. No symbolic link
     below ``directory`` is followed. Clips without a source are reported as skipped. With
     ``salvage`` the file may be damaged: what is whole is written, the rest is reported as damaged.
 
@@ -282,7 +325,8 @@ def unpack(
     with open(target, salvage=salvage, max_decoded=max_decoded) as opened:
         file = File(opened.container.strictly())
         report.damage += opened.damage
-        jobs = list(named_files(file))
+        wanted = list(file.clips.values()) if clips is None else file.clips_called(clips)
+        jobs = list(named_files(file) if clips is None else _files_of(file, wanted))
         renamed, written, notes = PortableNames(), set[str](), notes_on(name for name, _ in jobs)
         for done, (name, restore) in enumerate(jobs):
             try:
@@ -296,7 +340,7 @@ def unpack(
                 data = restore()
                 written.add(name)
                 path = folder.place(as_name, force=force)
-                with replacing(path, force=force) as stream:
+                with replacing(path, force=force, inputs=(target,)) as stream:
                     stream.write(data)
                 folder.note(name, path)
                 text = "" if as_name == name else f"as {as_name}"
@@ -308,13 +352,13 @@ def unpack(
                 report.outcomes.append(Outcome(name, result, 0, f"{name}: {error}"))
             if progress is not None:
                 progress(done + 1, len(jobs), name)
-        report.outcomes += _without_file(file)
+        report.outcomes += _without_file(wanted)
     return report
 
 
-def _without_file(file: File) -> Iterator[Outcome]:
+def _without_file(clips: Iterable[Clip]) -> Iterator[Outcome]:
     """The clips that have no source file, or one without a name."""
-    for clip in file.clips.values():
+    for clip in clips:
         with suppress(FormatError):  # it has failed already
             if clip.source is None or not clip.source.path:
                 text = "it has no source file" if clip.source is None else "its file has no name"
@@ -323,7 +367,15 @@ def _without_file(file: File) -> Iterator[Outcome]:
 
 def named_files(file: File, *, clips: bool = True) -> Iterator[tuple[str, Any]]:
     """Path and restoring function of every file that the archive holds under a name."""
-    for clip in file.clips.values() if clips else ():
+    yield from _sources_of(file.clips.values() if clips else ())
+    for attachment in file.attachments.values():
+        yield attachment.name, attachment.read
+    for name, (of, target) in file.aliases.items():
+        yield name, _alias_reader(file, name, of, target)
+
+
+def _sources_of(clips: Iterable[Clip]) -> Iterator[tuple[str, Any]]:
+    for clip in clips:
         try:
             source = clip.source
         except FormatError as error:  # damage of one clip is no other's
@@ -331,10 +383,15 @@ def named_files(file: File, *, clips: bool = True) -> Iterator[tuple[str, Any]]:
             continue
         if source is not None and source.path:
             yield source.path, clip.source_bytes
-    for attachment in file.attachments.values():
-        yield attachment.name, attachment.read
+
+
+def _files_of(file: File, clips: Sequence[Clip]) -> Iterator[tuple[str, Any]]:
+    """The same of some clips: their sources, and the files of their skeletons."""
+    yield from _sources_of(clips)
+    skeletons = file.skeleton_ids(clips)
     for name, (of, target) in file.aliases.items():
-        yield name, _alias_reader(file, name, of, target)
+        if of == payloads.OF_SKELETON and target in skeletons:
+            yield name, _alias_reader(file, name, of, target)
 
 
 def _fail(error: FormatError) -> bytes:

@@ -86,7 +86,7 @@ def extract(
     resolution: int = 0,
     joints: Joints = None,
     frames: tuple[int, int | None] | None = None,
-    clip: str | None = None,
+    clip: str | Sequence[str] | None = None,
     salvage: bool = False,
     force: bool = False,
     max_decoded: int | None = None,
@@ -96,22 +96,23 @@ def extract(
 
     ``resolution``: the number of finest resolutions to leave out. ``joints``: those whose channels
     are kept; all joints stay in the skeleton. ``frames``: a <= f < b, b None for the end.
-    ``clip``: take out this clip alone; otherwise all clips are cut alike, and attachments kept.
+    ``clip``: take out this clip, or these, alone; otherwise all are cut, and attachments kept.
     ``salvage``: the file may be damaged, but not in what is taken out.
     ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
-    Raises OptionError or MotionError for what cannot be cut so, FormatError for bad bytes; nothing
-    is left under the target's name then.
+    Raises OptionError or MotionError for what cannot be cut so, and where the target is the source;
+    FormatError for bad bytes; nothing is left under the target's name then.
     """
     if not resolution and joints is None and frames is None and clip is None:
         raise OptionError("nothing to extract: give a resolution, joints, frames or a clip")
     with open(source, salvage=salvage, max_decoded=max_decoded) as opened:
         file = File(opened.container.strictly())
-        clips = [file.only_clip(clip)] if clip is not None else list(file.clips.values())
+        names = [clip] if isinstance(clip, str) else clip
+        clips = list(file.clips.values()) if names is None else file.clips_called(names)
         if not clips:
             raise OptionError(f"{file.name} has no clip to extract from")
         cuts = [plan_cut(one, frames, joints, resolution) for one in clips]
-        with replacing(target, force=force) as stream:
-            return Copier(file, stream, progress).run(cuts, alone=clip is not None)
+        with replacing(target, force=force, inputs=(source,)) as stream:
+            return Copier(file, stream, progress).run(cuts, alone=names is not None)
 
 
 class Copier:

@@ -43,8 +43,9 @@ class Replacement:
     """What ``replace`` did.
 
     ``recoded``: the joints that stood in the file as copies of this one and were coded anew, their
-    values as before. The two numbers of bytes are those of the joint's streams. ``max_error``: how
-    far a decoded value is from the one that was given, at most, in source units.
+    values as before. The two numbers of bytes are those of the joint's streams, its masks and its
+    exceptions: numbers off the grid, which are counted, too. ``max_error``: how far a decoded value
+    is from the one that was given, at most, in source units.
     """
 
     clip: str
@@ -53,6 +54,8 @@ class Replacement:
     recoded: tuple[str, ...]
     joint_bytes: int
     joint_bytes_before: int
+    n_exceptions: int
+    n_exceptions_before: int
     max_error: float
     left_out: tuple[str, ...]
     size: int
@@ -80,13 +83,14 @@ def replace(
     byte for byte. A lossless clip takes every number exactly, or, ``on_grid``, the nearest that its
     source would print.
 
-    Raises OptionError where the codec cannot code a joint alone, MotionError for values that it
-    cannot hold; the file is as it was then.
+    Raises OptionError where the codec cannot code a joint alone, or where ``target`` is the source,
+    MotionError for values that it cannot hold; the file is as it was then.
     """
     with ExitStack() as stack:
+        inputs = [source.name if isinstance(source, File) else source]
         if target is None:
-            target, force = _locked(source, stack), True
-        stream = stack.enter_context(replacing(target, force=force))
+            target, force, inputs = _locked(source, stack), True, []
+        stream = stack.enter_context(replacing(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
         chosen = file.only_clip(clip)
         return _write(file, chosen, recode(chosen, joint, values, on_grid), stream, progress)
@@ -121,12 +125,28 @@ def _write(
         joint=addresses[recoded.joint],
         codec=clip.codec,
         recoded=tuple(addresses[other] for other in recoded.others),
-        joint_bytes=recoded.size,
-        joint_bytes_before=recoded.size_before,
+        joint_bytes=recoded.size + writer.beside.size,
+        joint_bytes_before=recoded.size_before + writer.beside_before.size,
+        n_exceptions=writer.beside.n_exceptions,
+        n_exceptions_before=writer.beside_before.n_exceptions,
         max_error=recoded.max_error,
         left_out=tuple(found.left_out),
         size=found.size,
     )
+
+
+@dataclass(slots=True)
+class _Beside:
+    """Bytes beside the codec's streams of a joint, and how many exceptions are in them."""
+
+    size: int = 0
+    n_exceptions: int = 0
+
+    def add(self, flag: int, stream: bytes) -> None:
+        self.size += len(stream)
+        if flag == GROUP_NOTES and stream:
+            notes = parse(payloads.GROUP_NOTES, stream, "group notes")
+            self.n_exceptions += len(notes.exceptions)
 
 
 class _Editor(Copier):
@@ -137,6 +157,7 @@ class _Editor(Copier):
     ) -> None:
         super().__init__(file, stream, progress)
         self.name, self.recoded = name, recoded
+        self.beside, self.beside_before = _Beside(), _Beside()
 
     def is_same(self, cut: ClipCut) -> bool:
         return cut.clip.name != self.name
@@ -211,6 +232,9 @@ class _Editor(Copier):
             numbers = [where(group) for group in range(counts.n_groups)]
             streams = [b"" if number is None else old[number] for number in numbers]
             for group, stream in new.items():
+                if group in edit.groups:
+                    self.beside_before.add(flag, streams[group])
+                    self.beside.add(flag, stream)
                 streams[group] = stream
             if row.header.flags & flag or any(streams):
                 flags |= flag

@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from mcz.errors import FormatError, SourceError, UnsupportedError
-from mcz.formats.find import find_asf
 from mcz.formats.line_by_line import Arriving
 from mcz.formats.notes import join_notes
 from mcz.motion import FrameNotes, Source
 
-__all__ = ["FORMATS", "Format", "find_asf", "format_by_id", "format_of", "recording_of", "sniffed"]
+__all__ = ["FORMATS", "Format", "format_by_id", "format_of", "recording_of", "sniffed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +28,11 @@ class Format:
     None as a third argument where ``wants_skeleton``; it raises SourceError. ``write`` is its
     inverse; it raises MotionError or FormatError. ``join_notes`` is the inverse of the notes' cut.
     ``arrive(lines, skeleton)`` reads what comes line by line, None where the format cannot.
-    ``has_more_joints(data, most)`` says after a quick look whether a file surely has more, None
-    where nobody can. ``states_rate``: the template holds the frame rate, so that it does not suit
-    another. ``recording(name, template, detail)`` is what the source says beside all numbers, None
-    where it says nothing; see ``mcz.Recording``.
+    ``bones(data, whole=False)``: of a format that wants a skeleton, how many values each bone of
+    the first frame, or of all, has. ``has_more_joints(data, most)`` says after a quick look whether
+    a file surely has more, None where nobody can. ``states_rate``: the template holds the frame
+    rate, so that it does not suit another. ``recording(name, template, detail)`` is what the source
+    says beside all numbers, None where it says nothing; see ``mcz.Recording``.
     """
 
     name: str
@@ -47,13 +47,14 @@ class Format:
     arrive: Callable[..., Arriving] | None = None
     recording: Callable[[str, bytes, bytes], Any] | None = None
     has_more_joints: Callable[..., bool] | None = None
+    bones: Callable[..., dict[str, int]] | None = None
 
 
 def _of(module: str, name: str) -> Callable[..., Any]:
     """The function of a format's module, which is imported when it is called."""
 
-    def call(*arguments: Any) -> Any:
-        return getattr(import_module(f"{__name__}.{module}"), name)(*arguments)
+    def call(*arguments: Any, **options: Any) -> Any:
+        return getattr(import_module(f"{__name__}.{module}"), name)(*arguments, **options)
 
     return call
 
@@ -71,6 +72,7 @@ FORMATS: dict[str, Format] = {
             join_notes,
             wants_skeleton=True,
             arrive=_of("amc", "arrive"),
+            bones=_of("amc", "bones"),
         ),
         Format(
             "bvh",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError, SourceError
-from mcz.formats.bones import fit, flat, match_names
+from mcz.formats.bones import fit, flat, match_names, matched
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.line_by_line import Arriving, Frame, Lines
 from mcz.formats.notes import RowNotes
@@ -139,6 +139,19 @@ class _Frames:
         return SourceError(f"line {line_of(self.data, at)}: {message}")
 
 
+def bones(data: bytes, *, whole: bool = False) -> dict[str, int]:
+    """The bones of the first frame, or of the ``whole`` file: how many values each has.
+
+    Nothing where there is no frame.
+    """
+    match = _FIRST_FRAME.search(data)
+    if match is None:
+        return {}
+    found = (_all_bones if whole else _first_bones)(data, match.start())
+    encoding = text_encoding(data)
+    return {bone.decode(encoding): count for bone, count in found.items()}
+
+
 def is_amc(data: bytes) -> bool:
     """Whether there is a line with a frame number."""
     return _FIRST_FRAME.search(data) is not None
@@ -235,6 +248,11 @@ class _ArrivingFrames:
         """The values of a frame, (n_channels,), NaN where a bone did not come."""
         if self._counts is None:
             self._counts = {name: len(texts) for name, texts in bones.items()}
+            lacking = matched(self.skeleton, self._counts)
+            if lacking.is_foreign:
+                raise self.source.error(
+                    f"the skeleton has none of the bones: {' '.join(lacking.lacking[:8])[:200]}"
+                )
             self.skeleton, self._columns = fit(self.skeleton, self._counts, self._unit)
         row = np.full(self.skeleton.n_channels, np.nan)
         values = self.source.numbers([text for texts in bones.values() for text in texts])

@@ -3,12 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import degrees, radians
 
 from mcz.motion import ROTATION_KINDS, Channel, Joint, Skeleton
 
 Columns = dict[str, int]  # bone -> column of its first value
+ROOT = "root"  # every ASF has it, whatever else it describes
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """How the bones of an AMC file match a skeleton.
+
+    ``lacking`` are the bones that it does not have, ``differing`` those that have other numbers of
+    values there; ``n_known`` counts the bones beside the root that it has.
+    """
+
+    lacking: tuple[str, ...]
+    differing: tuple[str, ...]
+    n_known: int
+
+    @property
+    def is_foreign(self) -> bool:
+        """Whether the skeleton has none of the bones, but for the root that all have."""
+        return bool(self.lacking) and not self.n_known
+
+
+def matched(skeleton: Skeleton, counts: Mapping[str, int]) -> Match:
+    """How bones with these numbers of values match ``skeleton``."""
+    names = match_names(skeleton, counts)
+    channels: dict[str | None, int] = {j.name: len(j.channels) for j in skeleton.joints}
+    known = [bone for bone in counts if names[bone] is not None]
+    return Match(
+        lacking=tuple(bone for bone in counts if names[bone] is None),
+        differing=tuple(bone for bone in known if channels[names[bone]] != counts[bone]),
+        n_known=sum(bone.casefold() != ROOT for bone in known),
+    )
 
 
 def flat(counts: Mapping[str, int], angle_unit: str) -> tuple[Skeleton, Columns]:

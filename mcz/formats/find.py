@@ -1,50 +1,60 @@
-"""Which ASF file belongs to an AMC file."""
+"""Which ASF files may belong to an AMC file, by their names and where they lie."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
-from mcz.errors import SourceError
-
 _SEPARATORS = re.compile(r"[^0-9A-Za-z]")
+_NUMBER = re.compile(r"[0-9]+$")
+
+TAKE, SUBJECT, NUMBER = "the take", "the subject", "the take without its number"
 
 
-def find_asf(amc_path: str | Path) -> Path | None:
-    """The skeleton of an AMC file, or None.
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An ASF file that may be that of an AMC; ``name_of`` is whose name it has, "" of neither.
 
-    Looked for in this order: an ASF of the same stem beside it; one whose stem is the AMC's up to
-    one of its separators (14.asf for 14_02.amc), the longest first; the same two in a sibling
-    folder ``asf``; the only ASF beside it. Case matters in stems, not in ``asf``. Raises
-    SourceError where two files are equally good, naming them.
+    Those of equal ``rank`` are equally near.
+    """
+
+    path: Path
+    name_of: str
+    rank: int
+
+
+def skeletons_around(amc_path: str | Path) -> list[Candidate]:
+    """The ASF files around an AMC file, those whose names fit it first, the best at the front.
+
+    A name fits that is the stem of the AMC (``TAKE``), or that stem up to one of its separators,
+    the longest first (``SUBJECT``: 14.asf for 14_02.amc); first beside it, then in a sibling folder
+    ``asf``; after that the stem without the number at its end (``NUMBER``: walk.asf for
+    walk2.amc). Case matters in stems, not in ``asf``.
     """
     path = Path(amc_path)
     beside = _skeletons(path.parent)
     siblings: list[Path] = []
     for folder in _folders(path.absolute().parent.parent):
         siblings += _skeletons(folder)
-    for files in (beside, siblings):
-        for stem in _stems(path.stem):
-            found = [file for file in files if file.stem == stem]
-            if found:
-                return _only(path, found)
-    return _only(path, beside) if beside else None
+    found: dict[Path, Candidate] = {}
+    exact, short = list(_stems(path.stem)), [(_NUMBER.sub("", path.stem), NUMBER)]
+    places = [(n, f) for names in (exact, short) for f in (beside, siblings) for n in names]
+    for rank, ((stem, name_of), files) in enumerate(places):
+        for file in files:
+            if stem and file.stem == stem:
+                found.setdefault(file, Candidate(file, name_of, rank))
+    others = (file for file in (*beside, *siblings) if file not in found)
+    return [*found.values(), *(Candidate(file, "", len(places)) for file in others)]
 
 
-def _only(path: Path, found: list[Path]) -> Path:
-    if len(found) > 1:
-        names = ", ".join(str(file) for file in found)
-        raise SourceError(f"{path.name}: {len(found)} skeletons are equally near: {names}")
-    return found[0]
-
-
-def _stems(stem: str) -> Iterator[str]:
-    """The stem, then its parts before each separator, longest first."""
-    yield stem
+def _stems(stem: str) -> Iterator[tuple[str, str]]:
+    """The stem, then its parts before each separator, longest first; whose name each is."""
+    yield stem, TAKE
     for match in reversed(list(_SEPARATORS.finditer(stem))):
         if match.start():
-            yield stem[: match.start()]
+            yield stem[: match.start()], SUBJECT
 
 
 def _skeletons(folder: Path) -> list[Path]:

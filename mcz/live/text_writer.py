@@ -13,6 +13,8 @@ from mcz.formats import FORMATS, sniffed
 from mcz.formats.line_by_line import Arriving
 from mcz.live.writer import LiveWriter
 from mcz.motion import Skeleton
+from mcz.reading.skeletons import NONE, how_given
+from mcz.reading.skeletons import NOTE as SKELETON_NOTE
 from mcz.reading.source_files import read_skeleton
 from mcz.units import facing, in_unit
 from mcz.writing.entry import Terms
@@ -27,6 +29,7 @@ class LiveReport:
     n_frames: int = 0
     n_channels: int = 0
     remarks: tuple[str, ...] = ()
+    is_renumbered: bool = False
 
 
 def encode_live(
@@ -40,6 +43,10 @@ def encode_live(
     """
     arriving, base = _arriving(lines, source_format, terms)
     notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
+    metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}
+    if base is not None:
+        found = (how_given(base), metadata.get(SKELETON_NOTE, ""))
+        metadata[SKELETON_NOTE] = "; ".join(filter(None, found))
     writer = LiveWriter(
         sink,
         facing(in_unit(arriving.skeleton, terms.unit), terms.up),
@@ -48,11 +55,11 @@ def encode_live(
         frame_rate=arriving.frame_rate if terms.rate is None else Fraction(terms.rate),
         frame_rate_exact=arriving.frame_rate_exact if terms.rate is None else True,
         name=name,
-        metadata=dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))},
+        metadata=metadata,
         first_number=arriving.first_number,
         base=base,
     )
-    report = LiveReport(n_channels=arriving.skeleton.n_channels)
+    report = LiveReport(n_channels=arriving.skeleton.n_channels, remarks=_remark(arriving, terms))
     with writer:
         _push_all(arriving, writer, report)
     if arriving.declared not in (None, report.n_frames):
@@ -71,11 +78,18 @@ def _arriving(
         raise OptionError(f"format {source_format!r} cannot come line by line; these can: {able}")
     base = None
     if found.wants_skeleton:
-        if terms.skeleton is None:
+        if terms.skeleton is None or terms.skeleton == NONE:
             raise OptionError(f"{source_format} that comes line by line needs its skeleton file")
         base = in_unit(read_skeleton(terms.skeleton), terms.unit)
     arriving: Arriving = found.arrive(iter(lines), base)
     return arriving, base
+
+
+def _remark(arriving: Arriving, terms: Terms) -> tuple[str, ...]:
+    """What is to be said of the skeleton that was given."""
+    if SKELETON_NOTE not in arriving.metadata:
+        return ()
+    return (f"{terms.skeleton} does not fit: {arriving.metadata[SKELETON_NOTE]}",)
 
 
 def _push_all(arriving: Arriving, writer: LiveWriter, report: LiveReport) -> None:
@@ -83,7 +97,9 @@ def _push_all(arriving: Arriving, writer: LiveWriter, report: LiveReport) -> Non
     for number, values in arriving.frames:
         if number is not None and number != due:
             remark = f"frame {number} comes where {due} is due; the clip counts on"
-            report.remarks = report.remarks or (remark,)
+            if not report.is_renumbered:
+                report.remarks = (*report.remarks, remark)
+            report.is_renumbered = True
             due = number
         writer.push(values)
         due += 1

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from types import TracebackType
 from typing import Any
@@ -101,6 +101,17 @@ class File:
         """Further names of a clip, skeleton or attachment: name -> (of, target)."""
         return self.container.directory.aliases
 
+    def alias_of(self, name: str) -> tuple[str, str]:
+        """What ``name`` is another name of: "clip", "skeleton" or "attachment", and which.
+
+        That is its name, of a skeleton its id in hex, for its own file is what the name restores.
+        """
+        of, target = self.aliases[name]
+        if of == payloads.OF_SKELETON:
+            return "skeleton", target.hex()
+        kind = "clip" if of == payloads.OF_CLIP else "attachment"
+        return kind, target.decode("utf-8", "replace")
+
     @property
     def damage(self) -> list[str]:
         """What salvage found wrong, in file order."""
@@ -165,6 +176,21 @@ class File:
             names = listed(self.clips)
             raise OptionError(f"{self.name} has {len(self.clips)} clips, choose one: {names}")
         return next(iter(self.clips.values()))
+
+    def clips_called(self, names: Iterable[str]) -> list[Clip]:
+        """The clips of these names, each once, in this order; raises as ``only_clip`` does."""
+        found = {clip.name: clip for clip in map(self.only_clip, names)}
+        return list(found.values())
+
+    def skeleton_ids(self, clips: Iterable[Clip]) -> set[bytes]:
+        """The ids of the skeletons of these clips, and of those that they are derived from."""
+        found: set[bytes] = set()
+        for clip in clips:
+            id_: bytes | None = clip.skeleton_id
+            while id_ and id_ not in found:
+                found.add(id_)
+                id_ = self.skeleton(id_).base
+        return found
 
 
 def open(

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+import warnings
 from fractions import Fraction
 from pathlib import Path
 
-from mcz.errors import OptionError
+from mcz.errors import OptionError, SkeletonWarning
 from mcz.formats import format_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.file import open
-from mcz.reading.source_files import read_source, skeleton_of, with_facts
+from mcz.reading.skeletons import take
+from mcz.reading.source_files import with_facts
 
 
 def read(
@@ -25,10 +27,11 @@ def read(
 ) -> Motion:
     """The motion in a BVH, AMC, C3D or MCZ file.
 
-    An AMC finds its ASF beside it, or takes ``skeleton``, a path or a Skeleton. ``rate`` in frames
-    a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up ("x", "y", "z"),
-    say what the file does not. Of an MCZ file ``clip`` is read, with ``max_decoded`` as in
-    ``open``. Raises SourceError, FormatError or OptionError.
+    An AMC finds its ASF beside it, or takes ``skeleton``, a path, a Skeleton or "none"; how it was
+    found stands in the metadata, and a SkeletonWarning tells of one whose name or dofs do not fit.
+    ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
+    ("x", "y", "z"), say what the file does not. Of an MCZ file ``clip`` is read, with
+    ``max_decoded`` as in ``open``. Raises SourceError, FormatError or OptionError.
     """
     path = Path(path)
     if path.suffix.lower() == ".mcz":
@@ -38,5 +41,8 @@ def read(
         source_format = format_of(path)
         if source_format.is_skeleton:
             raise OptionError(f"{path}: a skeleton without motion (mcz.read_skeleton reads it)")
-        motion = read_source(path, source_format, skeleton_of(path, source_format, skeleton))
+        taken = take(path, skeleton)
+        if taken.remark:
+            warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
+        motion = taken.motion
     return with_facts(motion, rate, unit, up)

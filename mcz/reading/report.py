@@ -5,7 +5,7 @@ Everything that ``mcz info`` and ``mcz verify`` print is computed here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,24 +37,32 @@ class Problem:
     __repr__ = brief
 
 
-def info(file: File) -> dict[str, Any]:
-    """The document that ``mcz info --json`` prints; its keys are stable."""
-    container = file.container
-    clips = [_clip_info(file, clip) for clip in file.clips.values()]
+def info(file: File, names: Sequence[str] | None = None) -> dict[str, Any]:
+    """The document that ``mcz info --json`` prints; its keys are stable.
+
+    ``names``: of these clips alone, and of their skeletons; raises OptionError for one not there.
+    """
+    container, whole = file.container, names is None
+    chosen = list(file.clips.values()) if names is None else file.clips_called(names)
+    clips = [_clip_info(file, clip) for clip in chosen]
     shared = container.directory.shared
+    ids = {id_ for _, id_ in shared} if whole else file.skeleton_ids(chosen)
+    used = {model["id"] for clip in clips for model in clip["models"]}
+    models = [id_ for kind, id_ in shared if kind == b"MODL" and (whole or id_.hex() in used)]
     sources = [c["source_bytes"] for c in clips if c["source_bytes"]]
+    attachments = [{"name": a.name, "bytes": a.size} for a in file.attachments.values()]
     return {
         "format_version": file.header["format_version"],
         "needs_version": file.header["needs_version"],
         "profile": file.header["profile"],
         "file_bytes": file.size,
         "index_bytes": container.index.index_length if container.index else 0,
-        "skeletons": [_skeleton_info(container, id_, s) for id_, s in file.skeletons],
-        "models": [_model_info(container, id_) for kind, id_ in shared if kind == b"MODL"],
+        "skeletons": [_skeleton_info(container, i, s) for i, s in file.skeletons if i in ids],
+        "models": [_model_info(container, id_) for id_ in models],
         "clips": clips,
-        "attachments": [{"name": a.name, "bytes": a.size} for a in file.attachments.values()],
-        "aliases": sorted(file.aliases),
-        "cr_file": sum(sources) / file.size if sources else None,
+        "attachments": attachments if whole else [],
+        "aliases": sorted(file.aliases) if whole else [],
+        "cr_file": sum(sources) / file.size if sources and whole else None,
         "damage": list(file.damage),
     }
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mcz.errors import MczError, OptionError, SourceError
-from mcz.formats import Format, find_asf, format_of
+from mcz.formats import Format, format_of
 from mcz.motion import Motion, Skeleton
 from mcz.units import facing, in_unit
 
@@ -24,17 +24,6 @@ def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     if skeleton.source is None:
         return skeleton
     return replace(skeleton, source=replace(skeleton.source, path=path.name))
-
-
-def skeleton_of(
-    path: Path, source_format: Format, given: str | os.PathLike[str] | Skeleton | None
-) -> Skeleton | None:
-    if not source_format.wants_skeleton:
-        return None
-    if isinstance(given, Skeleton):
-        return given
-    found = Path(given) if given is not None else find_asf(path)
-    return read_skeleton(found) if found is not None else None
 
 
 def read_source(

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
+import warnings
 from pathlib import Path
 from typing import Any
 
+from mcz.errors import SkeletonWarning
 from mcz.formats import FORMATS, Format, format_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.report import joint_facts
-from mcz.reading.source_files import read_bytes, read_skeleton, read_source, skeleton_of
+from mcz.reading.skeletons import take
+from mcz.reading.source_files import read_bytes, read_skeleton
 
 SUFFIXES = tuple(suffix for found in FORMATS.values() for suffix in found.suffixes)
 
@@ -34,10 +37,12 @@ def source_info(
     document: dict[str, Any] = {"format": source_format.name, "file_bytes": len(data)}
     if source_format.is_skeleton:
         return document | {"skeletons": [_skeleton_facts(read_skeleton(path))], "clips": []}
-    found = skeleton_of(path, source_format, skeleton)
-    motion = read_source(path, source_format, found, data)
+    taken = take(path, skeleton, data=data)
+    if taken.remark:
+        warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
+    motion = taken.motion
     clip = _clip_facts(motion, source_format, path.name, data)
-    clip["skeleton_file"] = _file_of(found)
+    clip["skeleton_file"] = _file_of(taken.skeleton)
     return document | {"skeletons": [_skeleton_facts(motion.skeleton)], "clips": [clip]}
 
 

@@ -7,13 +7,14 @@ import io
 import os
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from mcz.container.locks import is_abandoned, lock
 from mcz.errors import AccessError, ExistsError, OptionError
+from mcz.writing.inputs import refuse_inputs
 
 SUFFIX = ".part"
 SHOWN = 48  # characters of a name in that of its temporary file: 192 bytes of 255 at most
@@ -21,13 +22,15 @@ FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)  # errors that only writing has
 
 
 @contextmanager
-def replacing(target: Any, *, force: bool) -> Iterator[BinaryIO]:
+def replacing(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterator[BinaryIO]:
     """A binary stream whose bytes become ``target`` only when the block ends well.
 
     On disk that is a temporary file beside the target, synced and renamed; a device or a pipe, and
-    a stream that was given, are written as they are. Raises ExistsError where the target exists
-    and not ``force``, AccessError where it cannot be written.
+    a stream that was given, are written as they are. Raises OptionError where the target is one of
+    ``inputs``, whatever ``force`` says, ExistsError where it exists and not ``force``, AccessError
+    where it cannot be written.
     """
+    refuse_inputs(target, inputs)
     if hasattr(target, "write"):
         yield target
         return
@@ -37,6 +40,8 @@ def replacing(target: Any, *, force: bool) -> Iterator[BinaryIO]:
         return
     if not isinstance(target, (str, os.PathLike)):
         raise OptionError(f"cannot write to {target!r}: neither a path nor a binary stream")
+    if os.fspath(target)[-1:] in (os.sep, os.altsep):
+        raise OptionError(f"{target}: a folder; name the file in it")
     path = Path(target)
     if not force and os.path.lexists(path):
         raise ExistsError(f"{path} exists; use force to replace it")

@@ -16,7 +16,8 @@ from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError
 from mcz.formats import Format, format_of
 from mcz.motion import Motion, Skeleton
-from mcz.reading.source_files import read_bytes, read_skeleton, read_source, skeleton_of, with_facts
+from mcz.reading.skeletons import NONE, NOTE, Given, Taken, take
+from mcz.reading.source_files import read_bytes, read_skeleton, with_facts
 from mcz.units import facing, in_unit, unit_cm_of
 from mcz.writing.clip_writer import Progress, write_skeleton
 from mcz.writing.draft import Draft
@@ -28,10 +29,10 @@ from mcz.writing.tuning import write_tuned
 class Terms:
     """On which terms source files are taken: how they are coded, and what is said of them.
 
-    ``skeleton`` is the ASF of an AMC. ``rate`` in frames a second, ``unit`` and ``up``, the axis
-    that points up, say what the file does not. ``verbatim``: one that cannot be parsed is kept as
-    an attachment. ``keep_skeleton``: an ASF is restored as well, under its own name. Raises
-    OptionError for an unknown codec, unit or axis.
+    ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit`` and
+    ``up``, the axis that points up, say what the file does not. ``verbatim``: one that cannot be
+    parsed is kept as an attachment. ``keep_skeleton``: an ASF is restored as well, under its own
+    name. Raises OptionError for an unknown codec, unit or axis.
     """
 
     codec: str = DEFAULT
@@ -56,6 +57,9 @@ class Entry:
     def __init__(self, path: Path, name: str, terms: Terms) -> None:
         self.path, self.name, self.terms = path, name, terms
         self.reason = ""  # why it was kept verbatim
+        self.remark = ""  # of the skeleton, where that may be another's
+        self.notes: tuple[str, ...] = ()  # what its reader noticed
+        self.inputs: list[Path] = [path]  # the files that it was made of
         self.quality: dict[str, str] | None = None  # of a lossy clip what its record says
 
     def write(self, draft: Draft, progress: Progress | None = None) -> str:
@@ -72,42 +76,49 @@ class Entry:
         except (SourceError, MotionError, LimitError) as error:
             if not self.terms.verbatim:
                 raise
-            self.reason = str(error)
+            self.reason, self.remark, self.notes = str(error), "", ()
             with draft.step():
                 draft.writer.attachment(self.name, data)
             result = "verbatim"
         draft.paths[self.name] = digest
         return result
 
-    def _given_skeleton(self) -> Skeleton | None:
+    def _given_skeleton(self) -> Given:
         """The skeleton that was asked for; that it cannot be read is not the source's fault."""
-        if self.terms.skeleton is None or self.path.suffix.lower() != ".amc":
-            return None
-        return in_unit(read_skeleton(self.terms.skeleton), self.terms.unit)
+        given = self.terms.skeleton
+        if given is None or given == NONE or self.path.suffix.lower() != ".amc":
+            return None if given is None else NONE
+        self.inputs.append(Path(given))
+        return read_skeleton(given)
 
-    def _parsed(
-        self, writer: Writer, data: bytes, given: Skeleton | None, progress: Progress | None
-    ) -> str:
+    def _parsed(self, writer: Writer, data: bytes, given: Given, progress: Progress | None) -> str:
         source_format = format_of(self.path)
         if source_format.is_skeleton:
             id_ = write_skeleton(writer, in_unit(read_skeleton(self.path), self.terms.unit))
             alias_once(writer, self.name, id_)
             return "skeleton"
         _refuse_early(source_format, data, writer.profile)
-        skeleton = skeleton_of(self.path, source_format, given)
-        if skeleton is not None:
-            skeleton = in_unit(skeleton, self.terms.unit)
-        motion = read_source(self.path, source_format, skeleton, data)
-        motion = with_facts(motion, self.terms.rate, self.terms.unit, self.terms.up)
+        taken = take(self.path, given, self.terms.unit, data)
+        self._note(taken)
+        motion = with_facts(taken.motion, self.terms.rate, self.terms.unit, self.terms.up)
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
-        if skeleton is not None:
-            motion = self._based(writer, motion, skeleton)
+        if taken.skeleton is not None:
+            motion = self._based(writer, motion, taken.skeleton)
         name = clip_name(self.name, writer.directory)
         motion = replace(motion, name=name)
         codec, params = by_name(self.terms.codec), self.terms.params or {}
         self.quality = write_tuned(writer, motion, codec, params, progress)
         return "parsed"
+
+    def _note(self, taken: Taken) -> None:
+        """Keep what was noticed, for those who asked for the file to be taken."""
+        self.remark = taken.remark
+        keys = ("source-note", *(() if taken.skeleton is not None else (NOTE,)))
+        found = (taken.motion.metadata.get(key, "") for key in keys)
+        self.notes = tuple(filter(None, found))
+        if taken.chosen is not None and taken.chosen.path is not None:
+            self.inputs.append(taken.chosen.path)
 
     def _based(self, writer: Writer, motion: Motion, skeleton: Skeleton) -> Motion:
         """``motion`` after its ASF was written; a derived skeleton names it as its base.

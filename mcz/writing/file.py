@@ -7,6 +7,7 @@ into chunks.
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -15,12 +16,13 @@ from typing import Any
 from mcz.codecs import DEFAULT, by_name
 from mcz.container.limits import ARCHIVE, BASE, Profile
 from mcz.container.writer import Writer
-from mcz.errors import OptionError
+from mcz.errors import OptionError, SkeletonWarning
 from mcz.motion import Motion
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry, Terms
+from mcz.writing.inputs import refuse_inputs
 from mcz.writing.names import check_metadata, name_skeleton
 from mcz.writing.tuning import write_tuned
 from mcz.writing.written import Written, written
@@ -43,7 +45,7 @@ def write(
     key of the metadata that SPEC.md does not register, unless it is private (``x-...``).
     """
     check_metadata(motion.metadata, motion.name)
-    with replacing(target, force=force) as stream:
+    with replacing(target, force=force, inputs=params.values()) as stream:
         writer = Writer(stream, profile=profile_of(archive))
         name_skeleton(writer, motion.skeleton)
         quality = write_tuned(writer, motion, by_name(codec), params, progress)
@@ -72,17 +74,23 @@ def encode(
 ) -> Written:
     """Turn one ASF, AMC, BVH or C3D file into an MCZ file.
 
+    ``skeleton`` is the ASF of an AMC, as ``mcz.read`` takes it, with the same SkeletonWarning.
     ``verbatim`` keeps a file that cannot be parsed as an attachment. ``up`` is the axis that points
     up ("x", "y", "z"). Raises SourceError, OptionError, MotionError or LimitError; nothing is left
-    under the final name then.
+    under the final name then. A target that is the source or its skeleton is refused, even with
+    ``force``.
     """
     path = Path(source)
     if up is not None and path.suffix.lower() == ".asf":
         raise OptionError(f"{path}: a skeleton alone is kept as it is; say the up axis of its AMC")
     terms = Terms(codec, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up)
-    with replacing(target, force=force) as stream:
+    entry = Entry(path, path.name, terms)
+    inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
+    with replacing(target, force=force, inputs=inputs) as stream:
         draft = Draft(stream, profile_of(archive), hold=verbatim)
-        entry = Entry(path, path.name, terms)
         entry.write(draft, progress)
+        refuse_inputs(target, entry.inputs)
         draft.finish()
-    return written(draft.writer.directory, draft.writer.offset, entry.quality)
+    if entry.remark:
+        warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=2)
+    return written(draft.writer.directory, draft.writer.offset, entry.quality, entry.notes)

@@ -25,7 +25,8 @@ class WrittenClip:
 class Written:
     """What ``write`` and ``encode`` have written.
 
-    ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal.
+    ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal. ``notes``: what
+    is odd about the source file.
     """
 
     size: int
@@ -33,11 +34,17 @@ class Written:
     n_skeletons: int
     n_attachments: int
     decoded_bytes: int
+    notes: tuple[str, ...] = ()
 
     __repr__ = brief
 
 
-def written(directory: Directory, size: int, quality: Mapping[str, str] | None = None) -> Written:
+def written(
+    directory: Directory,
+    size: int,
+    quality: Mapping[str, str] | None = None,
+    notes: tuple[str, ...] = (),
+) -> Written:
     """What a file of one clip or none holds, with its size and the quality record of that clip."""
     return Written(
         size=size,
@@ -48,6 +55,7 @@ def written(directory: Directory, size: int, quality: Mapping[str, str] | None =
         n_skeletons=sum(kind == b"SKEL" for kind, _ in directory.shared),
         n_attachments=len(directory.attachments),
         decoded_bytes=max(map(_decoded_bytes, directory.clips.values()), default=0),
+        notes=notes,
     )
 
 

@@ -1,4 +1,4 @@
-"""Which ASF an AMC finds."""
+"""Which ASF files lie around an AMC, and whose names they have."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from mcz.errors import SourceError
-from mcz.formats import find_asf, format_of
+from mcz.formats import format_of
+from mcz.formats.find import NUMBER, SUBJECT, TAKE, skeletons_around
 
 
 def touch(folder: Path, *names: str) -> None:
@@ -17,34 +18,56 @@ def touch(folder: Path, *names: str) -> None:
         path.write_bytes(b"")
 
 
+def around(path: Path, folder: Path) -> list[tuple[str, str]]:
+    return [(c.path.relative_to(folder).as_posix(), c.name_of) for c in skeletons_around(path)]
+
+
 @pytest.mark.parametrize(
-    ("files", "found"),
+    ("files", "found", "name_of"),
     [
-        (["amc/14_02.asf", "amc/14.asf", "asf/14_02.asf"], "amc/14_02.asf"),
-        (["amc/14.ASF", "amc/1.asf", "asf/14_02.asf"], "amc/14.ASF"),
-        (["amc/140.asf", "amc/1.asf", "asf/14.asf"], "asf/14.asf"),
-        (["amc/140.asf", "ASF/14_02.Asf", "asf2/14.asf"], "ASF/14_02.Asf"),
-        (["amc/other.asf"], "amc/other.asf"),
-        (["other/14.asf"], None),
+        (["amc/14_02.asf", "amc/14.asf", "asf/14_02.asf"], "amc/14_02.asf", TAKE),
+        (["amc/14.ASF", "amc/1.asf", "asf/14_02.asf"], "amc/14.ASF", SUBJECT),
+        (["amc/140.asf", "amc/1.asf", "asf/14.asf"], "asf/14.asf", SUBJECT),
+        (["amc/140.asf", "ASF/14_02.Asf", "asf2/14.asf"], "ASF/14_02.Asf", TAKE),
+        (["amc/other.asf"], "amc/other.asf", ""),
+        (["asf/other.asf"], "asf/other.asf", ""),
     ],
 )
-def test_the_nearest_is_found(tmp_path: Path, files: list[str], found: str | None) -> None:
+def test_the_nearest_comes_first(
+    tmp_path: Path, files: list[str], found: str, name_of: str
+) -> None:
     touch(tmp_path, "amc/14_02.AMC", *files)
-    assert find_asf(tmp_path / "amc/14_02.AMC") == (found and tmp_path / found)
+    assert around(tmp_path / "amc/14_02.AMC", tmp_path)[0] == (found, name_of)
 
 
-def test_the_longest_prefix_wins(tmp_path: Path) -> None:
-    touch(tmp_path, "a_b-c.amc", "a.asf", "a_b.asf")
-    assert find_asf(tmp_path / "a_b-c.amc") == tmp_path / "a_b.asf"
+def test_nothing_is_looked_for_elsewhere(tmp_path: Path) -> None:
+    touch(tmp_path, "amc/14_02.AMC", "other/14.asf", "14.asf", "amc/asf/14.asf")
+    assert around(tmp_path / "amc/14_02.AMC", tmp_path) == []
 
 
-@pytest.mark.parametrize("names", [("x.asf", "y.asf"), ("14.asf", "14.ASF")])
-def test_two_equally_good_ones_are_an_error(tmp_path: Path, names: tuple[str, str]) -> None:
-    touch(tmp_path, *names)
+def test_the_longest_prefix_comes_first(tmp_path: Path) -> None:
+    touch(tmp_path, "a_b-c.amc", "a.asf", "a_b.asf", "b.asf")
+    found = around(tmp_path / "a_b-c.amc", tmp_path)
+    assert found == [("a_b.asf", SUBJECT), ("a.asf", SUBJECT), ("b.asf", "")]
+
+
+def test_a_number_at_the_end_is_no_part_of_the_name(tmp_path: Path) -> None:
+    touch(tmp_path, "walk12.amc", "walk.asf", "zombie.asf", "walk1.asf")
+    assert around(tmp_path / "walk12.amc", tmp_path) == [
+        ("walk.asf", NUMBER),
+        ("walk1.asf", ""),
+        ("zombie.asf", ""),
+    ]
+    touch(tmp_path, "12.amc", ".asf")
+    assert {name_of for _, name_of in around(tmp_path / "12.amc", tmp_path)} == {""}
+
+
+def test_files_of_one_name_are_equally_near(tmp_path: Path) -> None:
+    touch(tmp_path, "14.asf", "14.ASF")
     if len(list(tmp_path.iterdir())) < 2:
         pytest.skip("this file system does not tell upper from lower case")
-    with pytest.raises(SourceError, match=r"2 skeletons.*" + names[0]):
-        find_asf(tmp_path / "14_02.amc")
+    first, second = skeletons_around(tmp_path / "14_02.amc")
+    assert first.rank == second.rank
 
 
 def test_formats_go_by_suffix() -> None:

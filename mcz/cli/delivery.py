@@ -1,0 +1,81 @@
+"""Outputs of ``mcz decode`` on their way to files: all of them, or none."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    binary_output,
+    check_new,
+    echo,
+    plain_name,
+    print_json,
+    text_output,
+    write_output,
+)
+from mcz.cli.suffixes import is_folder
+
+Output = tuple[str, str, bytes]  # kind, file name, content
+
+
+def check_count(output: str | None, count: int) -> None:
+    """Raise Failure where an output names one file, and several clips are wanted."""
+    if count > 1 and output is not None and not is_folder(output):
+        raise Failure(f"-o {output} is one file, for {count} clips; name a folder", Exit.USAGE)
+
+
+def deliver(
+    file: str,
+    output: str | None,
+    outputs: Sequence[Output],
+    force: bool,
+    as_json: bool,
+    facts: dict[str, Any],
+) -> None:
+    """Write the outputs where they belong and say so.
+
+    What stands in the way of one of them is found before the first is written.
+    """
+    from mcz.writing.inputs import refuse_inputs
+
+    inputs = (sys.stdin if file == "-" else file,)
+    if output == "-":
+        refuse_inputs(sys.stdout, inputs)
+        data = outputs[0][2]
+        (binary_output if b"\0" in data else text_output)().write(data)
+        return
+    paths = _paths(file, output, outputs)
+    for path in paths:
+        refuse_inputs(path, inputs)
+        if paths.count(path) > 1:
+            raise Failure(f"{path}: {paths.count(path)} outputs have this name", Exit.USAGE)
+    for path in paths:
+        check_new(path, force)
+    if output is not None and is_folder(output):
+        with about(output):
+            Path(output).mkdir(parents=True, exist_ok=True)
+    rows = []
+    for path, (kind, _, data) in zip(paths, outputs, strict=True):
+        write_output(path, data, force)
+        rows.append({"path": str(path), "kind": kind, "bytes": len(data)})
+    if as_json:
+        print_json({"outputs": rows, **facts})
+        return
+    for row in rows:
+        echo(f"{row['path']}  {row['bytes']:,} bytes")
+
+
+def _paths(file: str, output: str | None, outputs: Sequence[Output]) -> list[Path]:
+    """Where each output belongs: the first under the name that was given, if one was."""
+    named = output is not None and not is_folder(output)
+    folder = Path() if file == "-" else Path(file).parent
+    if output is not None:
+        folder = Path(output).parent if named else Path(output)
+    paths = [folder / plain_name(name) for _, name, _ in outputs]
+    return [Path(str(output)), *paths[1:]] if named else paths

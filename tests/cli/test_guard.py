@@ -1,0 +1,464 @@
+"""Never destroy, never mix up: inputs, suffixes, options given twice, and what is left out."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.cli.common import run
+from mcz.cli.info import command as info_command
+from mcz.cli.main import cli
+from mcz.errors import OptionError
+
+ROOT = Path(__file__).parents[2]
+Call = Callable[..., tuple[int, str, str]]
+SLOPPY = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: %d\n"
+SLOPPY += "Frame Time: 0.01\n1\n2\n3\n"
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Call:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = int(run(cli, "mcz", [str(word) for word in arguments]))
+        return code, *capsys.readouterr()
+
+    return call
+
+
+@pytest.fixture
+def folder(samples: Path, tmp_path: Path) -> Path:
+    for path in samples.iterdir():
+        shutil.copy(path, tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def packed(folder: Path, call: Call) -> Path:
+    """walk.amc, walk.bvh and walk.c3d in one file."""
+    call("pack", folder, folder / "all.mcz")
+    return folder / "all.mcz"
+
+
+# An input is no output -----------------------------------------------------------
+
+
+def names_of(path: Path) -> list[Path]:
+    """The file under its name, behind a symbolic link, and under a second name."""
+    link, second = path.with_name("link.bvh"), path.with_name("second.bvh")
+    link.symlink_to(path)
+    os.link(path, second)
+    return [path, path.parent / "." / ".." / path.parent.name / path.name, link, second]
+
+
+def test_encode_keeps_its_source(folder: Path, call: Call) -> None:
+    source = folder / "walk.bvh"
+    before = source.read_bytes()
+    for target in names_of(source):
+        code, out, errors = call("encode", source, "-o", target, "--force")
+        assert (code, out) == (2, "")
+        assert "it is the input itself" in errors
+        with pytest.raises(OptionError, match="the input itself"):
+            mcz.encode(source, target, force=True)
+        assert target.read_bytes() == before
+    with source.open("r+b") as stream, pytest.raises(OptionError, match="the input itself"):
+        mcz.encode(source, stream)
+    with pytest.raises(OptionError, match="the input itself"):
+        mcz.encode(source, source.as_uri(), force=True)
+
+
+def test_encode_keeps_the_skeleton(folder: Path, call: Call) -> None:
+    asf = folder / "walk.asf"
+    before = asf.read_bytes()
+    for options in ((), ("--skeleton", asf)):  # found, or given
+        code, _, errors = call("encode", folder / "walk.amc", "-o", asf, "--force", *options)
+        assert code == 2
+        assert "it is the input itself" in errors
+    assert asf.read_bytes() == before
+    assert not list(folder.glob("*.part"))
+
+
+def test_encode_keeps_the_file_of_a_parameter(folder: Path, call: Call) -> None:
+    basis = folder / "b.basis"
+    words = ("encode", folder / "walk.c3d", "--codec", "lsdt-clip", "--param", f"basis={basis}")
+    assert call("train", folder / "walk.c3d", "-o", basis, "--iterations", 1)[0] == 0
+    before = basis.read_bytes()
+    code, _, errors = call(*words, "-o", basis, "--force")
+    assert (code, "it is the input itself" in errors) == (2, True)
+    assert basis.read_bytes() == before
+
+
+def test_other_commands_keep_their_input(packed: Path, folder: Path, call: Call) -> None:
+    before = packed.read_bytes()
+    link = folder / "link.mcz"
+    link.symlink_to(packed)
+    for target in (packed, link):
+        for words in (
+            ("decode", packed, "--clip", "walk.bvh", "--to", "csv", "-o", target, "--force"),
+            ("decode", packed, "--clip", "walk.bvh", "--to", "bvh", "-o", target, "--force"),
+            ("extract", packed, target, "--clip", "walk", "--force"),
+            ("append", target, packed, "--verbatim"),
+            ("repair", packed, "-o", target, "--force"),
+            ("train", packed, "-o", target, "--force"),
+        ):
+            code, out, errors = call(*words)
+            assert (code, out, errors.count("\n")) == (2, "", 1), words
+            said = "not overwritten" if words[0] == "repair" else "it is the input itself"
+            assert said in errors
+    assert packed.read_bytes() == before
+
+
+def test_append_keeps_its_target(packed: Path, folder: Path) -> None:
+    with pytest.raises(OptionError, match="the input itself"):
+        mcz.append([packed], packed, verbatim=True)
+    with pytest.raises(OptionError, match="the input itself"):
+        mcz.append([folder / "walk.amc"], folder / "walk.asf", skeleton=folder / "walk.asf")
+
+
+def test_pack_keeps_what_it_packs(folder: Path, call: Call) -> None:
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    code, _, errors = call("pack", folder, folder / "walk.bvh", "--force")
+    assert code == 2
+    assert "it is the input itself" in errors
+    (folder / "x.mcz").symlink_to(folder / "walk.bvh")
+    assert call("pack", folder, folder / "x.mcz", "--force")[0] == 2
+    (folder / "x.mcz").unlink()
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    for _ in range(2):  # the earlier archive is no part of the new one
+        assert call("pack", folder, folder / "all.mcz", "--keep-all", "--force")[0] == 0
+        with mcz.open(folder / "all.mcz") as file:
+            assert not file.attachments
+
+
+def test_unpack_keeps_its_archive(tmp_path: Path, call: Call) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "all.mcz").write_bytes(b"an earlier one")
+    assert call("pack", tmp_path / "in", tmp_path / "all.mcz", "--keep-all")[0] == 0
+    before = (tmp_path / "all.mcz").read_bytes()
+    code, _, errors = call("unpack", tmp_path / "all.mcz", tmp_path, "--force")
+    assert code == 1
+    assert "it is the input itself" in errors
+    assert (tmp_path / "all.mcz").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "encode - -o walk.bvh --force",
+        "encode - --codec lsdt-frame --param step=0.1 -o walk.bvh --force",
+        "encode walk.bvh -o - >> walk.bvh",
+        "stream encode -o walk.bvh --force",
+        "stream decode >> walk.bvh",
+        "decode - -o walk.bvh --force < walk.mcz",
+    ],
+)
+def test_standard_streams_are_files_too(folder: Path, words: str) -> None:
+    before = (folder / "walk.bvh").read_bytes()
+    mcz.encode(folder / "walk.bvh", folder / "walk.mcz")
+    if "<" in words:
+        os.replace(folder / "walk.mcz", folder / "kept.mcz")
+        os.link(folder / "kept.mcz", folder / "walk.mcz")
+        words = words.replace("-o walk.bvh", "-o kept.mcz --to csv")
+    else:
+        words += " < walk.bvh"
+    done = subprocess.run(
+        f"{sys.executable} -m mcz.cli.main {words}",
+        shell=True,
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    assert b"it is the input itself" in done.stderr
+    assert (folder / "walk.bvh").read_bytes() == before
+
+
+def test_a_device_is_nobody_s_input(folder: Path, call: Call) -> None:
+    if not Path("/dev/null").exists():
+        pytest.skip("no /dev/null")
+    assert call("encode", folder / "walk.bvh", "-o", "/dev/null", "--force")[0] == 0
+
+
+# What the suffix says ------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("suffix", "start"),
+    [("bvh", b"HIERARCHY"), ("BVH", b"HIERARCHY"), ("csv", b"frame,root.tx"), ("npz", b"PK")],
+)
+def test_a_suffix_converts(folder: Path, call: Call, suffix: str, start: bytes) -> None:
+    call("encode", folder / "walk.amc", "--rate", 120)
+    out = folder / f"x.{suffix}"
+    assert call("decode", folder / "walk.mcz", "-o", out)[0] == 0
+    assert out.read_bytes().startswith(start)
+
+
+def test_its_own_suffix_and_an_unknown_one_are_the_source(folder: Path, call: Call) -> None:
+    call("encode", folder / "walk.amc")
+    for name in ("x.amc", "x.AMC", "x.txt", "x"):
+        assert call("decode", folder / "walk.mcz", "-o", folder / name)[0] == 0
+        assert (folder / name).read_bytes() == (folder / "walk.amc").read_bytes()
+
+
+def test_to_wins(folder: Path, call: Call) -> None:
+    call("encode", folder / "walk.amc")
+    assert call("decode", folder / "walk.mcz", "--to", "csv", "-o", folder / "x.bvh")[0] == 0
+    assert (folder / "x.bvh").read_bytes().startswith(b"frame,")
+
+
+@pytest.mark.parametrize("suffix", ["asf", "mcz", "trc", "fbx"])
+def test_what_cannot_be_written_is_refused(folder: Path, call: Call, suffix: str) -> None:
+    call("encode", folder / "walk.amc")
+    out = folder / f"x.{suffix}"
+    code, _, errors = call("decode", folder / "walk.mcz", "-o", out)
+    assert code == 2
+    assert f"a clip cannot be written as .{suffix}" in errors
+    assert not out.exists()
+
+
+def test_a_rate_that_is_needed_is_asked_for(folder: Path, call: Call) -> None:
+    call("encode", folder / "walk.amc")  # it does not say its rate
+    code, _, errors = call("decode", folder / "walk.mcz", "-o", folder / "x.bvh")
+    assert code != 0
+    assert "rate" in errors
+    assert not (folder / "x.bvh").exists()
+    assert call("decode", folder / "walk.mcz", "-o", folder / "x.bvh", "--rate", 120)[0] == 0
+
+
+def test_joints_of_a_table(folder: Path, call: Call) -> None:
+    call("encode", folder / "walk.bvh")
+    words = ("decode", folder / "walk.mcz", "--joints", "Head", "-o")
+    assert call(*words, folder / "x.csv")[0] == 0
+    assert (folder / "x.csv").read_text().startswith("frame,Head.rz")
+    code, _, errors = call(*words, folder / "x.bvh")
+    assert (code, "--joints needs" in errors) == (2, True)
+
+
+def test_what_is_kept_has_one_format(folder: Path, call: Call) -> None:
+    call("encode", folder / "walk.asf")
+    code, _, errors = call("decode", folder / "walk.mcz", "-o", folder / "x.bvh")
+    assert code == 2
+    assert "walk.asf, which is not converted to .bvh" in errors
+    assert call("decode", folder / "walk.mcz", "-o", folder / "x.asf")[0] == 0
+
+
+# Outputs: all or none ------------------------------------------------------------
+
+
+def test_all_outputs_or_none(folder: Path, call: Call) -> None:
+    mcz.encode(folder / "walk.amc", folder / "p.mcz", codec="lsdt-clip", rate=120)
+    (folder / "out").mkdir()
+    (folder / "out" / "walk.asf").write_bytes(b"mine")
+    words = ("decode", folder / "p.mcz", "--to", "amc", "--solve-ik", "--with-skeleton", "-o")
+    for target in (folder / "out", folder / "out" / "x.amc"):
+        code, _, errors = call(*words, target)
+        assert (code, "walk.asf: exists" in errors) == (2, True)
+        assert [path.name for path in (folder / "out").iterdir()] == ["walk.asf"]
+    assert (folder / "out" / "walk.asf").read_bytes() == b"mine"
+
+
+def test_two_outputs_of_one_name(folder: Path, call: Call) -> None:
+    call("encode", folder / "walk.amc")
+    words = ("decode", folder / "walk.mcz", "--with-skeleton", "--force", "-o")
+    code, _, errors = call(*words, folder / "walk.asf", "--to", "csv")
+    assert (code, "2 outputs have this name" in errors) == (2, True)
+
+
+def test_a_slash_is_a_folder(folder: Path, call: Call) -> None:
+    call("encode", folder / "walk.bvh")
+    assert call("decode", folder / "walk.mcz", "-o", f"{folder}/deep/p/")[0] == 0
+    assert (folder / "deep/p/walk.bvh").read_bytes() == (folder / "walk.bvh").read_bytes()
+    code, _, errors = call("encode", folder / "walk.bvh", "-o", f"{folder}/q/")
+    assert (code, "name the file in it" in errors) == (2, True)
+    assert not (folder / "q").exists()
+
+
+# Options given twice -------------------------------------------------------------
+
+TWICE = [
+    ("encode", "a.bvh", "--force", "--force"),
+    ("encode", "a.bvh", "-o", "x.mcz", "--output", "y.mcz"),
+    ("decode", "a.mcz", "--to", "csv", "--to", "bvh"),
+    ("decode", "a.mcz", "--joints", "a", "--joints=b"),
+    ("info", "a.mcz", "--json", "--json"),
+    ("replace", "a.mcz", "b.mcz", "--joint", "a", "--joint", "b", "--values", "v.csv"),
+    ("bench", "--cache", "--no-cache"),
+    ("pack", "a", "b.mcz", "--rate", "1", "--rate", "2"),
+    ("append", "a.bvh", "b.mcz", "--unit", "m", "--unit", "cm"),
+    ("diff", "a.mcz", "b.mcz", "--frames", "0:1", "--frames", "0:2"),
+    ("extract", "a.mcz", "b.mcz", "--resolution", "1", "--resolution", "2"),
+    ("stream", "encode", "--name", "a", "--name", "b"),
+    ("stream", "decode", "a.mcz", "--lost", "hold", "--lost", "linear"),
+    ("train", "a.bvh", "-o", "x", "-o", "y"),
+    ("verify", "a.mcz", "--source", "x", "--source", "y"),
+    ("unpack", "a.mcz", "x", "--force", "--force"),
+    ("list", "a.mcz", "--json", "--json"),
+    ("repair", "a.mcz", "-o", "b.mcz", "--output", "c.mcz"),
+    ("codecs", "--json", "--json"),
+    ("sample", "x", "--force", "--force"),
+]
+
+
+@pytest.mark.parametrize("words", TWICE, ids=" ".join)
+def test_an_option_given_twice_is_an_error(words: tuple[str, ...], call: Call) -> None:
+    code, out, errors = call(*words)
+    assert (code, out) == (2, "")
+    name = " ".join(words[:2] if words[0] == "stream" else words[:1])
+    assert "is given 2 times, and takes one" in errors
+    assert f"see mcz {name} --help" in errors
+
+
+def test_every_command_is_tried_with_options_twice() -> None:
+    assert isinstance(cli, __import__("click").Group)
+    words = {words[0] for words in TWICE} | {"completion"}  # which has no options
+    assert words == set(cli.list_commands(None))  # type: ignore[arg-type]
+
+
+def test_help_and_lists_may_be_repeated(call: Call, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("decode", "--joints", "a", "--joints", "b", "--help")[0] == 0
+    words = ("encode", "a.bvh", "--param", "x=1", "--param", "y=2")
+    assert "a.bvh: no such file" in call(*words)[2]
+    assert run(info_command, "mcz-info", ["a.mcz", "--json", "--json"]) == 2
+    assert "--json is given 2 times" in capsys.readouterr().err
+
+
+def test_decode_several_clips(packed: Path, folder: Path, call: Call) -> None:
+    out = folder / "out"
+    words = ("decode", packed, "--clip", "walk", "--clip", "walk.bvh", "--clip", "walk")
+    assert call(*words, "-o", f"{out}/")[0] == 0
+    assert sorted(path.name for path in out.iterdir()) == ["walk.amc", "walk.bvh"]
+    assert (out / "walk.amc").read_bytes() == (folder / "walk.amc").read_bytes()
+    for target in ("-", folder / "x.amc"):
+        code, _, errors = call(*words, "-o", target)
+        assert (code, "is one file, for 2 clips" in errors) == (2, True)
+    rows = json.loads(call(*words, "--to", "csv", "-o", out, "--json")[1])["outputs"]
+    assert [Path(row["path"]).name for row in rows] == ["walk.csv", "walk.bvh.csv"]
+    assert call(*words, "--clip", "none", "-o", out)[0] == 2
+
+
+def test_unpack_and_extract_several_clips(packed: Path, folder: Path, call: Call) -> None:
+    out = folder / "out"
+    assert call("unpack", packed, out, "--clip", "walk", "--clip", "walk.c3d")[0] == 0
+    names = ["walk.amc", "walk.asf", "walk.c3d"]  # a clip comes with its skeleton
+    assert sorted(path.name for path in out.iterdir()) == names
+    small = folder / "small.mcz"
+    assert call("extract", packed, small, "--clip", "walk", "--clip", "walk.bvh")[0] == 0
+    with mcz.open(small) as file:
+        assert list(file.clips) == ["walk", "walk.bvh"]
+        assert file.clips["walk"].source_bytes() == (folder / "walk.amc").read_bytes()
+    assert call("verify", small)[0] == 0
+    assert call("unpack", packed, out, "--clip", "none")[0] == 2
+
+
+def test_info_of_some_clips(packed: Path, call: Call) -> None:
+    document = json.loads(call("info", packed, "--json", "--clip", "walk")[1])
+    assert [clip["name"] for clip in document["clips"]] == ["walk"]
+    assert [one["name"] for one in document["skeletons"]] == ["walk"]
+    assert len(json.loads(call("info", packed, "--json")[1])["skeletons"]) == 3
+    assert call("info", packed, "--clip", "none")[0] == 2
+    assert call("info", packed, "--clip", "walk", "--layout")[0] == 2
+
+
+# What is left out, what was noticed ----------------------------------------------
+
+
+def test_pack_names_what_it_leaves_out(folder: Path, call: Call) -> None:
+    (folder / "sub").mkdir()
+    for name in ("a.trc", "sub/b.trc", "notes.txt", "README"):
+        (folder / name).write_bytes(b"12345")
+    (folder / "sloppy.bvh").write_text(SLOPPY % 2)
+    words = ("pack", folder, folder / "all.mcz")
+    code, out, errors = call(*words)
+    assert code == 0
+    assert "left out 4 files: 2 .trc, 1 .txt, 1 without suffix" in errors
+    for name in ("a.trc", "sub/b.trc", "notes.txt", "README"):
+        assert f"mcz: {name}: skipped: no motion file; --keep-all keeps it" in errors
+    assert "mcz: sloppy.bvh: 2 frames are declared, 3 are there" in errors
+    size = (folder / "all.mcz").stat().st_size
+    total = sum((folder / f"walk.{s}").stat().st_size for s in ("asf", "amc", "bvh", "c3d"))
+    total += (folder / "sloppy.bvh").stat().st_size
+    assert f"sources {total:,} bytes, the file {size:,} bytes" in out
+    code, out, errors = call(*words, "--force", "--json")
+    document = json.loads(out)
+    assert "left out 4 files" in errors
+    assert document["bytes"] == size
+    assert document["counts"] == {"parsed": 4, "skeleton": 1, "skipped": 4}
+    rows = {row["path"]: row for row in document["files"]}
+    assert rows["a.trc"]["result"] == "skipped"
+    assert rows["sloppy.bvh"]["notes"] == ["2 frames are declared, 3 are there"]
+    assert "left out" not in call(*words, "--force", "--keep-all")[2]
+
+
+def test_many_of_a_kind_are_counted(tmp_path: Path, call: Call) -> None:
+    for number in range(60):
+        (tmp_path / f"{number:02}.png").write_bytes(b"")
+    errors = call("pack", tmp_path, tmp_path / "a.mcz")[2]
+    assert errors.count(".png: skipped") == 50
+    assert "mcz: 10 more .png files skipped: no motion file" in errors
+
+
+def test_encode_and_append_pass_on_what_was_noticed(folder: Path, call: Call) -> None:
+    for number, name in enumerate("ab"):
+        (folder / f"{name}.bvh").write_text(SLOPPY % number)
+    errors = call("encode", folder / "a.bvh")[2]
+    assert errors == f"mcz: {folder / 'a.bvh'}: 0 frames are declared, 3 are there\n"
+    _, out, errors = call("append", folder / "b.bvh", folder / "a.mcz")
+    assert "mcz: b.bvh: 1 frames are declared, 3 are there" in errors
+    assert f"the file {(folder / 'a.mcz').stat().st_size:,} bytes" in out
+
+
+def test_info_of_many_clips_passes_it_on(folder: Path, call: Call) -> None:
+    (folder / "notes.txt").write_text("left foot first")
+    for number in range(4):
+        (folder / f"s{number}.bvh").write_text((SLOPPY % 2).replace("3\n", f"3{number}\n"))
+    call("pack", folder, folder / "all.mcz")
+    shown = call("info", folder / "all.mcz")[1]
+    assert "source-note  2 frames are declared, 3 are there: s0, s1, s2, s3" in shown
+    assert "skeleton-note  ASF of the name of the take: walk" in shown
+    call("pack", folder, folder / "all.mcz", "--keep-all", "--force")
+    assert "\\n" not in call("info", folder / "all.mcz")[1]
+
+
+def test_an_amc_without_any_asf_is_told(folder: Path, call: Call) -> None:
+    (folder / "walk.asf").unlink()
+    assert "no ASF: a flat list of bones" in call("encode", folder / "walk.amc")[2]
+
+
+def test_list_says_what_a_name_restores(folder: Path, call: Call) -> None:
+    shutil.copy(folder / "walk.bvh", folder / "again.bvh")
+    call("pack", folder, folder / "all.mcz")
+    shown = call("list", folder / "all.mcz")[1]
+    assert "walk.asf  the file of skeleton " in shown
+    assert "walk.bvh  same content as clip again" in shown
+    document = json.loads(call("list", folder / "all.mcz", "--json")[1])
+    assert document["aliases"] == ["walk.asf", "walk.bvh"]
+    assert document["alias_targets"][1] == {"name": "walk.bvh", "of": "clip", "target": "again"}
+    assert document["alias_targets"][0]["of"] == "skeleton"
+
+
+def test_replace_counts_exceptions(folder: Path, call: Call) -> None:
+    call("encode", folder / "walk.bvh")
+    with mcz.open(folder / "walk.mcz") as file:
+        values = file.clips["walk"].read(joints=["Head"]) + np.pi / 1000
+    np.savez(folder / "v.npz", values=values)
+    words = ("replace", folder / "walk.mcz", folder / "x.mcz", "--joint", "Head")
+    words = (*words, "--values", folder / "v.npz", "--force")
+    code, out, _ = call(*words)
+    assert code == 0
+    assert "720 numbers of the joint off the grid, 0 before; --on-grid" in out
+    document = json.loads(call(*words, "--json")[1])
+    assert (document["n_exceptions"], document["n_exceptions_before"]) == (720, 0)
+    grown = (folder / "x.mcz").stat().st_size - (folder / "walk.mcz").stat().st_size
+    assert document["joint_bytes"] - document["joint_bytes_before"] == pytest.approx(grown, abs=300)
+    info = json.loads(call("info", folder / "x.mcz", "--json")[1])
+    assert info["clips"][0]["n_exceptions"] == 720
+    assert json.loads(call(*words, "--on-grid", "--json")[1])["n_exceptions"] == 0

@@ -1,0 +1,310 @@
+"""Never the wrong skeleton: which ASF an AMC gets, with what words, and what is recorded of it."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
+from mcz.errors import SkeletonWarning, SourceError
+from mcz.live.text_writer import encode_live
+from mcz.writing.entry import Terms
+
+ASF = b""":name small
+:units
+  length 0.45
+  angle deg
+:root
+  order TX TY TZ RX RY RZ
+  axis XYZ
+  position 0 0 0
+  orientation 0 0 0
+:bonedata
+  begin
+    id 1
+    name %s
+    direction 0 1 0
+    length 2
+    axis 0 0 0 XYZ
+    dof %s
+  end
+:hierarchy
+  begin
+    root %s
+  end
+"""
+AMC = b"1\nroot 0 0 0 0 0 0\nspine 1.5 2\n2\nroot 0 0 1 0 0 0\nspine 2.5 2\n"
+Said = Callable[..., tuple[int, str, str]]
+
+
+def asf(bone: bytes = b"spine", dofs: bytes = b"rx ry") -> bytes:
+    return ASF % (bone, dofs, bone)
+
+
+FITS, OTHER_DOFS, FOREIGN = asf(), asf(dofs=b"rx ry rz"), asf(b"tail")
+FILES = {"fits": FITS, "dofs": OTHER_DOFS, "foreign": FOREIGN}
+
+
+def put(folder: Path, amc: str, **kinds: str) -> Path:
+    """The path of an AMC in ``folder`` beside ASF files, each ``name="fits"`` or the like."""
+    for name, kind in kinds.items():
+        (folder / f"{name}.asf").write_bytes(FILES[kind])
+    path = folder / f"{amc}.amc"
+    path.write_bytes(AMC)
+    return path
+
+
+def read(path: Path, **options: object) -> tuple[mcz.Motion, list[str]]:
+    """The motion of a file, and what was warned of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        motion = mcz.read(path, **options)
+    assert all(one.category is SkeletonWarning for one in caught)
+    return motion, [str(one.message) for one in caught]
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Said:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = int(run(cli, "mcz", [str(word) for word in arguments]))
+        return code, *capsys.readouterr()
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("amc", "asfs", "note"),
+    [
+        ("walk_01", {"walk_01": "fits", "walk": "dofs"}, "ASF of the name of the take"),
+        ("walk_01", {"walk": "fits", "other": "fits"}, "ASF of the name of the subject"),
+        ("walk1", {"walk": "fits", "zombie": "fits"}, "the take without its number"),
+        ("a_b_c", {"a_b": "foreign", "a": "fits"}, "ASF of the name of the subject"),
+    ],
+)
+def test_without_a_word(tmp_path: Path, amc: str, asfs: dict[str, str], note: str) -> None:
+    """Where the name fits the take, and bones and dofs fit the file."""
+    motion, said = read(put(tmp_path, amc, **asfs))
+    assert said == []
+    assert note in motion.metadata["skeleton-note"]
+    assert motion.skeleton.n_joints == 2 and motion.skeleton.base is None
+
+
+@pytest.mark.parametrize(
+    ("amc", "asfs", "words"),
+    [
+        ("05_01", {"09": "fits"}, "09.asf, the only one around whose bones fit"),
+        ("05_01", {"09": "fits", "10": "foreign"}, "09.asf, the only one around whose bones fit"),
+        ("05_01", {"09": "fits", "10": "dofs"}, "09.asf, the only one around whose bones fit"),
+        ("05_01", {"09": "dofs"}, "the only one around whose bones fit; the dofs of spine"),
+        ("05_01", {"05": "dofs"}, "05.asf; the dofs of spine are not those of the file"),
+    ],
+)
+def test_with_a_line(tmp_path: Path, amc: str, asfs: dict[str, str], words: str) -> None:
+    motion, said = read(put(tmp_path, amc, **asfs))
+    assert len(said) == 1
+    assert words in said[0]
+    assert motion.skeleton.n_joints == 2
+
+
+@pytest.mark.parametrize(
+    ("amc", "asfs", "words"),
+    [
+        ("05_01", {"09": "fits", "10": "fits"}, "no skeleton has its name, and 2 have its bones"),
+        ("05_01", {"09": "foreign"}, "no skeleton around has its name or its bones"),
+        ("05_01", {"05": "foreign"}, "has its name, but not its bones"),
+        ("05_01", {"05": "foreign", "09": "fits"}, "has its name, but not its bones"),
+    ],
+)
+def test_refused(tmp_path: Path, amc: str, asfs: dict[str, str], words: str) -> None:
+    """The error names the candidates and the option."""
+    path = put(tmp_path, amc, **asfs)
+    with pytest.raises(SourceError) as caught:
+        mcz.read(path)
+    assert words in str(caught.value)
+    assert "--skeleton" in str(caught.value)
+    assert all(f"{name}.asf" in str(caught.value) for name in asfs)
+
+
+def test_files_of_one_name_are_a_riddle(tmp_path: Path) -> None:
+    path = put(tmp_path, "walk_1", walk="fits")
+    (tmp_path / "walk.ASF").write_bytes(OTHER_DOFS + b"# more\n")
+    if len(list(tmp_path.iterdir())) < 3:
+        pytest.skip("this file system does not tell upper from lower case")
+    assert read(path)[1] == []  # one fits better
+    (tmp_path / "walk.ASF").write_bytes(FITS + b"# more\n")
+    with pytest.raises(SourceError, match="2 skeletons are equally near"):
+        mcz.read(path)
+
+
+def test_a_skeleton_that_cannot_be_read(tmp_path: Path) -> None:
+    path = put(tmp_path, "walk_1", other="fits")
+    (tmp_path / "bad.asf").write_bytes(b"no")
+    assert "other.asf" in read(path)[1][0]
+    (tmp_path / "walk.asf").write_bytes(b"no")
+    with pytest.raises(SourceError, match=r"walk\.asf: line 1"):
+        mcz.read(path)
+
+
+def test_bones_that_come_late(tmp_path: Path) -> None:
+    """The whole file counts, not its first frame alone."""
+    path = put(tmp_path, "walk", walk="fits")
+    path.write_bytes(AMC + b"3\nroot 0 0 0 0 0 0\nspine 1 2\nprop 7\n")
+    with pytest.raises(SourceError, match=r"lacks prop; --skeleton"):
+        mcz.read(path)
+    motion, said = read(path, skeleton=tmp_path / "walk.asf")
+    assert "lacks prop; they are scalars without kinematics" in said[0]
+    assert motion.skeleton.n_joints == 3
+
+
+def test_one_that_is_given(tmp_path: Path) -> None:
+    path = put(tmp_path, "05_01", a="fits", b="dofs", c="foreign")
+    motion, said = read(path, skeleton=tmp_path / "a.asf")
+    assert (said, motion.metadata["skeleton-note"]) == ([], "ASF as given: a.asf")
+    again = read(path, skeleton=mcz.read_skeleton(tmp_path / "a.asf"))[0]
+    assert (again.skeleton, again.metadata) == (motion.skeleton, motion.metadata)
+    motion, said = read(path, skeleton=tmp_path / "b.asf")
+    assert "the dofs of spine are not those of the file" in said[0]
+    assert motion.metadata["skeleton-note"].startswith("ASF as given: b.asf; the channels of")
+    with pytest.raises(SourceError, match=r"c\.asf has none of its bones: spine"):
+        mcz.read(path, skeleton=tmp_path / "c.asf")
+    motion, said = read(path, skeleton="none")
+    assert said == []
+    assert motion.metadata["skeleton-note"].startswith("no ASF")
+
+
+def test_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
+    path = put(tmp_path, "05_01")
+    try:
+        (tmp_path / "caf\udce9.asf").write_bytes(FITS)
+    except (OSError, UnicodeError):
+        pytest.skip("this file system has no such names")
+    motion, said = read(path)
+    assert len(said) == 1
+    assert "caf\\udce9.asf" in motion.metadata["skeleton-note"]
+    report = mcz.pack(tmp_path, tmp_path / "a.mcz")
+    assert report.count("parsed") == 1
+
+
+# Every door ----------------------------------------------------------------------
+
+
+def test_encode_says_it_and_keeps_it(tmp_path: Path, call: Said) -> None:
+    path = put(tmp_path, "05_01", **{"09": "fits"})
+    code, _, errors = call("encode", path)
+    assert (code, errors.count("\n")) == (0, 1)
+    assert errors.startswith(f"mcz: {path}: its skeleton is {tmp_path / '09.asf'}, the only one")
+    shown = call("info", path.with_suffix(".mcz"))[1]
+    assert "skeleton-note  ASF the only one that fits: 09.asf" in shown
+    with pytest.warns(SkeletonWarning, match="the only one around"):
+        mcz.encode(path, tmp_path / "b.mcz")
+
+
+def test_encode_refuses_and_leads_on(tmp_path: Path, call: Said) -> None:
+    path = put(tmp_path, "05_01", **{"09": "foreign"})
+    code, out, errors = call("encode", path)
+    assert (code, out, errors.count("\n")) == (1, "", 1)
+    assert "09.asf (which lacks spine)" in errors and "--skeleton" in errors
+    assert not path.with_suffix(".mcz").exists()
+    assert call("encode", path, "--skeleton", "none")[0] == 0
+    code, _, errors = call("encode", path, "--force", "--skeleton", tmp_path / "09.asf")
+    assert code == 1 and "none of its bones" in errors
+    assert call("encode", path, "--force", "--verbatim")[0] == 0
+
+
+def test_pack_names_each(tmp_path: Path, call: Said) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    put(folder, "walk_1", walk="fits", other="dofs")
+    put(folder, "zombie")
+    (folder / "alone").mkdir()
+    put(folder / "alone", "riddle", a="fits", b="fits")
+    code, out, _ = call("pack", folder, tmp_path / "a.mcz", "--json")
+    rows = {row["path"]: row for row in json.loads(out)["files"]}
+    assert code == 1
+    assert rows["walk_1.amc"]["notes"] == []
+    assert "walk.asf, the only one around" in rows["zombie.amc"]["notes"][0]
+    assert "2 have its bones" in rows["alone/riddle.amc"]["message"]
+    _, _, errors = call("pack", folder, tmp_path / "a.mcz", "--force")
+    assert "mcz: zombie.amc: its skeleton is" in errors
+
+
+def test_append_names_it(tmp_path: Path, call: Said) -> None:
+    put(tmp_path, "walk", walk="fits")
+    assert call("encode", tmp_path / "walk.amc")[0] == 0
+    (tmp_path / "x").mkdir()
+    path = put(tmp_path / "x", "05_01", **{"09": "fits"})
+    code, _, errors = call("append", path, tmp_path / "walk.mcz")
+    assert code == 0
+    assert "09.asf, the only one around" in errors
+    path = put(tmp_path / "x", "05_02", **{"10": "fits"})
+    code, _, errors = call("append", path, tmp_path / "walk.mcz")
+    assert code == 1 and "2 have its bones" in errors
+
+
+def test_write_keeps_what_read_recorded(tmp_path: Path) -> None:
+    mcz.write(mcz.read(put(tmp_path, "walk", walk="fits")), tmp_path / "a.mcz")
+    with mcz.open(tmp_path / "a.mcz") as file:
+        note = file.clips["walk"].motion().metadata["skeleton-note"]
+    assert note == "ASF of the name of the take"
+
+
+def test_diff_and_bench(tmp_path: Path, call: Said) -> None:
+    path = put(tmp_path, "05_01", **{"09": "fits"})
+    shutil.copy(path, tmp_path / "05_02.amc")
+    code, _, errors = call("diff", path, tmp_path / "05_02.amc")
+    assert (code, errors.count("the only one around")) == (0, 2)
+    assert call("diff", path, path, "--skeleton", tmp_path / "09.asf")[2] == ""
+    options = ("--codecs", "raw", "--no-speeds", "--no-cache", "--jobs", "1")
+    code, _, errors = call("bench", path, *options)
+    assert (code, errors.count("the only one around")) == (0, 1)
+    put(tmp_path, "05_01", **{"10": "fits"})
+    assert call("diff", path, path)[0] == 1
+
+
+def test_live(tmp_path: Path) -> None:
+    put(tmp_path, "walk", a="fits", b="dofs", c="foreign")
+
+    def coded(name: str, sink: io.BytesIO) -> tuple[str, ...]:
+        terms = Terms("lsdt-frame", {"step": 0.01}, tmp_path / f"{name}.asf", rate=120)
+        return encode_live(AMC.splitlines(keepends=True), sink, "amc", terms).remarks
+
+    sink = io.BytesIO()
+    assert coded("a", sink) == ()
+    with mcz.open(sink.getvalue()) as file:
+        assert "ASF as given: a.asf" in file.clips["live"].metadata["skeleton-note"]
+        assert np.isfinite(file.clips["live"].read()).all()
+    assert "b.asf does not fit" in coded("b", io.BytesIO())[0]
+    with pytest.raises(SourceError, match="none of the bones: spine"):
+        coded("c", io.BytesIO())
+
+
+@pytest.mark.real
+def test_real_subjects(data: Path, tmp_path: Path) -> None:
+    """CMU's bones have the same names in all subjects: only names tell which is whose."""
+    take = data / "cmu/amc/05_01.amc"
+    assert read(take)[1] == []
+    shutil.copy(take, tmp_path / "05_01.amc")
+    shutil.copy(data / "cmu/asf/09.asf", tmp_path)
+    assert "09.asf" in read(tmp_path / "05_01.amc")[1][0]
+    shutil.copy(data / "cmu/asf/10.asf", tmp_path)
+    with pytest.raises(SourceError, match=r"09\.asf .*10\.asf"):
+        mcz.read(tmp_path / "05_01.amc")
+    shutil.copy(data / "cmu/asf/05.asf", tmp_path)
+    assert read(tmp_path / "05_01.amc")[1] == []
+
+
+@pytest.mark.real
+def test_a_real_skeleton_of_none_of_the_bones(data: Path, tmp_path: Path) -> None:
+    shutil.copy(data / "cmu/amc/05_01.amc", tmp_path)
+    shutil.copy(data / "other/endorphin/skeleton.asf", tmp_path)
+    with pytest.raises(SourceError, match=r"skeleton\.asf \(which lacks lowerback"):
+        mcz.read(tmp_path / "05_01.amc")
