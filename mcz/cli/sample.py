@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, echo, print_json, write_output
+from mcz.cli.common import Exit, about, echo, exists, print_json, write_output
 from mcz.cli.options import force_option, json_option
 
 
@@ -26,7 +26,7 @@ def command(folder: Path, force: bool, as_json: bool) -> Exit:
     files = sample_files()
     taken = [folder / name for name in files if (folder / name).exists()]
     if taken and not force:
-        raise Failure(f"{taken[0]}: exists; --force overwrites it", Exit.USAGE)
+        raise exists(taken[0])
     with about(str(folder)):
         folder.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():

@@ -69,7 +69,7 @@ def test_other_signals_as_csv(folder: Path, capsys: pytest.CaptureFixture[str]) 
     to = ("--to", "csv", "--force", "-o", folder / "x.csv")
     assert call(capsys, "decode", folder / "gait.mcz", "--signal", "analog", *to)[0] == 0
     head, rows = rows_of(folder / "x.csv")
-    assert head == ["frame", "Fx [N]", "EMG\x1b[2J"]
+    assert head == ["frame", "Fx [N]", r"EMG\x1b[2J"]  # escaped
     assert rows[:, 0].tolist() == [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6]
     assert np.array_equal(rows[:, 1:], (analog.stored - [1000, 0]) * [0.5, 2.0])
     part = ("--signal", "analog", "--stored", "--frames", "2:4")
