@@ -6,11 +6,12 @@ valid chunk and goes on. SPEC.md, "Grammar" and "Salvage", are normative.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from mcz.container import payloads, strict
 from mcz.container.chunks import (
     ANCILLARY,
+    COPY,
     FLAGS_OF,
     FOOT,
     HEADER,
@@ -27,6 +28,7 @@ from mcz.container.chunks import (
     read_payload,
     resynchronize,
 )
+from mcz.container.copies import check_copies, parse_copies
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -338,13 +340,24 @@ class Walker:
             payload = self._payload(chunk)
             if self.strict and chunk.type == b"QUAL":
                 parse(payloads.QUAL, payload, chunk.label)  # QUAL-02
-            if self.salvage and chunk.type == REPEAT and self.clip is None:  # REPT-03
-                for inner in chunks_in(payload, chunk.payload_offset):
-                    if inner.type != b"HEAD" or not self.found.directory.head:
-                        self._take(inner)
+            if self.strict and chunk.type == COPY:
+                copies = parse_copies(payload, chunk, self.source.size)
+                check_copies(copies, chunk, self.found.chunks, self._payload)
+            if self.salvage and chunk.type == REPEAT:  # REPT-03
+                self._repeat(chunks_in(payload, chunk.payload_offset))
         if self.clip is None and self.found.directory.clips:
             last = next(reversed(self.found.directory.clips))
             self.found.directory.clips[last].ancillary.append(chunk)
+
+    def _repeat(self, chunks: Sequence[Chunk]) -> None:
+        """Take in the chunks of a REPT: in a clip that is open, those that it lacks."""
+        held = self.found.directory
+        for chunk in chunks:
+            if self.clip is None:
+                if chunk.type != b"HEAD" or not held.head:
+                    self._take(chunk)
+            elif chunk.type in (b"SKEL", b"MODL"):
+                held.shared.setdefault((chunk.type, payload_id(self._payload(chunk))), chunk)
 
     def _foot(self, at: int) -> int:
         self._outside(Chunk(b"FOOT", 0, at, 0))
