@@ -246,6 +246,43 @@ def test_another_chunk_of_the_same_bytes_will_do() -> None:
         assert content(changed(data, skel.offset + 20), salvage=True) == content(data)
 
 
+def test_a_rept_changes_nothing_in_a_sound_file() -> None:
+    paths = [*(VECTORS / "valid/online").glob("repeat-*.mcz")]
+    assert len(paths) > 5
+    for path in (*paths, VECTORS / "uncommon/container/REPT-of-nothing.mcz"):
+        with mcz.open(path) as file, mcz.open(path, salvage=True) as salvaged:
+            assert not salvaged.damage
+            assert salvaged.skeletons == file.skeletons
+
+
+# Repair ----------------------------------------------------------------------
+
+
+def test_repair_loses_nothing_that_has_a_copy(packed: bytes, tmp_path: Path) -> None:
+    bad, sound = tmp_path / "bad.mcz", tmp_path / "sound.mcz"
+    whole = content(packed)
+    kinds = {chunk.type: chunk for chunk in chunks(packed, *COPIED, COPY)}
+    for number, chunk in enumerate(kinds.values()):
+        bad.write_bytes(changed(packed, chunk.offset + (2, 17)[number % 2]))
+        found = mcz.repair(bad, sound, force=True)
+        assert found.damage
+        assert not found.lost
+        assert content(sound.read_bytes()) == whole
+        with mcz.open(sound) as file:
+            assert len(file.container.copies()) == (chunk.type != COPY)
+
+
+def test_repair_makes_a_skeleton_again(folder: Path, tmp_path: Path) -> None:
+    bad, sound = tmp_path / "bad.mcz", tmp_path / "sound.mcz"
+    mcz.encode(folder / "walk.amc", bad, codec="raw")
+    data = bad.read_bytes()
+    skel, *_ = chunks(data, b"SKEL")
+    for at in (2, 17):
+        bad.write_bytes(changed(data, skel.offset + at))
+        assert not mcz.repair(bad, sound, force=True).lost
+        assert content(sound.read_bytes()) == content(data)
+
+
 # Writing -------------------------------------------------------------------------
 
 
@@ -340,6 +377,21 @@ def test_many_of_them_lie_in_several_chunks() -> None:
         sizes.append([len(copy.payload) for copy in copies])
     assert [len(one) for one in sizes] == [2, 1, 1, 2]
     assert all(len(one) == 1 or sum(one) <= MOST_BYTES for one in sizes)
+    assert mcz.verify(data) == []
+
+
+@pytest.mark.parametrize(("size", "copied"), [(1000, True), (20_000, False)])
+def test_a_model_is_copied_where_it_is_small_beside_the_rest(size: int, copied: bool) -> None:
+    out, draw = io.BytesIO(), random.Random(4)
+    writer = Writer(out, copies=True)
+    writer.shared(b"MODL", b"\x63" + draw.randbytes(size))
+    writer.attachment("noise", draw.randbytes(100_000))
+    writer.finish()
+    data = out.getvalue()
+    with mcz.open(data) as file:
+        (chunk,) = file.container.copies()
+    copies = parse_copies(data[chunk.payload_offset :][: chunk.length], chunk, len(data))
+    assert [copy.type for copy in copies] == [b"HEAD"] + [b"MODL"] * copied
     assert mcz.verify(data) == []
 
 

@@ -30,6 +30,7 @@ from mcz.errors import FormatError, TruncatedError
 from mcz.schema import build, deflate, parse, read_varint, varint
 
 MOST_BYTES = 64 * 1024  # of the copies in one COPY, decoded, so that a bad byte costs no more
+SMALL_PART = 64  # a model is copied where the file has this many times its bytes
 TYPE_SIZE = 4
 
 # Each copy in a COPY: (name, type, meaning).
@@ -74,6 +75,11 @@ def runs(copies: Iterable[Copy]) -> Iterator[list[Copy]]:
         run.append(copy)
     if run:
         yield run
+
+
+def worth_it(copy: Copy, n_bytes: int) -> bool:
+    """Whether a file of ``n_bytes`` should have it: no model that is a large part of the file."""
+    return copy.type != b"MODL" or len(copy.payload) * SMALL_PART <= n_bytes
 
 
 def build_copies(copies: Iterable[Copy], offset: int) -> bytes:

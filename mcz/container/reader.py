@@ -46,7 +46,7 @@ from mcz.container.packets import (
     head_size,
     is_head,
 )
-from mcz.container.restoring import restored
+from mcz.container.restoring import is_like, restored
 from mcz.container.scan import scan
 from mcz.container.segments import (
     FRESH,
@@ -184,7 +184,9 @@ class Container:
         """Let a damaged file have a SKEL, MODL or SRCE that it has lost: it lies behind its end."""
         better = self.source if isinstance(self.source, Overlay) else Overlay(self.source, {})
         end = max([self.source.size, *(at + len(part) for at, part in better.parts.items())])
-        self.source = better.with_more({end: build_chunk(kind, payload)})
+        chunk = build_chunk(kind, payload)
+        self.broken = [row for row in self.broken if not is_like(self.source, row[0], chunk)]
+        self.source = better.with_more({end: chunk})
         self.directory.shared[kind, payload_id(payload)] = Chunk(kind, 0, end, len(payload))
 
     def shared(self, kind: bytes, id_: bytes, schema: Any) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator
+from operator import eq
 
 from mcz.container.chunks import COPY, FOOT, Chunk, read_chunk, read_payload
 from mcz.container.copies import Copy, parse_copies
@@ -78,3 +79,9 @@ def _fault(source: ByteSource, copy: Copy) -> str:
     except FormatError as error:
         return str(error)
     return ""
+
+
+def is_like(source: ByteSource, offset: int, chunk: bytes) -> bool:
+    """Whether what lies at ``offset`` is this ``chunk``, damaged: most of its bytes are there."""
+    there = source.read(offset, max(0, min(len(chunk), source.size - offset)))
+    return bool(4 * sum(map(eq, there, chunk)) >= 3 * len(chunk))

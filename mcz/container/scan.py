@@ -6,7 +6,8 @@ valid chunk and goes on. SPEC.md, "Grammar" and "Salvage", are normative.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 from mcz.container import payloads, strict
 from mcz.container.chunks import (
@@ -344,20 +345,24 @@ class Walker:
                 copies = parse_copies(payload, chunk, self.source.size)
                 check_copies(copies, chunk, self.found.chunks, self._payload)
             if self.salvage and chunk.type == REPEAT:  # REPT-03
-                self._repeat(chunks_in(payload, chunk.payload_offset))
+                self._repeat(chunk, payload)
         if self.clip is None and self.found.directory.clips:
             last = next(reversed(self.found.directory.clips))
             self.found.directory.clips[last].ancillary.append(chunk)
 
-    def _repeat(self, chunks: Sequence[Chunk]) -> None:
-        """Take in the chunks of a REPT: in a clip that is open, those that it lacks."""
+    def _repeat(self, chunk: Chunk, payload: bytes) -> None:
+        """Take in the chunks of a REPT: of a clip that is open, those that may have been lost."""
         held = self.found.directory
-        for chunk in chunks:
-            if self.clip is None:
-                if chunk.type != b"HEAD" or not held.head:
-                    self._take(chunk)
-            elif chunk.type in (b"SKEL", b"MODL"):
-                held.shared.setdefault((chunk.type, payload_id(self._payload(chunk))), chunk)
+        if self.clip is None:
+            for inner in chunks_in(payload, chunk.payload_offset):
+                if inner.type != b"HEAD" or not held.head:
+                    self._take(inner)
+        elif self.found.damage:
+            with suppress(FormatError):  # what is no REPT says nothing
+                for inner in chunks_in(payload, chunk.payload_offset):
+                    if inner.type in (b"SKEL", b"MODL"):
+                        id_ = payload_id(self._payload(inner))
+                        held.shared.setdefault((inner.type, id_), inner)
 
     def _foot(self, at: int) -> int:
         self._outside(Chunk(b"FOOT", 0, at, 0))

@@ -23,7 +23,7 @@ from mcz.container.chunks import (
     build_foot,
     build_header,
 )
-from mcz.container.copies import Copy, build_copies, runs
+from mcz.container.copies import Copy, build_copies, runs, worth_it
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -266,7 +266,8 @@ class Writer:
     def finish(self, *, index: bool = True) -> None:
         """Write the copies that are wanted, INDX, unless told otherwise, and FOOT."""
         self._between_clips("FOOT")
-        for run in runs(self._copies or ()):
+        copies = (copy for copy in self._copies or () if worth_it(copy, self.offset))
+        for run in runs(copies):
             self.ancillary(COPY, build_copies(run, self.offset), safe_to_copy=False)
         start, length = 0, 0
         if index:
