@@ -220,6 +220,20 @@ def test_a_skeleton_is_made_again_from_its_asf(
         file.clips["walk"].read()
 
 
+def test_a_skeleton_that_faces_up_is_made_again_from_the_other(
+    folder: Path, tmp_path: Path
+) -> None:
+    mcz.encode(folder / "walk.amc", tmp_path / "a.mcz", up="z", codec="raw")
+    data = (tmp_path / "a.mcz").read_bytes()
+    both = chunks(data, b"SKEL")
+    assert len(both) == 2
+    for hit in (both[:1], both[1:], both):
+        bad = changed(data, *(skel.offset + 20 for skel in hit))
+        with mcz.open(bad, salvage=True) as file:
+            assert file.clips["walk"].skeleton.up_axis == "z"
+        assert content(bad, salvage=True) == content(data)
+
+
 def test_another_skeleton_is_not_taken_for_it(folder: Path, tmp_path: Path) -> None:
     """An ASF that is no longer what the skeleton was made of does not have its id."""
     skeleton = FORMATS["asf"].read((folder / "walk.asf").read_bytes(), "walk")
