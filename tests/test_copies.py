@@ -286,6 +286,19 @@ def test_repair_loses_nothing_that_has_a_copy(packed: bytes, tmp_path: Path) -> 
             assert len(file.container.copies()) == (chunk.type != COPY)
 
 
+def test_repair_of_a_clip_whose_end_is_lost(folder: Path, tmp_path: Path) -> None:
+    bad, sound = tmp_path / "bad.mcz", tmp_path / "sound.mcz"
+    mcz.encode(folder / "walk.bvh", bad, codec="raw")
+    data = bad.read_bytes()
+    with mcz.open(data) as file:
+        values = file.clips["walk"].read()
+    bad.write_bytes(changed(data, chunks(data, b"CEND")[0].offset + 20))
+    assert mcz.repair(bad, sound).lost
+    assert mcz.verify(sound) == []
+    with mcz.open(sound) as file:
+        np.testing.assert_array_equal(next(iter(file.clips.values())).read(), values)
+
+
 def test_repair_makes_a_skeleton_again(folder: Path, tmp_path: Path) -> None:
     bad, sound = tmp_path / "bad.mcz", tmp_path / "sound.mcz"
     mcz.encode(folder / "walk.amc", bad, codec="raw")
