@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mcz.conversion import Fit, convert, from_positions
-    from mcz.editing.archive import Outcome, Report, append, pack, unpack
+    from mcz.editing.archive import append, pack, unpack
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
+    from mcz.editing.outcomes import Outcome, Report
     from mcz.editing.repair import Repair, repair
     from mcz.editing.replacing import Replacement, replace
     from mcz.errors import (
@@ -51,7 +52,8 @@ if TYPE_CHECKING:
 __version__ = "0.9.0"
 
 _HOMES = {
-    "mcz.editing.archive": ("Outcome", "Report", "append", "pack", "unpack"),
+    "mcz.editing.archive": ("append", "pack", "unpack"),
+    "mcz.editing.outcomes": ("Outcome", "Report"),
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions"),

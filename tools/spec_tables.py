@@ -27,6 +27,7 @@ from tools import spec_trace
 
 MODULES = (
     "mcz.container.payloads",
+    "mcz.container.copies",
     "mcz.container.directory",
     "mcz.codecs.wavelet.shared",
     "mcz.codecs.curves.qbc",

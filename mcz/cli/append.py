@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from mcz.cli.common import Exit, Failure, about, existing
-from mcz.cli.options import chosen, encoding_options, json_option
+from mcz.cli.options import chosen, copies_option, encoding_options, json_option
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
@@ -35,6 +35,7 @@ from mcz.cli.progress import Progress
 @click.option(
     "--force", is_flag=True, help="Of a file that was cut short drop what is whole at its end."
 )
+@copies_option("where the file has some")
 @encoding_options
 @json_option
 def command(
@@ -44,6 +45,7 @@ def command(
     root: str | None,
     salvage: bool,
     force: bool,
+    copies: bool | None,
     as_json: bool,
     **options: Any,
 ) -> Exit:
@@ -69,6 +71,7 @@ def command(
             root=root,
             salvage=salvage,
             force=force,
+            copies=copies,
             progress=progress,
             **_known(chosen(**options)),
         )

@@ -22,7 +22,13 @@ from mcz.cli.common import (
     say,
 )
 from mcz.cli.figures import reached
-from mcz.cli.options import chosen, encoding_options, force_option, json_option
+from mcz.cli.options import (
+    chosen,
+    copies_option,
+    encoding_options,
+    force_option,
+    json_option,
+)
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -50,6 +56,7 @@ if TYPE_CHECKING:
     type=click.Choice(("bvh", "amc", "c3d", "asf")),
     help="What standard input is. Default: what it looks like; live BVH, or AMC with --skeleton.",
 )
+@copies_option("no")
 @encoding_options
 @force_option
 @json_option
@@ -106,6 +113,7 @@ def _encode_file(
     skeleton: str | None,
     force: bool,
     as_json: bool,
+    copies: bool | None,
     **options: Any,
 ) -> Exit:
     import mcz
@@ -125,6 +133,7 @@ def _encode_file(
             piped if sink is not None else target,
             skeleton=skeleton,
             force=force,
+            copies=bool(copies),
             progress=progress,
             **chosen(**options),
         )

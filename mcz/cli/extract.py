@@ -22,6 +22,7 @@ from mcz.cli.common import (
 from mcz.cli.damage import hinted
 from mcz.cli.options import (
     clips_option,
+    copies_option,
     decoded_option,
     force_option,
     json_option,
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
 )
 @clips_option
 @salvage_option
+@copies_option("where IN.mcz has some")
 @decoded_option
 @force_option
 @json_option
@@ -62,6 +64,7 @@ def command(
     frames: tuple[int, int | None] | None,
     clips: tuple[str, ...],
     salvage: bool,
+    copies: bool | None,
     max_decoded: int | None,
     force: bool,
     as_json: bool,
@@ -88,6 +91,7 @@ def command(
             salvage=salvage,
             force=force,
             max_decoded=max_decoded,
+            copies=copies,
             progress=progress,
         )
     if as_json:

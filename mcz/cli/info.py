@@ -162,7 +162,8 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
         f"{file}: MCZ {document['format_version']} (readers of {document['needs_version']} on), "
         f"{document['profile']} profile, {document['file_bytes']:,} bytes"
     )
-    yield f"  {', '.join(held)}; index {document['index_bytes']:,} bytes"
+    copies = f", copies {document['copy_bytes']:,}" if document["copy_bytes"] else ""
+    yield f"  {', '.join(held)}; index {document['index_bytes']:,}{copies} bytes"
     for skeleton in document["skeletons"][:FEW]:
         yield from _skeleton(skeleton)
     if len(document["skeletons"]) > FEW:

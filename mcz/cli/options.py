@@ -58,6 +58,16 @@ def decoded_option(function: Function) -> Function:
     )(function)
 
 
+def copies_option(default: str) -> Callable[[Function], Function]:
+    """``--copies``, as the argument ``copies`` of ``mcz.encode`` and its kin, None: ``default``."""
+    return click.option(
+        "--copies/--no-copies",
+        default=None,
+        help="Skeletons, templates and the like a second time, for --salvage to use where a bit "
+        f"of them is flipped. Default: {default}.",
+    )
+
+
 clips_option = click.option(
     "--clip",
     "clips",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from mcz.cli.common import Exit, echo, plural, print_json, say
 
 if TYPE_CHECKING:
-    from mcz.editing.archive import Outcome, Report
+    from mcz.editing.outcomes import Outcome, Report
 
 
 HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "restored")

@@ -7,7 +7,13 @@ from typing import Any
 import click
 
 from mcz.cli.common import Exit, about
-from mcz.cli.options import chosen, encoding_options, force_option, json_option
+from mcz.cli.options import (
+    chosen,
+    copies_option,
+    encoding_options,
+    force_option,
+    json_option,
+)
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
@@ -17,10 +23,17 @@ from mcz.cli.progress import Progress
 @click.argument("target", metavar="OUT.mcz", type=click.Path(readable=False))
 @encoding_options
 @click.option("--keep-all", is_flag=True, help="Keep files of other kinds too, as attachments.")
+@copies_option("yes")
 @force_option
 @json_option
 def command(
-    folder: str, target: str, keep_all: bool, force: bool, as_json: bool, **options: Any
+    folder: str,
+    target: str,
+    keep_all: bool,
+    copies: bool | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
 ) -> Exit:
     """Pack every motion file below DIR into OUT.mcz, skeletons that are shared only once.
 
@@ -31,6 +44,12 @@ def command(
 
     with about(folder, target), Progress() as progress:
         report = mcz.pack(
-            folder, target, keep_all=keep_all, force=force, progress=progress, **chosen(**options)
+            folder,
+            target,
+            keep_all=keep_all,
+            copies=copies is not False,
+            force=force,
+            progress=progress,
+            **chosen(**options),
         )
     return conclude(report, target, as_json)

@@ -53,7 +53,7 @@ def encode_lines(
     from mcz.live.text_writer import encode_live
     from mcz.writing.entry import Terms
 
-    for name in ("verbatim", "archive"):
+    for name in ("verbatim", "archive", "copies"):
         if options.pop(name):
             raise Failure(f"--{name} has no meaning for what is coded frame by frame", Exit.USAGE)
     stream = standard_input()

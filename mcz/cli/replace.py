@@ -23,7 +23,7 @@ from mcz.cli.common import (
     printable,
     say,
 )
-from mcz.cli.options import force_option, json_option
+from mcz.cli.options import copies_option, force_option, json_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 @click.option(
     "--on-grid", is_flag=True, help="Round to what the source prints. Default: every digit is kept."
 )
+@copies_option("where IN.mcz has some")
 @force_option
 @json_option
 def command(
@@ -57,6 +58,7 @@ def command(
     name: str | None,
     in_place: bool,
     on_grid: bool,
+    copies: bool | None,
     force: bool,
     as_json: bool,
 ) -> Exit:
@@ -89,6 +91,7 @@ def command(
                 values,
                 output,
                 on_grid=on_grid,
+                copies=copies,
                 force=force,
                 progress=progress,
             )

@@ -28,8 +28,11 @@ SAFE_TO_COPY = 2  # a rewriter that does not know the type keeps the chunk
 KNOWN_FLAGS = ANCILLARY | SAFE_TO_COPY
 
 REPEAT = b"REPT"  # flags: ANCILLARY alone
-FLAGS_OF = {b"QUAL": ANCILLARY | SAFE_TO_COPY, REPEAT: ANCILLARY}  # CHUNK-16, CHUNK-17
+COPY = b"COPY"  # flags: ANCILLARY alone, for what it says is true of this file only
+# CHUNK-16, CHUNK-17, CHUNK-18
+FLAGS_OF = {b"QUAL": ANCILLARY | SAFE_TO_COPY, REPEAT: ANCILLARY, COPY: ANCILLARY}
 REPEATED = (b"HEAD", b"SKEL", b"MODL", b"CLIP")  # the chunks that a REPT holds again
+COPIED = (b"HEAD", b"SKEL", b"MODL", b"SRCE", b"ALIA", b"CLIP", b"CEND")  # and a COPY
 
 _CANDIDATE = re.compile(rb"(?=[A-Za-z]{4}[\x00-\x03]\x00)")  # looks like the start of a header
 

@@ -194,6 +194,12 @@ CEND = Struct(
     "extension" / EXTENSION * "ignored, kept",
 )
 
+COPY = Struct(
+    "encoding" / OneOf(Int8ul, (STORED, DEFLATED)) * "0 stored, 1 raw deflate",
+    "size" / UVARINT * "bytes of the copies, decoded",
+    "data" / GreedyBytes * "the copies, encoded",
+)
+
 QUAL = Struct(
     "entries" / counted(METADATA) * "metric id or setting, and its value as text",
     "extension" / EXTENSION * "ignored, kept",

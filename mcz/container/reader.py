@@ -19,12 +19,14 @@ from mcz.container.chunks import (
     SIGNATURE,
     Chunk,
     Foot,
+    build_chunk,
     check_chunk,
     check_signature,
     parse_foot,
     read_chunk,
     read_payload,
 )
+from mcz.container.copies import Copy, copy_chunks, uncopied
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -35,6 +37,7 @@ from mcz.container.directory import (
     signal_rows,
 )
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
+from mcz.container.overlay import Overlay
 from mcz.container.packets import (
     CHECK_SIZE,
     NUMBERED,
@@ -43,6 +46,7 @@ from mcz.container.packets import (
     head_size,
     is_head,
 )
+from mcz.container.restoring import is_like, restored
 from mcz.container.scan import scan
 from mcz.container.segments import (
     FRESH,
@@ -100,7 +104,12 @@ class Container:
 
     def _salvage(self) -> Directory:
         found = scan(self.source, salvage=True)
-        self.damage, self.broken, self.feet = found.damage, found.broken, found.feet
+        better, notes = restored(self.source, found)
+        if better is not None:  # SALV-06
+            self.source = better
+            found = scan(better, salvage=True)
+        self.damage = notes + found.damage
+        self.broken, self.feet = found.broken, found.feet
         if not found.chunks:
             raise FormatError("nothing can be salvaged: no chunk is whole")
         return found.directory
@@ -162,6 +171,23 @@ class Container:
         # CHUNK-04, LIMIT-07
         check(f"chunk {chunk.label}: bytes", chunk.length, self.profile.chunk_bytes)
         return check_chunk(self.source.read(chunk.offset, chunk.size), chunk)
+
+    def copies(self) -> list[Chunk]:
+        """The COPY chunks of the file, in order."""
+        return copy_chunks(self.source, self.directory)
+
+    def uncopied(self) -> list[Copy]:
+        """Copies of the chunks that the file has behind the last COPY."""
+        return uncopied(self.source, self.directory, self.payload)
+
+    def add_shared(self, kind: bytes, payload: bytes) -> None:
+        """Let a damaged file have a SKEL, MODL or SRCE that it has lost: it lies behind its end."""
+        better = self.source if isinstance(self.source, Overlay) else Overlay(self.source, {})
+        end = max([self.source.size, *(at + len(part) for at, part in better.parts.items())])
+        chunk = build_chunk(kind, payload)
+        self.broken = [row for row in self.broken if not is_like(self.source, row[0], chunk)]
+        self.source = better.with_more({end: chunk})
+        self.directory.shared[kind, payload_id(payload)] = Chunk(kind, 0, end, len(payload))
 
     def shared(self, kind: bytes, id_: bytes, schema: Any) -> Any:
         """The fields of the SKEL, MODL or SRCE with this id, its hash checked."""

@@ -7,10 +7,12 @@ valid chunk and goes on. SPEC.md, "Grammar" and "Salvage", are normative.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 from mcz.container import payloads, strict
 from mcz.container.chunks import (
     ANCILLARY,
+    COPY,
     FLAGS_OF,
     FOOT,
     HEADER,
@@ -27,6 +29,7 @@ from mcz.container.chunks import (
     read_payload,
     resynchronize,
 )
+from mcz.container.copies import check_copies, parse_copies
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -338,13 +341,28 @@ class Walker:
             payload = self._payload(chunk)
             if self.strict and chunk.type == b"QUAL":
                 parse(payloads.QUAL, payload, chunk.label)  # QUAL-02
-            if self.salvage and chunk.type == REPEAT and self.clip is None:  # REPT-03
-                for inner in chunks_in(payload, chunk.payload_offset):
-                    if inner.type != b"HEAD" or not self.found.directory.head:
-                        self._take(inner)
+            if self.strict and chunk.type == COPY:
+                copies = parse_copies(payload, chunk, self.source.size)
+                check_copies(copies, chunk, self.found.chunks, self._payload)
+            if self.salvage and chunk.type == REPEAT:  # REPT-03
+                self._repeat(chunk, payload)
         if self.clip is None and self.found.directory.clips:
             last = next(reversed(self.found.directory.clips))
             self.found.directory.clips[last].ancillary.append(chunk)
+
+    def _repeat(self, chunk: Chunk, payload: bytes) -> None:
+        """Take in the chunks of a REPT: of a clip that is open, those that may have been lost."""
+        held = self.found.directory
+        if self.clip is None:
+            for inner in chunks_in(payload, chunk.payload_offset):
+                if inner.type != b"HEAD" or not held.head:
+                    self._take(inner)
+        elif self.found.damage:
+            with suppress(FormatError):  # what is no REPT says nothing
+                for inner in chunks_in(payload, chunk.payload_offset):
+                    if inner.type in (b"SKEL", b"MODL"):
+                        id_ = payload_id(self._payload(inner))
+                        held.shared.setdefault((inner.type, id_), inner)
 
     def _foot(self, at: int) -> int:
         self._outside(Chunk(b"FOOT", 0, at, 0))

@@ -14,6 +14,7 @@ from typing import Any
 
 from mcz.container.chunks import (
     ANCILLARY,
+    COPY,
     END_MAGIC,
     FOOT,
     HEADER,
@@ -37,7 +38,7 @@ from mcz.container.walk_arriving import PipeSource
 from mcz.errors import FormatError, TruncatedError, UnsupportedError
 
 TYPES = (b"HEAD", b"SKEL", b"MODL", b"SRCE", b"ATTA", b"ALIA", b"CLIP", b"DATA", b"CEND")
-KNOWN = frozenset((*TYPES, b"INDX", b"QUAL", REPEAT))
+KNOWN = frozenset((*TYPES, b"INDX", b"QUAL", REPEAT, COPY))
 WANTED = frozenset((*REPEATED, b"DATA", b"CEND", REPEAT))
 SMALL = MIB  # a chunk that is not wanted is checked up to this length, and skipped beyond
 TRY = 256  # bytes that a try counts as, beside those that it reads

@@ -7,12 +7,14 @@ SPEC.md, "Grammar", is normative.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from mcz.container import payloads
 from mcz.container.chunks import (
     ANCILLARY,
+    COPIED,
+    COPY,
     OPEN_LENGTH,
     SAFE_TO_COPY,
     SIGNATURE,
@@ -21,6 +23,7 @@ from mcz.container.chunks import (
     build_foot,
     build_header,
 )
+from mcz.container.copies import Copy, build_copies, runs, worth_it
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -63,7 +66,11 @@ def build_head(profile: Profile) -> bytes:
 
 
 class Writer:
-    """Appends chunks to ``sink``; ``directory`` and ``offset`` continue an existing file."""
+    """Appends chunks to ``sink``; ``directory`` and ``offset`` continue an existing file.
+
+    With ``copies`` the chunks that hold everything else together stand a second time before INDX,
+    those of ``uncopied``, which the file has already, among them.
+    """
 
     def __init__(
         self,
@@ -73,6 +80,8 @@ class Writer:
         directory: Directory | None = None,
         offset: int = 0,
         head_extension: bytes = b"",
+        copies: bool = False,
+        uncopied: Iterable[Copy] = (),
     ) -> None:
         self._sink = sink
         self.profile = profile
@@ -80,6 +89,7 @@ class Writer:
         self.directory = directory or Directory()
         self._clip: ClipRow | None = None
         self._next_packet: int | None = None  # while a DATA is open
+        self._copies = list(uncopied) if copies else None  # of what was written so far
         if offset == 0:
             self._write_head(head_extension)
 
@@ -97,6 +107,8 @@ class Writer:
         check(f"chunk {kind.decode()}: bytes", len(payload), self.profile.chunk_bytes)
         chunk = Chunk(kind, flags, self.offset, len(payload))
         self._write(build_chunk(kind, payload, flags))
+        if self._copies is not None and kind in COPIED:
+            self._copies.append(Copy(chunk.offset, kind, payload))
         return chunk
 
     def shared(self, kind: bytes, payload: bytes) -> bytes:
@@ -252,8 +264,11 @@ class Writer:
         self._clip = None
 
     def finish(self, *, index: bool = True) -> None:
-        """Write INDX, unless told otherwise, and FOOT."""
+        """Write the copies that are wanted, INDX, unless told otherwise, and FOOT."""
         self._between_clips("FOOT")
+        copies = (copy for copy in self._copies or () if worth_it(copy, self.offset))
+        for run in runs(copies):
+            self.ancillary(COPY, build_copies(run, self.offset), safe_to_copy=False)
         start, length = 0, 0
         if index:
             chunk = build_index(self.directory)
@@ -267,6 +282,8 @@ class Writer:
         """Forget what was written since, which the caller has kept from the sink."""
         self.directory, self.offset = directory, offset
         self._clip = self._next_packet = None
+        if self._copies is not None:
+            self._copies = [copy for copy in self._copies if copy.offset < offset]
 
     def _between_clips(self, what: str) -> None:
         if self._clip is not None:

@@ -6,18 +6,17 @@ import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from mcz.brief import brief
 from mcz.codecs import DEFAULT
 from mcz.container import payloads
 from mcz.container.reader import Container
 from mcz.container.strict import check_path
 from mcz.editing.appending import growing
+from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder, PortableNames, notes_on
 from mcz.errors import AccessError, ExistsError, FormatError, MczError, OptionError, SourceError
 from mcz.formats import FORMATS
@@ -35,55 +34,6 @@ from mcz.writing.names import check_name
 NAMES = ("stored", "portable", "strict")  # what unpack does about names that are not portable
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What became of one file, and why where that is not plain.
-
-    ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
-    "present" (the target has it already), "restored", "skipped", "exists" (it may not be replaced)
-    or "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage "damaged".
-    ``notes`` are what was noticed about one that was taken: its reader's, and whose skeleton it
-    got.
-    """
-
-    path: str
-    result: str
-    size: int = 0
-    message: str = ""
-    notes: tuple[str, ...] = ()
-
-    __repr__ = brief
-
-
-@dataclass(slots=True)
-class Report:
-    """The outcomes of a command over many files.
-
-    ``damage`` is what salvage found wrong, ``size`` that of the MCZ file, once it is written.
-    """
-
-    outcomes: list[Outcome] = field(default_factory=list)
-    damage: list[str] = field(default_factory=list)
-    size: int | None = None
-
-    __repr__ = brief
-
-    @property
-    def failures(self) -> list[Outcome]:
-        """The files that failed, those among them that exist and may not be replaced."""
-        return [outcome for outcome in self.outcomes if outcome.result in ("failed", "exists")]
-
-    def note(self, notes: Mapping[str, str]) -> None:
-        """Add what is to be said of some paths to their outcomes."""
-        for index, outcome in enumerate(self.outcomes):
-            if (text := notes.get(outcome.path)) and outcome.result not in ("failed", "skipped"):
-                message = f"{outcome.message}; {text}" if outcome.message else text
-                self.outcomes[index] = replace(outcome, message=message)
-
-    def count(self, result: str) -> int:
-        return sum(outcome.result == result for outcome in self.outcomes)
-
-
 def pack(
     directory: str | os.PathLike[str],
     target: Any,
@@ -97,14 +47,16 @@ def pack(
     keep_all: bool = False,
     force: bool = False,
     archive: bool = False,
+    copies: bool = True,
     progress: Progress | None = None,
 ) -> Report:
     """Pack every motion file below ``directory`` into one MCZ file.
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
-    relative to ``directory``. An earlier MCZ file of the target's name is no part of the new one;
-    any other file that the target would replace is refused, even with ``force``.
+    relative to ``directory``. ``copies`` is that of ``mcz.write``. An earlier MCZ file of the
+    target's name is no part of the new one; any other file that the target would replace is
+    refused, even with ``force``.
     """
     root = Path(directory)
     if not root.is_dir():
@@ -117,7 +69,7 @@ def pack(
     terms = Terms(codec, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
     with replacing(target, force=force, inputs=(*paths, *(params or {}).values())) as stream:
-        draft = Draft(stream, profile_of(archive))
+        draft = Draft(stream, profile_of(archive), copies=copies)
         report = _write_entries(draft, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
         draft.finish()
@@ -197,6 +149,7 @@ def append(
     root: str | os.PathLike[str] | None = None,
     salvage: bool = False,
     force: bool = False,
+    copies: bool | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Add files after the last valid FOOT of an MCZ file; what it held stays readable throughout.
@@ -207,16 +160,23 @@ def append(
 
     A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
     lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
-    them. Where its end is damaged, one of the two has to be given. Raises AccessError while another
-    process is appending, OptionError where the target is a source itself.
+    them. Where its end is damaged, one of the two has to be given. ``copies`` is that of
+    ``mcz.write``, of all that has none yet; None: where the file has some. Raises AccessError while
+    another process is appending, OptionError where the target is a source itself.
     """
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
     terms = Terms(codec, params, skeleton, rate, unit, verbatim, up=up)
     entries = [Entry(Path(s), _name_below(s, root), terms) for s in sources]
     with growing(Path(target), salvage=salvage, force=force) as growth:
         container = growth.container
+        wanted = bool(container.copies()) if copies is None else copies
         draft = Draft(
-            growth.added, container.profile, container.directory, _stored_paths(container)
+            growth.added,
+            container.profile,
+            container.directory,
+            _stored_paths(container),
+            copies=wanted,
+            uncopied=container.uncopied() if wanted else (),
         )
         report = _write_entries(draft, entries, progress)
         if report.failures:

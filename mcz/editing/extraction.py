@@ -15,9 +15,8 @@ from typing import Any, BinaryIO
 from mcz.brief import brief
 from mcz.container import payloads
 from mcz.container.chunks import (
-    CRC,
+    COPY,
     FOOT,
-    HEADER,
     SAFE_TO_COPY,
     SIGNATURE,
     Chunk,
@@ -25,11 +24,10 @@ from mcz.container.chunks import (
     read_chunk,
 )
 from mcz.container.directory import ClipRow
-from mcz.container.packets import read_packets
 from mcz.container.reader import Container
-from mcz.container.source import Forward
 from mcz.container.value_hash import ValueDigest, value_hash
 from mcz.container.writer import Writer, payload_id
+from mcz.editing.ancillary import inside
 from mcz.editing.cutting import (
     WITHOUT_SOURCE,
     ClipCut,
@@ -90,6 +88,7 @@ def extract(
     salvage: bool = False,
     force: bool = False,
     max_decoded: int | None = None,
+    copies: bool | None = None,
     progress: Progress | None = None,
 ) -> Extraction:
     """Write what is left of the MCZ file ``source`` when all else is cut, without re-encoding.
@@ -99,6 +98,7 @@ def extract(
     ``clip``: take out this clip, or these, alone; otherwise all are cut, and attachments kept.
     ``salvage``: the file may be damaged, but not in what is taken out.
     ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
+    ``copies``: as ``mcz.write`` has it; None: where ``source`` has some.
     Raises OptionError or MotionError for what cannot be cut so, and where the target is the source;
     FormatError for bad bytes; nothing is left under the target's name then.
     """
@@ -112,18 +112,28 @@ def extract(
             raise OptionError(f"{file.name} has no clip to extract from")
         cuts = [plan_cut(one, frames, joints, resolution) for one in clips]
         with replacing(target, force=force, inputs=(source,)) as stream:
-            return Copier(file, stream, progress).run(cuts, alone=names is not None)
+            copier = Copier(file, stream, progress, copies)
+            return copier.run(cuts, alone=names is not None)
 
 
 class Copier:
-    """Copies what is left of a file to ``stream``."""
+    """Copies what is left of a file to ``stream``; ``copies`` None: where it has some."""
 
-    def __init__(self, file: File, stream: BinaryIO, progress: Progress | None) -> None:
+    def __init__(
+        self,
+        file: File,
+        stream: BinaryIO,
+        progress: Progress | None,
+        copies: bool | None = None,
+    ) -> None:
         self.file, self.progress = file, progress
         self.container: Container = file.container
         head = parse(payloads.HEAD, self.container.directory.head, "HEAD")
         self.writer = Writer(
-            stream, profile=self.container.profile, head_extension=bytes(head.extension)
+            stream,
+            profile=self.container.profile,
+            head_extension=bytes(head.extension),
+            copies=bool(self.container.copies()) if copies is None else copies,
         )
         self.found = Extraction()
         self.done = self.total = 0  # segments
@@ -313,14 +323,14 @@ class Copier:
 
     def inside(self, row: ClipRow) -> None:
         """Copy the ancillary chunks between CLIP and CEND."""
-        for chunk in _inside(self.container, row):
+        for chunk in inside(self.container, row):
             self.ancillary(chunk)
 
     def ancillary(self, chunk: Chunk) -> None:
         """Copy an ancillary chunk where that is safe."""
         if chunk.flags & SAFE_TO_COPY:  # CHUNK-13, CHUNK-14
             self.writer.ancillary(chunk.type, self.container.payload(chunk))
-        else:
+        elif chunk.type != COPY:  # those are made anew where they are wanted
             self.found.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
 
     def _note(self, cut: ClipCut) -> None:
@@ -387,32 +397,3 @@ def _first_number(text: str, count: int) -> int:
     words = text.split(":")
     good = len(words) == count and all(re.fullmatch("[0-9]{1,16}", word) for word in words)
     return int(words[0]) if good else 0
-
-
-def _inside(container: Container, row: ClipRow) -> Iterator[Chunk]:
-    """The ancillary chunks between CLIP and CEND."""
-    assert row.cend is not None
-    source, at = container.source, row.clip.offset + row.clip.size
-    ends = {
-        segment.chunk().offset: segment.stop + CRC.size
-        for segment in row.segments
-        if not segment.packet
-    }
-    while at < row.cend.offset:
-        if at in ends:
-            at = ends[at]
-            continue
-        chunk = read_chunk(source, at)
-        if chunk.length is None:
-            at = _end_of_packets(container, chunk)
-            continue
-        if chunk.flags:
-            yield chunk
-        at += chunk.size
-
-
-def _end_of_packets(container: Container, chunk: Chunk) -> int:
-    read = Forward(container.source, chunk.offset + HEADER.size)
-    for _ in read_packets(read, container.profile.packet_bytes):
-        pass
-    return read.at

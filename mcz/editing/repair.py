@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
 from mcz.container import payloads
-from mcz.container.chunks import FOOT, Chunk, parse_foot
+from mcz.container.chunks import COPY, FOOT, Chunk, parse_foot
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.container.source import ByteSource
@@ -32,7 +32,8 @@ from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 
 Run = tuple[int, int]  # frames a <= f < b
-TOLD = (b"HEAD", b"INDX", b"DATA", b"CEND")  # chunks without content, or of a clip that is named
+# Chunks without content of their own, or of a clip that is named.
+TOLD = (b"HEAD", b"INDX", b"DATA", b"CEND", COPY)
 NOTE = "lost: the template of the source file was damaged"
 
 
@@ -95,7 +96,9 @@ def _gone(container: Container) -> Iterator[str]:
     names = _names(container)
     for at, chunk in container.broken:
         if chunk is None and at < last and at not in indices:
-            yield names.get(at, f"what began at byte {at}")
+            name = names.get(at, f"what began at byte {at}")
+            if name:
+                yield name
         elif chunk is not None and chunk.type not in TOLD:
             yield names.get(at, f"chunk {chunk.label}")
 
@@ -106,15 +109,15 @@ def _index_offset(container: Container, foot: int) -> int:
 
 
 def _names(container: Container) -> dict[int, str]:
-    """What the index, if it is sound, says that begins at each offset."""
+    """What the index, if it is sound, says that begins at each offset; "" where that is no loss."""
     names: dict[int, str] = {}
     with suppress(FormatError):
         listed = Container(container.source).directory
         for name, clip in listed.clips.items():
             names[clip.clip.offset] = f"clip {name!r}: all of it"
-            names |= {
-                one.offset: f"clip {name!r}: its {one.type.decode()}" for one in clip.ancillary
-            }
+            for one in clip.ancillary:
+                text = f"clip {name!r}: its {one.type.decode()}"
+                names[one.offset] = "" if one.type == COPY else text
         for name, row in listed.attachments.items():
             names |= {part.offset: f"attachment {name!r}" for part in row.parts}
     return names

@@ -72,6 +72,7 @@ def replace(
     *,
     on_grid: bool = False,
     force: bool = False,
+    copies: bool | None = None,
     progress: Progress | None = None,
 ) -> Replacement:
     """Give one joint of a clip other values; write the file to ``target``, by default in place.
@@ -81,7 +82,7 @@ def replace(
     channels of the joint), are in source units; a clip without a source file takes NaN for invalid.
     The joint is coded anew with the clip's own codec and settings, all other streams are copied
     byte for byte. A lossless clip takes every number exactly, or, ``on_grid``, the nearest that its
-    source would print.
+    source would print. ``copies``: as ``mcz.write`` has it; None: where the file has some.
 
     Raises OptionError where the codec cannot code a joint alone, or where ``target`` is the source,
     MotionError for values that it cannot hold; the file is as it was then.
@@ -93,7 +94,9 @@ def replace(
         stream = stack.enter_context(replacing(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
         chosen = file.only_clip(clip)
-        return _write(file, chosen, recode(chosen, joint, values, on_grid), stream, progress)
+        recoded = recode(chosen, joint, values, on_grid)
+        writer = _Editor(file, stream, chosen.name, recoded, progress, copies)
+        return _write(file, chosen, recoded, writer)
 
 
 def _locked(source: Any, stack: ExitStack) -> Path:
@@ -111,10 +114,7 @@ def _locked(source: Any, stack: ExitStack) -> Path:
     return path
 
 
-def _write(
-    file: File, clip: Clip, recoded: Recoded, stream: BinaryIO, progress: Progress | None
-) -> Replacement:
-    writer = _Editor(file, stream, clip.name, recoded, progress)
+def _write(file: File, clip: Clip, recoded: Recoded, writer: _Editor) -> Replacement:
     found = writer.run(
         [plan_cut(one, None, None, 0) for one in file.clips.values()],
         alone=False,
@@ -153,9 +153,15 @@ class _Editor(Copier):
     """Copies a file, the streams of one joint of one clip replaced."""
 
     def __init__(
-        self, file: File, stream: BinaryIO, name: str, recoded: Recoded, progress: Progress | None
+        self,
+        file: File,
+        stream: BinaryIO,
+        name: str,
+        recoded: Recoded,
+        progress: Progress | None,
+        copies: bool | None,
     ) -> None:
-        super().__init__(file, stream, progress)
+        super().__init__(file, stream, progress, copies)
         self.name, self.recoded = name, recoded
         self.beside, self.beside_before = _Beside(), _Beside()
 

@@ -272,6 +272,8 @@ class Clip:
         self, info: SignalInfo, values: NDArray[Any], mask: NDArray[np.bool_] | None
     ) -> None:
         """Raise ChecksumError where these are not the values and the mask of a whole signal."""
+        if self._cend is None:  # of a damaged file
+            raise FormatError(f"clip {self.name!r} has no CEND")
         hashes = self._cend.value_sha256
         if len(hashes) != len(self.signals):  # CEND-02
             raise FormatError(

@@ -28,6 +28,7 @@ from mcz.errors import (
 from mcz.formats import FORMATS
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
+from mcz.reading.lost_skeletons import restore_skeletons
 from mcz.reading.names import clip_called, listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
@@ -67,7 +68,7 @@ class File:
         }
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return File, (self.container,)
+        return _file, (self.container,)
 
     def __repr__(self) -> str:
         held = f"{counted(len(self.clips), 'clip')}, {counted(len(self.attachments), 'attachment')}"
@@ -226,11 +227,17 @@ def open(
         raise
 
 
+def _file(container: Container) -> File:
+    if container.salvage:
+        restore_skeletons(container)
+    return File(container)
+
+
 def _opened(source: ByteSource, options: Mapping[str, Any]) -> File:
     """The file; while another process appends to it, the file up to its last end."""
     while True:
         try:
-            return File(Container(source, **options))
+            return _file(Container(source, **options))
         except TruncatedError as error:
             size = source.size_now()
             if source.grows():
@@ -241,6 +248,6 @@ def _opened(source: ByteSource, options: Mapping[str, Any]) -> File:
             if size == source.size:  # nobody is at it, or has been meanwhile
                 raise
             source = source.up_to(size)
-    file = File(Container(source.up_to(end), **options))
+    file = _file(Container(source.up_to(end), **options))
     file.grows = True
     return file

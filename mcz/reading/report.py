@@ -57,6 +57,7 @@ def info(file: File, names: Sequence[str] | None = None) -> dict[str, Any]:
         "profile": file.header["profile"],
         "file_bytes": file.size,
         "index_bytes": container.index.index_length if container.index else 0,
+        "copy_bytes": sum(chunk.size for chunk in container.copies()),
         "skeletons": [_skeleton_info(container, i, s) for i, s in file.skeletons if i in ids],
         "models": [_model_info(container, id_) for id_ in models],
         "clips": clips,
@@ -235,7 +236,7 @@ def _count(notes: bytes) -> int:
     return len(parse(payloads.GROUP_NOTES, notes, "group notes").exceptions)
 
 
-HEADINGS = tuple("HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL REPT INDX".split())
+HEADINGS = tuple("HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL REPT COPY INDX".split())
 
 
 def validate(file: File) -> list[Problem]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
 from typing import BinaryIO
 
+from mcz.container.copies import Copy
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile
 from mcz.container.writer import Writer
@@ -21,7 +22,8 @@ class Draft:
 
     ``paths`` tells what the file restores under each path: the SHA-256 of those bytes, or a
     function that finds it. With ``hold`` False what is written goes straight to ``sink``, so that
-    nothing can be taken back; that needs no memory and suits a file of one step.
+    nothing can be taken back; that needs no memory and suits a file of one step. ``copies`` and
+    ``uncopied`` are those of ``Writer``.
     """
 
     def __init__(
@@ -32,11 +34,20 @@ class Draft:
         paths: Mapping[str, Digest] | None = None,
         *,
         hold: bool = True,
+        copies: bool = False,
+        uncopied: Iterable[Copy] = (),
     ) -> None:
         self._sink, self._pending, self._hold = sink, io.BytesIO(), hold
         self.paths = dict(paths or {})
         offset = directory.end if directory is not None else 0
-        self.writer = Writer(self, profile=profile, directory=directory, offset=offset)
+        self.writer = Writer(
+            self,
+            profile=profile,
+            directory=directory,
+            offset=offset,
+            copies=copies,
+            uncopied=uncopied,
+        )
         self._commit()
 
     def write(self, data: bytes, /) -> int:

@@ -35,18 +35,21 @@ def write(
     *,
     force: bool = False,
     archive: bool = False,
+    copies: bool = False,
     progress: Progress | None = None,
     **params: Any,
 ) -> Written:
     """Write ``motion`` to a new MCZ file: a path, an fsspec target or a binary stream.
 
-    ``params`` are the codec's; ``archive`` chooses the profile of large limits. Raises
+    ``params`` are the codec's; ``archive`` chooses the profile of large limits. ``copies``: what
+    holds the clip together, skeleton and template among it, stands in the file a second time, so
+    that a flipped bit there costs no frame (``mcz.open`` with ``salvage``). Raises
     OptionError, MotionError, or LimitError where the profile is too small; MotionError also for a
     key of the metadata that SPEC.md does not register, unless it is private (``x-...``).
     """
     check_metadata(motion.metadata, motion.name)
     with replacing(target, force=force, inputs=params.values()) as stream:
-        writer = Writer(stream, profile=profile_of(archive))
+        writer = Writer(stream, profile=profile_of(archive), copies=copies)
         name_skeleton(writer, motion.skeleton)
         quality = write_tuned(writer, motion, by_name(codec), params, progress)
         writer.finish()
@@ -70,13 +73,15 @@ def encode(
     verbatim: bool = False,
     force: bool = False,
     archive: bool = False,
+    copies: bool = False,
     progress: Progress | None = None,
 ) -> Written:
     """Turn one ASF, AMC, BVH or C3D file into an MCZ file.
 
     ``skeleton`` is the ASF of an AMC, as ``mcz.read`` takes it, with the same SkeletonWarning.
     ``verbatim`` keeps a file that cannot be parsed as an attachment. ``up`` is the axis that points
-    up ("x", "y", "z"). Raises SourceError, OptionError, MotionError or LimitError; nothing is left
+    up ("x", "y", "z"). ``copies`` is that of ``mcz.write``.
+    Raises SourceError, OptionError, MotionError or LimitError; nothing is left
     under the final name then. A target that is the source or its skeleton is refused, even with
     ``force``.
     """
@@ -87,7 +92,7 @@ def encode(
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with replacing(target, force=force, inputs=inputs) as stream:
-        draft = Draft(stream, profile_of(archive), hold=verbatim)
+        draft = Draft(stream, profile_of(archive), hold=verbatim, copies=copies)
         entry.write(draft, progress)
         refuse_inputs(target, entry.inputs)
         draft.finish()

@@ -13,6 +13,7 @@ import {
   readFoot,
 } from "./chunks.js";
 import { frameNumbers, readClip } from "./clip.js";
+import { COPIED, checkCopies } from "./copies.js";
 import { addSegment, readSegment } from "./data.js";
 import { Refused, Unsupported } from "./errors.js";
 import { readHead } from "./head.js";
@@ -80,6 +81,7 @@ class Walk {
     // For INDX: what the file has so far.
     this.head = null;
     this.shared = [];
+    this.copied = new Map(); // the chunks so far that a COPY may have, by offset
   }
 
   run() {
@@ -111,7 +113,9 @@ class Walk {
   }
 
   chunk() {
-    return readChunk(this.bytes, this.at, this.file.limits.payloadBytes);
+    const chunk = readChunk(this.bytes, this.at, this.file.limits.payloadBytes);
+    if (COPIED.has(chunk.type)) this.copied.set(chunk.offset, chunk);
+    return chunk;
   }
 
   /** A chunk or a FOOT. */
@@ -145,8 +149,10 @@ class Walk {
     this.endOfFoot = foot.end;
   }
 
-  /** QUAL, REPT and unknown types: nothing that they say bears upon what is decoded. */
-  readAncillary({ type, offset, payload }) {
+  /** QUAL, REPT, COPY and unknown types: nothing that they say bears upon what is decoded. */
+  readAncillary(chunk) {
+    const { type, offset, payload } = chunk;
+    if (type === "COPY") checkCopies(chunk, this.copied, this.bytes.length);
     const quality = type === "QUAL" ? readQuality(payload) : null;
     if (this.clip || !this.lastClip) return;
     this.lastClip.ancillary.push({ type, offset, length: payload.length });

@@ -9,8 +9,8 @@ import { Sha256 } from "./sha256.js";
 const STORED = 0;
 const RAW_DEFLATE = 1;
 
-/** Decodes the `data` of SRCE and ATTA. */
-function decoded(encoding, data, size, what) {
+/** Decodes the `data` of SRCE, ATTA and COPY. */
+export function decoded(encoding, data, size, what) {
   if (encoding === RAW_DEFLATE) return inflate(data, size, what);
   if (encoding !== STORED) throw new Refused(`${what}: encoding ${encoding}`);
   if (data.length !== size) throw new Refused(`${what}: ${data.length} bytes, not ${size}`);

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from mcz.codecs import CODECS
 from mcz.container import payloads
-from mcz.container.chunks import HEADER, REPEAT, SIGNATURE, parse_header
+from mcz.container.chunks import COPY, HEADER, REPEAT, SIGNATURE, parse_header
 from mcz.container.packets import CHECK_SIZE, END, FRAME, NUMBERED, body_check
 from mcz.errors import MczError
 from mcz.formats import FORMATS
@@ -59,6 +59,7 @@ def since(vector: Vector) -> str:
     own += ["0.4"] * any(name in SINCE_04 for name in names)
     own += ["0.3"] * any(name in SINCE_03 for name in names)
     own += ["0.4"] * any(True for _ in _payloads(vector.data, REPEAT))
+    own += ["0.9"] * any(True for _ in _payloads(vector.data, COPY))
     own += ["0.3"] * any(p[:1] == BASES for p in _payloads(vector.data, b"MODL"))
     own += [SHORT_OF[kind] for kind in _kinds(vector.data) if kind in SHORT_OF]
     if vector.since:

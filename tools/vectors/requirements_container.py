@@ -69,6 +69,8 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "PACK-01": ("uncommon/container/*packets*", "uncommon/container/open-data*"),
     "PACK-12": ("valid/*/packets-*", "valid/online/live*", "valid/online/numbered*"),
     "REPT-03": ("valid/online/repeat-*",),
+    "COPY-02": ("valid/container/copies*", "invalid/copies/payload-*", "invalid/copies/in-SKEL"),
+    "COPY-03": ("invalid/copies/before-file", "invalid/copies/reaches-in"),
     "CEND-02": ("invalid/clip/value-hash-missing", "invalid/clip/value-hash-too-many"),
     "CEND-05": ("invalid/*/another-value", "invalid/*/hash-*"),
     "QUAL-02": ("valid/container/quality", "valid/mrdwt/quality-odd"),
@@ -130,6 +132,12 @@ ARGUED: dict[str, str] = {
     "SALV-04": _SALVAGE + "test_container.py::test_open_data_cut_anywhere_salvages_whole_packets",
     "SALV-05": _SALVAGE + "test_live.py::test_a_lost_frame_costs_those_up_to_the_next_fresh_one",
     "LIMIT-06": "a file that breaks it has more than 64 MiB, and raw deflate does not shorten MODL",
+    "SALV-06": _SALVAGE + "test_copies.py::test_a_bad_byte_costs_nothing_that_has_a_copy",
+    "SALV-07": _SALVAGE + "test_copies.py::test_a_bad_byte_costs_nothing_that_has_a_copy",
+    "SALV-08": _SALVAGE + "test_copies.py::test_what_is_sound_is_kept",
+    "SALV-09": _SALVAGE + "test_copies.py::test_a_skeleton_is_made_again_from_its_asf",
+    "LIMIT-16": "copies of chunks that are there, each once, are shorter than the file: whatever "
+    "states more is refused by LIMIT-14, COPY-02 or COPY-03",
     "LIMIT-07": "a file that breaks it has more than 2 GiB, or ends before the chunk (CHUNK-05)",
     "LIMIT-11": "raw deflate makes at most 1032 times its bytes, less than the 4096 times the file "
     "that is allowed: whatever states more is refused by LIMIT-14, ATTA-03 or ATTA-04",

@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from mcz.container import payloads
+from mcz.container.chunks import COPY, SIGNATURE
 from mcz.container.limits import ARCHIVE
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import build, varint
+from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.deflate import END, Bits, code_of, own_lengths
 from tools.vectors.build.edits import at, put
 from tools.vectors.build.files import Crafter, Vector, Whole, attached, file_of, finished, partial
 from tools.vectors.build.motions import HUNDREDTHS, dance, numbers
-from tools.vectors.build.source_files import BOTH
+from tools.vectors.build.source_files import BOTH, PLAIN, take
 
 MARK = "\ufeff"
 
@@ -28,6 +30,7 @@ def vectors() -> Iterable[Vector]:
     _clips(shelf)
     _attachments(shelf)
     _quality(shelf)
+    _copies(shelf)
     _names(shelf)
     _versions(shelf)
     _unknown(shelf)
@@ -82,6 +85,39 @@ def _quality(shelf: Whole) -> None:
     entries = [{"key": "position_error_cm", "value": "0.0"}, {"key": "encoder", "value": "none"}]
     crafter.ancillary(b"QUAL", build(payloads.QUAL, {"entries": entries, "extension": b""}, "QUAL"))
     shelf.hold("quality", "QUAL", "A quality record behind CEND.", finished(crafter), dance())
+
+
+def _copies(shelf: Whole) -> None:
+    plain, spec = take(PLAIN, "plain"), "COPY; INDX"
+    given: dict[str, Any] = {"sources": (("plain.bvh", PLAIN),), "modes": BOTH}
+    for name, stored, purpose in (
+        ("copies", False, "Everything but DATA a second time before INDX, deflated."),
+        ("copies-stored", True, "The same, stored."),
+    ):
+        crafter = Crafter()
+        crafter.clip(plain)
+        crafter.clip(dance())
+        content = content_of(copies_of(crafter), crafter.offset)
+        payload = payload_of(content, stored=stored)
+        crafter.ancillary(COPY, payload, safe_to_copy=False)
+        shelf.hold(name, spec, purpose, finished(crafter), plain, dance(), **given)
+    crafter = Crafter()
+    for motion in (plain, dance()):
+        before = crafter.offset if crafter.directory.clips else len(SIGNATURE)
+        crafter.clip(motion)
+        content = content_of(copies_of(crafter, before), crafter.offset)
+        crafter.ancillary(COPY, payload_of(content), safe_to_copy=False)
+        data = finished(crafter)
+    purpose = "Two bodies, each with copies of its own chunks, none of HEAD in the second."
+    shelf.hold("copies-appended", spec, purpose, data, plain, dance(), **given)
+    crafter = Crafter()
+    crafter.ancillary(COPY, payload_of(b""), safe_to_copy=False)
+    crafter.clip(dance())
+    first = copies_of(crafter)[:1]
+    crafter.ancillary(COPY, payload_of(content_of(first, crafter.offset)), safe_to_copy=False)
+    crafter.ancillary(COPY, payload_of(content_of(first, crafter.offset)), safe_to_copy=False)
+    purpose = "A COPY of nothing before any clip, and two of the same chunk behind it."
+    shelf.hold("copies-few", spec, purpose, finished(crafter), dance())
 
 
 def _names(shelf: Whole) -> None:

@@ -1,0 +1,179 @@
+"""Chunks that stand in a file a second time, so that a flipped bit in the first costs nothing.
+
+SPEC.md, "COPY", is normative.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+from mcz.container import payloads
+from mcz.container.chunks import (
+    COPIED,
+    COPY,
+    FOOT,
+    FRAMING,
+    SIGNATURE,
+    Chunk,
+    build_chunk,
+    is_foot_at,
+    read_chunk,
+)
+from mcz.container.directory import Directory
+from mcz.container.limits import check
+from mcz.container.source import ByteSource
+from mcz.container.strict import decoded
+from mcz.errors import FormatError, TruncatedError
+from mcz.schema import build, deflate, parse, read_varint, varint
+
+MOST_BYTES = 64 * 1024  # of the copies in one COPY, decoded, so that a bad byte costs no more
+SMALL_PART = 64  # a model is copied where the file has this many times its bytes
+TYPE_SIZE = 4
+
+# Each copy in a COPY: (name, type, meaning).
+COPIED_FIELDS = (
+    ("distance", "varint", "bytes from where the chunk begins to where this COPY begins"),
+    ("type", "4 bytes", "its type"),
+    ("payload", "sized", "its payload"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Copy:
+    """What a COPY says of one chunk of the file: where it begins, its type, its payload."""
+
+    offset: int
+    type: bytes
+    payload: bytes
+
+    @property
+    def stop(self) -> int:
+        return self.offset + FRAMING + len(self.payload)
+
+    @property
+    def chunk(self) -> bytes:
+        """The whole chunk as it was: types that may be copied have no flags."""
+        return build_chunk(self.type, self.payload)
+
+    @property
+    def label(self) -> str:
+        return f"{self.type.decode()} at {self.offset}"
+
+
+def runs(copies: Iterable[Copy]) -> Iterator[list[Copy]]:
+    """``copies``, those of one COPY at a time."""
+    run: list[Copy] = []
+    size = 0
+    for copy in copies:
+        size += copy.stop - copy.offset
+        if run and size > MOST_BYTES:
+            yield run
+            run, size = [], copy.stop - copy.offset
+        run.append(copy)
+    if run:
+        yield run
+
+
+def worth_it(copy: Copy, n_bytes: int) -> bool:
+    """Whether a file of ``n_bytes`` should have it: no model that is a large part of the file."""
+    return copy.type != b"MODL" or len(copy.payload) * SMALL_PART <= n_bytes
+
+
+def build_copies(copies: Iterable[Copy], offset: int) -> bytes:
+    """The payload of a COPY that will begin at ``offset``."""
+    content = b"".join(
+        varint(offset - copy.offset) + copy.type + varint(len(copy.payload)) + copy.payload
+        for copy in copies
+    )
+    packed = deflate(content)
+    encoding = payloads.DEFLATED if len(packed) < len(content) else payloads.STORED
+    fields = {"encoding": encoding, "size": len(content), "data": packed if encoding else content}
+    return build(payloads.COPY, fields, "COPY")
+
+
+def parse_copies(payload: bytes, chunk: Chunk, limit: int) -> list[Copy]:
+    """The copies in ``payload``, that of the COPY ``chunk``; they decode to ``limit`` at most.
+
+    Raises FormatError where they are not in file order, or not before the COPY.
+    """
+    fields = parse(payloads.COPY, payload, chunk.label)
+    check(f"chunk {chunk.label}: bytes of the copies", fields.size, limit)  # LIMIT-16
+    content = decoded(fields.data, fields.encoding, fields.size, chunk.label)
+    copies: list[Copy] = []
+    at = end = 0
+    while at < len(content):
+        try:
+            copy, at = _read_copy(content, at, chunk)
+        except FormatError as error:
+            error.args = (f"chunk {chunk.label}: {error}",)
+            raise
+        if not end <= copy.offset <= copy.stop <= chunk.offset:  # COPY-03
+            raise FormatError(
+                f"chunk {chunk.label}: the copy of {copy.label}, which would end at {copy.stop}, "
+                f"is behind that of a chunk that ends at {end}"
+            )
+        end = copy.stop
+        copies.append(copy)
+    return copies
+
+
+def copy_chunks(source: ByteSource, directory: Directory) -> list[Chunk]:
+    """The COPY chunks of a file that belong to a clip; without clips all, up to a fault."""
+    rows = directory.clips.values()
+    if rows:
+        return [chunk for row in rows for chunk in row.ancillary if chunk.type == COPY]
+    found, at = [], len(SIGNATURE)
+    with suppress(FormatError):
+        while at < source.size:
+            if is_foot_at(source, at):
+                at += FOOT.size
+                continue
+            chunk = read_chunk(source, at)
+            if chunk.type == COPY:
+                found.append(chunk)
+            at += chunk.size
+    return found
+
+
+def uncopied(
+    source: ByteSource, directory: Directory, payload_of: Callable[[Chunk], bytes]
+) -> list[Copy]:
+    """Copies of the chunks behind the last COPY of a file; of aliases the directory knows none."""
+    held = copy_chunks(source, directory)
+    last = held[-1].offset if held else 0
+    chunks = [Chunk(b"HEAD", 0, len(SIGNATURE), len(directory.head)), *directory.shared.values()]
+    for row in directory.clips.values():
+        chunks += [chunk for chunk in (row.clip, row.cend) if chunk is not None]
+    chunks = sorted((c for c in chunks if c.offset > last), key=lambda chunk: chunk.offset)
+    return [Copy(chunk.offset, chunk.type, payload_of(chunk)) for chunk in chunks]
+
+
+def check_copies(
+    copies: Sequence[Copy],
+    chunk: Chunk,
+    before: Sequence[Chunk],
+    payload_of: Callable[[Chunk], bytes],
+) -> None:
+    """Compare what the COPY ``chunk`` says with the chunks ``before`` it, in file order."""
+    for copy in copies:
+        at = bisect_left(before, copy.offset, key=lambda other: other.offset)
+        there = before[at] if at < len(before) else None
+        same = there is not None and (there.offset, there.type) == (copy.offset, copy.type)
+        if there is None or not same or payload_of(there) != copy.payload:  # COPY-02
+            raise FormatError(f"chunk {chunk.label}: no {copy.label} is as its copy says")
+
+
+def _read_copy(content: bytes, at: int, chunk: Chunk) -> tuple[Copy, int]:
+    """The copy at offset ``at`` of the decoded ``content``, and the offset after it."""
+    distance, at = read_varint(content, at)
+    kind = content[at : at + TYPE_SIZE]
+    length, start = read_varint(content, at + TYPE_SIZE)
+    stop = start + length
+    if stop > len(content):
+        raise TruncatedError(f"a copy ends at {stop} of {len(content)} bytes")  # CONV-13
+    if kind not in COPIED:  # COPY-01
+        raise FormatError(f"a copy of a chunk of type {kind!r}")
+    return Copy(chunk.offset - distance, kind, content[start:stop]), stop

@@ -1,0 +1,40 @@
+"""The ancillary chunks of a clip, which lie between its segments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from mcz.container.chunks import CRC, HEADER, Chunk, read_chunk
+from mcz.container.directory import ClipRow
+from mcz.container.packets import read_packets
+from mcz.container.reader import Container
+from mcz.container.source import Forward
+
+
+def inside(container: Container, row: ClipRow) -> Iterator[Chunk]:
+    """The ancillary chunks between CLIP and CEND."""
+    assert row.cend is not None
+    source, at = container.source, row.clip.offset + row.clip.size
+    ends = {
+        segment.chunk().offset: segment.stop + CRC.size
+        for segment in row.segments
+        if not segment.packet
+    }
+    while at < row.cend.offset:
+        if at in ends:
+            at = ends[at]
+            continue
+        chunk = read_chunk(source, at)
+        if chunk.length is None:
+            at = _end_of_packets(container, chunk)
+            continue
+        if chunk.flags:
+            yield chunk
+        at += chunk.size
+
+
+def _end_of_packets(container: Container, chunk: Chunk) -> int:
+    read = Forward(container.source, chunk.offset + HEADER.size)
+    for _ in read_packets(read, container.profile.packet_bytes):
+        pass
+    return read.at

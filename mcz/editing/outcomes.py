@@ -1,0 +1,57 @@
+"""What became of the files of a command over many."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from mcz.brief import brief
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of one file, and why where that is not plain.
+
+    ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
+    "present" (the target has it already), "restored", "skipped", "exists" (it may not be replaced)
+    or "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage "damaged".
+    ``notes`` are what was noticed about one that was taken: its reader's, and whose skeleton it
+    got.
+    """
+
+    path: str
+    result: str
+    size: int = 0
+    message: str = ""
+    notes: tuple[str, ...] = ()
+
+    __repr__ = brief
+
+
+@dataclass(slots=True)
+class Report:
+    """The outcomes of a command over many files.
+
+    ``damage`` is what salvage found wrong, ``size`` that of the MCZ file, once it is written.
+    """
+
+    outcomes: list[Outcome] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+    size: int | None = None
+
+    __repr__ = brief
+
+    @property
+    def failures(self) -> list[Outcome]:
+        """The files that failed, those among them that exist and may not be replaced."""
+        return [outcome for outcome in self.outcomes if outcome.result in ("failed", "exists")]
+
+    def note(self, notes: Mapping[str, str]) -> None:
+        """Add what is to be said of some paths to their outcomes."""
+        for index, outcome in enumerate(self.outcomes):
+            if (text := notes.get(outcome.path)) and outcome.result not in ("failed", "skipped"):
+                message = f"{outcome.message}; {text}" if outcome.message else text
+                self.outcomes[index] = replace(outcome, message=message)
+
+    def count(self, result: str) -> int:
+        return sum(outcome.result == result for outcome in self.outcomes)

@@ -1,0 +1,508 @@
+"""COPY: what holds a file together stands in it twice, and a flipped bit there costs nothing."""
+
+from __future__ import annotations
+
+import io
+import pickle
+import random
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
+from mcz.container.chunks import ANCILLARY, COPIED, COPY, Chunk, build_chunk
+from mcz.container.copies import MOST_BYTES, Copy, build_copies, parse_copies
+from mcz.container.limits import BASE
+from mcz.container.overlay import Overlay
+from mcz.container.scan import scan
+from mcz.container.source import open_source
+from mcz.container.writer import Writer
+from mcz.errors import FormatError, LimitError, MotionError
+from mcz.formats import FORMATS
+from mcz.reading.report import info
+from mcz.sample import write_samples
+from mcz.writing.draft import Draft
+from tests.motions import smooth
+from tests.repair import use
+
+VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The samples: an AMC with its ASF, a BVH, a C3D."""
+    folder = tmp_path_factory.mktemp("samples")
+    write_samples(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def packed(folder: Path) -> bytes:
+    out = io.BytesIO()
+    assert not mcz.pack(folder, out, codec="raw").failures
+    return out.getvalue()
+
+
+def chunks(data: bytes, *kinds: bytes) -> list[Chunk]:
+    """The chunks of these types, all without one, in file order."""
+    return [c for c in scan(open_source(data)).chunks if not kinds or c.type in kinds]
+
+
+def changed(data: bytes, *places: int) -> bytes:
+    bad = bytearray(data)
+    for at in places:
+        bad[at] ^= 0x10
+    return bytes(bad)
+
+
+def content(data: bytes, *, salvage: bool = False) -> dict[str, object]:
+    """Every value and every file that an archive gives, by name."""
+    with mcz.open(data, salvage=salvage) as file:
+        found: dict[str, object] = {}
+        for name, clip in file.clips.items():
+            for signal in range(len(clip.signals)):
+                values, mask = clip.read_masked(signal=signal)
+                masked = b"" if mask is None or mask.all() else mask.tobytes()
+                found[f"{name} {signal}"] = values.tobytes(), masked
+            if clip.source is not None:
+                found[clip.source.path] = clip.source_bytes()
+        for name, (_, target) in file.aliases.items():
+            found[name] = file.skeleton_bytes(target)
+        return found
+
+
+# Salvage -----------------------------------------------------------------------
+
+
+def test_a_bad_byte_costs_nothing_that_has_a_copy(packed: bytes) -> None:
+    whole = content(packed)
+    assert len(whole) == 8  # three clips, a signal more, three files, an ASF
+    for chunk in chunks(packed, *COPIED):
+        for at in (0, 9, 16 + (chunk.length or 0) // 2, chunk.size - 1):
+            bad = changed(packed, chunk.offset + at)
+            with mcz.open(bad, salvage=True) as file:
+                assert re.match(f"{chunk.label}: .*; its copy is used", file.damage[0])
+                assert len(file.damage) == 1
+            assert content(bad, salvage=True) == whole, (chunk, at)
+
+
+def test_all_of_them_may_be_bad_at_once(packed: bytes) -> None:
+    every = chunks(packed, *COPIED)
+    bad = changed(packed, *(chunk.offset + 18 for chunk in every), *range(8), len(packed) - 9)
+    with mcz.open(bad, salvage=True) as file:
+        used = [line for line in file.damage if line.endswith("its copy is used")]
+        assert len(used) == len(every)
+    assert content(bad, salvage=True) == content(packed)
+
+
+def test_a_bad_copy_costs_nothing(packed: bytes) -> None:
+    (copy,) = chunks(packed, COPY)
+    for at in (0, 7, 30, copy.size - 1):
+        bad = changed(packed, copy.offset + at)
+        with mcz.open(bad, salvage=True) as file:
+            assert file.damage
+        assert content(bad, salvage=True) == content(packed)
+
+
+@pytest.mark.parametrize("codec", ["lossless", "raw"])
+def test_bit_rot(folder: Path, codec: str) -> None:
+    """A byte anywhere: only the DATA that has it is lost, each loss is named, no value wrong."""
+    out = io.BytesIO()
+    mcz.pack(folder, out, codec=codec)
+    data, draw = out.getvalue(), random.Random(codec)
+    spans = [(c.offset, c.offset + c.size) for c in chunks(data, b"DATA")]
+    truth = signals(data)
+    for number in range(60):
+        at = len(data) * number // 60 + draw.randrange(len(data) // 60)
+        n_lost = 0
+        bad = changed(data, at)
+        for name, values in signals(bad, salvage=True).items():
+            lost = np.isnan(values).all(axis=1) & ~np.isnan(truth[name]).all(axis=1)
+            np.testing.assert_array_equal(values[~lost], truth[name][~lost])
+            n_lost += int(lost.sum())
+        assert bool(n_lost) == any(a <= at < b for a, b in spans)
+        with mcz.open(bad, salvage=True) as file:
+            assert file.damage
+
+
+def signals(data: bytes, *, salvage: bool = False) -> dict[tuple[str, int], np.ndarray]:
+    with mcz.open(data, salvage=salvage) as file:
+        return {
+            (name, signal.index): clip.read(signal=signal.index)
+            for name, clip in file.clips.items()
+            for signal in clip.signals
+        }
+
+
+def test_what_lies_before_the_signature_moves_all_alike(packed: bytes) -> None:
+    (first, *_) = chunks(packed, b"SKEL")
+    bad = b"junk of a mail program" + changed(packed, first.offset + 30)
+    assert content(bad, salvage=True) == content(packed)
+
+
+def test_what_is_sound_is_kept(packed: bytes) -> None:
+    """A COPY that tells another tale of chunks that are there changes none of them."""
+    skel, *_ = chunks(packed, b"SKEL")
+    (copy,) = chunks(packed, COPY)
+    other = build_chunk(COPY, b"", ANCILLARY)
+    for offset, size in ((skel.offset, skel.length or 0), (skel.offset + 3, 5), (skel.offset, 9)):
+        lie = [Copy(offset, b"SKEL", bytes(size))]
+        other = build_chunk(COPY, build_copies(lie, copy.offset), ANCILLARY)
+        bad = packed[: copy.offset] + other + packed[copy.offset + copy.size :]
+        with mcz.open(bad, salvage=True) as file:
+            assert any("is not used: what lies there is sound" in line for line in file.damage)
+            assert not any("copy is used" in line for line in file.damage)
+        assert content(bad, salvage=True) == content(packed)
+        with pytest.raises(FormatError):
+            scan(open_source(bad), whole=True)
+
+
+def test_an_archive_within_an_archive(packed: bytes) -> None:
+    """What the COPY of an attached file says is of that file, wherever it lies."""
+    out = io.BytesIO()
+    writer = Writer(out, copies=True)
+    mcz.open(packed).close()
+    noise = random.Random(1).randbytes(len(packed))
+    writer.attachment("a.bin", noise)
+    writer.chunk(b"xtra", packed, ANCILLARY)
+    writer.finish()
+    data = out.getvalue()
+    extra = next(chunk for chunk in chunks(data) if chunk.type == b"xtra")
+    skel = chunks(packed, b"SKEL")[0]
+    bad = changed(data, extra.offset + 5, extra.payload_offset + skel.offset + 20)
+    with mcz.open(bad, salvage=True) as file:
+        assert file.attachments["a.bin"].read() == noise
+        for clip in file.clips.values():
+            clip.read()
+
+
+def test_a_salvaged_file_is_pickled_as_it_is(packed: bytes) -> None:
+    skel = chunks(packed, b"SKEL")[0]
+    with mcz.open(changed(packed, skel.offset + 20), salvage=True) as file:
+        again = pickle.loads(pickle.dumps(file))
+        assert again.damage == file.damage
+        for name, clip in file.clips.items():
+            np.testing.assert_array_equal(again.clips[name].read(), clip.read())
+
+
+# Without a COPY ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("unit", [None, "m", "in"])
+@pytest.mark.parametrize("named", [True, False])
+def test_a_skeleton_is_made_again_from_its_asf(
+    folder: Path, tmp_path: Path, unit: str | None, named: bool
+) -> None:
+    for name in ("walk.asf", "walk.amc"):
+        text = (folder / name).read_text()
+        text = text if named else re.sub(":name.*\n", "", text)
+        (tmp_path / name).write_text(text)
+    mcz.encode(tmp_path / "walk.amc", tmp_path / "a.mcz", unit=unit, codec="raw")
+    data = (tmp_path / "a.mcz").read_bytes()
+    whole = content(data)
+    skel, *_ = chunks(data, b"SKEL")
+    for at in (2, 20, skel.size - 1):
+        bad = changed(data, skel.offset + at)
+        with mcz.open(bad, salvage=True) as file:
+            assert any("is made again from its ASF, SRCE at" in line for line in file.damage)
+            again = pickle.loads(pickle.dumps(file))
+            assert list(again.clips) == list(file.clips)
+            assert again.clips["walk"].skeleton == file.clips["walk"].skeleton
+        assert content(bad, salvage=True) == whole
+    both = changed(data, skel.offset + 20, chunks(data, b"SRCE")[0].offset + 20)
+    with mcz.open(both, salvage=True) as file, pytest.raises(FormatError, match="no SKEL"):
+        file.clips["walk"].read()
+
+
+def test_a_skeleton_that_faces_up_is_made_again_from_the_other(
+    folder: Path, tmp_path: Path
+) -> None:
+    mcz.encode(folder / "walk.amc", tmp_path / "a.mcz", up="z", codec="raw")
+    data = (tmp_path / "a.mcz").read_bytes()
+    both = chunks(data, b"SKEL")
+    assert len(both) == 2
+    for hit in (both[:1], both[1:], both):
+        bad = changed(data, *(skel.offset + 20 for skel in hit))
+        with mcz.open(bad, salvage=True) as file:
+            assert file.clips["walk"].skeleton.up_axis == "z"
+        assert content(bad, salvage=True) == content(data)
+
+
+def test_another_skeleton_is_not_taken_for_it(folder: Path, tmp_path: Path) -> None:
+    """An ASF that is no longer what the skeleton was made of does not have its id."""
+    skeleton = FORMATS["asf"].read((folder / "walk.asf").read_bytes(), "walk")
+    odd = replace(skeleton, up_axis="z")
+    motion = FORMATS["amc"].read((folder / "walk.amc").read_bytes(), "walk", skeleton)
+    out = io.BytesIO()
+    mcz.write(replace(motion, skeleton=odd, source=None), out, codec="raw")
+    skel, *_ = chunks(out.getvalue(), b"SKEL")
+    with mcz.open(changed(out.getvalue(), skel.offset + 20), salvage=True) as file:
+        assert not any("made again" in line for line in file.damage)
+        with pytest.raises(FormatError, match="no SKEL"):
+            file.clips["walk"].read()
+
+
+def test_another_chunk_of_the_same_bytes_will_do() -> None:
+    data = (VECTORS / "uncommon/container/repeated-template.mcz").read_bytes()
+    whole = content(data)
+    for kind in (b"SKEL", b"SRCE"):
+        for chunk in chunks(data, kind):
+            assert content(changed(data, chunk.offset + 20), salvage=True) == whole
+    for path in sorted((VECTORS / "valid/online").glob("repeat-[oe][na]c*.mcz")):
+        data = path.read_bytes()
+        skel, *_ = chunks(data, b"SKEL")
+        assert content(changed(data, skel.offset + 20), salvage=True) == content(data)
+
+
+def test_a_rept_changes_nothing_in_a_sound_file() -> None:
+    paths = [*(VECTORS / "valid/online").glob("repeat-*.mcz")]
+    assert len(paths) > 5
+    for path in (*paths, VECTORS / "uncommon/container/REPT-of-nothing.mcz"):
+        with mcz.open(path) as file, mcz.open(path, salvage=True) as salvaged:
+            assert not salvaged.damage
+            assert salvaged.skeletons == file.skeletons
+
+
+# Repair ----------------------------------------------------------------------
+
+
+def test_repair_loses_nothing_that_has_a_copy(packed: bytes, tmp_path: Path) -> None:
+    bad, sound = tmp_path / "bad.mcz", tmp_path / "sound.mcz"
+    whole = content(packed)
+    kinds = {chunk.type: chunk for chunk in chunks(packed, *COPIED, COPY)}
+    for number, chunk in enumerate(kinds.values()):
+        bad.write_bytes(changed(packed, chunk.offset + (2, 17)[number % 2]))
+        found = mcz.repair(bad, sound, force=True)
+        assert found.damage
+        assert not found.lost
+        assert content(sound.read_bytes()) == whole
+        with mcz.open(sound) as file:
+            assert len(file.container.copies()) == (chunk.type != COPY)
+
+
+def test_repair_of_a_clip_whose_end_is_lost(folder: Path, tmp_path: Path) -> None:
+    bad, sound = tmp_path / "bad.mcz", tmp_path / "sound.mcz"
+    mcz.encode(folder / "walk.bvh", bad, codec="raw")
+    data = bad.read_bytes()
+    with mcz.open(data) as file:
+        values = file.clips["walk"].read()
+    bad.write_bytes(changed(data, chunks(data, b"CEND")[0].offset + 20))
+    assert mcz.repair(bad, sound).lost
+    assert mcz.verify(sound) == []
+    with mcz.open(sound) as file:
+        np.testing.assert_array_equal(next(iter(file.clips.values())).read(), values)
+
+
+def test_repair_makes_a_skeleton_again(folder: Path, tmp_path: Path) -> None:
+    bad, sound = tmp_path / "bad.mcz", tmp_path / "sound.mcz"
+    mcz.encode(folder / "walk.amc", bad, codec="raw")
+    data = bad.read_bytes()
+    skel, *_ = chunks(data, b"SKEL")
+    for at in (2, 17):
+        bad.write_bytes(changed(data, skel.offset + at))
+        assert not mcz.repair(bad, sound, force=True).lost
+        assert content(sound.read_bytes()) == content(data)
+
+
+# Writing -------------------------------------------------------------------------
+
+
+def n_copies(target: object) -> int:
+    with mcz.open(target) as file:
+        found = file.container.copies()
+        assert info(file)["copy_bytes"] == sum(chunk.size for chunk in found)
+    assert mcz.verify(target) == []
+    return len(found)
+
+
+def test_who_makes_them(folder: Path, tmp_path: Path) -> None:
+    a, b, c = (tmp_path / f"{name}.mcz" for name in "abc")
+    bvh = folder / "walk.bvh"
+    mcz.pack(folder, a, codec="raw")
+    assert n_copies(a) == 1
+    mcz.pack(folder, b, codec="raw", copies=False)
+    assert n_copies(b) == 0
+    for target, before in ((a, 1), (b, 0)):
+        mcz.append([bvh], target, root=folder.parent, codec="raw")
+        assert n_copies(target) == 2 * before
+        mcz.extract(target, c, clip="walk", force=True)
+        assert n_copies(c) == before
+        mcz.extract(target, c, clip="walk", copies=not before, force=True)
+        assert n_copies(c) == 1 - before
+        with mcz.open(target) as file:
+            joint = file.clips["walk"].skeleton.joints[0].name
+            values = file.clips["walk"].read(joints=[joint])
+        found = mcz.replace(target, "walk", joint, values, c, force=True)
+        assert n_copies(c) == before
+        assert not found.left_out
+    mcz.append([bvh], b, root=folder.parent.parent, copies=True, codec="raw")
+    assert n_copies(b) == 1
+    mcz.append([bvh], a, root=folder.parent.parent, copies=False, codec="raw")
+    assert n_copies(a) == 2
+    mcz.encode(bvh, c, force=True, codec="raw")
+    assert n_copies(c) == 0
+    mcz.encode(bvh, c, force=True, codec="raw", copies=True)
+    assert n_copies(c) == 1
+
+
+def test_what_an_append_has_not_yet_copied(folder: Path, tmp_path: Path) -> None:
+    """Chunks that others appended without copies get theirs with the next that has some."""
+    path = tmp_path / "a.mcz"
+    mcz.pack(folder, path, codec="raw", copies=False)
+    mcz.append([folder / "walk.bvh"], path, root=folder.parent, codec="raw", copies=True)
+    data = path.read_bytes()
+    for chunk in chunks(data, b"HEAD", b"SKEL", b"SRCE", b"CLIP", b"CEND"):
+        bad = changed(data, chunk.offset + 18)
+        assert content(bad, salvage=True) == content(data), chunk
+
+
+def test_a_file_without_clips(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    mcz.encode(folder / "walk.asf", path, copies=True)
+    assert n_copies(path) == 1
+    data = path.read_bytes()
+    skel, *_ = chunks(data, b"SKEL")
+    assert content(changed(data, skel.offset + 18), salvage=True) == content(data)
+    mcz.append([folder / "walk.bvh"], path, codec="raw")
+    assert n_copies(path) == 1  # those before any clip belong to none
+    assert len(chunks(path.read_bytes(), COPY)) == 2
+
+
+def test_a_step_that_failed_is_not_copied() -> None:
+    out = io.BytesIO()
+    draft = Draft(out, BASE, copies=True)
+    with pytest.raises(MotionError), draft.step():
+        draft.writer.template(3, b"a template that nobody wants")
+        raise MotionError("no")
+    with draft.step():
+        draft.writer.template(3, b"another")
+    draft.finish()
+    data = out.getvalue()
+    (copy,) = chunks(data, COPY)
+    copies = parse_copies(data[copy.payload_offset :][: copy.length], copy, len(data))
+    assert [one.type for one in copies] == [b"HEAD", b"SRCE"]
+    assert mcz.verify(data) == []
+
+
+def test_many_of_them_lie_in_several_chunks() -> None:
+    out, draw = io.BytesIO(), random.Random(2)
+    writer = Writer(out, copies=True)
+    for size in (40_000, 40_000, 200_000, 10, 10):
+        writer.template(3, draw.randbytes(size))
+    writer.finish()
+    data = out.getvalue()
+    found = chunks(data, COPY)
+    sizes = []
+    for chunk in found:
+        copies = parse_copies(data[chunk.payload_offset :][: chunk.length], chunk, len(data))
+        sizes.append([len(copy.payload) for copy in copies])
+    assert [len(one) for one in sizes] == [2, 1, 1, 2]
+    assert all(len(one) == 1 or sum(one) <= MOST_BYTES for one in sizes)
+    assert mcz.verify(data) == []
+
+
+@pytest.mark.parametrize(("size", "copied"), [(1000, True), (20_000, False)])
+def test_a_model_is_copied_where_it_is_small_beside_the_rest(size: int, copied: bool) -> None:
+    out, draw = io.BytesIO(), random.Random(4)
+    writer = Writer(out, copies=True)
+    writer.shared(b"MODL", b"\x63" + draw.randbytes(size))
+    writer.attachment("noise", draw.randbytes(100_000))
+    writer.finish()
+    data = out.getvalue()
+    with mcz.open(data) as file:
+        (chunk,) = file.container.copies()
+    copies = parse_copies(data[chunk.payload_offset :][: chunk.length], chunk, len(data))
+    assert [copy.type for copy in copies] == [b"HEAD"] + [b"MODL"] * copied
+    assert mcz.verify(data) == []
+
+
+def test_the_same_with_every_byte_cut_or_changed() -> None:
+    """No byte string is too odd for a reader, and a strict one takes no false copy."""
+    out = io.BytesIO()
+    mcz.write(smooth(3), out, codec="raw", copies=True)
+    data = out.getvalue()
+    (copy,) = chunks(data, COPY)
+    for at in range(copy.offset, copy.offset + copy.size):
+        use(changed(data, at), salvage=True)
+        assert mcz.verify(changed(data, at))
+    payload = data[copy.payload_offset :][: copy.length]
+    for size in range(len(payload)):
+        other = build_chunk(COPY, payload[:size], ANCILLARY)
+        bad = data[: copy.offset] + other + data[copy.offset + copy.size :]
+        with pytest.raises(FormatError):
+            scan(open_source(bad), whole=True)
+        with mcz.open(bad, salvage=True) as file:
+            np.testing.assert_array_equal(file.clips["smooth"].read(), smooth(3).values)
+
+
+def test_copies_are_no_longer_than_the_file() -> None:
+    chunk = Chunk(COPY, ANCILLARY, 1000, 9)
+    payload = build_copies([Copy(8, b"SRCE", bytes(900))], 1000)
+    assert len(parse_copies(payload, chunk, 1100)) == 1
+    with pytest.raises(LimitError, match="COPY at 1000: bytes of the copies: 908 is over"):
+        parse_copies(payload, chunk, 900)
+
+
+def test_an_overlay_reads_like_the_whole() -> None:
+    draw = random.Random(3)
+    whole = bytearray(draw.randbytes(300))
+    parts = {at: draw.randbytes(size) for at, size in ((0, 3), (50, 20), (70, 1), (90, 40))}
+    source = Overlay(open_source(bytes(whole)), parts | {300: b"behind the end"})
+    for at, part in parts.items():
+        whole[at : at + len(part)] = part
+    for _ in range(400):
+        start, stop = sorted(draw.choices(range(301), k=2))
+        assert source.read(start, stop - start) == whole[start:stop]
+    assert source.read(307, 3) == b"the"
+    assert source.size == 300
+    assert source.name == "bytes"
+
+
+# Commands ------------------------------------------------------------------------
+
+
+def test_the_commands_say_it(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, bvh = str(tmp_path / "a.mcz"), str(folder / "walk.bvh")
+
+    def told(*arguments: str) -> str:
+        assert run(cli, "mcz", [*arguments]) == 0
+        return capsys.readouterr().out
+
+    told("encode", bvh, "-o", path, "--copies", "--codec", "raw")
+    with mcz.open(path) as file:
+        size = info(file)["copy_bytes"]
+    assert f"copies {size:,} bytes" in told("info", path)
+    assert "COPY payload" in told("info", "--layout", path)
+    told("encode", bvh, "-o", path, "--force", "--codec", "raw")
+    assert "copies" not in told("info", path)
+    told("pack", str(folder), path, "--no-copies", "--force", "--codec", "raw")
+    assert "copies" not in told("info", path)
+    told("append", "--copies", "--root", str(folder.parent), "--codec", "raw", bvh, path)
+    assert "copies" in told("info", path)
+    out = str(tmp_path / "b.mcz")
+    told("extract", path, out, "--clip", "walk", "--no-copies")
+    assert "copies" not in told("info", out)
+
+
+@cache
+def invalid() -> list[Path]:
+    return sorted((VECTORS / "invalid/copies").glob("*.mcz"))
+
+
+@pytest.mark.parametrize("path", invalid(), ids=lambda path: path.stem)
+def test_false_copies_are_refused_and_salvaged_around(path: Path) -> None:
+    data = path.read_bytes()
+    with pytest.raises(FormatError, match="COPY"):
+        scan(open_source(data), whole=True)
+    with mcz.open(data, salvage=True) as file:
+        assert len(file.clips) == 2
+        for clip in file.clips.values():
+            assert not np.isnan(clip.read()).any()

@@ -1,0 +1,41 @@
+"""COPY chunks made to order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from mcz.container import payloads
+from mcz.container.chunks import COPIED, HEADER, SIGNATURE, parse_header
+from mcz.container.copies import Copy
+from mcz.schema import build, deflate, varint
+from tools.vectors.build.files import Crafter
+
+Edit = Callable[[list[Copy]], list[Copy]]
+
+
+def copies_of(crafter: Crafter, start: int = len(SIGNATURE)) -> list[Copy]:
+    """Of the chunks that ``crafter`` has written from ``start`` on those that can be copied."""
+    data, at, found = crafter.data, start, []
+    while at < len(data):
+        chunk = parse_header(data[at : at + HEADER.size], at)
+        if chunk.type in COPIED:
+            payload = data[chunk.payload_offset :][: chunk.length]
+            found.append(Copy(at, chunk.type, payload))
+        at += chunk.size
+    return found
+
+
+def content_of(copies: Sequence[Copy], offset: int) -> bytes:
+    """The copies, decoded, of a COPY at ``offset``; nothing is checked."""
+    return b"".join(
+        varint(offset - copy.offset) + copy.type + varint(len(copy.payload)) + copy.payload
+        for copy in copies
+    )
+
+
+def payload_of(content: bytes, *, size: int | None = None, stored: bool = False) -> bytes:
+    """The payload of a COPY; ``size`` is what it says that there is."""
+    data = content if stored else deflate(content)
+    stated = len(content) if size is None else size
+    fields = {"encoding": int(not stored), "size": stated, "data": data}
+    return build(payloads.COPY, fields, "COPY")
