@@ -148,6 +148,7 @@ def test_pybvh_on_real_files(data: Path, name: str) -> None:
         "other/tiny/noroot.bvh",
     ],
 )
+@pytest.mark.filterwarnings("ignore::mcz.SkeletonWarning")  # two have no ASF of their name
 def test_scipy_on_real_files(data: Path, name: str) -> None:
     motion = mcz.read(data / name)
     values, skeleton = motion.values[:500], motion.skeleton
