@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from mcz.cli.common import plural
+from mcz.cli.recording import recording_lines
 
 
 def source_lines(
@@ -36,5 +37,6 @@ def source_lines(
         yield f"  sha256     {clip['source_sha256']}"
         share = 100 * clip["exceptions_share"]
         yield f"  exceptions {clip['n_exceptions']:,} numbers off their grid ({share:.3g} %)"
+        yield from recording_lines(clip["recording"])
         for key, value in clip["metadata"].items():
             yield f"  {key}  {value[:80]}"

@@ -11,6 +11,8 @@ from typing import Any
 from mcz.errors import SkeletonWarning
 from mcz.formats import FORMATS, Format, format_of
 from mcz.motion import Motion, Skeleton
+from mcz.reading.recording import recording
+from mcz.reading.recording_report import document_of
 from mcz.reading.report import joint_facts
 from mcz.reading.skeletons import take
 from mcz.reading.source_files import read_bytes, read_skeleton
@@ -72,6 +74,7 @@ def _clip_facts(motion: Motion, source_format: Format, name: str, data: bytes) -
             for s in motion.signals
         ],
         "n_invalid": n_invalid,
+        "recording": document_of(recording(motion)),
         "source_format": source_format.name,
         "source_path": name,
         "source_bytes": len(data),
