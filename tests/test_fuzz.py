@@ -28,6 +28,10 @@ ODD = (  # vectors that this package reads but would write otherwise, or cannot 
     "older",
     "unknown",
     "model-missing",
+    "model-behind",
+    "model-later",
+    "appended-nothing",
+    "end-not-fresh",
 )
 EVERY = 23  # vectors between two that are looked at
 

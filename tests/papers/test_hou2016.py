@@ -105,6 +105,7 @@ def test_all_tables_of_a_generated_clip(
     assert run_command(command, "papers", arguments) == 0
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("short")
 def test_without_training_clips_the_rest_remains(folder: Path, tmp_path: Path) -> None:
     alone = tmp_path / "17_10.amc"
@@ -149,6 +150,7 @@ def test_claims_are_judged_by_the_figures() -> None:
     assert short_clips == [("yes", "CR / CR: 17_10 (2,783) 1.17 (1.17 to 1.17)")]
 
 
+@pytest.mark.long
 @pytest.mark.real
 def test_the_papers_order_on_a_clip_of_the_paper(data: Path) -> None:
     case = named([str(data)], None)["17_10"]

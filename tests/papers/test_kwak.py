@@ -381,6 +381,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tools.papers.kwak.coder.GOFS", (30, 2**20))
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("short")
 def test_all_tables_of_generated_clips(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
