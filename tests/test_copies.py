@@ -506,3 +506,12 @@ def test_false_copies_are_refused_and_salvaged_around(path: Path) -> None:
         assert len(file.clips) == 2
         for clip in file.clips.values():
             assert not np.isnan(clip.read()).any()
+
+
+def test_a_file_with_copies_can_be_followed(samples: Path, tmp_path: Path) -> None:
+    mcz.encode(samples / "walk.bvh", tmp_path / "walk.mcz", codec="raw", copies=True)
+    data = (tmp_path / "walk.mcz").read_bytes()
+    assert b"COPY" in data
+    rows = [values for _, values, _ in mcz.live_frames(io.BytesIO(data))]
+    with mcz.open(data) as file:
+        np.testing.assert_array_equal(rows, file.only_clip().read())

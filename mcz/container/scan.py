@@ -156,8 +156,7 @@ class Walker:
                 raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x} on a critical type")
             handler(chunk)
         elif chunk.flags != FLAGS_OF.get(chunk.type, chunk.flags):
-            due = FLAGS_OF[chunk.type]
-            raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, it has {due}")
+            raise FormatError(f"chunk {chunk.label}: flags {chunk.flags:#x}, not those of its type")
         elif chunk.flags & ANCILLARY:  # CHUNK-12
             self._ancillary(chunk)
         else:
@@ -342,13 +341,16 @@ class Walker:
             if self.strict and chunk.type == b"QUAL":
                 parse(payloads.QUAL, payload, chunk.label)  # QUAL-02
             if self.strict and chunk.type == COPY:
-                copies = parse_copies(payload, chunk, self.source.size)
-                check_copies(copies, chunk, self.found.chunks, self._payload)
+                self._copies(chunk, payload)
             if self.salvage and chunk.type == REPEAT:  # REPT-03
                 self._repeat(chunk, payload)
         if self.clip is None and self.found.directory.clips:
             last = next(reversed(self.found.directory.clips))
             self.found.directory.clips[last].ancillary.append(chunk)
+
+    def _copies(self, chunk: Chunk, payload: bytes) -> None:
+        copies = parse_copies(payload, chunk, self.source.size)
+        check_copies(copies, chunk, self.found.chunks, self._payload)
 
     def _repeat(self, chunk: Chunk, payload: bytes) -> None:
         """Take in the chunks of a REPT: of a clip that is open, those that may have been lost."""

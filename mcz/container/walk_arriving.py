@@ -1,7 +1,7 @@
 """Walking a file while it is being written: its parts as their bytes arrive, each once.
 
-SPEC.md, "Strict reading" and "Open DATA and packets", are normative. INDX is not compared with the
-rest, which is not kept.
+SPEC.md, "Strict reading" and "Open DATA and packets", are normative. INDX and COPY are not compared
+with the rest, which is not kept.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mcz.container.chunks import SIGNATURE, Chunk, check_signature
+from mcz.container.copies import parse_copies
 from mcz.container.directory import SegmentRow
 from mcz.container.scan import Walker
 from mcz.container.source import ByteSource
@@ -128,3 +129,7 @@ class ArrivingWalker(Walker):
         self._outside(chunk)
         self._payload(chunk)
         self.index = chunk
+
+    def _copies(self, chunk: Chunk, payload: bytes) -> None:
+        """Check its form: what the copies are of was let go, and is less than came before it."""
+        parse_copies(payload, chunk, chunk.offset)
