@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         UnsupportedError,
     )
     from mcz.kinematics import positions
+    from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
     from mcz.live.concealment import LiveFrame
     from mcz.live.generators import LiveReader, stream_decode, stream_encode
@@ -84,6 +85,7 @@ _HOMES = {
     "mcz.live.strict_reader": ("live_frames",),
     "mcz.live.writer": ("LiveWriter",),
     "mcz.kinematics": ("positions",),
+    "mcz.kinematics.contacts": ("Contact", "Contacts", "contacts"),
     "mcz.reading.report": ("Problem", "verify"),
     "mcz.metrics": ("Comparison", "compare"),
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
@@ -100,6 +102,8 @@ __all__ = [
     "ChecksumError",
     "Clip",
     "Comparison",
+    "Contact",
+    "Contacts",
     "Event",
     "Exceptions",
     "ExistsError",
@@ -135,6 +139,7 @@ __all__ = [
     "UnsupportedError",
     "append",
     "compare",
+    "contacts",
     "convert",
     "encode",
     "extract",

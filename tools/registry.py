@@ -63,7 +63,8 @@ def registry(text: str) -> dict[str, Any]:
         "edit_keys": _keyed(rows_after(text, "## Replacing a joint\n"), "key", "value"),
         "metrics": [
             {"id": name, "unit": unit, "meaning": meaning}
-            for names, unit, meaning in rows_after(text, "### Metrics\n")
+            for heading in ("### Metrics\n", "### Contacts\n")
+            for names, unit, meaning in rows_after(text, heading)
             for name in names.split(", ")
         ],
         "model_kinds": _keyed(rows_after(text, "**Model kinds**"), "id", "name"),

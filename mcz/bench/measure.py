@@ -17,6 +17,8 @@ from mcz.codecs.contract import Codec, Request, Span, model_finder
 from mcz.container.limits import BASE
 from mcz.container.writer import Writer
 from mcz.formats import format_of
+from mcz.kinematics import SHELL_CM
+from mcz.metrics.comparison import NO_CONTACTS
 from mcz.motion import Motion
 from mcz.reading.report import clip_ratios
 from mcz.reading.sizes import clip_sizes
@@ -29,7 +31,10 @@ Record = dict[str, Any]
 
 LEAST_SECONDS = 0.25  # of CPU time that a speed is taken from, the fastest of its runs
 MOST_RUNS = 50
-DROPPED = ("frames", "channels", "point_set", "points", "max_position_error_point")
+DROPPED = (
+    *("frames", "channels", "point_set", "points", "max_position_error_point"),
+    *("shell_radius_cm", "shell_max_joint", *NO_CONTACTS),
+)
 
 
 def what_is_coded(motion: Motion, codec: str) -> Motion:
@@ -72,7 +77,8 @@ def point(
     with mcz.open(data, max_decoded=2**53) as file:
         clip = file.only_clip()
         sizes, ratios = clip_sizes(file.container, clip), clip_ratios(file, clip)
-        found = mcz.compare(motion, clip.motion(), virtual_markers=markers)
+        radius = SHELL_CM if markers else None
+        found = mcz.compare(motion, clip.motion(), virtual_markers=markers, shell_cm=radius)
     coded = sizes.payload + sizes.overhead + sizes.models
     if not by_name(variant.codec).lossless:
         ratios = _ratios(motion, len(load(case).data), coded)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from math import inf
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -18,12 +20,12 @@ from mcz.cli.common import (
     echo,
     existing,
     opened,
-    plural,
     print_json,
     to_frames,
+    to_rate,
 )
-from mcz.cli.figures import figure_lines
-from mcz.cli.options import UNITS, decoded_option, json_option
+from mcz.cli.diff_lines import lines_of
+from mcz.cli.options import UNITS, decoded_option, json_option, up_option
 from mcz.errors import MczError
 
 if TYPE_CHECKING:
@@ -31,9 +33,20 @@ if TYPE_CHECKING:
     from mcz.motion import Motion
     from mcz.reading.file import File
 
-FEW = 12  # names of joints that are shown
 RATIOS = ("cr_source", "cr_float32", "cr_40B")
 Cut = tuple[int, int | None] | None
+
+
+def _to_radius(ctx: click.Context, param: click.Parameter, value: float) -> float:
+    """Callback of a radius in cm."""
+    if not 0 < value < inf:
+        raise click.BadParameter(f"{value:g} is not a length above 0")
+    return value
+
+
+def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[str, ...]:
+    """Callback of names with commas between them."""
+    return () if value is None else tuple(name.strip() for name in value.split(",") if name.strip())
 
 
 @click.command(short_help="How far one motion is from another.", epilog=EXIT_CODES)
@@ -56,6 +69,27 @@ Cut = tuple[int, int | None] | None
     type=click.Path(readable=False),
     help="The ASF of an AMC, or none.",
 )
+@click.option(
+    "--rate", metavar="R", callback=to_rate, help="Frames a second of a file that does not say."
+)
+@up_option("Axis that points up, of a file that does not say.")
+@click.option(
+    "--shell",
+    "shell_cm",
+    metavar="CM",
+    type=float,
+    default=3.0,
+    callback=_to_radius,
+    help="Radius of the shell around where joints start. Default: 3.",
+)
+@click.option("--by-joint", is_flag=True, help="The distances of every joint, too.")
+@click.option("--contacts", is_flag=True, help="Every contact of a foot with the floor, too.")
+@click.option(
+    "--feet",
+    metavar="NAME,...",
+    callback=_to_names,
+    help="Joints that stand on the floor. Default: those called foot, toe, ankle or heel.",
+)
 @decoded_option
 @json_option
 def command(
@@ -63,23 +97,23 @@ def command(
     b: str,
     names: tuple[str, ...],
     frames: Cut,
-    unit: str | None,
-    skeleton: str | None,
     max_decoded: int | None,
     as_json: bool,
+    **options: Any,
 ) -> Exit:
     """Compare B with A, the original: any two of .amc, .bvh, .c3d and .mcz.
 
-    Errors of channels and of positions in length units and cm, SPEC.md's "Metrics"; compression
-    ratios of an .mcz. The exit code is 0 whenever the two could be compared, however much they
-    differ.
+    Errors of channels, and of positions in length units and cm, SPEC.md's "Metrics"; how far feet
+    slide that stand in A; compression ratios of an .mcz. The exit code is 0 whenever the two could
+    be compared, however much they differ.
     """
+    wanted = _Wanted(frames=frames, **options)
     if (a, b) == ("-", "-"):
         raise Failure("only one of A and B can be standard input", Exit.USAGE)
     with ExitStack() as stack:
-        left, right = (_Side(path, stack, unit, skeleton, max_decoded) for path in (a, b))
+        left, right = (_Side(path, stack, wanted, max_decoded) for path in (a, b))
         pairs = list(_pairs(left, right, names))
-        documents = [_compared(left, right, *pair, frames) for pair in pairs]
+        documents = [_compared(left, right, *pair, wanted) for pair in pairs]
     only = {
         f"only_in_{key}": sorted(set(own.clips) - set(other.clips))
         for key, own, other in (("a", left, right), ("b", right, left))
@@ -89,12 +123,44 @@ def command(
         print_json({"a": a, "b": b, "clips": documents, **only})
         return Exit.FINE
     for number, document in enumerate(documents):
-        for line in ([""] if number else []) + list(_lines(a, b, document)):
+        for line in ([""] if number else []) + list(lines_of(a, b, document)):
             echo(line)
     for key, found in only.items():
         for name in found:
             echo(f"only in {a if key == 'only_in_a' else b}: {name}")
     return Exit.FINE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Wanted:
+    """What is compared, how, and what the two sides do not say themselves."""
+
+    frames: Cut
+    unit: str | None
+    rate: Fraction | None
+    up: str | None
+    skeleton: str | None
+    shell_cm: float
+    by_joint: bool
+    contacts: bool
+    feet: tuple[str, ...]
+
+    def told(self, motion: Motion) -> Motion:
+        """``motion`` with what it does not say itself."""
+        from mcz.reading.source_files import with_facts
+
+        return with_facts(
+            motion,
+            self.rate if motion.frame_rate is None else None,
+            self.unit if motion.skeleton.unit_cm is None else None,
+            None if motion.skeleton.up_axis else self.up,
+        )
+
+    def feet_of(self, motion: Motion) -> tuple[str, ...] | bool:
+        """What ``mcz.compare`` is to find contacts of; by default only where names say so."""
+        from mcz.kinematics.feet import feet_of
+
+        return self.feet or self.contacts or bool(feet_of(motion.skeleton))
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,11 +179,10 @@ class _Side:
         self,
         path: str,
         stack: ExitStack,
-        unit: str | None,
-        skeleton: str | None,
+        wanted: _Wanted,
         max_decoded: int | None,
     ) -> None:
-        self.path, self._unit, self._skeleton = path, unit, skeleton
+        self.path, self._wanted = path, wanted
         self.file: File | None = None
         if path == "-" or PurePath(path).suffix.lower() == ".mcz":
             self.file = stack.enter_context(opened(path, max_decoded=max_decoded))
@@ -128,16 +193,16 @@ class _Side:
     def clips(self) -> list[str]:
         return [] if self.file is None else list(self.file.clips)
 
-    def load(self, name: str | None, frames: Cut) -> _Loaded:
-        """The motion called ``name``, or the only one, cut to ``frames``."""
+    def load(self, name: str | None) -> _Loaded:
+        """The motion called ``name``, or the only one, cut to the frames that are wanted."""
         import mcz
         from mcz.reading.report import clip_ratios
-        from mcz.reading.source_files import with_facts
 
+        frames = self._wanted.frames
         with about(self.path):
             if self.file is None:
                 is_amc = PurePath(self.path).suffix.lower() == ".amc"
-                motion = mcz.read(self.path, skeleton=self._skeleton if is_amc else None)
+                motion = mcz.read(self.path, skeleton=self._wanted.skeleton if is_amc else None)
                 start, stop = _range(frames, motion.n_frames, self.path)
                 signals = tuple(signal.cut(start, stop) for signal in motion.signals)
                 motion = replace(motion, signals=signals, source=None, frame_numbers=None)
@@ -148,8 +213,7 @@ class _Side:
                 motion = clip.motion((start, stop))
                 found = clip_ratios(self.file, clip)
                 ratios = {key: found[key] for key in RATIOS}
-            if motion.skeleton.unit_cm is None:
-                motion = with_facts(motion, None, self._unit)
+            motion = self._wanted.told(motion)
         return _Loaded(motion, start, ratios)
 
 
@@ -184,26 +248,59 @@ def _pairs(
 
 
 def _compared(
-    left: _Side, right: _Side, a: str | None, b: str | None, frames: Cut
+    left: _Side, right: _Side, a: str | None, b: str | None, wanted: _Wanted
 ) -> dict[str, Any]:
     """The document of one pair of motions."""
     import mcz
 
-    one, other = left.load(a, frames), right.load(b, frames)
+    one, other = left.load(a), right.load(b)
     if one.motion.n_frames != other.motion.n_frames:
         raise Failure(
             f"{left.path} has {one.motion.n_frames} frames, {right.path} "
             f"{other.motion.n_frames}; --frames A:B chooses what both have"
         )
     with about(f"{left.path}, {right.path}"):
-        found = mcz.compare(one.motion, other.motion)
-    entries = found.entries()
-    if found.where is not None:
-        entries["max_position_error_frame"] = found.where[0] + one.start
+        found = mcz.compare(
+            one.motion,
+            other.motion,
+            shell_cm=wanted.shell_cm,
+            contacts=wanted.feet_of(one.motion) if one.motion.skeleton.joints else False,
+        )
+    entries = _in_clip(found.entries(), one.start)
     document: dict[str, Any] = {"name_a": one.motion.name, "name_b": other.motion.name, **entries}
+    document["feet"] = _feet(found)
+    if wanted.by_joint:
+        document["by_joint"] = [_in_clip(each.entries(), one.start) for each in found.by_joint]
+    if wanted.contacts:
+        slides = () if found.sliding is None else found.sliding.slides
+        document["contact_list"] = [
+            asdict(slide) | {"first": slide.first + one.start} for slide in slides
+        ]
     document["joints"] = _by_joints(one.motion, other.motion, found, one.start)
     document |= {"notes": list(found.notes), "ratios_a": one.ratios, "ratios_b": other.ratios}
     return document
+
+
+def _in_clip(entries: Mapping[str, Any], start: int) -> dict[str, Any]:
+    """Figures with their frames counted from the first of the clip, not of what was cut."""
+    return {
+        key: value + start if key.endswith("_frame") and value is not None else value
+        for key, value in entries.items()
+    }
+
+
+def _feet(found: Comparison) -> dict[str, Any] | None:
+    """What contacts were looked for with; None where none were."""
+    if found.sliding is None:
+        return None
+    contacts = found.sliding.contacts
+    return {
+        "joints": list(contacts.joints),
+        "up_axis": contacts.up_axis,
+        "up_guessed": contacts.up_guessed,
+        "frame_rate": contacts.frame_rate,
+        "rate_assumed": contacts.rate_assumed,
+    }
 
 
 def _by_joints(a: Motion, b: Motion, found: Comparison, start: int) -> dict[str, Any] | None:
@@ -221,39 +318,3 @@ def _by_joints(a: Motion, b: Motion, found: Comparison, start: int) -> dict[str,
     if errors.frame is not None:
         document["frame"] = errors.frame + start
     return document
-
-
-def _joint_lines(a: str, b: str, found: dict[str, Any]) -> Iterator[str]:
-    n_joints = len(found["joints"])
-    if not n_joints:
-        yield "no joint has the same name in both"
-        return
-    suffix, unit = ("", "units") if found["unit_cm"] is None else ("_cm", "cm")
-    if found["mean"] is not None:
-        mean, most = found[f"mean{suffix}"], found[f"greatest{suffix}"]
-        yield (
-            f"{plural(n_joints, 'joint')} of the same name: mean {mean:.6g} {unit} apart, "
-            f"at most {most:.6g} {unit} (frame {found['frame']}, {found['joint']})"
-        )
-    for path, names in ((a, found["only_in_a"]), (b, found["only_in_b"])):
-        if names:
-            more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
-            yield f"joints of {path} alone: {', '.join(names[:FEW])}{more}"
-
-
-def _lines(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
-    """The text that people read, without line ends."""
-    entries = dict(document)
-    names = entries.pop("name_a"), entries.pop("name_b")
-    notes, ratios = entries.pop("notes"), [entries.pop("ratios_a"), entries.pop("ratios_b")]
-    yield f"{a} ({names[0]}) and {b} ({names[1]})"
-    joints = entries.pop("joints")
-    yield from (f"  {line}" for line in figure_lines(entries))
-    if joints is not None:
-        yield from (f"  {line}" for line in _joint_lines(a, b, joints))
-    for path, found in zip((a, b), ratios, strict=True):
-        known = {key: value for key, value in (found or {}).items() if value is not None}
-        if known:
-            shown = ", ".join(f"{key} {value:.4g}" for key, value in known.items())
-            yield f"  {path}: {shown}"
-    yield from (f"  note: {note}" for note in notes)

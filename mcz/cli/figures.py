@@ -11,6 +11,9 @@ SETTING = "param."
 SHOWN_ELSEWHERE = (
     *("frames", "channels", "point_set", "points", "unit_cm", "codec"),
     *("max_position_error_frame", "max_position_error_point"),
+    *("shell_radius_cm", "shell_max_frame", "shell_max_joint"),
+    *("contacts", "contact_frames", "slide_mean_mm", "slide_max_mm", "slide_max_frame"),
+    *("slide_max_joint", "slide_path_mm", "slide_path_original_mm"),
 )
 WIDEST = 80  # characters that are shown of a key or value: records in files may say anything
 UNCUT = "uncut_"  # in front of the figures of a clip before it was cut
@@ -24,6 +27,7 @@ def figure_lines(entries: Mapping[str, Any]) -> Iterator[str]:
     rows = [["metric", "value", "unit", "cm", ""], *_rows(held)]
     if len(rows) > 1:
         yield from table(rows, "lrlrl").split("\n")
+    yield from _contact_lines(held)
 
 
 def reached(quality: Mapping[str, str]) -> str:
@@ -70,20 +74,17 @@ def _what(held: Mapping[str, str]) -> Iterator[str]:
 
 
 def _rows(held: Mapping[str, str]) -> Iterator[list[str]]:
-    where = [
-        f"{word} {held[key]}"
-        for word, key in (
-            ("frame", "max_position_error_frame"),
-            ("point", "max_position_error_point"),
-        )
-        if key in held
-    ]
+    notes = {
+        "max_position_error": _where(held, "max_position_error", "point"),
+        "shell_mean_cm": _radius(held),
+        "shell_max_cm": _where(held, "shell_max", "joint"),
+    }
     for key, value in held.items():
         metric = key.removeprefix(UNCUT)
         beside = key.removesuffix("_cm") in held and key.endswith("_cm")
         if key in SHOWN_ELSEWHERE or key.startswith(SETTING) or beside:
             continue
-        note = ", ".join(where) if key == "max_position_error" else ""
+        note = notes.get(key, "")
         if key.endswith("_cm"):
             yield [key.removesuffix("_cm"), "", "", _number(value), note]
         elif metric in DISTANCES:
@@ -91,6 +92,34 @@ def _rows(held: Mapping[str, str]) -> Iterator[list[str]]:
         else:
             squared = "channels, squared" if metric.rpartition(".")[2].startswith("mse") else ""
             yield [key, _number(value), squared, "", note]
+
+
+def _where(held: Mapping[str, str], metric: str, what: str) -> str:
+    """Where the greatest is, as far as it is said: ``frame 7, point Head``."""
+    words = ("frame", what)
+    return ", ".join(f"{w} {held[f'{metric}_{w}']}" for w in words if f"{metric}_{w}" in held)
+
+
+def _radius(held: Mapping[str, str]) -> str:
+    radius = held.get("shell_radius_cm")
+    return "" if radius is None else f"{_number(radius)} cm from where joints start"
+
+
+def _contact_lines(held: Mapping[str, str]) -> Iterator[str]:
+    """How many contacts the feet have, and how far they slide in them."""
+    if "contacts" not in held:
+        return
+    some = held["contacts"] != "0" and "contact_frames" in held
+    frames = f", {held['contact_frames']} frames" if some else ""
+    yield f"contacts of feet: {held['contacts']}{frames}"
+    keys = ("mean", "max", "path", "path_original")
+    mean, most, path, meant = (_number(held.get(f"slide_{key}_mm", "?")) for key in keys)
+    if "slide_mean_mm" in held:
+        where = _where(held, "slide_max", "joint")
+        at = f" ({where})" if where else ""
+        yield f"they slide {mean} mm on average, at most {most} mm{at}"
+    if "slide_path_mm" in held:
+        yield f"they move {path} mm in all, {meant} mm in the original"
 
 
 def _shown(value: Any) -> str:

@@ -27,7 +27,6 @@ from mcz.editing.extraction import Copier
 from mcz.editing.recoding import Recoded, recode
 from mcz.errors import AccessError, MotionError, OptionError
 from mcz.formats import FORMATS
-from mcz.metrics import compare
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
@@ -35,7 +34,7 @@ from mcz.reading.source_info import of_no_file
 from mcz.schema import build, parse
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
-from mcz.writing.quality import CHUNK, texts_of
+from mcz.writing.quality import CHUNK, figures, texts_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,6 +289,6 @@ def edited_quality(old: dict[str, str], recoded: Recoded) -> dict[str, str]:
     edited = [name for name in old.get("edit-joints", "").split(",") if name]
     now["edit-joints"] = ",".join(dict.fromkeys([*edited, address]))
     if not recoded.info.codec.lossless:
-        figures = texts_of(compare(recoded.given, recoded.decoded).entries())
-        now |= {f"edit_{key}": value for key, value in figures.items()}
+        found = texts_of(figures(recoded.given, recoded.decoded))
+        now |= {f"edit_{key}": value for key, value in found.items()}
     return now

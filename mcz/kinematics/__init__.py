@@ -9,26 +9,38 @@ from __future__ import annotations
 
 from mcz.kinematics.points import (
     MARKER_DISTANCE_CM,
+    SHELL_CM,
+    Places,
     depths,
+    first_points,
     origins_of,
+    places_of,
     point_names,
     point_set,
     points_and_markers_of,
+    points_of,
     positions,
     positions_of,
     reach,
+    shell_points_of,
     virtual_markers_of,
 )
 
 __all__ = [
     "MARKER_DISTANCE_CM",
+    "SHELL_CM",
+    "Places",
     "depths",
+    "first_points",
     "origins_of",
+    "places_of",
     "point_names",
     "point_set",
     "points_and_markers_of",
+    "points_of",
     "positions",
     "positions_of",
     "reach",
+    "shell_points_of",
     "virtual_markers_of",
 ]

@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
-from mcz.kinematics.chain import Chain, Floats, Pose, chain_of
+from mcz.kinematics.chain import Chain, Floats, Pose, chain_of, times
 from mcz.motion import POSITION_KINDS, Joint, Motion, Skeleton
 
 MARKER_DISTANCE_CM = 3.0  # of a virtual marker from its joint's point
+SHELL_CM = (
+    3.0  # of a point of the shell from its joint's origin, unless another radius is asked for
+)
+
+
+class Places(NamedTuple):
+    """Where things are over time, each float64 (n_frames, n, 3) in length units.
+
+    ``points`` as of ``positions``, ``markers`` as of ``virtual_markers_of``, ``shell`` as of
+    ``shell_points_of``; empty (n = 0) where they were not asked for.
+    """
+
+    points: Floats
+    markers: Floats
+    shell: Floats
 
 
 def positions(motion: Motion) -> Floats:
@@ -49,26 +65,55 @@ def virtual_markers_of(skeleton: Skeleton, values: Floats) -> Floats:
     return _Positions(skeleton, values, markers=True).markers
 
 
+def shell_points_of(skeleton: Skeleton, values: Floats, radius_cm: float = SHELL_CM) -> Floats:
+    """Three points a joint, ``radius_cm`` off its origin along the axes that turn with it.
+
+    float64 (n_frames, 3 n_joints, 3) in length units. These axes are those of the world in the
+    rest pose, whatever ``axis`` says. Raises OptionError where the length unit is unknown,
+    otherwise as ``positions``.
+    """
+    return _Positions(skeleton, values, shell_cm=radius_cm).shell
+
+
 def points_and_markers_of(skeleton: Skeleton, values: Floats) -> tuple[Floats, Floats]:
     """``positions_of`` and ``virtual_markers_of`` from one pass over the joints."""
-    positions = _Positions(skeleton, values, points=True, markers=True)
-    return positions.points, positions.markers
+    places = places_of(skeleton, values, markers=True)
+    return places.points, places.markers
+
+
+def places_of(
+    skeleton: Skeleton, values: Floats, *, markers: bool = False, shell_cm: float | None = None
+) -> Places:
+    """``positions_of`` and, as wanted, the others, from one pass over the joints."""
+    found = _Positions(skeleton, values, points=True, markers=markers, shell_cm=shell_cm)
+    return Places(found.points, found.markers, found.shell)
 
 
 class _Positions:
-    """Points (n_frames, n_points, 3) and virtual markers (n_frames, 3 n_joints, 3), as wanted."""
+    """Points (n_frames, n_points, 3), virtual markers and points of the shell, as wanted."""
 
     def __init__(
-        self, skeleton: Skeleton, values: Floats, *, points: bool = False, markers: bool = False
+        self,
+        skeleton: Skeleton,
+        values: Floats,
+        *,
+        points: bool = False,
+        markers: bool = False,
+        shell_cm: float | None = None,
     ) -> None:
         self._list = list(_points(skeleton))
         self._distance = marker_distance(skeleton) if markers else 0.0
         self._firsts = dict(reversed(self._list)) if markers else {}  # earlier points replace later
+        self._radius = 0.0 if shell_cm is None else shell_radius(skeleton, shell_cm)
+        n_shell = 0 if shell_cm is None else 3 * skeleton.n_joints
         self.points = np.empty((len(values), len(self._list) if points else 0, 3))
         self.markers = np.empty((len(values), 3 * len(self._firsts), 3))
+        self.shell = np.empty((len(values), n_shell, 3))
         chain = chain_of(skeleton)
         for rows, columns, pose in chain.poses(values):
             self._place(chain, rows, columns, pose)
+            if n_shell:
+                self._place_shell(chain, rows, pose)
 
     def _place(self, chain: Chain, rows: slice, columns: Floats, pose: Pose) -> None:
         points, markers = self.points[rows], self.markers[rows]
@@ -85,6 +130,16 @@ class _Positions:
         _forget(points)
         _forget(markers)
 
+    def _place_shell(self, chain: Chain, rows: slice, pose: Pose) -> None:
+        shell = self.shell[rows]
+        by_joint = shell.reshape(len(shell), len(pose.axes), 3, 3)
+        for joint, (origin, axes, own) in enumerate(
+            zip(pose.origins, pose.axes, chain.turned, strict=True)
+        ):
+            turned = axes if own is None else times(axes, own.T[:, :, None])  # W, as B = W C
+            by_joint[:, joint] = (origin[:, None] + self._radius * turned).T
+        _forget(shell)
+
 
 def marker_distance(skeleton: Skeleton) -> float:
     if skeleton.unit_cm is None:
@@ -93,6 +148,23 @@ def marker_distance(skeleton: Skeleton) -> float:
             "off its joints; give the unit (--unit)"
         )
     return MARKER_DISTANCE_CM / skeleton.unit_cm
+
+
+def check_radius(radius_cm: float) -> None:
+    """Raise OptionError where this is no radius of a shell."""
+    if not 0 < radius_cm < np.inf:
+        raise OptionError(f"a shell of {radius_cm} cm: its radius is a length above 0")
+
+
+def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
+    """``radius_cm`` in length units; OptionError where there is no such length."""
+    check_radius(radius_cm)
+    if skeleton.unit_cm is None:
+        raise OptionError(
+            f"skeleton {skeleton.name!r}: its length unit is unknown, and the shell lies "
+            f"{radius_cm:g} cm off its joints; give the unit (--unit)"
+        )
+    return radius_cm / skeleton.unit_cm
 
 
 def _forget(points: Floats) -> None:
@@ -148,6 +220,14 @@ def points_of(skeleton: Skeleton) -> list[list[int]]:
     for joint, tail in _points(skeleton):
         result[joint].append(tail)
     return result
+
+
+def first_points(skeleton: Skeleton) -> list[int]:
+    """The first point of every joint, as its index among all points."""
+    firsts: dict[int, int] = {}
+    for number, (joint, _) in enumerate(_points(skeleton)):
+        firsts.setdefault(joint, number)
+    return [firsts[joint] for joint in range(skeleton.n_joints)]
 
 
 def depths(skeleton: Skeleton) -> Floats:

@@ -123,7 +123,8 @@ class _Trials:
         container = Container(open_source(out.getvalue()), max_decoded=2**53)
         clip = Clip(container, container.directory.clips[motion.name])
         if not target.falls:
-            return _error(target, compare(motion, clip.motion(), virtual_markers=False))
+            found = compare(motion, clip.motion(), virtual_markers=False, shell_cm=None)
+            return _error(target, found)
         sizes = clip_sizes(container, clip)
         if target.name == "target_bytes":
             return float(sizes.payload + sizes.overhead + sizes.models)

@@ -19,6 +19,7 @@ from mcz.cli.common import run
 from mcz.cli.figures import figure_lines
 from mcz.cli.main import cli
 from tests import overlap_codec
+from tests.test_contacts import markers
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -233,3 +234,122 @@ def test_real_rounding(data: Path, tmp_path: Path, call: Call) -> None:
     assert clip["mse"] == found.mse
     assert clip["virtual_marker_mean_cm"] == found.virtual_marker_mean_cm
     assert clip["point_set"] == "acclaim"
+
+
+# Shells, joints, contacts
+
+
+@pytest.fixture
+def standing(tmp_path: Path) -> tuple[Path, Path]:
+    """Two .mcz of markers, frames 10 to 70 with a foot that stands; in the second it creeps."""
+    places = np.zeros((90, 2, 3))
+    places[:, 1] = (0, 0, 90)
+    places[:10, 0, 0] = np.arange(10) * -5
+    places[70:, 0, 0] = np.arange(20) * 5
+    moved = places.copy()
+    moved[:, 0, 1] += np.arange(90) * 0.01
+    for name, values in (("a", places), ("b", moved)):
+        motion = markers("lfoot head", values, frame_rate=None, up_axis="")
+        mcz.write(motion, tmp_path / f"{name}.mcz")
+    return tmp_path / "a.mcz", tmp_path / "b.mcz"
+
+
+def test_the_shell_has_a_radius(folder: Path, moved: Path, call: Call) -> None:
+    walk = folder / "walk.bvh"
+    clip = document(call("diff", walk, moved, "--unit", "cm", "--json"))["clips"][0]
+    assert (clip["shell_radius_cm"], clip["shell_max_frame"]) == (3, 7)
+    assert clip["shell_max_cm"] == pytest.approx(5)
+    code, out, _ = call("diff", walk, moved, "--unit", "cm", "--shell", "0.5", "--frames", "5:9")
+    rows = {line.split()[0]: line for line in out.splitlines() if line.startswith("  shell")}
+    assert code == 0
+    assert "0.5 cm from where joints start" in rows["shell_mean"]
+    assert rows["shell_max"].split()[1:5] == ["5", "frame", "7,", "joint"]
+    for bad in ("0", "-1", "nan", "wide"):
+        assert call("diff", walk, moved, "--shell", bad)[0] == 2
+
+
+def test_a_table_by_joint(folder: Path, moved: Path, call: Call) -> None:
+    arguments = "diff", folder / "walk.bvh", moved, "--unit", "cm", "--frames", "5:9", "--by-joint"
+    code, out, _ = call(*arguments)
+    lines = [line.strip() for line in out.splitlines()]
+    head = lines.index("joint          mean cm  max cm  frame  shell mean cm  max cm  frame")
+    assert code == 0
+    assert lines[head - 1] == ""
+    assert lines[head + 1].split() == ["Hips", "2", "5", "7", "2", "5", "7"]
+    shown = document(call(*arguments, "--json"))["clips"][0]["by_joint"]
+    assert [joint["joint"] for joint in shown] == mcz.read(moved).skeleton.addresses()
+    assert len(lines) - head - 1 >= len(shown)
+    first = shown[0]
+    assert (first["points"], first["max_position_error_frame"], first["shell_max_frame"]) == (
+        1,
+        7,
+        7,
+    )
+    assert first["mean_position_error_cm"] == first["mean_position_error"] == pytest.approx(2)
+    code, out, _ = call(*arguments[:3], "--by-joint")
+    assert "mean units" in out and "shell" not in out
+    document(call("diff", folder / "walk.bvh", folder / "walk.c3d", "--by-joint", "--json"))
+    assert "by_joint" not in document(call(*arguments[:3], "--json"))["clips"][0]
+
+
+def test_small_distances_by_joint_are_in_mm(standing: tuple[Path, Path], call: Call) -> None:
+    _, out, _ = call("diff", *standing, "--by-joint", "--frames", ":80")
+    assert "joint  mean mm  max mm  frame  shell mean mm  max mm  frame" in out
+    assert "lfoot     3.95     7.9     79" in out
+
+
+def test_feet_that_stand_slide(standing: tuple[Path, Path], call: Call) -> None:
+    code, out, _ = call("diff", *standing)
+    lines = [line.strip() for line in out.splitlines()]
+    assert code == 0
+    (said,) = [line for line in lines if line.startswith("contacts of feet: 1, ")]
+    (slid,) = [line for line in lines if line.startswith("they slide")]
+    assert "joint lfoot)" in slid and "mm on average, at most" in slid
+    assert "feet: lfoot; z up (guessed), 120 frames a second (assumed)" in lines
+    clip = document(call("diff", *standing, "--contacts", "--json"))["clips"][0]
+    (contact,) = clip["contact_list"]
+    assert said == f"contacts of feet: 1, {contact['n_frames']} frames"
+    assert clip["slide_max_mm"] == pytest.approx((contact["n_frames"] - 1) * 0.1)
+    assert clip["slide_max_mm"] == contact["max_mm"]
+    assert clip["slide_max_frame"] == contact["first"] + contact["n_frames"] - 1
+    assert clip["feet"] == {
+        "joints": ["lfoot"],
+        "up_axis": "z",
+        "up_guessed": True,
+        "frame_rate": 120.0,
+        "rate_assumed": True,
+    }
+    cut = document(call("diff", *standing, "--frames", "30:60", "--contacts", "--json"))["clips"][0]
+    assert [(c["first"], c["n_frames"]) for c in cut["contact_list"]] == [(30, 30)]
+    assert cut["slide_max_frame"] == 59
+    _, out, _ = call("diff", *standing, "--contacts")
+    assert "contact of  first  frames  mean mm  max mm  path mm  original's mm" in out
+
+
+def test_who_stands_how_fast_and_where_up_is(standing: tuple[Path, Path], call: Call) -> None:
+    found = document(call("diff", *standing, "--rate", "30", "--up", "z", "--json"))["clips"][0]
+    assert (found["feet"]["frame_rate"], found["feet"]["up_guessed"]) == (30, False)
+    found = document(call("diff", *standing, "--feet", "head, lfoot", "--json"))["clips"][0]
+    assert found["feet"]["joints"] == ["head", "lfoot"]
+    assert found["contacts"] == 2
+    fails(call("diff", *standing, "--feet", "hand"), 1, "a.mcz", "no joint 'hand'")
+    fails(call("diff", *standing, "--rate", "fast"), 2, "fast")
+
+
+def test_without_feet_nothing_is_said_unless_asked(tmp_path: Path, call: Call) -> None:
+    motion = markers("head", np.zeros((60, 1, 3)))
+    mcz.write(motion, tmp_path / "a.mcz")
+    pair = tmp_path / "a.mcz", tmp_path / "a.mcz"
+    _, out, _ = call("diff", *pair)
+    assert "contacts of" not in out and "feet:" not in out
+    _, out, _ = call("diff", *pair, "--contacts")
+    assert "note: no joint is a foot by its name: no contacts (--feet names them)" in out
+    clip = document(call("diff", *pair, "--contacts", "--json"))["clips"][0]
+    assert (clip["feet"], clip["contacts"], clip["contact_list"]) == (None, None, [])
+
+
+def test_records_with_contacts_are_shown() -> None:
+    told = {"contacts": "3", "slide_mean_mm": "0.05", "slide_max_mm": "0.1"}
+    lines = list(figure_lines(told | {"shell_mean_cm": "0.25"}))
+    assert lines[-2:] == ["contacts of feet: 3", "they slide 0.05 mm on average, at most 0.1 mm"]
+    assert lines[-3].split() == ["shell_mean", "0.25"]

@@ -82,7 +82,7 @@ def point_of(loaded: Loaded, variant: Variant, params: Mapping[str, Any]) -> Rec
     with mcz.open(data, max_decoded=2**53) as file:
         clip = file.only_clip()
         sizes = clip_sizes(file.container, clip)
-        found = mcz.compare(motion, clip.motion(), virtual_markers=False)
+        found = mcz.compare(motion, clip.motion(), virtual_markers=False, shell_cm=None)
     if found.mean_position_error_cm is None:
         raise MotionError(f"{motion.name}: {'; '.join(found.notes) or 'no figure in cm'}")
     coded, n_points = sizes.payload + sizes.overhead, found.points or 0

@@ -1,0 +1,254 @@
+"""Contacts: in which frames a foot stands. SPEC.md, "Contacts", is normative.
+
+A foot stands where its point is slow and near the lowest that it gets. Two thresholds each keep
+the answer from flickering: what is below the wider ones belongs to a contact if somewhere in it
+both are below the narrower ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.brief import brief, counted
+from mcz.errors import MotionError, OptionError
+from mcz.kinematics.chain import Floats
+from mcz.kinematics.feet import feet_of
+from mcz.kinematics.points import first_points, positions_of
+from mcz.motion import Motion, Skeleton
+
+Flags = NDArray[np.bool_]
+
+USUAL_RATE = 120.0  # frames a second where nobody says: that of CMU's AMC files
+AXES = "xyz"
+BLOCK = 2**19  # numbers that are worked on at a time
+
+
+@dataclass(frozen=True, slots=True)
+class ContactRule:
+    """What counts as standing: speeds in cm/s, heights in cm, times in seconds.
+
+    ``speed`` is that over ``window``; ``height`` is above the percentile ``floor`` of all heights
+    of that point. A contact goes on below ``wide_speed`` and ``wide_height``. Interruptions of up
+    to ``gap`` are closed, and what is then shorter than ``least`` is none.
+    """
+
+    speed: float = 15.0
+    wide_speed: float = 30.0
+    height: float = 6.0
+    wide_height: float = 8.0
+    floor: float = 5.0
+    window: float = 1 / 30
+    gap: float = 0.025
+    least: float = 0.1
+
+
+RULE = ContactRule()
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Frames ``first`` <= f < ``first + n_frames`` in which the point of ``joint`` stands."""
+
+    joint: str
+    first: int
+    n_frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """All contacts of a motion, joint by joint in the order of the skeleton, each in time order.
+
+    ``joints`` are those that were looked at, as ``Skeleton.addresses`` names them. ``up_axis`` is
+    "x", "y" or "z", and ``up_guessed`` where the skeleton does not say it; ``rate_assumed`` where
+    ``frame_rate`` is 120 because nobody says it. Raises MotionError where a run is of another
+    joint or beyond the frames.
+    """
+
+    runs: tuple[Contact, ...]
+    joints: tuple[str, ...]
+    n_frames: int
+    up_axis: str = ""
+    up_guessed: bool = False
+    frame_rate: float = USUAL_RATE
+    rate_assumed: bool = False
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        for run in self.runs:
+            last = run.first + run.n_frames
+            if run.joint not in self.joints or not 0 <= run.first < last <= self.n_frames:
+                raise MotionError(f"{run} is not of {self.n_frames} frames of {self.joints}")
+
+    def frames(self, joint: str) -> Flags:
+        """Whether ``joint`` stands, frame by frame, bool (n_frames,).
+
+        Raises MotionError where that joint was not looked at.
+        """
+        if joint not in self.joints:
+            known = ", ".join(self.joints)
+            raise MotionError(f"joint {joint!r} is none of those looked at: {known}")
+        standing = np.zeros(self.n_frames, np.bool_)
+        for run in self.runs:
+            if run.joint == joint:
+                standing[run.first : run.first + run.n_frames] = True
+        return standing
+
+
+def contacts(
+    motion: Motion, joints: Sequence[int | str] | None = None, rule: ContactRule = RULE
+) -> Contacts:
+    """In which frames of ``motion`` a foot stands; SPEC.md, "Contacts", has the rule.
+
+    ``joints`` are the feet, by index or name; None takes those whose names say so, ``LeftFoot``,
+    ``ltoes`` and the like. What stands is the first point of the joint. An axis that points up and
+    a frame rate that nobody says are guessed, and the result says so. Where a position is unknown,
+    nothing stands.
+
+    Raises MotionError where there is no such joint, no foot by name or no kinematics, and
+    OptionError where the length unit is unknown.
+    """
+    skeleton, signal = motion.skeleton, motion.signals[0]
+    if signal.channels is not None:
+        raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
+    tracks = FootTracks(skeleton, joints, motion.n_frames)
+    step = max(1, BLOCK // max(1, skeleton.n_channels + 12 * skeleton.n_joints))
+    for start in range(0, motion.n_frames, step):
+        block = signal.cut(start, min(start + step, motion.n_frames))
+        rows = block.masked()[:: signal.samples_per_frame].astype(np.float64, copy=False)
+        tracks.add(start, positions_of(skeleton, rows))
+    rate = None if motion.frame_rate is None else float(motion.frame_rate)
+    return tracks.contacts(rate, skeleton.up_axis, rule)
+
+
+class FootTracks:
+    """Where the feet of a motion are in every frame, from blocks of positions of all points.
+
+    ``joints`` as of ``contacts``, whose errors it raises. ``feet`` is float64 (n_feet, n_frames,
+    3), ``body`` the mean of all known points, float64 (n_frames, 3), both in length units.
+    """
+
+    def __init__(
+        self, skeleton: Skeleton, joints: Sequence[int | str] | None, n_frames: int
+    ) -> None:
+        found = feet_of(skeleton) if joints is None else [skeleton.find(j) for j in joints]
+        if not found:
+            raise MotionError(
+                f"skeleton {skeleton.name!r}: none of its {counted(skeleton.n_joints, 'joint')} is "
+                "a foot by its name; say which joints are (joints=, --feet)"
+            )
+        if skeleton.unit_cm is None:
+            raise OptionError(
+                f"skeleton {skeleton.name!r}: its length unit is unknown, and a foot stands where "
+                "it is slow in cm/s; give the unit (--unit)"
+            )
+        addresses, firsts = skeleton.addresses(), first_points(skeleton)
+        self.joints = tuple(addresses[joint] for joint in dict.fromkeys(found))
+        self.unit_cm = skeleton.unit_cm
+        self._points = [firsts[joint] for joint in dict.fromkeys(found)]
+        self.feet = np.full((len(self._points), n_frames, 3), np.nan)
+        self.body = np.full((n_frames, 3), np.nan)
+
+    def add(self, start: int, points: Floats) -> None:
+        """Take positions of all points, (frames, n_points, 3), from frame ``start`` on."""
+        frames = slice(start, start + len(points))
+        self.body[frames] = _means(points)
+        for foot, point in enumerate(self._points):
+            self.feet[foot, frames] = points[:, point]
+
+    def contacts(self, rate: float | None, up_axis: str, rule: ContactRule = RULE) -> Contacts:
+        """The contacts; ``rate`` in frames a second, None and "" are unknown."""
+        up = up_axis or self.guessed_up()
+        frame_rate = rate or USUAL_RATE
+        with np.errstate(over="ignore"):  # what overflows is unknown
+            places = self.feet * self.unit_cm
+        return Contacts(
+            runs=tuple(
+                Contact(joint, first, n_frames)
+                for joint, track in zip(self.joints, places, strict=True)
+                for first, n_frames in runs_of(track, frame_rate, AXES.index(up), rule)
+            ),
+            joints=self.joints,
+            n_frames=self.feet.shape[1],
+            up_axis=up,
+            up_guessed=not up_axis,
+            frame_rate=frame_rate,
+            rate_assumed=rate is None,
+        )
+
+    def guessed_up(self) -> str:
+        """The axis along which the body is farthest from its feet, on average; "y" if none is."""
+        with np.errstate(all="ignore"):
+            apart = self.body - self.feet
+            known = np.isfinite(apart).all(axis=2)
+            means = np.abs(apart[known].sum(axis=0))
+        return AXES[int(means.argmax())] if np.nanmax(means) > 0 else "y"
+
+
+def _means(points: Floats) -> Floats:
+    """The mean over the points of a frame that are known, NaN where none is, (frames, 3)."""
+    with np.errstate(all="ignore"):
+        means: Floats = points.sum(axis=1) / points.shape[1]
+        if not np.isfinite(means).all():  # a search for what is unknown takes longer
+            known: Flags = np.asarray(np.isfinite(points).all(axis=2))
+            sums = np.where(known[..., None], points, 0.0).sum(axis=1)
+            means = sums / known.sum(axis=1)[:, None]
+    return means
+
+
+def runs_of(
+    track: Floats, rate: float, up: int, rule: ContactRule = RULE
+) -> Iterator[tuple[int, int]]:
+    """First frame and number of frames of every contact of one point.
+
+    ``track`` has its positions in cm, float64 (n_frames, 3), NaN where unknown; ``up`` is the
+    column of the axis that points up, ``rate`` in frames a second.
+    """
+    known: Flags = np.asarray(np.isfinite(track).all(axis=1))
+    if not known.any():
+        return
+    with np.errstate(all="ignore"):  # what overflows does not stand
+        speed = speeds(track, rate, rule.window)
+        height = track[:, up] - np.percentile(track[known, up], rule.floor)
+        surely = (speed < rule.speed) & (height < rule.height)
+        perhaps = (speed < rule.wide_speed) & (height < rule.wide_height)
+    for first, stop in _joined(perhaps, known, frames_in(rule.gap, rate)):
+        if stop - first >= max(2, frames_in(rule.least, rate)) and surely[first:stop].any():
+            yield first, stop - first
+
+
+def speeds(track: Floats, rate: float, window: float) -> Floats:
+    """The speed of a point, from its places half a ``window`` before and after, in units/s.
+
+    ``track`` is (n_frames, 3); the result (n_frames,), NaN where one of the places is unknown.
+    """
+    half = max(1, frames_in(window / 2, rate))
+    frames = np.arange(len(track))
+    before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(track) - 1)
+    x, y, z = (track[after] - track[before]).T
+    found: Floats = np.sqrt(x * x + y * y + z * z) * rate / (after - before)
+    return found
+
+
+def frames_in(seconds: float, rate: float) -> int:
+    """The nearest whole number of frames, of two the greater."""
+    return int(np.floor(seconds * rate + 0.5))
+
+
+def _joined(flags: Flags, known: Flags, gap: int) -> Iterator[tuple[int, int]]:
+    """First frame and end of every run of ``flags``, runs with up to ``gap`` between them joined.
+
+    What is between them must be ``known``.
+    """
+    edges = np.flatnonzero(np.diff(flags, prepend=False, append=False)).tolist()
+    runs: list[tuple[int, int]] = []
+    for first, stop in zip(edges[::2], edges[1::2], strict=True):
+        if runs and first - runs[-1][1] <= gap and known[runs[-1][1] : first].all():
+            runs[-1] = runs[-1][0], stop
+        else:
+            runs.append((first, stop))
+    yield from runs

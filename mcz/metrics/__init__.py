@@ -1,0 +1,13 @@
+"""How far a decoded motion is from the original: channels, points, markers, shell, contacts.
+
+SPEC.md, "Metrics", defines every id. Figures are sums of binary64 in no fixed order: they agree
+between machines to about 1e-9, not to the last bit.
+"""
+
+from __future__ import annotations
+
+from mcz.metrics.comparing import compare
+from mcz.metrics.comparison import Comparison, JointFigures
+from mcz.metrics.sliding import ContactSlide, Sliding
+
+__all__ = ["Comparison", "ContactSlide", "JointFigures", "Sliding", "compare"]
