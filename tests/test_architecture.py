@@ -42,7 +42,7 @@ ALLOWED = {
     "annexes": set(),
     "coding": GROUND | {"annexes"},
     "transforms": GROUND,
-    "codecs": MODEL | {"angles", "annexes", "kinematics", "coding", "transforms"},
+    "codecs": MODEL | {"angles", "annexes", "kinematics", "coding", "transforms", "units"},
     "container": MODEL,
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},

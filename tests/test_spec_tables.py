@@ -16,6 +16,7 @@ from mcz.codecs import CODECS
 from mcz.codecs.curves import kernels as qbc_kernels
 from mcz.codecs.lossless import kernels as lossless_kernels
 from mcz.codecs.online import kernels as online_kernels
+from mcz.codecs.posewave import header as posewave
 from mcz.coding import logistic, mixing, residuals, space_kernels
 from mcz.container import chunks
 from mcz.formats import FORMATS, amc, c3d_restore
@@ -88,6 +89,7 @@ def test_groups_and_resolutions_of_codecs() -> None:
         codec = CODECS[int(row[0])]
         assert row[4] == ("any" if codec.domain == "ordinals" else codec.grouping)
         by_codec = {"mrdwt": levels, "dwt": levels, "awt": levels, "qbc": "1 to 2"}
+        by_codec["posewave"] = f"1 to {posewave.MAX_LEVELS + 1}"
         assert row[5] == by_codec.get(codec.name, "1")
 
 

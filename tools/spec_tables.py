@@ -37,6 +37,7 @@ MODULES = (
     "mcz.codecs.spatial.windows",
     "mcz.codecs.spatial.lsdt_frame",
     "mcz.codecs.online.coder",
+    "mcz.codecs.posewave.header",
     "mcz.formats.layout",
     "mcz.formats.notes",
     "mcz.formats.c3d_layout",
@@ -100,7 +101,7 @@ def type_name(subcon: Any) -> str:
         case construct.IfThenElse():
             return type_name(subcon.thensubcon) + ", or absent"
         case construct.FormatField():
-            return {"B": "u8", "d": "binary64"}[subcon.fmtstr[-1]]
+            return {"B": "u8", "f": "binary32", "d": "binary64"}[subcon.fmtstr[-1]]
     if subcon is construct.GreedyBytes:
         return "bytes to the end"
     return type_name(subcon.subcon)

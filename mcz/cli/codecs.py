@@ -57,7 +57,7 @@ def _document(codec: Codec) -> dict[str, Any]:
 def _parameters(codec: Codec) -> tuple[Parameter, ...]:
     from mcz.codecs.parameters import TARGETS
 
-    return (*codec.parameters, *(TARGETS if codec.dial else ()))
+    return (*(p for p in codec.parameters if not p.inner), *(TARGETS if codec.dial else ()))
 
 
 def _facts(parameter: Parameter) -> dict[str, Any]:

@@ -23,6 +23,7 @@ HOMES = {
     9: "spatial.mdtt",
     10: "spatial.pca_rdo",
     11: "online.online",
+    13: "posewave.posewave",
 }
 
 
@@ -62,11 +63,13 @@ class Codecs(MutableMapping[int, Codec]):
 
 CODECS = Codecs()
 DEFAULT = "lossless"  # the best lossless one there is
+ALIASES = {"lossy": "posewave"}  # the best lossy one there is
 
 
 def by_name(name: str) -> Codec:
-    """The codec called ``name``; raises OptionError where there is none."""
+    """The codec called ``name``, or by a name of ``ALIASES``; raises OptionError for another."""
     names = CODECS.names()
+    name = ALIASES.get(name, name)
     if name not in names:
         raise OptionError(f"no codec is called {name!r}; there are: {', '.join(names)}")
     return CODECS[names[name]]

@@ -252,6 +252,9 @@ class Codec:
     header names (None: there never are any). ``live`` and ``follow``: coding and decoding frame by
     frame (None: the codec cannot).
 
+    ``promise`` gives the targets that it meets where a caller asks for none and leaves its dial
+    alone (None: none).
+
     ``recode`` codes some groups anew (None: the codec cannot do that), of a codec with ``regroup``
     in any of the segments, of others in all. ``preview`` says what can be read without decoding
     the rest (None: nothing exactly).
@@ -267,6 +270,7 @@ class Codec:
     grouping: Grouping = "joint"
     parameters: tuple[Parameter, ...] = field(default=())
     dial: Dial | None = None
+    promise: Callable[[Mapping[str, Any]], dict[str, Any]] | None = None
     cut: Cut | None = None
     regroup: Regroup | None = None
     recode: Recode | None = None
@@ -275,6 +279,10 @@ class Codec:
     uses: Uses | None = None
     live: Live | None = None
     follow: Follow | None = None
+
+    def has(self, name: str) -> bool:
+        """Whether it has a parameter of that name."""
+        return any(parameter.name == name for parameter in self.parameters)
 
     def options(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """All parameters, those given checked; raises OptionError for an unknown or bad one."""

@@ -17,12 +17,16 @@ Presets = Mapping[str, Mapping[str, Any]]
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter of a codec, as ``--param name=value`` gives it."""
+    """One parameter of a codec, as ``--param name=value`` gives it.
+
+    ``inner``: it is found by a search for a target; nobody is told of it, and no record names it.
+    """
 
     name: str
     default: Any
     help: str
     parse: Callable[[Any], Any]
+    inner: bool = False
 
     @property
     def range(self) -> str:
@@ -35,7 +39,8 @@ class Dial:
     """The one parameter that trades quality for size: the greater, the smaller the file.
 
     ``rises``: the greater, the better the quality instead. ``whole``: it is an integer. A caller
-    who names a size or an error has it searched for between ``low`` and ``high``.
+    who names a size or an error has it searched for between ``low`` and ``high``, from ``guess`` on
+    where that gives a setting for a target and its limit.
     """
 
     parameter: str
@@ -43,6 +48,7 @@ class Dial:
     high: float
     rises: bool = False
     whole: bool = False
+    guess: Callable[[str, float], float | None] | None = None
 
 
 def in_range(text: str, parse: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -101,7 +101,9 @@ def write_clip(
     sha256 = motion.source.sha256 if motion.source else b""
     writer.end_clip(motion.n_frames, sha256, hashes)
     if quality and not codec.lossless:
-        record = quality_record(motion, decoded, codec.name, options, remarks)
+        inner = {parameter.name for parameter in codec.parameters if parameter.inner}
+        settings = {name: value for name, value in options.items() if name not in inner}
+        record = quality_record(motion, decoded, codec.name, settings, remarks)
         writer.ancillary(CHUNK, quality_payload(record))
         return record
     return None

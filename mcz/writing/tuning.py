@@ -6,45 +6,31 @@ measure.
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Any
 
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import Dial
-from mcz.container.reader import Container
-from mcz.container.source import open_source
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
-from mcz.metrics import compare
 from mcz.motion import Motion
-from mcz.reading.clip import Clip
-from mcz.reading.sizes import clip_sizes
+from mcz.writing.bounding import REFINEMENT, bounded
 from mcz.writing.clip_writer import Progress, asked, write_clip
 from mcz.writing.positions import as_codec_wants
+from mcz.writing.trials import Target, Trials
+from mcz.writing.weighing import QUALITY, Limits, weighted
 
 GOAL = 0.985  # of a target: near enough to stop
 PROMISED = 0.97  # of a target: what is less is remarked upon
 MOST_TRIALS = 60
+MOST_TURNS = 4  # of weights and a target, each found for the other
 CLOSE = 1.00002  # between a setting that meets the target and one that does not
+GUESSED = 1.25  # from a setting that was guessed to the next
 NEAR, NEIGHBORS = 1.01, 24  # where figures jump: settings tried beside the one that was found
 
 Point = tuple[float, float]  # a setting and its figure
-
-
-@dataclass(frozen=True, slots=True)
-class Target:
-    """What was asked for; the figure of that name must not exceed ``limit``.
-
-    ``falls``: the figure falls as the files get smaller (a size), instead of rising (an error).
-    """
-
-    name: str
-    limit: float
-    falls: bool
 
 
 def write_tuned(
@@ -62,19 +48,65 @@ def write_tuned(
     options = codec.options(params)
     motion = as_codec_wants(writer, motion, codec, options)
     targets = asked(options)
-    if not targets or codec.dial is None:
+    if not targets and codec.promise and codec.dial and options[codec.dial.parameter] is None:
+        targets = codec.promise(options)
+    limits = options.get(QUALITY)
+    if codec.dial is None or not (targets or limits):
         return write_clip(writer, motion, codec, params, progress)
-    target = _target(motion, codec.dial, options, targets)
-    trial = _Trials(motion, codec, params, writer)
-    setting, reached, ended = search(codec.dial, target, trial)
-    remark = None
+    target = _target(motion, codec.dial, options, targets) if targets else None
+    trial = Trials(motion, codec, params, writer)
+    if limits:
+        found, remarks = _with_quality(codec, target, trial, limits)
+    else:
+        found, remarks = _meet(codec, target, trial)
+    return write_clip(writer, motion, codec, {**params, **found}, progress, remarks=remarks)
+
+
+Found = tuple[dict[str, Any], dict[str, str]]  # parameters, and what the quality record says
+
+
+def _with_quality(codec: Codec, target: Target | None, trial: Trials, limits: Limits) -> Found:
+    """Weights of joints beside what meets a target.
+
+    Not with a coarser step for all joints, which the weights would allow: that took more bytes.
+    """
+    assert codec.dial is not None
+    _check_unit(trial.motion, QUALITY)
+    weights: dict[str, Any] = {}
+    for _ in range(MOST_TURNS):
+        found, remarks = _meet(codec, target, trial.given(weights))
+        weights, kept = weighted(codec.dial, trial, limits, {**found, **weights})
+        both = {**found, **weights}
+        if target is None or trial.figure(target, both) <= target.limit:
+            return both, {**remarks, **kept}
+    name = "" if target is None else f"{target.name} {target.limit:g}"
+    raise OptionError(f"{QUALITY} and {name} cannot both be kept")
+
+
+def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
+    """Parameters that meet a target, none where there is none."""
+    assert codec.dial is not None
+    if target is None:
+        return {}, {}
+    if target.name == "max_error_cm" and codec.has(REFINEMENT):
+        return bounded(codec.dial, target, trial)
+    return _searched(codec.dial, target, trial)
+
+
+def _check_unit(motion: Motion, name: str) -> None:
+    if motion.skeleton.unit_cm is None:
+        raise OptionError(f"{name} has no meaning: the length unit is unknown; --unit says it")
+
+
+def _searched(dial: Dial, target: Target, trial: Trials) -> Found:
+    """The setting of the dial that meets a target, and what the quality record says of it."""
+    setting, reached, ended = search(dial, target, trial)
+    remarks = {"target_reached": repr(reached)}
     if reached < PROMISED * target.limit:
-        dial = codec.dial.parameter
-        why = f"the range of {dial} ends there" if ended else f"no {dial} that was tried is nearer"
-        remark = f"{target.name} {target.limit:g}: {reached:g} was reached; {why}"
-    remarks = {"target_reached": repr(reached)} | ({"target_remark": remark} if remark else {})
-    found = dict(params) | {codec.dial.parameter: int(setting) if codec.dial.whole else setting}
-    return write_clip(writer, motion, codec, found, progress, remarks=remarks)
+        why = f"no {dial.parameter} that was tried is nearer"
+        why = f"the range of {dial.parameter} ends there" if ended else why
+        remarks["target_remark"] = f"{target.name} {target.limit:g}: {reached:g} was reached; {why}"
+    return {dial.parameter: int(setting) if dial.whole else setting}, remarks
 
 
 def _target(
@@ -89,56 +121,9 @@ def _target(
         raise OptionError(
             "kbps has no meaning: the frame rate is unknown (--rate says it) or there are no frames"
         )
-    if name.endswith("_cm") and motion.skeleton.unit_cm is None:
-        raise OptionError(f"{name} has no meaning: the length unit is unknown; --unit says it")
+    if name.endswith("_cm"):
+        _check_unit(motion, name)
     return Target(name, float(limit), falls=not name.endswith("_cm"))
-
-
-class _Trials:
-    """The figures of a clip at one setting of the dial, measured on a file in memory."""
-
-    def __init__(
-        self, motion: Motion, codec: Codec, params: Mapping[str, Any], writer: Writer
-    ) -> None:
-        self.motion, self.codec, self.params, self.writer = motion, codec, params, writer
-        self.alone = replace(motion, signals=motion.signals[:1])
-        self.others = 0.0  # bytes of the further signals, which no dial changes
-
-    def __call__(self, target: Target, setting: float) -> float:
-        figures = self._measure(self.alone, target, setting)
-        if len(self.motion.signals) > 1 and target.falls:
-            if not self.others:
-                whole = self._measure(self.motion, target, setting)
-                self.others = whole - figures
-            figures += self.others
-        return figures
-
-    def _measure(self, motion: Motion, target: Target, setting: float) -> float:
-        assert self.codec.dial is not None
-        out = io.BytesIO()
-        scratch = Writer(out, profile=self.writer.profile)
-        params = dict(self.params) | {self.codec.dial.parameter: setting}
-        write_clip(scratch, motion, self.codec, params, quality=False)
-        scratch.finish()
-        container = Container(open_source(out.getvalue()), max_decoded=2**53)
-        clip = Clip(container, container.directory.clips[motion.name])
-        if not target.falls:
-            found = compare(motion, clip.motion(), virtual_markers=False, shell_cm=None)
-            return _error(target, found)
-        sizes = clip_sizes(container, clip)
-        if target.name == "target_bytes":
-            return float(sizes.payload + sizes.overhead + sizes.models)
-        assert motion.frame_rate is not None
-        return float(sizes.payload * 8 * motion.frame_rate / motion.n_frames / 1000)
-
-
-def _error(target: Target, comparison: Any) -> float:
-    name = target.name.replace("_error_cm", "_position_error_cm")
-    value = getattr(comparison, name)
-    if value is None:
-        why = "; ".join(comparison.notes) or "no position is known in any frame"
-        raise OptionError(f"{target.name} has no meaning: {why}")
-    return float(value)
 
 
 def search(
@@ -195,12 +180,13 @@ def _bracket(
     dial: Dial, target: Target, measure: Callable[[Target, float], float]
 ) -> tuple[Point, Point, bool]:
     """A setting that meets the target and one that does not, or the end of the range."""
-    setting = min(max(1.0, dial.low), dial.high)
+    guessed = dial.guess and dial.guess(target.name, target.limit)
+    setting = _fitting(dial, guessed or 1.0)
     found = setting, _figure(dial, measure, target, setting)
     first_meets = found[1] <= target.limit
     falls = target.falls != dial.rises  # as the dial goes up
     upwards = first_meets != falls  # where the other side of the target lies
-    factor = 2.0
+    factor = GUESSED if guessed else 2.0
     while True:
         end = dial.high if upwards else dial.low
         if setting == end:

@@ -26,9 +26,11 @@ from conformance.child import Limits
 from conformance.server import Server
 from mcz.cli import conformance
 from mcz.codecs import by_name
+from mcz.codecs.posewave import choices
 from mcz.errors import OptionError
 from mcz.motion import Motion
 from tests.codecs.lossy import gapped, markers, rough, saved, wandering
+from tests.codecs.test_posewave_contacts import RUNS, walking
 from tests.motions import smooth
 from tests.test_vector_tools import vector_of
 from tools import make_vectors
@@ -103,6 +105,20 @@ ONLINE = (
     {"bitrate": 10},
     {"bitrate": 0.5, "gof": 4, "coder": "golomb"},
 )
+POSEWAVE = (
+    {},
+    {"step": 0.3, "segment_frames": 17},
+    {"step": 1},
+    {"step": 0.5, "levels": 0},
+    {"step": 0.3, "levels": 8},
+    {"preset": "preview", "levels": 1},
+)
+CONTACTS: tuple[dict[str, Any], ...] = (
+    {"step": 0.1},
+    {"step": 1, "contact_tolerance": 0.1, "segment_frames": 64},
+    {"step": 0.1, "levels": 0},
+    {"step": 0.3, "levels": 8},
+)
 SETTINGS: dict[str, tuple[dict[str, Any], ...]] = {
     "raw": ({}, {"segment_frames": 17}),
     "lossless": ({}, {"segment_frames": 17}),
@@ -116,6 +132,7 @@ SETTINGS: dict[str, tuple[dict[str, Any], ...]] = {
     "mdtt": OWN,
     "pca-rdo": OWN,
     "online": ONLINE,
+    "posewave": POSEWAVE,
 }
 CASES = [(codec, params) for codec, rows in SETTINGS.items() for params in rows]
 POINTS = ("lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo", "online")
@@ -180,13 +197,14 @@ CHANNEL_CUTS: tuple[dict[str, Any], ...] = (
     {"frames": (0, 5), "resolution": 1},
 )
 CHANNEL_CODECS = ("mrdwt", "qbc", "dwt", "awt")
+MORE_CUTS = dict.fromkeys(CHANNEL_CODECS, CHANNEL_CUTS) | {"posewave": CHANNEL_CUTS[1:]}
 
 
 @pytest.mark.parametrize("codec", SETTINGS)
 def test_cut_clips(codec: str, tmp_path: Path, other: Server) -> None:
     source, target = tmp_path / "all.mcz", tmp_path / "cut.mcz"
     mcz.write(smooth(150), source, codec=codec, segment_frames=20)
-    for cut in (*CUTS, *(CHANNEL_CUTS if codec in CHANNEL_CODECS else ())):
+    for cut in (*CUTS, *MORE_CUTS.get(codec, ())):
         if codec == "qbc" and cut.get("resolution") == 2:
             continue  # it has two
         mcz.extract(source, target, **cut, force=True)
@@ -207,6 +225,33 @@ def test_live_clips(codec: str, params: dict[str, Any], other: Server) -> None:
         writer.push(row)
     writer.close()
     check(out.getvalue(), other, params)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_finer_steps_of_posewave(seed: int, other: Server) -> None:
+    """Rows that have steps of their own."""
+    wanted = np.random.default_rng(seed).integers(0, 8, 90)
+    for refinement in (wanted, np.where(wanted == 7, 7, 0), np.sort(wanted)):
+        data = saved("posewave", smooth(90), step=0.5, refinement=refinement, segment_frames=50)
+        check(data, other, refinement)
+
+
+@pytest.mark.parametrize("codes", [(2, 0), (1, 6), (5, 3), (0, 4)], ids=str)
+def test_axis_orders_of_posewave(
+    codes: tuple[int, ...], other: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Joints whose angles are coded in other orders of axes than those of the source."""
+    monkeypatch.setattr(choices, "choose_orders", lambda source: [*codes, 0, 0])
+    for step in (0.01, 1.0):
+        check(saved("posewave", smooth(90), step=step, segment_frames=50), other, step)
+
+
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_contacts_of_posewave(unit: str, other: Server) -> None:
+    """Points of feet that keep their places."""
+    for seed, params in enumerate(CONTACTS):
+        motion = walking(150, seed, unit)
+        check(saved("posewave", motion, contacts=RUNS, **params), other, params)
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -283,6 +328,11 @@ REAL: dict[str, tuple[dict[str, Any], ...]] = {
     "pca": ({}, {"preset": "khan2014"}),
     **{name: ({}, {"preset": "hou2016"}) for name in POINTS[:-1]},
     "online": ({}, {"step": 0.1, "order": "reordered"}, {"coder": "golomb"}),
+    "posewave": (
+        {"step": 0.1},
+        {"step": 0.01, "segment_frames": 100},
+        {"step": 1, "levels": 8},
+    ),
 }
 
 

@@ -109,6 +109,10 @@ export class ByteReader {
     return value;
   }
 
+  f32() {
+    return this.view.getFloat32(this.skip(4), true);
+  }
+
   f64() {
     return this.view.getFloat64(this.skip(8), true);
   }

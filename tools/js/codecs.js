@@ -10,14 +10,16 @@ import * as mrdwt from "./codecs/mrdwt.js";
 import * as online from "./codecs/online.js";
 import * as pcaRdo from "./codecs/pca-rdo.js";
 import * as pca from "./codecs/pca.js";
+import * as posewave from "./codecs/posewave.js";
 import * as qbc from "./codecs/qbc.js";
 import * as raw from "./codecs/raw.js";
 import { Unsupported } from "./errors.js";
 
 const CODECS = new Map(
-  [raw, lossless, mrdwt, qbc, pca, dwt, awt, lsdtFrame, lsdtClip, mdtt, pcaRdo, online].map(
-    (codec) => [codec.id, codec],
-  ),
+  [
+    ...[raw, lossless, mrdwt, qbc, pca, dwt, awt, lsdtFrame, lsdtClip, mdtt, pcaRdo, online],
+    posewave,
+  ].map((codec) => [codec.id, codec]),
 );
 
 /** Names of the codecs, in the order of their ids. */

@@ -3,18 +3,20 @@
 import { Refused } from "./errors.js";
 
 const HALF = 32768;
-const GREATEST_WEIGHT = 2 ** 24;
-const GREATEST_COUNT = 250;
+export const GREATEST_WEIGHT = 2 ** 24;
+const EVEN_WEIGHT = 26214;
+export const GREATEST_COUNT = 250;
 
+/** squash(x) of every 128th x from -2048 on. */
 // prettier-ignore
-const NODES = [
+export const NODES = [
   22, 36, 60, 98, 162, 267, 439, 720, 1179, 1921, 3108, 4971, 7812, 11955, 17625, 24743, 32768,
   40793, 47911, 53581, 57724, 60565, 62428, 63615, 64357, 64816, 65097, 65269, 65374, 65438, 65476,
   65500, 65514,
 ];
 
 /** squash(x) is SQUASH[x + 2048]. */
-const SQUASH = new Int32Array(4096);
+export const SQUASH = new Int32Array(4096);
 for (let x = -2047; x <= 2047; x++) {
   const i = (x + 2048) >> 7;
   const v = (x + 2048) & 127;
@@ -22,14 +24,14 @@ for (let x = -2047; x <= 2047; x++) {
 }
 
 /** stretch(p) is STRETCH[p >> 4]. squash grows with x, so the least x grows with p. */
-const STRETCH = new Int32Array(4096);
+export const STRETCH = new Int32Array(4096);
 for (let i = 0, x = -2047; i < 4096; i++) {
   while (x < 2047 && SQUASH[x + 2048] < 16 * i + 8) x++;
   STRETCH[i] = x;
 }
 
 /** What a context of count n moves of its way to a bit, in 65536ths: RATE[n]. */
-const RATE = new Int32Array(GREATEST_COUNT + 1);
+export const RATE = new Int32Array(GREATEST_COUNT + 1);
 for (let n = 0; n <= GREATEST_COUNT; n++) RATE[n] = Math.floor(65536 / (n + 2));
 
 /**
@@ -153,6 +155,21 @@ export class Model {
     const bytes = (lines) => Uint8Array.from(lines.join("").match(/../g), (x) => parseInt(x, 16));
     const probabilities = Uint16Array.from(bytes(table.probabilities), (byte) => 256 * byte + 128);
     return new Model(probabilities, bytes(table.counts), Float64Array.from(table.weights));
+  }
+
+  /**
+   * A model that knows nothing: contexts of even chances, mixers of equal weights.
+   *
+   * @param {number} nContexts
+   * @param {number} nMixers
+   */
+  static even(nContexts, nMixers) {
+    const probabilities = new Uint16Array(nContexts).fill(HALF);
+    return new Model(
+      probabilities,
+      new Uint8Array(nContexts),
+      new Float64Array(3 * nMixers).fill(EVEN_WEIGHT),
+    );
   }
 
   /** A model of its own that begins where this one is. */

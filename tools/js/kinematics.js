@@ -12,7 +12,7 @@ const QW = 11;
 const QZ = 14;
 
 /** Axes (0 x, 1 y, 2 z) of each axis_order, the first letter first. */
-const AXIS_ORDERS = [
+export const AXIS_ORDERS = [
   [0, 1, 2],
   [0, 2, 1],
   [1, 0, 2],

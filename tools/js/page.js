@@ -11,6 +11,7 @@ const ANNEX_FILES = [
   "frame_start.json",
   "lossless_start.json",
   "online_start.json",
+  "posewave_start.json",
   "pca_start.json",
   "qbc_start.json",
   "wavelet_start.json",

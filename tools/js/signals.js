@@ -115,6 +115,7 @@ function signalLayout(clip, signal) {
   return {
     name: signal.name,
     channels: signal.channels,
+    skeleton: signal.ownChannels ? null : clip.skeleton,
     groups: groupsOf(signal),
     grids: gridsOf(signal),
     integer: signal.integer,

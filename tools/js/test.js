@@ -16,7 +16,11 @@ import { Refused } from "./errors.js";
 import * as grids from "./grids.js";
 import { inflate } from "./inflate.js";
 import { Kinematics, hasKinematics } from "./kinematics.js";
+import { halvings, join } from "./lifting.js";
 import { ordinalOf } from "./ordinals.js";
+import { PoseMetric } from "./pose-metric.js";
+import { AcrossChannels, folded } from "./pose-prediction.js";
+import { logOf } from "./pose-sizes.js";
 import { PrefixCode } from "./prefix.js";
 import { Sha256, sha256 } from "./sha256.js";
 import { checkAsf } from "./source-asf.js";
@@ -541,6 +545,121 @@ test("kinematics: what is invalid", () => {
   assert.ok(!hasKinematics(skeletonOf(joints, { angleUnit: 0 })));
   assert.ok(!hasKinematics(skeletonOf([{ channels: "plain" }])));
   assert.ok(hasKinematics(skeletonOf([{}])));
+});
+
+// Pose metric
+
+/** R, row after row, of a factor. */
+function denseOf({ paths, starts, nKept }, entries) {
+  return paths.map((path, c) => {
+    const row = new Array(nKept).fill(0);
+    const root = 1 / entries[starts[c + 1] - 1];
+    path.forEach((d, i) => (row[d] = d === c ? root : root * entries[starts[c] + i]));
+    return row;
+  });
+}
+
+const SWINGING = [
+  { channels: "tx ty tz rz rx", offset: [1, 2, 3] },
+  { channels: "ry rx", offset: [2, 0, 1], axis: [10, 20, 30], tails: [[1, 0, 0], [0, 2, 1]] },
+  { channels: "tx rz plain rx", offset: [0, -3, 0], tails: [[1, 1, 0]] },
+];
+
+// Lifting
+
+test("lifting: lengths", () => {
+  assert.deepEqual(halvings(37, 3), [37, 19, 10, 5]);
+  assert.deepEqual(halvings(3, 8), [3, 2, 1]);
+  assert.deepEqual(halvings(1, 8), [1]);
+});
+
+test("lifting: what stands still is its approximation", () => {
+  for (const n of [2, 3, 7, 8]) {
+    const approximation = new Float64Array(2 * Math.ceil(n / 2)).map((_, i) => (i % 2 ? -3 : 5));
+    const rows = join(approximation, new Float64Array(2 * Math.floor(n / 2)), 2);
+    assert.equal(rows.length, 2 * n);
+    rows.forEach((x, i) => assert.ok(Math.abs(x - (i % 2 ? -3 : 5)) < 1e-12));
+  }
+});
+
+test("lifting: the taps of the 9/7 wavelet", () => {
+  // The synthesis filters of bior4.4 have unit norm; those of Lifting have 1 and 2 as their sums.
+  const approximation = new Float64Array(16);
+  approximation[8] = 1;
+  const low = join(approximation, new Float64Array(16), 1).subarray(12, 21);
+  const taps = [...WAVELETS[10].lo].filter((tap) => tap !== 0);
+  assert.equal(taps.length, 7);
+  taps.forEach((tap, k) => assert.ok(Math.abs(low[k + 1] - tap * Math.SQRT2) < 1e-9));
+});
+
+// Rows in the metric
+
+test("posewave: logarithms of sizes", () => {
+  for (let k = 0; k < 1024; k++) {
+    const e = logOf(k / 16);
+    const slack = 1 + 1e-12;
+    assert.ok(2 ** (e / 6) <= (1 + k / 4) * slack && 1 + k / 4 < 2 ** ((e + 1) / 6) * slack, `${k}`);
+  }
+  assert.equal(logOf(0), 0);
+  assert.equal(logOf(63 / 4), 36);
+  assert.equal(logOf(2 ** 33), logOf(4095.999));
+});
+
+test("posewave: folded sums", () => {
+  assert.equal(folded(Float64Array.from({ length: 96 }, (_, i) => i)), 4560);
+  // What is added first decides what is rounded away.
+  const values = new Float64Array(64);
+  [values[0], values[32], values[16], values[48]] = [1e16, 1, 1, -1e16];
+  assert.equal(folded(values), 1e16 + 1 + (1 - 1e16));
+});
+
+test("posewave: channels that go together are foretold", () => {
+  const across = new AcrossChannels(2);
+  const next = dice(5);
+  for (let row = 0; row < 400; row++) {
+    const x = next() - 0.5;
+    across.learn(Float64Array.of(8 * x, -24 * x), 1);
+  }
+  across.means.fill(0);
+  across.spread(0, 0, 1);
+  assert.ok(Math.abs(across.means[1] + 3) < 0.1, `${across.means[1]}`);
+});
+
+test("pose metric: what points really do", () => {
+  for (const intrinsic of [true, false]) {
+    const skeleton = skeletonOf(SWINGING, { intrinsic });
+    const values = skeleton.channels.map((_, i) => 17 * i - 60);
+    const kept = [...values.keys()];
+    const reg = kept.map(() => 1e-3);
+    const metric = new PoseMetric(skeleton, kept, reg, { radius: 0, kappa: 0 });
+    const R = denseOf(metric, metric.factor(values));
+    const kinematics = new Kinematics(skeleton);
+    const slopes = kept.map((c) => {
+      const at = (step) => kinematics.pose(values.map((v, i) => (i === c ? v + step : v))).points.flat();
+      const before = at(-1e-3);
+      return at(1e-3).map((x, i) => (x - before[i]) / 2e-3);
+    });
+    const nPoints = slopes[0].length / 3;
+    for (const c of kept) {
+      for (const d of kept) {
+        const found = R.reduce((sum, row) => sum + row[c] * row[d], c === d ? -1e-3 : 0);
+        const expected = slopes[c].reduce((sum, x, i) => sum + x * slopes[d][i], 0) / nPoints;
+        assert.ok(Math.abs(found - expected) < 1e-8, `${c} ${d}: ${found}, not ${expected}`);
+      }
+    }
+  }
+});
+
+test("pose metric: rows come back", () => {
+  const skeleton = skeletonOf(SWINGING);
+  const roll = dice(9);
+  const kept = [0, 1, 3, 4, 6, 7, 8, 9, 10];
+  const reg = kept.map(() => 1e-4);
+  const metric = new PoseMetric(skeleton, kept, reg, { radius: 0.5, kappa: 0.5 });
+  const entries = metric.factor(skeleton.channels.map(() => 300 * roll()));
+  const x = kept.map(() => roll() - 0.5);
+  const y = denseOf(metric, entries).map((row) => row.reduce((sum, r, i) => sum + r * x[i], 0));
+  metric.fromMetric(entries, y).forEach((value, i) => assert.ok(Math.abs(value - x[i]) < 1e-9));
 });
 
 test("ASF: the skeleton that a file describes", () => {

@@ -1,0 +1,102 @@
+"""Compiled: the approximations of a segment, row after row, each at the pose of the one before.
+
+SPEC.md, "Codec 13: posewave", is normative and has the steps below in the same order. Imported on
+first use only.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.posewave.apply_kernels import row_out_of
+from mcz.codecs.posewave.metric_kernels import factor_rows
+from mcz.codecs.posewave.skeleton_plan import Plan
+from mcz.jit import inner, kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MEMORY = 0.97  # of what was learned, from row to row
+PRIOR, PRIOR_SHARE = 0.25, 0.5  # (PRIOR * greatest step)^2 times 4, and the share it stands for
+
+
+class Course(NamedTuple):
+    """How the approximations have gone so far: a row goes on as the last two did, more or less.
+
+    ``pose`` (1, n_channels) is the last one, ``kept`` (n_kept,) are its columns that change. By
+    kept channel: ``expected`` is the next row, ``moved`` the last difference of rows, ``above`` and
+    ``below`` the products of neighboring differences and their squares. ``n_rows`` (1,).
+    """
+
+    pose: Floats
+    kept: Ints
+    expected: Floats
+    moved: Floats
+    above: Floats
+    below: Floats
+    n_rows: Ints
+
+
+def course_of(still: Floats, kept: Ints, greatest: Floats) -> Course:
+    """Before the first row: ``still`` (n_channels,) is the pose, ``greatest`` (n_kept,) steps."""
+    scale = PRIOR * greatest
+    below = 4.0 * scale * scale
+    return Course(
+        pose=still[None].copy(),
+        kept=kept,
+        expected=still[kept],
+        moved=np.zeros(len(kept)),
+        above=PRIOR_SHARE * below,
+        below=below,
+        n_rows=np.zeros(1, np.int64),
+    )
+
+
+@inner
+def go_on(course: Course, difference: Floats) -> None:
+    """The next row is ``difference`` (n_kept,) away from what was expected."""
+    n_rows = course.n_rows[0]
+    for k in range(len(course.kept)):
+        c = course.kept[k]
+        value = course.expected[k] + difference[k]
+        moved = value - course.pose[0, c]
+        if n_rows >= 2:
+            course.above[k] = course.above[k] * MEMORY + moved * course.moved[k]
+            course.below[k] = course.below[k] * MEMORY + course.moved[k] * course.moved[k]
+        share = min(max(course.above[k] / course.below[k], 0.0), 1.0)
+        course.pose[0, c] = value
+        course.expected[k] = value + (share * moved if n_rows >= 1 else 0.0)
+        course.moved[k] = moved if n_rows >= 1 else 0.0
+    course.n_rows[0] = n_rows + 1
+
+
+@kernel
+def next_factor(plan: Plan, course: Course, packed: Floats) -> None:
+    """Fill ``packed`` (1, n_entries) at the last pose."""
+    lane = np.empty((1, len(plan.path), 1))
+    factor_rows(plan, course.pose, lane, 1, 1)
+    packed[0] = lane[0, :, 0]
+
+
+@kernel
+def take_row(plan: Plan, course: Course, packed: Floats, row: Floats) -> None:
+    """Go on by a row (1, n_kept) that is in the metric."""
+    difference = np.empty(len(course.kept))
+    row_out_of(plan, packed[0], row[0], difference)
+    go_on(course, difference)
+
+
+@kernel
+def take_rows(plan: Plan, course: Course, rows: Floats, approx: Floats) -> None:
+    """The approximations, (n_rows, n_kept), of rows in the metric."""
+    n_kept = len(course.kept)
+    packed, difference = np.empty((1, len(plan.path), 1)), np.empty(n_kept)
+    for m in range(len(rows)):
+        factor_rows(plan, course.pose, packed, 1, 1)
+        row_out_of(plan, packed[0, :, 0], rows[m], difference)
+        go_on(course, difference)
+        for k in range(n_kept):
+            approx[m, k] = course.pose[0, course.kept[k]]

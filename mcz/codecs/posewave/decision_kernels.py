@@ -1,0 +1,180 @@
+"""Compiled: integers as decisions, each coded by the mixed opinion of several contexts.
+
+SPEC.md, "Rows in the metric", is normative and has the steps below in the same order. One
+function serves encoder and decoder. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+from mcz.codecs.posewave.state import (
+    C_ESCAPE,
+    C_EXTRA,
+    C_SIGN,
+    COUNT_LIMIT,
+    M_SIGN,
+    N_INPUTS,
+    N_OPINIONS,
+    N_SLOTS,
+    Ints,
+    Model,
+)
+from mcz.coding import mixing
+from mcz.coding.logistic import LIMIT
+from mcz.coding.mixing import Bytes, adaptive, code, mixed, number
+from mcz.coding.residuals import bits
+from mcz.jit import inner
+
+BIAS = 77
+INSIDE = (1 << 24) - 1  # no index of a slot is larger: says that none is below zero
+FIRST_ESCAPED = 49
+MOST_LENGTH = 32
+LEAST_CHANCE = 16
+COST_UNIT = 4096  # of a bit
+
+
+# Where an integer is coded: its level; sets of weights and second thoughts; contexts of its sign;
+# whether the side away from its mean is the negative one.
+Contexts = tuple[int, int, int, int, int, int, int, int]
+LEVEL, ONE, OTHER, SECOND, SIGN_1, SIGN_2, SIGN_3, DOWN = range(8)
+
+
+@inner
+def opinion(model: Model, slot: int, one: Ints, other: Ints, second: Ints) -> tuple[int, int, int]:
+    """The mixed chance of a 1, that after second thoughts, and the mixed one stretched."""
+    slots, at, inputs = model.slots, model.at, model.inputs
+    stretch, trust = model.stretch, model.trust
+    dot = (one[N_OPINIONS] + other[N_OPINIONS]) * BIAS
+    for k in range(N_OPINIONS):
+        known = slots[(at[k] + slot) & INSIDE]
+        said = (stretch[(known >> 12) & 4095] * trust[known & 255]) >> 16
+        inputs[k] = said
+        dot += (one[k] + other[k]) * said
+    x = min(max(dot >> 16, -LIMIT), LIMIT) + 2048
+    chance = model.squash[x & 4095]
+    node, share = (x >> 7) & 31, x & 127
+    later = (second[node] * (128 - share) + second[node + 1] * share) >> 7
+    final = (chance + later + 1) >> 1
+    return chance, min(max(final, LEAST_CHANCE), 65536 - LEAST_CHANCE), x
+
+
+@inner
+def learn(
+    model: Model, slot: int, one: Ints, other: Ints, second: Ints, bit: int, chance: int, x: int
+) -> None:
+    """Let all learn from a coded bit that ``opinion`` was asked about."""
+    slots, at, inputs, rates = model.slots, model.at, model.inputs, model.rates
+    error = (bit << 16) - chance
+    inputs[N_OPINIONS] = BIAS
+    for k in range(N_INPUTS):
+        change = (inputs[k] * error + 32768) >> 16
+        one[k] = min(max(one[k] + change, -mixing.MAX_WEIGHT), mixing.MAX_WEIGHT)
+        other[k] = min(max(other[k] + change, -mixing.MAX_WEIGHT), mixing.MAX_WEIGHT)
+    target = 65535 if bit else 0
+    for k in range(N_OPINIONS):
+        where = (at[k] + slot) & INSIDE
+        known = slots[where]
+        p, n = known >> 8, known & 255
+        p += ((target - p) * rates[n]) >> 16
+        slots[where] = p << 8 | min(n + 1, COUNT_LIMIT)
+    node, share = (x >> 7) & 31, x & 127
+    second[node] += ((target - second[node]) * (128 - share)) >> 14
+    second[node + 1] += ((target - second[node + 1]) * share) >> 14
+
+
+@inner
+def decide(model: Model, data: Bytes, bit: int, slot: int, where: Contexts) -> int:
+    """Code a decision, then let the model learn."""
+    one, other = model.weights[where[ONE], slot], model.weights[where[OTHER], slot]
+    second = model.second[where[SECOND], slot]
+    chance, final, x = opinion(model, slot, one, other, second)
+    bit = code(model.coder, data, bit, final)
+    learn(model, slot, one, other, second, bit, chance, x)
+    return bit
+
+
+@inner
+def code_error(model: Model, data: Bytes, error: int, where: Contexts) -> int:
+    """Code by how far an integer misses its rounded mean, and return it."""
+    if decide(model, data, 1 if error != 0 else 0, 0, where) == 0:
+        return 0
+    far = (1 if error < 0 else 0) ^ where[DOWN] ^ 1
+    signs = C_SIGN + where[SIGN_1], C_SIGN + where[SIGN_2], C_SIGN + where[SIGN_3]
+    far = mixed(model.coder, data, far, M_SIGN + where[LEVEL], signs[0], signs[1], signs[2])
+    model.at[0] += far * N_SLOTS
+    size = abs(error)
+    bucket, found = bucket_of(size), 1
+    while found < N_SLOTS:
+        if decide(model, data, 1 if bucket > found else 0, found, where) == 0:
+            break
+        found += 1
+    size = code_rest(model.coder, data, size, found, where[LEVEL])
+    return -size if far ^ where[DOWN] ^ 1 else size
+
+
+@inner
+def bucket_of(size: int) -> int:
+    """The buckets are 1, 2, 3, 4, 5-6, 7-8, 9-12, 13-16, 17-24, 25-32, 33-48 and all above."""
+    if size < 5:
+        return size
+    n = bits(size - 1)
+    return min(2 * n - 1 + ((size - 1) >> (n - 2) & 1), N_SLOTS)
+
+
+@inner
+def code_rest(coder: Ints, data: Bytes, size: int, bucket: int, level: int) -> int:
+    """Code which of its bucket a size is."""
+    if bucket < 5:
+        return bucket
+    if bucket < N_SLOTS:
+        n = (bucket - 3) >> 1
+        low = ((4 if bucket & 1 else 6) << (n - 1)) + 1
+        rest = size - low
+        top = adaptive(coder, data, rest >> (n - 1) & 1, C_EXTRA + bucket)
+        return low + (top << (n - 1)) + number(coder, data, rest, n - 1)
+    rest = size - FIRST_ESCAPED + 1
+    length, found = bits(max(rest, 0)), 1
+    while found < MOST_LENGTH:
+        context = C_ESCAPE + level * MOST_LENGTH + found
+        if adaptive(coder, data, 1 if length > found else 0, context) == 0:
+            break
+        found += 1
+    rest = 1 << (found - 1) | number(coder, data, rest, found - 1)
+    return FIRST_ESCAPED - 1 + rest
+
+
+@inner
+def cost_of(model: Model, error: int, where: Contexts) -> int:
+    """About what ``code_error`` would take, in units of ``COST_UNIT``; nothing is changed."""
+    one, other = model.weights[where[ONE]], model.weights[where[OTHER]]
+    second, costs = model.second[where[SECOND]], model.costs
+    _, chance, _ = opinion(model, 0, one[0], other[0], second[0])
+    if error == 0:
+        return int(costs[(65536 - chance) >> 4])
+    total = costs[chance >> 4]
+    far = (1 if error < 0 else 0) ^ where[DOWN] ^ 1
+    signs = C_SIGN + where[SIGN_1], C_SIGN + where[SIGN_2], C_SIGN + where[SIGN_3]
+    chance = mixed_chance(model.coder, M_SIGN + where[LEVEL], signs)
+    total += costs[(chance if far else 65536 - chance) >> 4]
+    model.at[0] += far * N_SLOTS
+    bucket, found = bucket_of(abs(error)), 1
+    while found < N_SLOTS:
+        _, chance, _ = opinion(model, found, one[found], other[found], second[found])
+        total += costs[(chance if bucket > found else 65536 - chance) >> 4]
+        if bucket <= found:
+            break
+        found += 1
+    model.at[0] -= far * N_SLOTS
+    if bucket >= 5:
+        plain = (bucket - 3) >> 1 if bucket < N_SLOTS else 2 * bits(abs(error))
+        total += COST_UNIT * plain
+    return int(total)
+
+
+@inner
+def mixed_chance(coder: Ints, mixer: int, contexts: tuple[int, int, int]) -> int:
+    """The probability with which ``mixing.mixed`` would code a 1."""
+    dot, at = 0, mixing.WEIGHTS + 3 * mixer
+    for context in contexts:
+        dot += coder[at] * coder[mixing.STRETCH + (coder[mixing.MODELS + 2 * context] >> 4)]
+        at += 1
+    return int(coder[mixing.SQUASH + 2048 + min(max(dot >> 16, -LIMIT), LIMIT)])

@@ -1,0 +1,147 @@
+"""What the header of a ``posewave`` signal says: steps, the metric, the levels.
+
+SPEC.md, "Codec 13: posewave", is normative; the names below are its field names.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from construct import ExprValidator, Float32l, Int8ul, Struct
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Layout
+from mcz.codecs.posewave.contact_plan import CONTACTS, Contacts, parse_contacts
+from mcz.codecs.posewave.model import Start, start_tables
+from mcz.codecs.posewave.orders import N_ORDERS, check_orders
+from mcz.codecs.steps import code_of, ratio_of
+from mcz.errors import FormatError
+from mcz.motion import POSITION_KINDS, ROTATION_KINDS
+from mcz.schema import build, counted, parse
+
+Floats = NDArray[np.float64]
+
+NAME = "posewave"
+MAX_LEVELS = 8
+MAX_FINE = 24
+WHOLE_SHARE = 16
+N_STARTS = 2
+
+POSEWAVE_HEADER = Struct(
+    "levels" / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_LEVELS) * "levels, 0 to 8",
+    "borrowing"
+    / ExprValidator(Int8ul, lambda n, ctx: n <= ctx.levels)
+    * "finest levels of details that take the metric of the next coarser one",
+    "start"
+    / ExprValidator(Int8ul, lambda n, ctx: n < N_STARTS)
+    * "start table of the model, 0 or 1",
+    "refining"
+    / ExprValidator(Int8ul, lambda n, ctx: n <= 1)
+    * "1: rows may have finer steps of their own; 0: none has",
+    "step"
+    / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)
+    * "quantizer step of a row in the metric, in length units, 2^-60 to 2^60",
+    "radius"
+    / ExprValidator(Float32l, lambda x, ctx: 0 <= x <= 2.0**60)
+    * "of the shell, in length units, 0 to 2^60",
+    "shell"
+    / ExprValidator(Int8ul, lambda n, ctx: n <= WHOLE_SHARE)
+    * "share of the shell in the metric, in sixteenths",
+    "rotation" / Int8ul * "step code of the greatest step of a rotation channel",
+    "position" / Int8ul * "step code of the greatest step of a position channel",
+    "first"
+    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_FINE)
+    * "halvings from the greatest step to that of a segment's first values, 0 to 24",
+    "constant"
+    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_FINE)
+    * "halvings from there to the step of constant channels, 0 to 24",
+    "plain"
+    / counted(Int8ul, 2**14)
+    * "of each channel of another kind the step code of its step; none: they are 128",
+    "weights" / counted(Int8ul, 2**14) * "of each joint the step code of its weight; none: all 1",
+    "orders"
+    / counted(ExprValidator(Int8ul, lambda n, ctx: n < N_ORDERS), 2**14)
+    * "of each joint the code of its axis order, 0 to 6; none: all 0",
+    "contacts" / counted(CONTACTS, 1) * "none, or what the contacts of segments rest on",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """The fields of POSEWAVE_HEADER, checked against a layout.
+
+    Arrays are by channel, but for ``weights`` (n_joints,): ``greatest`` steps and the step of the
+    ``first`` value of a segment and of a ``constant``, in source units. ``orders``: a code of each
+    joint, or none.
+    """
+
+    levels: int
+    borrowing: int
+    start: Start
+    refining: bool
+    step: float
+    radius: float
+    shell: float
+    greatest: Floats
+    first: Floats
+    constant: Floats
+    weights: Floats
+    orders: tuple[int, ...]
+    contacts: Contacts | None = None
+
+
+def build_header(**fields: Any) -> bytes:
+    return build(POSEWAVE_HEADER, {"contacts": [], **fields}, f"{NAME} header")
+
+
+def parse_header(header: bytes, layout: Layout) -> Header:
+    """Raises FormatError where ``header`` does not fit the skeleton of ``layout``."""
+    fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
+    skeleton = layout.skeleton
+    if skeleton is None or layout.samples_per_frame != 1 or len(layout.groups) > 1:
+        raise FormatError(
+            f"{NAME}: {layout.samples_per_frame} samples a frame, {len(layout.groups)} groups"
+        )
+    if layout.n_resolutions > fields.levels + 1:
+        raise FormatError(f"{NAME}: {layout.n_resolutions} resolutions, {fields.levels} levels")
+    kinds = [channel.kind for channel in skeleton.channels]
+    n_plain = sum(kind not in (*ROTATION_KINDS, *POSITION_KINDS) for kind in kinds)
+    for name, due in (
+        ("plain", n_plain),
+        ("weights", skeleton.n_joints),
+        ("orders", skeleton.n_joints),
+    ):
+        if len(fields[name]) not in (0, due):
+            raise FormatError(f"{NAME}: {len(fields[name])} of {name}, {due} are due")
+    check_orders(fields.orders, skeleton, NAME)
+    plain = iter(fields.plain or [code_of(1.0)] * n_plain)
+    rotation, position = ratio_of(fields.rotation), ratio_of(fields.position)
+    greatest = np.array(
+        [
+            rotation
+            if kind in ROTATION_KINDS
+            else position
+            if kind in POSITION_KINDS
+            else ratio_of(next(plain))
+            for kind in kinds
+        ],
+        np.float64,
+    )
+    first = greatest * 2.0**-fields.first
+    return Header(
+        levels=fields.levels,
+        borrowing=fields.borrowing,
+        start=start_tables()[fields.start],
+        refining=fields.refining == 1,
+        step=fields.step,
+        radius=fields.radius,
+        shell=fields.shell / WHOLE_SHARE,
+        greatest=greatest,
+        first=first,
+        constant=first * 2.0**-fields.constant,
+        weights=np.array([ratio_of(code) for code in fields.weights] or [1.0] * skeleton.n_joints),
+        orders=tuple(fields.orders),
+        contacts=parse_contacts(fields.contacts, skeleton, NAME),
+    )

@@ -1,0 +1,84 @@
+"""The metric of a segment: rows of differences of poses, made into rows that one step suits.
+
+SPEC.md, "Pose metric", is normative.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.posewave.header import Header
+from mcz.motion import Skeleton
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ALONE = np.zeros(1, np.int64)
+
+
+@cache
+def kernels() -> Any:
+    from mcz.codecs.posewave import metric_kernels
+
+    return metric_kernels
+
+
+@cache
+def apply_kernels() -> Any:
+    from mcz.codecs.posewave import apply_kernels as found
+
+    return found
+
+
+class Metric:
+    """That of the kept channels of a segment, whose other channels stand still.
+
+    ``still`` (n_channels,) has their values.
+    """
+
+    def __init__(
+        self, header: Header, skeleton: Skeleton, kept: NDArray[np.bool_], still: Floats
+    ) -> None:
+        from mcz.codecs.posewave.skeleton_plan import make_plan
+
+        self.kept, self.still = np.flatnonzero(kept), still
+        ratios = header.step / header.greatest[kept]
+        self.plan = make_plan(
+            skeleton,
+            kept,
+            ratios * ratios,
+            radius=header.radius,
+            kappa=header.shell,
+            joint_weights=header.weights,
+            orders=header.orders,
+        )
+
+    def factors(self, poses: Floats) -> Floats:
+        """What the kernels need of ``poses``, (n_poses, n_kept)."""
+        values = np.repeat(self.still[None], len(poses), axis=0)
+        values[:, self.kept] = poses
+        if not len(poses):
+            return np.zeros((0, self.plan.n_entries))
+        packed: Floats = kernels().factor(self.plan, values)
+        by_pose = packed.transpose(0, 2, 1).reshape(len(packed) * packed.shape[2], packed.shape[1])
+        return np.ascontiguousarray(by_pose[: len(poses)])
+
+    def empty(self) -> Floats:
+        """Room for the factor of a single pose."""
+        return np.empty((1, self.plan.n_entries))
+
+    def into(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
+        """Differences of values, (n_rows, n_kept), in the metric, each at the pose ``which``."""
+        result = np.empty_like(rows)
+        apply_kernels().rows_into(self.plan, factors, np.ascontiguousarray(rows), result, which)
+        return result
+
+    def out_of(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
+        """The inverse of ``into``."""
+        result = np.empty_like(rows)
+        apply_kernels().rows_out_of(self.plan, factors, np.ascontiguousarray(rows), result, which)
+        return result

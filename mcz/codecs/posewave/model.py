@@ -1,0 +1,198 @@
+"""The model with which the levels of a clip are coded, as it starts.
+
+SPEC.md, "Rows in the metric" and its annex, are normative.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mcz.annexes import annex_bytes
+from mcz.codecs.posewave.state import (
+    BLOCK,
+    LANES,
+    N_FEATURES,
+    N_INPUTS,
+    N_LEVELS,
+    N_OWN,
+    N_SCALES,
+    N_SETS,
+    N_SHARED,
+    N_SLOTS,
+    N_SMALL,
+    N_SMALL_MIXERS,
+    N_TAPS,
+    N_TRAINED,
+    USUAL,
+    Floats,
+    Ints,
+    Model,
+)
+from mcz.coding import mixing
+from mcz.coding.logistic import rate_table, squash_table, stretch_table
+
+N_SECOND = 33
+START_ENERGY = 500.0
+
+N_LOGS = 1024
+
+
+class Start(NamedTuple):
+    """A start table: what is known before a clip, of channels by their class.
+
+    ``shared`` and ``own`` are slots, the latter (classes, slots); ``small`` the mixers and contexts
+    of ``coder``; ``weights`` (sets, slots, inputs) and ``own_weights`` (classes, slots, inputs);
+    ``second`` (slots, 33); ``taps`` (2 levels, 5); ``level_sizes`` (levels, 16), ``own_sizes`` and
+    ``usual`` by class.
+    """
+
+    shared: Ints
+    own: Ints
+    small: Ints
+    weights: Ints
+    own_weights: Ints
+    second: Ints
+    taps: Floats
+    level_sizes: Floats
+    own_sizes: Floats
+    usual: Floats
+
+
+@cache
+def start_tables() -> tuple[Start, ...]:
+    """The start tables of the annex; nobody writes to them."""
+    document = json.loads(annex_bytes("posewave_start.json"))
+    return tuple(start_of(table) for table in document["sets"])
+
+
+def start_of(table: Mapping[str, Any]) -> Start:
+    """A start table as arrays."""
+    slots = _bytes(table["probabilities"]) * 65536 + 32768 + _bytes(table["counts"])
+    own = slots[N_SHARED * N_SLOTS :].reshape(-1, N_OWN * N_SLOTS)
+    small = np.empty(3 * 64 + 2 * N_SMALL, np.int64)
+    small[: 3 * 64] = 0
+    small[: 3 * N_SMALL_MIXERS] = table["small_weights"]
+    small[3 * 64 :: 2] = 32768
+    small[3 * 64 + 1 :: 2] = 0
+    trained = slice(3 * 64, 3 * 64 + 2 * N_TRAINED)
+    small[trained][::2] = _bytes(table["small_probabilities"]) * 256 + 128
+    small[trained][1::2] = _bytes(table["small_counts"])
+    weights = (_bytes(table["weights"]) - 128).reshape(-1, N_SLOTS, N_INPUTS) * 1024
+    return Start(
+        shared=slots[: N_SHARED * N_SLOTS],
+        own=own,
+        small=small,
+        weights=weights[:N_SETS],
+        own_weights=weights[N_SETS:],
+        second=_bytes(table["second"]).reshape(N_SLOTS, N_SECOND) * 256 + 128,
+        taps=np.array(table["taps"]).reshape(2 * N_LEVELS, N_TAPS) / 1024,
+        level_sizes=np.array(table["level_sizes"]).reshape(N_LEVELS, N_FEATURES) / 1024,
+        own_sizes=np.array(table["own_sizes"]).reshape(-1, N_FEATURES) / 1024,
+        usual=np.array(table["usual"]) / 1024,
+    )
+
+
+def _bytes(lines: list[str]) -> Ints:
+    return np.frombuffer(bytes.fromhex("".join(lines)), "u1").astype(np.int64)
+
+
+def wide_of(n_channels: int) -> int:
+    """Columns of a matrix of magnitudes, or of values: one a channel, the mean, zeros."""
+    return -(-(n_channels + 1) // LANES) * LANES
+
+
+def new_rows(n_rows: int, n_channels: int) -> Floats:
+    """Magnitudes and values of the rows of a level, as ``code_rows`` takes them for ``here``.
+
+    Three rows of zeros are in front; ``[3:]`` is what a finer level takes for ``parent``.
+    """
+    return np.zeros((n_rows + 3, 2 * wide_of(n_channels)))
+
+
+def no_rows(n_channels: int) -> Floats:
+    """What stands for the rows of a coarser level where there is none."""
+    return np.zeros((1, 2 * wide_of(n_channels)))
+
+
+def make_model(classes: Ints, start: Start, coder: Ints | None = None) -> Model:
+    """The model for channels of these ``classes`` (n,), before the first level.
+
+    A class is 0 for what is no rotation; 1 for a rotation of a root; otherwise by the joints of the
+    subtree below the channel's joint, that one counted: 2 for one, 3 up to 3, 4 up to 7, 5 beyond.
+    ``coder`` is a state that has been used already, for what comes before the rows.
+    """
+    n, wide = len(classes), wide_of(len(classes))
+    n_blocks = -(-n // BLOCK)
+    own_sizes, features = np.zeros((N_FEATURES, wide)), np.zeros((N_FEATURES, wide))
+    own_sizes[:, :n] = start.own_sizes[classes].T
+    features[USUAL, :n] = start.usual[classes]
+    return Model(
+        coder=start_coder(start) if coder is None else coder,
+        classes=np.asarray(classes, np.int64),
+        slots=np.concatenate([start.shared, start.own[classes].ravel()]),
+        weights=np.concatenate([start.weights, start.own_weights[classes]]),
+        second=np.tile(start.second, (N_SCALES, 1, 1)),
+        at=np.zeros(N_INPUTS - 1, np.int64),
+        inputs=np.zeros(N_INPUTS, np.int64),
+        stretch=stretch_table(),
+        squash=squash_table(),
+        rates=rate_table(),
+        trust=trust_table(),
+        logs=log_table(),
+        costs=cost_table(),
+        columns=np.zeros((n_blocks, BLOCK, BLOCK)),
+        variances=np.zeros((n_blocks, BLOCK)),
+        seen=np.zeros(1),
+        means=np.zeros(BLOCK),
+        taps=start.taps.copy(),
+        tap_energy=np.full((2 * N_LEVELS, N_TAPS), START_ENERGY),
+        timely=np.zeros(wide),
+        sources=np.zeros((N_TAPS + 2, wide)),
+        level_weights=start.level_sizes.copy(),
+        own_weights=own_sizes,
+        features=features,
+        sizes=np.zeros((4, wide)),
+    )
+
+
+def start_coder(start: Start) -> Ints:
+    """The state of the coder before the first stream."""
+    coder = np.zeros(mixing.MODELS + 2 * N_SMALL, np.int64)
+    coder[mixing.SQUASH : mixing.SQUASH + 4096] = squash_table()
+    coder[mixing.STRETCH : mixing.STRETCH + 4096] = stretch_table()
+    rates = rate_table()
+    coder[mixing.RATES : mixing.RATES + len(rates)] = rates
+    coder[mixing.WEIGHTS :] = start.small
+    return coder
+
+
+@cache
+def trust_table() -> Ints:
+    """How much of what a context says counts that was used n times, in 65536ths."""
+    n = np.arange(256, dtype=np.int64)
+    return 65536 * (10 * n + 4) // (10 * n + 16)
+
+
+@cache
+def log_table() -> Ints:
+    """floor(6 log2(1 + k / 4)) for k from 0 to 1023: the most e with 4^6 2^e <= (4 + k)^6."""
+    powers = [4**6 << e for e in range(60)]
+    found, e = [], 0
+    for k in range(N_LOGS):
+        while powers[e + 1] <= (4 + k) ** 6:
+            e += 1
+        found.append(e)
+    return np.array(found, np.int64)
+
+
+@cache
+def cost_table() -> Ints:
+    """4096 times the bits that an event of probability (k + 1/2) / 4096 takes: for encoders."""
+    bits = [round(-4096 * math.log2((k + 0.5) / 4096)) for k in range(4096)]
+    return np.array([*bits, 0], np.int64)

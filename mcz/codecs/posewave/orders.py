@@ -1,0 +1,176 @@
+"""Joints that are coded as Euler angles in another order of axes than the source has.
+
+SPEC.md, "Axis orders", is normative. Where the middle angle of the source comes near a quarter
+turn, its other two turn fast although the joint does not; in another order all three may be calm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.angles import FULL_TURN
+from mcz.codecs.posewave.turns import BEYOND, RULES
+from mcz.errors import FormatError, MotionError
+from mcz.kinematics.chain import QUATERNION_KINDS
+from mcz.motion import ROTATION_KINDS, Joint, Skeleton
+from mcz.schema import read_varint, varint
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Sequenced = tuple[int, int, int]  # axes as their rotations are multiplied from the left
+
+SEQUENCES: tuple[Sequenced, ...] = (
+    (0, 1, 2),
+    (0, 2, 1),
+    (1, 0, 2),
+    (1, 2, 0),
+    (2, 0, 1),
+    (2, 1, 0),
+)
+KEPT, N_ORDERS = 0, 1 + len(SEQUENCES)  # code KEPT: as the source has it; n: SEQUENCES[n - 1]
+N_NOTES = 4  # kinds: a switch, turns about x, y, z
+MAX_TURNS = 2**41
+PRICE = 0.25  # of a switch, in turns
+
+
+class Place(NamedTuple):
+    """A coded joint: its columns by axis x y z, the sequence coded, and the source's."""
+
+    columns: Ints
+    coded: Ints
+    own: Ints
+
+
+@cache
+def kernels() -> Any:
+    from mcz.codecs.posewave import order_kernels
+
+    return order_kernels
+
+
+def own_sequence(joint: Joint, skeleton: Skeleton) -> Sequenced | None:
+    """That of a joint that can have an order; None of another.
+
+    It has three rotation channels about three axes, no quaternion, and angles of a known unit.
+    """
+    kinds = [channel.kind for channel in joint.channels]
+    axes = [ROTATION_KINDS.index(kind) for kind in kinds if kind in ROTATION_KINDS]
+    if sorted(axes) != [0, 1, 2] or not skeleton.angle_unit:
+        return None
+    if any(kind in QUATERNION_KINDS for kind in kinds):
+        return None
+    a, b, c = axes if skeleton.intrinsic else axes[::-1]
+    return a, b, c
+
+
+def columns_by_axis(skeleton: Skeleton, index: int) -> list[int]:
+    """The columns of the rotations about x, y and z, of a joint that has one each."""
+    kinds = [channel.kind for channel in skeleton.joints[index].channels]
+    start = skeleton.columns(index).start
+    return [start + kinds.index(kind) for kind in ROTATION_KINDS]
+
+
+def check_orders(codes: Sequence[int], skeleton: Skeleton, where: str) -> None:
+    """Raises FormatError for a joint that cannot have an order."""
+    for index, (code, joint) in enumerate(zip(codes, skeleton.joints, strict=False)):
+        if code != KEPT and own_sequence(joint, skeleton) is None:
+            raise FormatError(f"{where}: order {code} of joint {index}, whose axes have none")
+
+
+class Orders:
+    """The orders of a clip; ``codes`` (n_joints,), or none."""
+
+    def __init__(self, codes: Sequence[int], skeleton: Skeleton) -> None:
+        self.rule = RULES[skeleton.angle_unit]
+        self.full = FULL_TURN.get(skeleton.angle_unit, 0.0)
+        self.places = [
+            _place(skeleton, joint, code) for joint, code in enumerate(codes) if code != KEPT
+        ]
+
+    def coded(self, values: Floats) -> Floats:
+        """``values`` of the source, (n_frames, n_channels), as they are coded."""
+        if not self.places:
+            return values
+        found, nothing = values.copy(), np.zeros((len(values), N_NOTES), np.int64)
+        for place in self.places:
+            if not (np.abs(values[:, place.columns]) < BEYOND).all():
+                raise MotionError("posewave: an angle of 2^40 or more in another order of axes")
+            angles = self._turned(values, place, place.own, place.coded)
+            kernels().follow(angles, place.coded, self.full, nothing)
+            found[:, place.columns] = angles
+        return found
+
+    def notes_and_values(self, source: Floats, coded: Floats) -> tuple[bytes, Floats]:
+        """What a decoder is told beside ``coded`` values, and the source's as it will have them."""
+        if not self.places:
+            return b"", coded
+        notes = np.zeros((len(coded), len(self.places), N_NOTES), np.int64)
+        for index, place in enumerate(self.places):
+            angles = self._turned(coded, place, place.coded, place.own)
+            given, told = source[:, place.columns], notes[:, index]
+            kernels().tell_switches(angles, given, place.own, self.full, PRICE * self.full, told)
+            kernels().follow(angles, place.own, self.full, told)
+            kernels().tell_turns(angles, given, self.full, told)
+        return _build_notes(notes), self.values(coded, notes)
+
+    def take_notes(self, stream: bytes, n_frames: int, where: str) -> tuple[Ints, bytes]:
+        """The notes, (n_frames, n_places, 4), that a stream begins with, and the rest of it."""
+        notes = np.zeros((n_frames, len(self.places), N_NOTES), np.int64)
+        return (notes, _read_notes(stream, notes, where)) if self.places else (notes, stream)
+
+    def values(self, coded: Floats, notes: Ints) -> Floats:
+        """The source's values, by what ``take_notes`` found."""
+        found = coded.copy() if self.places else coded
+        for index, place in enumerate(self.places):
+            angles = self._turned(coded, place, place.coded, place.own)
+            kernels().follow(angles, place.own, self.full, notes[:, index])
+            found[:, place.columns] = angles
+        return found
+
+    def _turned(self, values: Floats, place: Place, given: Ints, wanted: Ints) -> Floats:
+        angles = np.ascontiguousarray(values[:, place.columns])
+        kernels().turn_over(angles, given, wanted, self.rule)
+        return angles
+
+
+def _place(skeleton: Skeleton, index: int, code: int) -> Place:
+    columns = columns_by_axis(skeleton, index)
+    own = own_sequence(skeleton.joints[index], skeleton)
+    return Place(*(np.array(x, np.int64) for x in (columns, SEQUENCES[code - 1], own)))
+
+
+def _build_notes(notes: Ints) -> bytes:
+    """How many there are; of each how many places lie between it and the one before, and turns."""
+    flat = notes.ravel()
+    numbers = np.flatnonzero(flat).tolist()
+    out = bytearray(varint(len(numbers)))
+    for before, number in pairwise([-1, *numbers]):
+        out += varint(number - before - 1)
+        if number % N_NOTES:
+            turns = int(flat[number])
+            out += varint(2 * turns if turns >= 0 else -2 * turns - 1)
+    return bytes(out)
+
+
+def _read_notes(stream: bytes, notes: Ints, where: str) -> bytes:
+    """Fill ``notes``; return the rest of the stream."""
+    flat, number = notes.reshape(-1), -1
+    count, at = read_varint(stream, 0)
+    for _ in range(count):
+        gap, at = read_varint(stream, at)
+        number += 1 + gap
+        if number >= len(flat):
+            raise FormatError(f"{where}: a note {number} of {len(flat)}")
+        flat[number] = 1
+        if number % N_NOTES:
+            turns, at = read_varint(stream, at)
+            if not 0 < turns < MAX_TURNS:
+                raise FormatError(f"{where}: {turns} for turns")
+            flat[number] = (turns >> 1) ^ -(turns & 1)
+    return stream[at:]

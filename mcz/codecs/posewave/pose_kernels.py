@@ -1,0 +1,191 @@
+"""Compiled: poses of a batch of frames, and the composite inertia of every joint.
+
+SPEC.md, "Pose metric", is normative. Arrays end in an axis of ``width`` lanes, one a frame, and
+every innermost loop goes over ``lanes``, which is the same number: that one is known only when the
+loop runs, so that LLVM makes vectors of it; the other is known when it is compiled, so that LLVM
+knows how far apart rows are. For one frame alone both are known.
+"""
+
+from __future__ import annotations
+
+from mcz.codecs.posewave.skeleton_plan import Floats, Plan
+from mcz.codecs.posewave.turns import BEYOND, sine_cosine
+from mcz.jit import inner
+
+# Angles, then sines, (n_turns, width); cosines, likewise; scratch (9, width); ``axes``
+# (n_joints + 1, 9, width) and ``origins`` (n_joints + 1, 3, width), of which 0 is what roots hang
+# from; ``motions`` (n_kept, 6, width), what one unit of a channel does.
+Lanes = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
+
+
+@inner
+def take_values(columns: Floats, column: int, first: int, values: Floats, lanes: int) -> None:
+    """What a column has in the frames from ``first`` on; after the last, the last again."""
+    last = len(columns) - 1
+    for p in range(lanes):
+        value = columns[min(first + p, last), column]
+        values[p] = value if abs(value) < BEYOND else 0.0
+
+
+@inner
+def place_joints(plan: Plan, columns: Floats, first: int, batch: Lanes, lanes: int) -> None:
+    """Place the joints of the frames from ``first`` on; ``columns`` (n_frames, n_channels)."""
+    axes, origins = batch[3], batch[4]
+    _take_turns(plan, columns, first, batch[0], batch[1], lanes)
+    for p in range(lanes):
+        for i in range(9):
+            axes[0, i, p] = 1.0 if i % 4 == 0 else 0.0
+        for i in range(3):
+            origins[0, i, p] = 0.0
+    for joint in range(len(plan.parents)):
+        parent = plan.parents[joint]
+        _hang(axes[parent + 1], origins[parent + 1], plan.arms[joint], origins[joint + 1], lanes)
+        _move(plan, joint, columns, first, batch, lanes)
+        _turn(plan, joint, batch, lanes)
+
+
+@inner
+def _take_turns(
+    plan: Plan, columns: Floats, first: int, angles: Floats, cosines: Floats, lanes: int
+) -> None:
+    for turn in range(len(plan.turns)):
+        take_values(columns, plan.turns[turn, 1], first, angles[turn], lanes)
+        for p in range(lanes):
+            angles[turn, p], cosines[turn, p] = sine_cosine(angles[turn, p], plan.rule)
+
+
+@inner
+def _hang(above: Floats, origin: Floats, arm: Floats, own: Floats, lanes: int) -> None:
+    x, y, z = arm[0], arm[1], arm[2]
+    for i in range(3):
+        for p in range(lanes):
+            way = above[3 * i, p] * x + above[3 * i + 1, p] * y + above[3 * i + 2, p] * z
+            own[i, p] = origin[i, p] + way
+
+
+@inner
+def _move(plan: Plan, joint: int, columns: Floats, first: int, batch: Lanes, lanes: int) -> None:
+    """Move a joint by its position channels; a root stays where it is."""
+    _, _, scratch, axes, origins, motions = batch
+    above, origin = axes[plan.parents[joint] + 1], origins[joint + 1]
+    for move in range(plan.move_starts[joint], plan.move_starts[joint + 1]):
+        column, number = plan.moves[move]
+        take_values(columns, column, first, scratch[3], lanes)
+        x, y, z = plan.directions[move]
+        for i in range(3):
+            for p in range(lanes):
+                scratch[i, p] = (
+                    above[3 * i, p] * x + above[3 * i + 1, p] * y + above[3 * i + 2, p] * z
+                )
+        if plan.parents[joint] >= 0:
+            for i in range(3):
+                for p in range(lanes):
+                    origin[i, p] += scratch[3, p] * scratch[i, p]
+        if number >= 0:
+            for i in range(3):
+                for p in range(lanes):
+                    motions[number, i, p] = 0.0
+                    motions[number, 3 + i, p] = scratch[i, p]
+
+
+@inner
+def _turn(plan: Plan, joint: int, batch: Lanes, lanes: int) -> None:
+    """Turn a joint by its rotation channels, from the outermost to the innermost."""
+    sines, cosines, own, axes, origins, motions = batch
+    _change(axes[plan.parents[joint] + 1], plan.changes[joint], own, lanes)
+    for turn in range(plan.turn_starts[joint], plan.turn_starts[joint + 1]):
+        axis, number = plan.turns[turn, 0], plan.turns[turn, 2]
+        if number >= 0:
+            radians = plan.rule.radians
+            _note_turn(own, axis, radians, origins[joint + 1], motions[number], lanes)
+        if axis == 0:  # LLVM makes vectors only where it knows which columns these are
+            _mix(own, 1, 2, sines[turn], cosines[turn], lanes)
+        elif axis == 1:
+            _mix(own, 2, 0, sines[turn], cosines[turn], lanes)
+        else:
+            _mix(own, 0, 1, sines[turn], cosines[turn], lanes)
+    for i in range(9):
+        for p in range(lanes):
+            axes[joint + 1, i, p] = own[i, p]
+
+
+@inner
+def _change(above: Floats, change: Floats, own: Floats, lanes: int) -> None:
+    for i in range(3):
+        for k in range(3):
+            x, y, z = change[0, k], change[1, k], change[2, k]
+            for p in range(lanes):
+                own[3 * i + k, p] = (
+                    above[3 * i, p] * x + above[3 * i + 1, p] * y + above[3 * i + 2, p] * z
+                )
+
+
+@inner
+def _note_turn(
+    axes: Floats, axis: int, radians: float, origin: Floats, motion: Floats, lanes: int
+) -> None:
+    """What one unit of a rotation does: the turn, and how it moves what is at the root."""
+    for p in range(lanes):
+        x, y, z = axes[axis, p] * radians, axes[axis + 3, p] * radians, axes[axis + 6, p] * radians
+        a, b, c = origin[0, p], origin[1, p], origin[2, p]
+        motion[0, p] = x
+        motion[1, p] = y
+        motion[2, p] = z
+        motion[3, p] = b * z - c * y
+        motion[4, p] = c * x - a * z
+        motion[5, p] = a * y - b * x
+
+
+@inner
+def _mix(axes: Floats, j: int, k: int, sines: Floats, cosines: Floats, lanes: int) -> None:
+    for p in range(lanes):
+        sine, cosine = sines[p], cosines[p]
+        for i in range(3):
+            one, other = axes[3 * i + j, p], axes[3 * i + k, p]
+            axes[3 * i + j, p] = one * cosine + other * sine
+            axes[3 * i + k, p] = other * cosine - one * sine
+
+
+@inner
+def gather_inertia(plan: Plan, axes: Floats, origins: Floats, inertia: Floats, lanes: int) -> None:
+    """Fill ``inertia`` (n_joints, 10, width) with all that a joint moves, about its root."""
+    n_joints = len(plan.parents)
+    for joint in range(n_joints):
+        _own_inertia(plan.masses[joint], axes[joint + 1], origins[joint + 1], inertia[joint], lanes)
+    for back in range(n_joints):
+        joint = n_joints - 1 - back
+        parent = plan.parents[joint]
+        if parent >= 0:
+            for i in range(10):
+                for p in range(lanes):
+                    inertia[parent, i, p] += inertia[joint, i, p]
+
+
+@inner
+def _own_inertia(mass: Floats, axes: Floats, origin: Floats, inertia: Floats, lanes: int) -> None:
+    m, mx, my, mz = mass[0], mass[1], mass[2], mass[3]
+    xx, yy, zz, xy, xz, yz = mass[4], mass[5], mass[6], mass[7], mass[8], mass[9]
+    for p in range(lanes):
+        a, b, c = axes[0, p], axes[1, p], axes[2, p]
+        d, e, f = axes[3, p], axes[4, p], axes[5, p]
+        g, h, i = axes[6, p], axes[7, p], axes[8, p]
+        x, y, z = origin[0, p], origin[1, p], origin[2, p]
+        # The first moment about the joint's own origin, and about the root's.
+        u, v, w = a * mx + b * my + c * mz, d * mx + e * my + f * mz, g * mx + h * my + i * mz
+        r, s, t = m * x + u, m * y + v, m * z + w
+        # How much more inertia there is about the root than about the joint.
+        ax, ay, az = x * r + u * x, y * s + v * y, z * t + w * z
+        # B J, then B J B'.
+        a0, a1, a2 = a * xx + b * xy + c * xz, a * xy + b * yy + c * yz, a * xz + b * yz + c * zz
+        d0, d1, d2 = d * xx + e * xy + f * xz, d * xy + e * yy + f * yz, d * xz + e * yz + f * zz
+        g0, g1, g2 = g * xx + h * xy + i * xz, g * xy + h * yy + i * yz, g * xz + h * yz + i * zz
+        inertia[0, p] = m
+        inertia[1, p] = r
+        inertia[2, p] = s
+        inertia[3, p] = t
+        inertia[4, p] = (a0 * a + a1 * b + a2 * c) + (ay + az)
+        inertia[5, p] = (d0 * d + d1 * e + d2 * f) + (ax + az)
+        inertia[6, p] = (g0 * g + g1 * h + g2 * i) + (ax + ay)
+        inertia[7, p] = (a0 * d + a1 * e + a2 * f) - (x * s + u * y)
+        inertia[8, p] = (a0 * g + a1 * h + a2 * i) - (x * t + u * z)
+        inertia[9, p] = (d0 * g + d1 * h + d2 * i) - (y * t + v * z)

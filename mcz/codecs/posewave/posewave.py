@@ -1,0 +1,181 @@
+"""Codec 13, ``posewave``: wavelets in time, coded in the metric of the pose.
+
+SPEC.md, "Codec 13: posewave", is normative; the names below are its field names.
+
+Frames become a pyramid: an approximation of every 32nd frame or so, and details of five levels. All
+channels of one time and level are a row. A row is not coded in degrees but in the metric of the
+pose that a decoder has from the coarser levels: how far points and local axes move. So one
+quantizer step serves all channels, and what is not seen costs nothing.
+
+Exactness: lossy; decoding is bit-exact (integers, and binary64 + - * / in the order that SPEC.md
+states). A stream holds one resolution of one segment; a segment decodes by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import (
+    Codec,
+    Encoded,
+    Fetch,
+    Layout,
+    Request,
+    Segment,
+    SignalSource,
+    Span,
+)
+from mcz.codecs.gaps import SegmentReader
+from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
+from mcz.codecs.posewave.choices import Choice, choose, guess
+from mcz.codecs.posewave.contact_choice import parse_runs
+from mcz.codecs.posewave.header import NAME, Header, parse_header
+from mcz.codecs.posewave.limits import joint_limits
+from mcz.codecs.posewave.segment import decode_segment, encode_segment
+from mcz.codecs.segments import (
+    SEGMENT_FRAMES_PARAMETER,
+    Lengths,
+    halving,
+    segment_frames_of,
+    skeleton_of,
+)
+from mcz.errors import FormatError
+
+Floats = NDArray[np.float64]
+
+MOST_FRAMES = 8192  # of a segment, where the caller leaves it open
+LEAST_FRAMES = 512
+
+
+# What a preset promises: that no point is farther off in any frame.
+PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}
+
+
+def promise(options: Mapping[str, Any]) -> dict[str, Any]:
+    """The greatest error in cm of the preset."""
+    return {"max_error_cm": PRESETS[options["preset"]]}
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the values of ``source``, rotations unwrapped; what is invalid is filled.
+
+    Raises MotionError for a value that is not finite or too large.
+    """
+    layout = source.layout
+    choice = choose(source, params)
+    header = parse_header(choice.header, layout)
+    segments = _segments(source, header, choice, params)
+    return Encoded(choice.header, segments, header.levels + 1)
+
+
+def _segments(
+    source: SignalSource, header: Header, choice: Choice, params: Mapping[str, Any]
+) -> Iterator[Segment]:
+    layout = source.layout
+    skeleton = skeleton_of(NAME, layout)
+    if not layout.n_channels:
+        if layout.n_frames:
+            yield Segment(0, layout.n_frames, ())
+        return
+    wanted = segment_frames_of(layout, params["segment_frames"])
+    length = min(wanted or MOST_FRAMES, layout.most_frames)
+    lengths = Lengths(length, bool(wanted), least=LEAST_FRAMES)
+    reader = SegmentReader(NAME, source)
+
+    octaves, keeper = params["refinement"], choice.keeper
+
+    def code(first: int, stop: int) -> tuple[bytes, ...]:
+        own = None if octaves is None else octaves[first:stop]
+        if keeper:
+            keeper.first = first
+        values = reader(first, stop)
+        return encode_segment(header, skeleton, values, choice.weights, own, keeper)[0]
+
+    for first, stop, streams in halving(layout.n_frames, lengths, code):
+        yield Segment(first, stop - first, streams)
+    if keeper and header.contacts:
+        keeper.warn(skeleton, header.contacts)
+
+
+def decode(
+    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+) -> Floats:
+    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
+    fields = parse_header(header, layout)
+    for span in spans:
+        if span.lead or span.tail or not span.fresh:
+            raise FormatError(f"{NAME}: the segment at {span.first} bears upon others")
+    skeleton = layout.skeleton
+    assert skeleton is not None  # the header was checked against it
+    n_channels = layout.n_channels if request.groups else 0
+    out = np.zeros((request.stop - request.start, n_channels))
+    if not n_channels:
+        return out
+    for index, span in enumerate(spans):
+        start, stop = max(span.first, request.start), min(span.stop, request.stop)
+        if start >= stop:
+            continue
+        streams = [
+            fetch(index, resolution, 0)
+            for resolution in range(layout.n_resolutions - request.resolution)
+        ]
+        where = f"{NAME}: segment at {span.first}"
+        values = decode_segment(fields, skeleton, streams, span.n_frames, where)
+        out[start - request.start : stop - request.start] = values[
+            start - span.first : stop - span.first
+        ]
+    return out
+
+
+CODEC = Codec(
+    id=13,
+    name=NAME,
+    version=0,
+    domain="values",
+    lossless=False,
+    encode=encode,
+    decode=decode,
+    grouping="all",
+    dial=Dial("step", 2.0**-30, 2.0**30, guess=guess),
+    promise=promise,
+    parameters=(
+        Parameter(
+            "preset",
+            "visible",
+            "no point is farther off than 1 mm (mm), 5 mm (visible), 3 cm (preview)",
+            choice("preset", tuple(PRESETS)),
+        ),
+        Parameter(
+            "step",
+            None,
+            "quantizer step in cm; default: what the preset takes",
+            number("step", 1e-9, 1e9),
+        ),
+        Parameter("levels", None, "levels; default: what suits the clip", integer("levels", 0, 8)),
+        Parameter(
+            "contacts",
+            None,
+            "feet that stand keep their place: feet, or lfoot:120+45,rfoot:160+52",
+            parse_runs,
+        ),
+        Parameter(
+            "contact_tolerance",
+            0.01,
+            "cm that the displacement of a joint in a contact may be off",
+            number("contact_tolerance", 1e-6, 1e6),
+        ),
+        Parameter(
+            "quality",
+            None,
+            "mean errors of joints or groups of them, such as feet=0.5mm,head=1mm",
+            joint_limits,
+        ),
+        Parameter("weights", None, "weight of each joint", np.asarray, inner=True),
+        Parameter("refinement", None, "octaves of each frame", np.asarray, inner=True),
+        SEGMENT_FRAMES_PARAMETER,
+    ),
+)

@@ -1,0 +1,133 @@
+"""Compiled: what the coefficients of a row are likely to be, in binary64 in a fixed order.
+
+SPEC.md, "Rows in the metric", is normative and has the steps below in the same order. Loops run
+along the channels, item by item, so that they are as quick as the machine's vectors and still have
+one right answer. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+from mcz.codecs.posewave.state import (
+    BLOCK,
+    LANES,
+    N_TAPS,
+    TAP_BEFORE_1,
+    TAP_BEFORE_2,
+    TAP_LAST,
+    TAP_NEXT,
+    TAP_PARENT,
+    USUAL,
+    Floats,
+    Model,
+)
+from mcz.jit import inner
+
+MEMORY = 0.996  # what a live row leaves of what earlier ones have taught
+NOISE = 0.1  # variance that each live row adds to that of a channel
+PRIOR = 2.0  # variance of a channel of which nothing is known
+CARRIED = 40.0  # rows at most that the coarser levels count for
+TAP_MEMORY, TAP_RATE, MOST_TAP = 0.98, 0.012, 2.0
+
+
+@inner
+def begin_prediction(model: Model, level: int) -> None:
+    """Let a level start from what the coarser one has taught; the first one knows nothing."""
+    seen = model.seen
+    if level == 0:
+        seen[0] = 0.0
+        for block in range(len(model.columns)):
+            model.columns[block] = 0.0
+            model.variances[block] = PRIOR
+    if seen[0] > CARRIED:
+        share = CARRIED / seen[0]
+        for block in range(len(model.columns)):
+            line = model.variances[block]
+            for c in range(BLOCK):
+                line[c] *= share
+        seen[0] = CARRIED
+
+
+@inner
+def predict_in_time(model: Model, here: Floats, parent: Floats, level: int, row: int) -> None:
+    """Fill ``timely``: what rows before, and those of the coarser level, say of the values."""
+    timely, sources = model.timely, model.sources
+    width, last = len(timely), len(parent) - 1
+    up = min(row >> 1, last)
+    sources[TAP_BEFORE_1] = here[row + 2, width:]
+    sources[TAP_BEFORE_2] = here[row + 1, width:]
+    sources[TAP_PARENT] = parent[up, width:]
+    sources[TAP_NEXT] = parent[min(up + 1, last), width:]
+    sources[TAP_LAST] = parent[max(up - 1, 0), width:]
+    timely[:] = 0.0
+    for k in range(N_TAPS):
+        source, tap = sources[k], model.taps[2 * level + (row & 1), k]
+        for c in range(width):
+            timely[c] += tap * source[c]
+
+
+@inner
+def learn_in_time(model: Model, values: Floats, level: int, row: int, share: float) -> None:
+    """Let the taps learn from what they missed; ``timely`` is used up."""
+    timely, sources, usual = model.timely, model.sources, model.features[USUAL]
+    scale, product = sources[N_TAPS], sources[N_TAPS + 1]
+    which = 2 * level + (row & 1)
+    taps, energy = model.taps[which], model.tap_energy[which]
+    for c in range(len(timely)):
+        weight = share / (usual[c] + 0.3)
+        timely[c] = (values[c] - timely[c]) * weight
+        scale[c] = weight
+    for k in range(N_TAPS):
+        source = sources[k]
+        for c in range(len(timely)):
+            product[c] = source[c] * source[c] * scale[c]
+        energy[k] = energy[k] * TAP_MEMORY + total_of(product)
+        for c in range(len(timely)):
+            product[c] = source[c] * timely[c]
+        tap = taps[k] + TAP_RATE * total_of(product) / (energy[k] * (1.0 - TAP_MEMORY) + 5.0)
+        taps[k] = min(max(tap, -MOST_TAP), MOST_TAP)
+
+
+@inner
+def total_of(values: Floats) -> float:
+    """The sum of values, a multiple of ``LANES`` of them; they are folded, and used up."""
+    for start in range(LANES, len(values), LANES):
+        part = values[start : start + LANES]
+        for c in range(LANES):
+            values[c] += part[c]
+    for c in range(16):
+        values[c] += values[c + 16]
+    for c in range(8):
+        values[c] += values[c + 8]
+    for c in range(4):
+        values[c] += values[c + 4]
+    return float(values[0] + values[1] + (values[2] + values[3]))
+
+
+@inner
+def spread(means: Floats, column: Floats, miss: float) -> None:
+    """Add to the means of later channels of a block what the miss of one says of them.
+
+    As in ``take_in``, what comes out for earlier channels is never used: without ends that move the
+    loop is quicker.
+    """
+    for c in range(BLOCK):
+        means[c] += column[c] * miss
+
+
+@inner
+def take_in(columns: Floats, variances: Floats, rest: Floats, size: int, share: float) -> None:
+    """Add what was missed in time, ``rest``, to L D L', of which ``columns`` has the columns of L.
+
+    One step of Bennett's update for each channel. ``rest`` is used up.
+    """
+    for a in range(size):
+        miss, before = rest[a], variances[a] * MEMORY + NOISE
+        after = before + share * miss * miss
+        gain = share * miss / after
+        share *= before / after
+        variances[a] = after
+        line = columns[a]
+        for b in range(BLOCK):
+            left = rest[b] - miss * line[b]
+            rest[b] = left
+            line[b] += gain * left

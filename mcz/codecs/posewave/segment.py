@@ -1,0 +1,190 @@
+"""Segments of ``posewave``: streams from frames, and back.
+
+SPEC.md, "Codec 13: posewave", is normative; ``walk.py`` goes from level to level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.posewave.contact_keeper import Keeper
+from mcz.codecs.posewave.contacts import decode_contacts, room_of
+from mcz.codecs.posewave.header import NAME, Header
+from mcz.codecs.posewave.orders import Orders
+from mcz.codecs.posewave.pyramid import Pyramid
+from mcz.codecs.posewave.rows import RowCoder, Stream, code_head, fresh_coder
+from mcz.codecs.posewave.walk import Walk
+from mcz.errors import FormatError, MotionError
+from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
+from mcz.transforms import lifting
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MAX_NUMBER = 2.0**40  # of a first value
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """What an encoder lets a bit cost, in squared steps, in approximations and in details."""
+
+    approximations: float
+    details: float
+
+    def of(self, level: int) -> float:
+        return self.details if level else self.approximations
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """Which channels change in a segment, and the first value of every channel, in steps."""
+
+    kept: NDArray[np.bool_]
+    numbers: Ints
+
+    def values(self, header: Header) -> Floats:
+        """The pose that the numbers stand for, (n_channels,)."""
+        steps = np.where(self.kept, header.first, header.constant)
+        return np.multiply(self.numbers, steps, dtype=np.float64)
+
+
+def encode_segment(
+    header: Header,
+    skeleton: Skeleton,
+    values: Floats,
+    weights: Weights,
+    refinement: Ints | None = None,
+    contacts: Keeper | None = None,
+) -> tuple[tuple[bytes, ...], Floats]:
+    """The streams of a segment of unwrapped ``values``, and what a decoder will have of them.
+
+    Both are (n_frames, n_channels). ``refinement`` (n_frames,) asks for steps of 2^-r of the
+    usual ones where rows bear on these frames, ``contacts`` has what is to keep its place. Raises
+    MotionError for values that are too large.
+    """
+    orders = Orders(header.orders, skeleton)
+    coded = orders.coded(values)
+    streams, found = encode_coded(header, skeleton, coded, weights, refinement, contacts)
+    notes, found = orders.notes_and_values(values, found)
+    return (notes + streams[0], *streams[1:]), found
+
+
+def encode_coded(
+    header: Header,
+    skeleton: Skeleton,
+    values: Floats,
+    weights: Weights,
+    refinement: Ints | None = None,
+    contacts: Keeper | None = None,
+) -> tuple[tuple[bytes, ...], Floats]:
+    """As ``encode_segment``, of ``values`` whose angles are in the orders of the header."""
+    head = choose_head(header, values)
+    pyramid = Pyramid(len(values), header.levels, header.borrowing)
+    if refinement is None or not header.refining:
+        refinement = np.zeros(len(values), np.int64)
+    approx, details = values[:, head.kept], []
+    for _ in range(pyramid.n_details):
+        approx, detail = lifting.split(approx)
+        details.append(detail)
+    bands = [approx, *reversed(details)]
+    classes, coder = classes_of(skeleton), fresh_coder(header.start)
+    rows = RowCoder(classes[head.kept], header.start, coder, NAME, refining=header.refining)
+    walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
+    streams = []
+    for level, band in enumerate(bands):
+        is_last = level == pyramid.n_details
+        room = _room(pyramid, level, head) + (is_last and room_of(header.contacts, len(values)))
+        stream = Stream(coder, room, None)
+        if level == 0:
+            code_head(
+                stream, kinds_of(skeleton), head.kept.astype(np.int64), head.numbers.copy(), NAME
+            )
+        rows.begin(level, pyramid.kind(level), len(band), stream)
+        rows.exponents[:] = pyramid.exponents(level, refinement)
+        code = partial(rows.encode, weights.of(level))
+        (walk.code_details if level else walk.code_coarsest)(level, code, band, rows.exponents)
+        if not is_last:
+            streams.append(stream.finish())
+    found = walk.values()
+    if header.contacts:
+        (contacts or Keeper()).encode(header.contacts, walk.metric.plan, stream, values, found)
+    streams.append(stream.finish())
+    empty = [b""] * (header.levels - pyramid.n_details)
+    return (streams[0], *empty, *streams[1:]), found
+
+
+def _room(pyramid: Pyramid, level: int, head: Head) -> int:
+    """As many bytes as the stream of a level may take."""
+    return 8 * len(head.kept) + pyramid.rows(level) * (8 * int(head.kept.sum()) + 1) + 1024
+
+
+def decode_segment(
+    header: Header, skeleton: Skeleton, streams: Sequence[bytes], n_frames: int, where: str
+) -> Floats:
+    """The values, (n_frames, n_channels); details of which there is no stream are zero."""
+    pyramid = Pyramid(n_frames, header.levels, header.borrowing)
+    n_empty = header.levels - pyramid.n_details
+    if any(streams[1 : 1 + n_empty]):
+        raise FormatError(f"{where}: a stream of a level that {n_frames} frames have not")
+    orders = Orders(header.orders, skeleton)
+    notes, coarsest = orders.take_notes(streams[0], n_frames, where)
+    streams = [coarsest, *streams[1 + n_empty :]]
+    classes = classes_of(skeleton)
+    coder = fresh_coder(header.start)
+    stream = Stream(coder, 0, streams[0])
+    kept, numbers = np.zeros((2, len(classes)), np.int64)
+    code_head(stream, kinds_of(skeleton), kept, numbers, where)
+    head = Head(kept == 1, numbers)
+    walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
+    rows = RowCoder(classes[head.kept], header.start, coder, where, refining=header.refining)
+    for level in range(pyramid.n_details + 1):
+        if level >= len(streams):
+            walk.skip(level)
+            continue
+        stream = Stream(coder, 0, streams[level]) if level else stream
+        rows.begin(level, pyramid.kind(level), pyramid.rows(level), stream)
+        found = rows.decode()
+        (walk.take_details if level else walk.take_coarsest)(level, found, rows.exponents)
+        if level < pyramid.n_details or not header.contacts:
+            stream.check_whole(f"{where}: level {level}")
+    values = walk.values()
+    if header.contacts and len(streams) > pyramid.n_details:
+        decode_contacts(header.contacts, walk.metric.plan, stream, values, where)
+        stream.check_whole(f"{where}: contacts")
+    return orders.values(values, notes)
+
+
+def kinds_of(skeleton: Skeleton) -> Ints:
+    """0 for rotation channels, 1 for positions, 2 for others."""
+    kinds = [channel.kind for channel in skeleton.channels]
+    found = [0 if k in ROTATION_KINDS else 1 if k in POSITION_KINDS else 2 for k in kinds]
+    return np.array(found, np.int64)
+
+
+def classes_of(skeleton: Skeleton) -> Ints:
+    """What channels are to the model of their rows: by how many joints a rotation moves."""
+    n_below = [1] * skeleton.n_joints
+    for index in range(skeleton.n_joints - 1, -1, -1):
+        parent = skeleton.joints[index].parent
+        if parent >= 0:
+            n_below[parent] += n_below[index]
+    found = []
+    for joint, n in zip(skeleton.joints, n_below, strict=True):
+        own = 1 if joint.parent < 0 else 2 + (n >= 2) + (n >= 4) + (n >= 8)
+        found += [own if channel.kind in ROTATION_KINDS else 0 for channel in joint.channels]
+    return np.array(found, np.int64)
+
+
+def choose_head(header: Header, values: Floats) -> Head:
+    """A channel that hardly leaves its middle is constant."""
+    low, high = values.min(axis=0), values.max(axis=0)
+    kept = high - low > 0.5 * header.constant
+    numbers = np.where(kept, values[0] / header.first, 0.5 * (low + high) / header.constant)
+    if not (np.abs(numbers) < MAX_NUMBER).all():
+        raise MotionError(f"{NAME}: a value exceeds 2^40 steps of {header.first.max():g}")
+    return Head(kept, np.rint(numbers).astype(np.int64))

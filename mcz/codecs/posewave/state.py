@@ -1,0 +1,83 @@
+"""What encoder and decoder know of the rows so far, and how it is laid out.
+
+SPEC.md, "Rows in the metric", is normative; the names below are its names.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+N_LEVELS = 6
+MAX_INDEX = 1 << 30
+BLOCK = 64  # channels at most that are predicted from one another
+LANES = 32  # rows of magnitudes and of values have a multiple of this, behind which are zeros
+
+# Features of a channel: magnitudes of coefficients around it.
+N_FEATURES = 16
+BEFORE_1, BEFORE_2, BEFORE_3, GRAND, PARENT, PARENT_NEXT, PARENT_LAST = range(7)
+SIDE_1, SIDE_2, SIDE_3, SIDE_4, ROW, ROW_BEFORE, ROW_PARENT, USUAL, SCALED = range(7, 16)
+
+# Sources of a mean in time: the values of two rows before and of three of the coarser level.
+TAP_BEFORE_1, TAP_BEFORE_2, TAP_PARENT, TAP_NEXT, TAP_LAST, N_TAPS = range(6)
+
+# Contexts of opinions, each of 12 slots: is it zero; is its bucket beyond 1, 2 .. 11.
+N_SLOTS = 12
+N_OPINIONS = 4
+N_INPUTS = N_OPINIONS + 1
+C_MEAN, C_LEVEL, C_ROWS, N_SHARED = 0, 384, 768, 1280  # the last opinion has contexts by channel
+N_OWN = 36
+N_SCALES, N_SETS = 16, 64
+COUNT_LIMIT = 250
+N_CLASSES = 6
+
+# Contexts and mixers in ``coder``, as those of ``coding.mixing``.
+C_FLAG, C_SIGN, C_EXTRA, C_ESCAPE, C_EXPONENT = 0, 208, 416, 428, 620
+MAX_EXPONENT = 7
+N_TRAINED = C_EXPONENT  # small contexts of the start tables; those behind them begin even
+N_SMALL = C_EXPONENT + (MAX_EXPONENT + 1) * MAX_EXPONENT
+M_FLAG, M_SIGN, N_SMALL_MIXERS = 0, N_LEVELS, 2 * N_LEVELS
+
+
+class Model(NamedTuple):
+    """All that is known; ``wide`` is the number of channels rounded up to ``LANES``, one to spare.
+
+    ``coder`` is a state of ``coding.mixing``. ``slots`` are the contexts of opinions, p << 8 | n
+    each; ``weights`` (sets, slots, inputs), one set for each channel behind the shared ones;
+    ``second`` (scales, slots, 33). ``at`` and ``inputs`` are what is thought of one decision.
+    ``columns`` (blocks, 64, 64), ``variances`` (blocks, 64) and ``seen``, how many rows they know,
+    are the prediction across channels, ``taps`` (2 levels, 5) and ``tap_energy`` that in time;
+    ``level_weights`` (levels, 16) and ``own_weights`` (16, wide) predict magnitudes. The others are
+    tables and room to work in.
+    """
+
+    coder: Ints
+    classes: Ints
+    slots: Ints
+    weights: Ints
+    second: Ints
+    at: Ints
+    inputs: Ints
+    stretch: Ints
+    squash: Ints
+    rates: Ints
+    trust: Ints
+    logs: Ints
+    costs: Ints
+    columns: Floats
+    variances: Floats
+    seen: Floats
+    means: Floats
+    taps: Floats
+    tap_energy: Floats
+    timely: Floats
+    sources: Floats
+    level_weights: Floats
+    own_weights: Floats
+    features: Floats
+    sizes: Floats

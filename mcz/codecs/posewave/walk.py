@@ -1,0 +1,132 @@
+"""From rows in the metric to the values of a segment, level by level, coarse to fine.
+
+SPEC.md, "Codec 13: posewave", is normative. Encoder and decoder go the same way: each level's rows
+are coded at the pose that a decoder has by then, so an encoder decodes what it has just coded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.posewave.header import Header
+from mcz.codecs.posewave.metric import Metric
+from mcz.codecs.posewave.pyramid import Pyramid
+from mcz.motion import Skeleton
+from mcz.transforms import lifting
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Code = Callable[[int, Floats], Floats]  # (first row, rows wanted) -> rows as a decoder has them
+
+BLOCK_ENTRIES = 2**21  # numbers of factors that are in memory at a time
+
+
+@cache
+def kernels() -> Any:
+    from mcz.codecs.posewave import course_kernels
+
+    return course_kernels
+
+
+def between(approx: Floats, n_rows: int) -> Floats:
+    """The poses halfway from each approximation to the next: those of the details."""
+    after = np.concatenate([approx[1:], approx[-1:]])
+    found: Floats = (approx[:n_rows] + after[:n_rows]) * 0.5
+    return found
+
+
+class Walk:
+    """Goes through the levels of a segment, coarse to fine, from rows that are in the metric."""
+
+    def __init__(
+        self,
+        header: Header,
+        skeleton: Skeleton,
+        pyramid: Pyramid,
+        kept: NDArray[np.bool_],
+        first: Floats,
+    ) -> None:
+        """``first`` (n_channels,) is the pose before the first; channels not ``kept`` keep it."""
+        self.header, self.pyramid, self.still = header, pyramid, first
+        self.kept = np.flatnonzero(kept)
+        self.metric = Metric(header, skeleton, kept, first)
+        self.poses = self.approx = np.zeros((0, len(self.kept)))
+
+    def values(self) -> Floats:
+        """The frames, (n_frames, n_channels), after the last level."""
+        found = np.repeat(self.still[None], len(self.approx), axis=0)
+        found[:, self.kept] = self.approx
+        return found
+
+    def steps(self, level: int, exponents: Ints) -> Floats:
+        """The step of each row, (n_rows, 1)."""
+        halved: Floats = np.ldexp(1.0, -exponents).astype(np.float64)
+        return self.pyramid.step(level, self.header.step) * halved[:, None]
+
+    def course(self) -> Any:
+        return kernels().course_of(self.still, self.kept, self.header.greatest[self.kept])
+
+    def code_coarsest(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
+        """Level 0, a row at a time: ``code`` gives what a decoder will have of it."""
+        course, steps = self.course(), self.steps(level, exponents)
+        packed = self.metric.empty()
+        self.approx = np.empty((len(rows), len(self.kept)))
+        for m, row in enumerate(rows):
+            kernels().next_factor(self.metric.plan, course, packed)
+            wanted = self.metric.into(packed, (row - course.expected)[None]) / steps[m]
+            kernels().take_row(self.metric.plan, course, packed, code(m, wanted) * steps[m])
+            self.approx[m] = course.pose[0, self.kept]
+
+    def take_coarsest(self, level: int, rows: Floats, exponents: Ints) -> None:
+        """Level 0 from all of its rows in the metric, in steps."""
+        self.approx = np.empty((len(rows), len(self.kept)))
+        scaled = rows * self.steps(level, exponents)
+        kernels().take_rows(self.metric.plan, self.course(), scaled, self.approx)
+
+    def code_details(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
+        """A level of details, all rows at once: ``code`` gives what a decoder will have."""
+        which = self._poses_of(level)
+        wanted = self._through(self.metric.into, which, rows) / self.steps(level, exponents)
+        self._add(level, which, code(0, wanted), exponents)
+
+    def take_details(self, level: int, rows: Floats, exponents: Ints) -> None:
+        """A level of details from its rows in the metric, in steps."""
+        self._add(level, self._poses_of(level), rows, exponents)
+
+    def skip(self, level: int) -> None:
+        """A level without details."""
+        nothing = np.zeros((self.pyramid.rows(level), len(self.kept)))
+        self.approx = lifting.join(self.approx, nothing)
+
+    def _poses_of(self, level: int) -> Ints:
+        """Of each row the number of its pose, which is that of a coarser level's where borrowed."""
+        pyramid = self.pyramid
+        n_rows = pyramid.rows(level)
+        if pyramid.depth(level) > pyramid.borrowing:
+            self.poses, self.level = between(self.approx, n_rows), level
+        found: Ints = np.minimum(np.arange(n_rows) >> (level - self.level), len(self.poses) - 1)
+        return found
+
+    def _add(self, level: int, which: Ints, rows: Floats, exponents: Ints) -> None:
+        live = np.flatnonzero(rows.any(axis=1)) if rows.size else np.zeros(0, np.int64)
+        detail = np.zeros(rows.shape)
+        scaled = rows[live] * self.steps(level, exponents)[live]
+        detail[live] = self._through(self.metric.out_of, which[live], scaled)
+        self.approx = lifting.join(self.approx, detail)
+
+    def _through(self, way: Any, which: Ints, rows: Floats) -> Floats:
+        """Rows one way through the metric, each at the pose of number ``which``."""
+        found = np.empty_like(rows)
+        n_rows = min(max(BLOCK_ENTRIES // max(1, self.metric.plan.n_entries), 8), 512)
+        for start in range(0, len(rows), n_rows):
+            block = slice(start, start + n_rows)
+            numbers, at = np.unique(which[block], return_inverse=True)
+            found[block] = way(
+                self.metric.factors(self.poses[numbers]), rows[block], at.astype(np.int64)
+            )
+        return found

@@ -1,0 +1,53 @@
+"""A bound on the greatest error, met where it is missed and not by a finer step everywhere.
+
+A codec that takes part has a parameter ``refinement``: of each frame, by how many octaves the steps
+of what bears upon it are to be finer.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mcz.codecs.parameters import Dial
+from mcz.errors import OptionError
+from mcz.writing.trials import Floats, Target, Trials
+
+REFINEMENT = "refinement"
+MOST_OCTAVES = 7
+MOST_ROUNDS = 10  # with one step
+MOST_STEPS = 6
+FINER = 0.7  # from one step to the next
+MARGIN = 0.3  # octaves that are added to what a frame misses
+
+
+def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[dict[str, Any], dict[str, str]]:
+    """A step and the refinement of frames that meet the bound, and what the record says of it.
+
+    Raises OptionError where none that was tried does.
+    """
+    step = (dial.guess and dial.guess(target.name, target.limit)) or 1.0
+    for _ in range(MOST_STEPS):
+        octaves = np.zeros(trial.motion.n_frames, np.int64)
+        for _ in range(MOST_ROUNDS):
+            found = {dial.parameter: step, REFINEMENT: octaves}
+            errors = trial.frame_errors(found)
+            if not (errors > target.limit).any():
+                reached = float(errors.max(initial=0.0))
+                return found, {"target_reached": repr(reached)}
+            octaves = _refined(octaves, errors / target.limit)
+        step = max(step * FINER, dial.low)
+    raise OptionError(
+        f"{target.name} {target.limit:g} cannot be met: {dial.parameter} {step:g} gives "
+        f"{errors.max():g}"
+    )
+
+
+def _refined(octaves: Any, ratios: Floats) -> Any:
+    """More octaves where ``ratios`` (n_frames,) of errors to the bound exceed 1, and beside it."""
+    with np.errstate(divide="ignore"):
+        missing = np.where(ratios > 1, np.ceil(np.log2(ratios) + MARGIN), 0.0).astype(np.int64)
+    padded = np.pad(missing, 1)
+    added = np.maximum(missing, np.maximum(padded[:-2], padded[2:]))
+    return np.minimum(octaves + added, MOST_OCTAVES)

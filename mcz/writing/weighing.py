@@ -1,0 +1,84 @@
+"""Quality by joint: what joints weigh, so that each keeps the mean error that was asked for.
+
+A codec that takes part has a parameter ``quality``, mean errors in cm of joints or groups of them,
+and one ``weights``, what each joint counts for in its metric.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.brief import among
+from mcz.codecs.parameters import Dial
+from mcz.errors import OptionError
+from mcz.kinematics.feet import feet_of
+from mcz.motion import Skeleton
+from mcz.writing.trials import Trials
+
+Floats = NDArray[np.float64]
+Limits = Sequence[tuple[str, float]]  # a joint or a group of joints, and its limit in cm
+
+QUALITY, WEIGHTS = "quality", "weights"
+MOST_ROUNDS = 8
+OVER = 1.15  # by how much more a weight grows than the square of what is missed
+MOST_WEIGHT = 2.0**24
+GROUPS = {
+    "hands": r"hand|wrist|finger|thumb|index|middle|ring|pinky",
+    "head": r"head|neck|eye|jaw",
+    "arms": r"clavicle|collar|shoulder|humerus|arm|radius|elbow|hand|wrist|finger|thumb",
+    "legs": r"hip|thigh|femur|upleg|leg|knee|shin|tibia|foot|toe|ankle",
+    "spine": r"spine|back|chest|thorax|abdomen",
+}
+
+
+def joints_of(skeleton: Skeleton, name: str) -> list[int]:
+    """The joints that ``name`` means: a group, or else a joint of that name; raises OptionError."""
+    addresses = skeleton.addresses()
+    if name in addresses:
+        return [addresses.index(name)]
+    found = []
+    if name == "feet":
+        found = feet_of(skeleton)
+    elif name in GROUPS:
+        pattern = re.compile(GROUPS[name], re.IGNORECASE)
+        found = [i for i, joint in enumerate(skeleton.joints) if pattern.search(joint.name)]
+    if not found:
+        known = ["feet", *GROUPS, *addresses]
+        raise OptionError(f"quality: no joint and no group is called {name!r}{among(name, known)}")
+    return found
+
+
+def weighted(
+    dial: Dial, trial: Trials, limits: Limits, found: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Weights with which the joints keep their ``limits``, with the parameters ``found``.
+
+    Also returns what the quality record says of it. Raises OptionError where they cannot be kept.
+    """
+    skeleton = trial.motion.skeleton
+    groups = [(name, joints_of(skeleton, name), limit) for name, limit in limits]
+    given = found.get(WEIGHTS)
+    weights = np.ones(skeleton.n_joints) if given is None else np.array(given)
+    for _ in range(MOST_ROUNDS):
+        errors = trial.joint_errors({**found, WEIGHTS: weights})
+        means = [float(errors[joints].mean()) for _, joints, _ in groups]
+        if all(mean <= limit for mean, (_, _, limit) in zip(means, groups, strict=True)):
+            remarks = {
+                f"quality_reached.{name}": repr(mean)
+                for mean, (name, _, _) in zip(means, groups, strict=True)
+            }
+            return {WEIGHTS: weights}, remarks
+        for mean, (_, joints, limit) in zip(means, groups, strict=True):
+            if mean > limit:
+                factor = (mean / limit) ** 2 * OVER
+                weights[joints] = np.minimum(weights[joints] * factor, MOST_WEIGHT)
+    worst = max(zip(means, groups, strict=True), key=lambda pair: pair[0] / pair[1][2])
+    raise OptionError(
+        f"quality: {worst[1][0]}={worst[1][2]:g}cm cannot be kept with {dial.parameter} "
+        f"{found.get(dial.parameter)}: {worst[0]:g} cm was reached"
+    )

@@ -1,0 +1,282 @@
+"""Codec 13, ``posewave``: rows in the metric of the pose."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.codecs.posewave.header import POSEWAVE_HEADER
+from mcz.motion import Motion, Signal
+from mcz.schema import build, parse
+from tests.codecs.lossy import (
+    Array,
+    Direct,
+    amc,
+    bones,
+    bytes_of,
+    clip_of,
+    decoded,
+    gapped,
+    markers,
+    rough,
+    saved,
+    wandering,
+)
+from tests.motions import smooth
+
+NAME = "posewave"
+KINDS = ["tx", "ty", "tz", "rz", "rx", "ry", "rz", "rx"]
+
+
+def mean_error_cm(motion: Motion, values: Array) -> float:
+    found = replace(motion, signals=(Signal(values),))
+    error = mcz.compare(motion, found, virtual_markers=False).mean_position_error_cm
+    assert error is not None
+    return float(error)
+
+
+@given(
+    n_frames=st.integers(0, 70),
+    kinds=st.lists(st.sampled_from([*KINDS, "sx", "length", "qw"]), max_size=9),
+    step=st.floats(1e-4, 10),
+    levels=st.integers(0, 8),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_what_is_read_is_what_the_encoder_had(
+    n_frames: int, kinds: list[str], step: float, levels: int, seed: int
+) -> None:
+    """An encoder decodes what it codes; a file of it is closed with a hash of the values."""
+    motion = wandering(n_frames, kinds, seed)
+    with mcz.open(saved(NAME, motion, step=step, levels=levels)) as file:
+        assert file.only_clip().read().shape == (n_frames, len(kinds))
+
+
+@given(step=st.floats(1e-3, 1), seed=st.integers(0, 2**32 - 1))
+def test_errors_follow_the_step(step: float, seed: int) -> None:
+    motion = wandering(90, KINDS, seed)
+    values = Direct(NAME, motion, step=step).read()
+    assert mean_error_cm(motion, values) < 2 * step
+
+
+def test_a_finer_step_is_nearer_and_larger() -> None:
+    motion = smooth(300)
+    sizes, errors = [], []
+    for step in (1.0, 0.1, 0.01):
+        coded = Direct(NAME, motion, step=step)
+        sizes.append(coded.n_bytes)
+        errors.append(mean_error_cm(motion, coded.read()))
+    assert sizes == sorted(sizes) and errors == sorted(errors, reverse=True)
+
+
+@pytest.mark.parametrize("levels", [0, 1, 3, 8])
+def test_resolutions(levels: int) -> None:
+    motion = smooth(200)
+    coded = Direct(NAME, motion, step=0.01, levels=levels)
+    assert coded.layout.n_resolutions == levels + 1
+    errors = [mean_error_cm(motion, coded.read(resolution=k)) for k in range(levels + 1)]
+    assert errors[0] < 0.05
+    assert all(a <= 1.05 * b for a, b in zip(errors, errors[1:], strict=False))
+
+
+@given(data=st.data())
+def test_parts_are_those_of_the_whole(data: st.DataObject) -> None:
+    coded = _segmented()
+    start = data.draw(st.integers(0, 150))
+    stop = data.draw(st.integers(start, 150))
+    k = data.draw(st.integers(0, 3))
+    whole = coded.read(resolution=k)
+    np.testing.assert_array_equal(coded.read(start, stop, resolution=k), whole[start:stop])
+
+
+def _segmented() -> Direct:
+    return Direct(NAME, wandering(150, KINDS, 3), step=0.1, levels=3, segment_frames=40)
+
+
+def test_segments_decode_by_themselves() -> None:
+    coded = _segmented()
+    assert [span.first for span in coded.spans] == [0, 40, 80, 120]
+
+    def fetch(segment: int, resolution: int, group: int) -> bytes:
+        assert segment == 2
+        return coded.stream(segment, resolution, group)
+
+    found = coded.read(80, 120, changes={"fetch": fetch})
+    np.testing.assert_array_equal(found, coded.read()[80:120])
+
+
+def test_details_that_are_not_stored_are_left_out() -> None:
+    coded = _segmented()
+    fewer = replace(coded.layout, n_resolutions=2)
+    np.testing.assert_array_equal(coded.read(changes={"layout": fewer}), coded.read(resolution=2))
+
+
+@pytest.mark.parametrize("n_frames", [1, 2, 3, 4, 5, 10])
+def test_short_clips(n_frames: int) -> None:
+    motion = wandering(n_frames, KINDS, n_frames)
+    assert mean_error_cm(motion, decoded(NAME, motion, step=0.05)) < 0.2
+
+
+def test_channels_that_stand_still_cost_nothing() -> None:
+    motion = smooth(400)
+    values = np.array(motion.values)
+    still = np.repeat(values[:1], len(values), axis=0)
+    one = np.where(np.arange(values.shape[1]) == 4, values, still)
+    signals = [(Signal(v),) for v in (still, one)]
+    sizes = [Direct(NAME, replace(motion, signals=s), step=0.05).n_bytes for s in signals]
+    assert sizes[0] < 60 and sizes[1] < 1500
+
+
+def test_gaps_and_rough_values() -> None:
+    for motion in (gapped(), rough(300, 5)):
+        found = decoded(NAME, motion, step=0.1)
+        mask = motion.signals[0].mask
+        assert mask is not None
+        assert np.isnan(found[~mask]).all() and np.isfinite(found[mask]).all()
+
+
+def test_markers_are_points_of_their_own() -> None:
+    motion = markers(300, 20)
+    assert mean_error_cm(motion, decoded(NAME, motion, step=0.05)) < 0.2  # a mean of 20 points
+
+
+@pytest.mark.parametrize("angle_unit", ["deg", "rad", ""])
+def test_angle_units(angle_unit: str) -> None:
+    """Where it is unknown, channels are coded one by one."""
+    motion = clip_of(
+        wandering(120, ["rx", "ry", "rz"], 1).values / 60, ["rx", "ry", "rz"], angle_unit
+    )
+    full = {"deg": 360.0, "rad": 2 * np.pi, "": 360.0}[angle_unit]
+    missed = decoded(NAME, motion, step=0.01) - motion.values
+    missed -= full * np.rint(missed / full)
+    assert np.abs(missed).max() < {"deg": 1.0, "rad": 0.5, "": 6.0}[angle_unit]
+
+
+def test_many_channels() -> None:
+    kinds = ["rx"] * 400
+    steps = np.random.default_rng(0).normal(0, 0.3, (40, 400))
+    motion = clip_of(np.cumsum(steps, axis=0), kinds)
+    with mcz.open(saved(NAME, motion, step=1.0), max_decoded=2**30) as file:
+        assert np.isfinite(file.only_clip().read()).all()
+
+
+@pytest.mark.parametrize("value", [1e30, np.inf, np.nan])
+def test_values_that_cannot_be_coded(value: float) -> None:
+    values = np.array(wandering(20, KINDS, 1).values)
+    values[7, 3] = value
+    with pytest.raises(mcz.MotionError, match="posewave"):
+        saved(NAME, clip_of(values, KINDS), step=0.1)
+
+
+def changed(coded: Direct, **fields: Any) -> dict[str, Any]:
+    header = parse(POSEWAVE_HEADER, coded.header, "header")
+    return {"header": build(POSEWAVE_HEADER, {**header, **fields}, "header")}
+
+
+@pytest.mark.parametrize(
+    "fields", [{"plain": [128]}, {"weights": [128]}, {"levels": 1, "borrowing": 0}]
+)
+def test_headers_that_do_not_fit(fields: dict[str, Any]) -> None:
+    coded = _segmented()
+    with pytest.raises(mcz.FormatError, match=f"{next(iter(fields))}"):
+        coded.read(changes=changed(coded, **fields))
+
+
+@given(data=st.data())
+def test_any_change_of_a_stream_decodes_or_is_refused(data: st.DataObject) -> None:
+    coded = _segmented()
+    place = data.draw(st.sampled_from(coded.places()))
+    stream = bytearray(coded.stream(*place))
+    what = data.draw(st.sampled_from(["cut", "flip", "more"]))
+    if what == "cut" or not stream:
+        stream = stream[: data.draw(st.integers(0, max(0, len(stream) - 1)))]
+    elif what == "flip":
+        stream[data.draw(st.integers(0, len(stream) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    else:
+        stream += data.draw(st.binary(min_size=1, max_size=9))
+    with suppress(mcz.MczError):
+        coded.read(changes=coded.with_stream(place, bytes(stream)))
+
+
+def test_a_bound_is_met_by_refining_frames() -> None:
+    motion = smooth(400)
+    data = saved(NAME, motion, max_error_cm=0.2)
+    with mcz.open(data) as file:
+        found = file.only_clip().motion()
+        quality = file.only_clip().quality
+    error = mcz.compare(motion, found).max_position_error_cm
+    assert error is not None and error <= 0.2
+    assert not any("refinement" in key for key in quality)
+
+
+def test_unknown_units_have_steps_in_their_own() -> None:
+    motion = smooth(60)
+    motion = replace(motion, skeleton=replace(motion.skeleton, unit_cm=None))
+    assert np.isfinite(decoded(NAME, motion, step=0.05)).all()
+    with pytest.raises(mcz.OptionError, match="--unit"):
+        saved(NAME, motion, mean_error_cm=0.1)
+
+
+def test_a_skeleton_of_no_extent() -> None:
+    skeleton = bones(["rx", "ry"])
+    joints = tuple(replace(joint, offset=(0.0, 0.0, 0.0)) for joint in skeleton.joints)
+    motion = wandering(50, ["rx", "ry"], 1)
+    motion = replace(motion, skeleton=replace(skeleton, joints=joints))
+    assert np.isfinite(decoded(NAME, motion, step=0.1)).all()
+
+
+def test_interpreted_loops_give_the_same_bits(tmp_path: Path) -> None:
+    path = tmp_path / "clip.mcz"
+    path.write_bytes(saved(NAME, smooth(24), step=0.2, levels=2))
+    program = (
+        "import sys, mcz\n"
+        "with mcz.open(sys.argv[1]) as file: print(file.only_clip().read().tobytes().hex())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(path)],
+        env={**os.environ, "MCZ_LOOPS": "interpreted"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    with mcz.open(path) as file:
+        assert done.stdout.strip() == file.only_clip().read().tobytes().hex()
+
+
+@pytest.mark.parametrize("name", ["16_02", "49_01"])
+def test_half_of_mrdwt_at_equal_error(data: Path, name: str) -> None:
+    motion = amc(data, name)
+    ours = saved(NAME, motion, mean_error_cm=0.05)
+    theirs = saved("mrdwt", motion, mean_error_cm=0.05)
+    assert bytes_of(ours) < 0.6 * bytes_of(theirs)
+
+
+def test_quality_by_joint() -> None:
+    """The tails of the arm keep their limit; what the others weigh stays as it was."""
+    motion = smooth(300)
+    name = motion.skeleton.joints[-1].name
+    plain = saved(NAME, motion, step=0.2)
+    data = saved(NAME, motion, step=0.2, quality=f"{name}=0.2mm")
+    with mcz.open(data) as file:
+        clip = file.only_clip()
+        figures = mcz.compare(motion, clip.motion()).by_joint[-1]
+        quality = clip.quality
+    assert figures.mean_position_error * motion.skeleton.unit_cm <= 0.02
+    assert f"quality_reached.{name}" in quality and "param.weights" not in quality
+    assert bytes_of(plain) < bytes_of(data) < bytes_of(saved(NAME, motion, step=0.01))
+
+
+@pytest.mark.parametrize("text", ["feet", "feet=1", "feet=1furlong", "feet=0mm", "nobody=1mm"])
+def test_qualities_that_mean_nothing(text: str) -> None:
+    with pytest.raises(mcz.OptionError, match="quality"):
+        saved(NAME, smooth(20), step=0.1, quality=text)

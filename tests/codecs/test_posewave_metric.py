@@ -1,0 +1,441 @@
+"""The pose metric of codec 13: against numeric Jacobians, its factor, and its odd cases."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mcz
+from mcz.codecs.posewave.metric_kernels import (
+    LANES,
+    factor,
+    factor_one,
+    from_metric,
+    inverse_root,
+    to_metric,
+)
+from mcz.codecs.posewave.skeleton_plan import MAX_PATH, PLAIN, Plan, make_plan
+from mcz.codecs.posewave.turns import RULES, sine_cosine
+from mcz.kinematics.chain import chain_of
+from mcz.kinematics.points import points_of, positions_of
+from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Channel, Joint, Skeleton
+from tests.skeletons import skeletons, values_for
+
+TURNING = tuple(Channel(kind) for kind in ROTATION_KINDS)
+MOVING = tuple(Channel(kind) for kind in POSITION_KINDS)
+METRIC_KINDS = (*POSITION_KINDS, *ROTATION_KINDS)
+KAPPA, RADIUS = 0.4, 1.5
+
+
+def plan_of(skeleton: Skeleton, added: float = 1e-3, **options: object) -> Plan:
+    """All channels kept."""
+    n = skeleton.n_channels
+    given = {"radius": RADIUS, "kappa": KAPPA, **options}
+    return make_plan(skeleton, np.ones(n, np.bool_), np.full(n, added), **given)  # type: ignore[arg-type]
+
+
+def dense(plan: Plan, packed: np.ndarray, pose: int = 0) -> np.ndarray:
+    """R of a pose, (n_kept, n_kept)."""
+    width = packed.shape[2]
+    entries = packed[pose // width, :, pose % width]
+    result = np.zeros((plan.n_kept, plan.n_kept))
+    for number, (start, stop) in enumerate(zip(plan.starts, plan.starts[1:], strict=False)):
+        root = 1.0 / entries[stop - 1]
+        result[number, plan.path[start : stop - 1]] = root * entries[start : stop - 1]
+        result[number, number] = root
+    return result
+
+
+def metric_of(plan: Plan, values: np.ndarray) -> np.ndarray:
+    """G of a single pose, (n_kept, n_kept), its regularization taken off."""
+    root = dense(plan, factor(plan, values[None]))
+    product: np.ndarray = root.T @ root
+    return product - np.diag(plan.regularization)
+
+
+def plain_pose(skeleton: Skeleton, values: np.ndarray) -> np.ndarray:
+    """``values`` (n, n_channels) with quaternions that do not turn, scales of 1, lengths of 0."""
+    neutral = {"q": 0.0, "qw": 1.0, "s": 1.0, "l": 0.0}
+    result = values.copy()
+    for column, kind in enumerate(channel.kind for channel in skeleton.channels):
+        if kind and kind not in METRIC_KINDS:
+            result[:, column] = neutral.get(kind, neutral.get(kind[0], 0.0))
+    return result
+
+
+def weighted_points(
+    skeleton: Skeleton, values: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """All points and shell points, (n, n_points + 3 n_joints, 3), and the weight of each."""
+    values = plain_pose(skeleton, values)
+    points = positions_of(skeleton, values)
+    chain = chain_of(skeleton)
+    shells = []
+    pose = chain.pose(np.ascontiguousarray(values.T))
+    for joint, (origin, axes) in enumerate(zip(pose.origins, pose.axes, strict=True)):
+        frame = chain.turned[joint]
+        back = np.eye(3) if frame is None else frame.T
+        world = np.einsum("ikf,kl->fil", np.broadcast_to(axes, (3, 3, len(values))), back)
+        shells += [origin.T + RADIUS * world[:, :, k] for k in range(3)]
+    owners = [j for j, own in enumerate(points_of(skeleton)) for _ in own]
+    heavy = (1 - KAPPA) / len(owners) * weights[owners]
+    light = np.repeat(KAPPA / (3 * skeleton.n_joints) * weights, 3)
+    return np.concatenate([points, np.stack(shells, 1)], 1), np.concatenate([heavy, light])
+
+
+def numeric(
+    skeleton: Skeleton, values: np.ndarray, weights: np.ndarray | None = None
+) -> np.ndarray:
+    """G of a pose by central differences, (n_channels, n_channels); 0 where it is plain."""
+    weights = np.ones(skeleton.n_joints) if weights is None else weights
+    step = 2e-3 if skeleton.angle_unit == "deg" else 3e-5
+    n = skeleton.n_channels
+    steps = step * np.eye(n)
+    ends, heavy = weighted_points(
+        skeleton, np.concatenate([values + steps, values - steps]), weights
+    )
+    slopes = (ends[:n] - ends[n:]) / (2 * step)
+    kinds = np.array([channel.kind in METRIC_KINDS for channel in skeleton.channels], np.bool_)
+    slopes[~kinds] = 0.0
+    result: np.ndarray = np.einsum("cpi,dpi,p->cd", slopes, slopes, heavy)
+    return result
+
+
+def assert_near(found: np.ndarray, expected: np.ndarray, share: float = 3e-7) -> None:
+    assert np.abs(found - expected).max(initial=0.0) <= share * (
+        1 + np.abs(expected).max(initial=0.0)
+    )
+
+
+@given(skeletons(), st.integers(0, 1000))
+def test_metric_is_that_of_numeric_jacobians(skeleton: Skeleton, seed: int) -> None:
+    values = values_for(skeleton, 1, seed)[0]
+    weights = np.random.default_rng(seed).uniform(0.1, 5, skeleton.n_joints)
+    plan = plan_of(skeleton, joint_weights=weights)
+    assert_near(metric_of(plan, values), numeric(skeleton, values, weights))
+
+
+@given(skeletons(), st.integers(0, 1000))
+def test_kept_channels_alone(skeleton: Skeleton, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    values = values_for(skeleton, 1, seed)[0]
+    kept = random.integers(0, 2, skeleton.n_channels).astype(np.bool_)
+    added = random.uniform(0.01, 2, int(kept.sum()))
+    plan = make_plan(skeleton, kept, added, radius=RADIUS, kappa=KAPPA)
+    assert_near(metric_of(plan, values), numeric(skeleton, values)[kept][:, kept])
+
+
+@given(skeletons(), st.integers(1, 20), st.integers(0, 1000))
+def test_rows_come_back(skeleton: Skeleton, n_poses: int, seed: int) -> None:
+    plan = plan_of(skeleton, 1e-4)
+    packed = factor(plan, values_for(skeleton, n_poses, seed))
+    rows = np.random.default_rng(seed).normal(size=(n_poses, plan.n_kept))
+    inside = to_metric(plan, packed, rows)
+    expected = [dense(plan, packed, pose) @ row for pose, row in enumerate(rows)]
+    assert_near(inside, np.array(expected), 1e-12)
+    assert_near(from_metric(plan, packed, inside), rows, 1e-9)
+
+
+@given(skeletons(), st.integers(2, 20), st.integers(1, 3), st.integers(0, 1000))
+def test_batches_are_singles_to_the_bit(
+    skeleton: Skeleton, n_poses: int, repeat: int, seed: int
+) -> None:
+    plan, values = plan_of(skeleton), values_for(skeleton, n_poses, seed)
+    packed = factor(plan, values)
+    singles = np.empty((n_poses, plan.n_entries, 1))
+    factor_one(plan, values, singles)
+    flat = packed.transpose(0, 2, 1).reshape(-1, plan.n_entries)[:n_poses]
+    assert np.array_equal(flat, singles[:, :, 0])
+    alone = [factor(plan, pose[None]) for pose in values]
+    assert np.array_equal(np.concatenate(alone), singles)
+    n_rows = n_poses * repeat - (repeat - 1)
+    rows = np.random.default_rng(seed).normal(size=(n_rows, plan.n_kept))
+    for action in (to_metric, from_metric):
+        whole = action(plan, packed, rows, repeat)
+        assert np.array_equal(whole, action(plan, singles, rows, repeat))
+        for n, row in enumerate(rows):
+            assert np.array_equal(whole[n], action(plan, alone[n // repeat], row[None])[0])
+
+
+def test_poses_go_on_to_the_number_asked_for() -> None:
+    skeleton = chain(3)
+    plan, values = plan_of(skeleton), values_for(skeleton, 2)
+    longer = factor(plan, values, 19)
+    repeated = factor(plan, values[[0, *[1] * 18]])
+    assert len(longer) == -(-19 // LANES)
+    assert np.array_equal(longer, repeated)
+
+
+def test_shapes_that_do_not_fit() -> None:
+    skeleton = chain(3)
+    plan = plan_of(skeleton)
+    packed = factor(plan, values_for(skeleton, 19))
+    with pytest.raises(ValueError, match="25 rows for 3 batches"):
+        to_metric(plan, packed, np.zeros((25, 9)))
+    with pytest.raises(ValueError, match="rows of 8 values for 9 channels"):
+        from_metric(plan, packed, np.zeros((19, 8)))
+    with pytest.raises(ValueError, match=r"poses of shape \(2, 8\) for 9 channels"):
+        factor(plan, np.zeros((2, 8)))
+    with pytest.raises(ValueError, match="8 of 9 channels are kept"):
+        make_plan(skeleton, np.ones(9, np.bool_), np.zeros(8), radius=1.0)
+
+
+def test_worked_example() -> None:
+    """As SPEC.md has it."""
+    hip = Joint("hip", channels=tuple(Channel(kind) for kind in "tx ty tz rz rx".split()))
+    knee = Joint("knee", 0, (0.0, -4.0, 0.5), ((0.0, -3.0, 0.0),), (10.0, 20.0, 30.0), "XYZ")
+    knee = replace(knee, channels=tuple(Channel(kind) for kind in "ry rx".split()))
+    kept = np.array([1, 1, 0, 1, 1, 1, 1], np.bool_)
+    plan = make_plan(Skeleton((hip, knee)), kept, np.full(6, 0.001), radius=3.0, kappa=0.5)
+    packed = factor(plan, np.array([[1.0, 90.0, 2.0, 30.0, -40.0, 10.0, 100.0]]))
+    assert packed[0, :, 0].tolist() == EXAMPLE
+    row = from_metric(plan, packed, np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]))
+    assert row[0].tolist() == EXAMPLE_ROW
+
+
+def chain(n_joints: int, own: tuple[Channel, ...] = TURNING, **more: object) -> Skeleton:
+    """One joint below the other."""
+    joints = [Joint(f"{n}", n - 1, (0.3, 1.0, -0.2), (), channels=own) for n in range(n_joints)]
+    joints[-1] = replace(joints[-1], tails=((0.0, 1.0, 0.0),))
+    return Skeleton(tuple(joints), **more)  # type: ignore[arg-type]
+
+
+def test_long_paths_are_cut_at_joints() -> None:
+    skeleton = chain(50)
+    plan = plan_of(skeleton)
+    lengths = np.diff(plan.starts)
+    assert lengths.max() == MAX_PATH
+    assert lengths[: MAX_PATH + 1].tolist() == [*range(1, MAX_PATH + 1), 1]
+    values = values_for(skeleton, 1)[0] * 0.3
+    expected = numeric(skeleton, values)
+    block = np.arange(150) // MAX_PATH
+    expected[block[:, None] != block] = 0.0
+    assert_near(metric_of(plan, values), expected)
+
+
+def test_a_joint_that_would_exceed_the_path_begins_a_block() -> None:
+    plan = plan_of(chain(20, (*MOVING, *TURNING, *MOVING, *TURNING)))
+    assert np.diff(plan.starts).tolist() == [*range(1, MAX_PATH + 1)] * 2 + [*range(1, 49)]
+    plan = plan_of(chain(10, (*MOVING, *TURNING, Channel("rx"), *MOVING, *TURNING)))
+    assert np.diff(plan.starts).tolist() == [*range(1, 92), *range(1, 40)]
+    plan = plan_of(chain(1, TURNING * 70))
+    assert np.diff(plan.starts).tolist() == [*range(1, 97), *range(1, 97), *range(1, 19)]
+
+
+def test_cost_is_linear() -> None:
+    def seconds(n_joints: int) -> float:
+        skeleton = chain(n_joints)
+        plan, values = plan_of(skeleton), values_for(skeleton, LANES)
+        factor(plan, values)
+        taken = []
+        for _ in range(3):
+            start = time.perf_counter()
+            factor(plan, values)
+            taken.append(time.perf_counter() - start)
+        return min(taken)
+
+    assert seconds(683) < 40 * seconds(43)  # a channel costs up to 2 * 96^2 products in either
+
+
+def test_nothing_to_do() -> None:
+    empty = Skeleton(())
+    plan = plan_of(empty)
+    packed = factor(plan, np.zeros((3, 0)))
+    assert packed.shape == (1, 0, LANES)
+    assert to_metric(plan, packed, np.zeros((3, 0))).shape == (3, 0)
+    skeleton = chain(2)
+    plan = make_plan(skeleton, np.zeros(6, np.bool_), np.zeros(0), radius=1.0)
+    assert plan.n_entries == 0
+    assert from_metric(plan, factor(plan, np.zeros((1, 6))), np.zeros((1, 0))).shape == (1, 0)
+
+
+def test_plain_channels_stand_alone() -> None:
+    kinds = ("rx", "", "sy", "qx", "length", "tz")
+    own = tuple(Channel(kind, "smile" if not kind else "") for kind in kinds)
+    skeleton = chain(2, own)
+    added = np.linspace(0.5, 6, 12)
+    plan = make_plan(skeleton, np.ones(12, np.bool_), added, radius=1.0)
+    plain = [*range(1, 5), *range(7, 11)]
+    assert np.flatnonzero(plan.joints == PLAIN).tolist() == plain
+    root = dense(plan, factor(plan, values_for(skeleton, 1)))
+    square = root.T @ root
+    assert np.allclose(square[plain][:, plain], np.diag(added[plain]))
+    others = np.delete(np.arange(12), plain)
+    assert not square[plain][:, others].any()
+    assert (np.diag(square)[others] > added[others]).all()
+
+
+def test_an_unknown_angle_unit_makes_all_plain() -> None:
+    unknown = chain(3, (*MOVING, *TURNING), angle_unit="")
+    assert (plan_of(unknown).joints == PLAIN).all()
+    markers = Skeleton(tuple(Joint(f"{n}", channels=MOVING) for n in range(3)), angle_unit="")
+    plan = plan_of(markers)
+    assert plan.joints.tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2]
+    assert np.allclose(metric_of(plan, np.zeros(9)), np.eye(9) / 3)
+
+
+def test_a_singular_metric_is_held_by_its_regularization() -> None:
+    joints = [Joint(f"{n}", n - 1, channels=TURNING) for n in range(4)]
+    plan = plan_of(Skeleton(tuple(joints)), 0.01, radius=0.0)
+    packed = factor(plan, np.zeros((1, 12)))
+    assert np.allclose(dense(plan, packed), 0.1 * np.eye(12))
+
+
+LARGE = st.sampled_from([0.0, 1.0, -3e11, 1e12, -1.1e12, 5e15, 1e300, -1e308, 1e-300])
+WILD = st.tuples(LARGE, LARGE, LARGE)
+
+
+@settings(max_examples=60)
+@given(st.data())
+def test_huge_numbers_give_numbers(data: st.DataObject) -> None:
+    kinds = st.lists(st.sampled_from([*MOVING, *TURNING]), max_size=7).map(tuple)
+    joints = [
+        Joint(
+            f"{n}",
+            n - 1,
+            data.draw(WILD),
+            (data.draw(WILD),),
+            data.draw(WILD),
+            channels=data.draw(kinds),
+            adds_to_offset=data.draw(st.booleans()),
+        )
+        for n in range(data.draw(st.integers(1, 12)))
+    ]
+    skeleton = Skeleton(tuple(joints), angle_unit=data.draw(st.sampled_from(["deg", "rad"])))
+    added = data.draw(st.sampled_from([0.0, 1e-9, 1.0, 1e300]))
+    weights = np.full(len(joints), data.draw(st.sampled_from([0.0, 1.0, 1e300])))
+    plan = plan_of(skeleton, added, radius=data.draw(LARGE), joint_weights=weights)
+    wild = st.sampled_from([0.0, 7.0, 1e5, 1e11, -2e11, 1e300, np.inf, -np.inf, np.nan])
+    n = skeleton.n_channels
+    values = np.array(data.draw(st.lists(wild, min_size=n, max_size=n)), np.float64)
+    packed = factor(plan, values[None])
+    assert np.isfinite(packed).all()
+    assert (packed[0, plan.starts[1:] - 1] > 0).all()
+    rows = np.array([[1e150, -1e150][k % 2] for k in range(n)], np.float64)[None]
+    assert np.isfinite(from_metric(plan, packed, rows)).all()
+    assert np.isfinite(to_metric(plan, packed, 1e-140 * rows)).all()
+
+
+@given(
+    st.floats(-(2**40), 2**40, exclude_min=True, exclude_max=True), st.sampled_from(["deg", "rad"])
+)
+def test_sine_and_cosine(angle: float, unit: str) -> None:
+    if unit == "rad" and abs(angle) > 1.6e6:
+        angle = angle % 1e6
+    sine, cosine = sine_cosine(angle, RULES[unit])
+    exact = np.radians(np.fmod(angle, 360.0)) if unit == "deg" else angle
+    assert abs(sine - np.sin(exact)) < 1e-12
+    assert abs(cosine - np.cos(exact)) < 1e-12
+
+
+@given(st.floats(2.0**-102, 2.0**121))
+def test_inverse_root(value: float) -> None:
+    assert inverse_root(value) * np.sqrt(value) == pytest.approx(1.0, abs=4e-16)
+
+
+def test_angles_of_whole_quarters_are_exact() -> None:
+    quarters = [sine_cosine(90.0 * n, RULES["deg"]) for n in range(-4, 5)]
+    assert quarters[4:8] == [(0, 1), (1, 0), (0, -1), (-1, 0)]
+    assert quarters[:5] == quarters[4:]
+    assert sine_cosine(2.0**40, RULES["deg"]) == (0, 1)
+    assert sine_cosine(float("nan"), RULES["rad"]) == (0, 1)
+
+
+def bits_of_factor() -> str:
+    """Of a skeleton that has all that turns and moves: R, and rows both ways."""
+    joints = (
+        Joint("hip", -1, (1.0, 2.0, 3.0), channels=(*MOVING, *TURNING)),
+        Joint(
+            "knee", 0, (0.1, -4.0, 0.2), ((0.0, -1.0, 0.0),), (10.0, -70.0, 35.0), "ZXY", TURNING
+        ),
+        Joint("toe", 1, (0.1, -4.0, 0.2), channels=(*MOVING, Channel("sx"), *TURNING[1:])),
+    )
+    skeleton = Skeleton(joints, intrinsic=False)
+    plan, values = plan_of(skeleton), values_for(skeleton, 3)
+    found = []
+    for packed in (factor(plan, values), factor(plan, values[:1])):
+        rows = np.cos(np.arange(packed.shape[2] * plan.n_kept, dtype=np.float64))
+        rows = rows.reshape(-1, plan.n_kept)[:3]
+        found += [packed, to_metric(plan, packed, rows), from_metric(plan, packed, rows)]
+    return b"".join(array.tobytes() for array in found).hex()
+
+
+def test_interpreted_loops_give_the_same_bits() -> None:
+    program = "from tests.codecs.test_posewave_metric import bits_of_factor as b; print(b())"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=Path(__file__).parents[2],
+        env={**os.environ, "MCZ_LOOPS": "interpreted"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == bits_of_factor()
+
+
+EXAMPLE = [
+    1.0973520013442857,
+    -0.021810194362063346,
+    1.1226982177077387,
+    5.206724587509656,
+    4.503222518161679,
+    16.354191908995503,
+    3.0391725169259223,
+    -5.024822825980067,
+    0.02265737589732067,
+    14.02408529556312,
+    -1.893320796389913,
+    -1.2347879109604658,
+    -0.3025983176057028,
+    -0.2795767522456736,
+    22.943105458050226,
+    -2.88102751904688,
+    -0.5444596060704099,
+    -0.5051817387899982,
+    0.3601410426354744,
+    0.020250218127484444,
+    23.48567792514303,
+]
+EXAMPLE_ROW = [
+    1.0973520013442857,
+    2.2693298958483954,
+    33.1296685923123,
+    63.41364844406157,
+    147.34927163563896,
+    136.22591855143898,
+]
+
+REAL = (
+    "cmu/amc/49_18.amc",
+    "cmu/bvh/05_01.bvh",
+    "cmu/bvh-3dsmax/131_01.bvh",
+    "cmu/bvh-blender/02_01.bvh",
+    "cmu/bvh-daz/01_01.bvh",
+    "cmu/bvh-iclone/001_01.bvh",
+    "cmu/c3d/01_01.c3d",
+    "other/bandai-namco/dataset-1_bow_active_001.bvh",
+)
+
+
+@pytest.mark.real
+@pytest.mark.parametrize("name", REAL)
+def test_real_clips(name: str, data: Path) -> None:
+    motion = mcz.read(data / name)
+    skeleton, values = motion.skeleton, np.asarray(motion.values, np.float64)
+    pose = np.nan_to_num(values[len(values) // 2])
+    plan = plan_of(skeleton, 1e-2)
+    expected = numeric(skeleton, pose)
+    assert_near(metric_of(plan, pose), expected)
+    assert np.abs(expected).max() > 0
+    rows = np.random.default_rng(0).normal(size=(1, plan.n_kept))
+    packed = factor(plan, pose[None])
+    assert_near(from_metric(plan, packed, to_metric(plan, packed, rows)), rows, 1e-9)

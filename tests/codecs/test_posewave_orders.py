@@ -1,0 +1,330 @@
+"""Axis orders of codec 13: rotations stay, and the source's angles come back."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+import mcz
+from mcz.angles import FULL_TURN, unwrap
+from mcz.codecs.posewave.arc import arc
+from mcz.codecs.posewave.choices import choose
+from mcz.codecs.posewave.header import parse_header
+from mcz.codecs.posewave.metric_kernels import factor
+from mcz.codecs.posewave.order_choices import choose_orders
+from mcz.codecs.posewave.orders import SEQUENCES, Orders, own_sequence
+from mcz.codecs.posewave.posewave import CODEC
+from mcz.codecs.posewave.segment import decode_segment, encode_segment
+from mcz.codecs.posewave.skeleton_plan import make_plan
+from mcz.codecs.posewave.turns import RULES, sine_cosine
+from mcz.errors import FormatError, MotionError
+from mcz.kinematics.points import positions_of
+from mcz.motion import ROTATION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.writing.signal_source import MemorySource
+
+Floats = np.ndarray
+UNITS = st.sampled_from(["deg", "rad"])
+SEQUENCE = st.sampled_from(SEQUENCES)
+CODES = st.integers(1, 6)
+PARAMETERS = {"step": 0.2, "levels": 3, "weights": None}
+# Of a quarter turn: near gimbal lock and in it.
+QUARTERS = st.one_of(
+    st.floats(-9, 9), st.sampled_from([0.0, 1.0, -1.0, 2.0, 3.0, 1 + 1e-9, 1 - 1e-13, -1 + 1e-6])
+)
+
+
+def single(own: tuple[int, ...], unit: str, intrinsic: bool = True) -> Skeleton:
+    """A joint with two ends that turns about the axes of ``own``, from the left, and moves."""
+    turning = [Channel(ROTATION_KINDS[axis]) for axis in (own if intrinsic else own[::-1])]
+    channels = (turning[0], Channel("ty"), *turning[1:])
+    ends = ((1.0, 2.0, 3.0), (-2.0, 1.0, 0.5))
+    return Skeleton(
+        (Joint("hip", -1, (0.0, 0.0, 0.0), ends, channels=channels),),
+        unit_cm=10.0,
+        angle_unit=unit,
+        intrinsic=intrinsic,
+    )
+
+
+def rotations(skeleton: Skeleton, values: Floats, sequence: tuple[int, ...]) -> Floats:
+    """The matrices of the joint's angles, taken in an order of axes."""
+    columns = Orders([1], skeleton).places[0].columns
+    letters = "".join("XYZ"[axis] for axis in sequence)
+    degrees = skeleton.angle_unit == "deg"
+    turns = Rotation.from_euler(letters, values[:, columns][:, sequence], degrees)
+    return np.asarray(turns.as_matrix())
+
+
+def wandering(unit: str, n_frames: int, seed: int, speed: float = 0.05) -> Floats:
+    """Angles of four channels that go on and on, now and then by whole turns and half ones."""
+    random = np.random.default_rng(seed)
+    steps = random.normal(0, speed, (n_frames, 4))
+    steps = np.cumsum(steps, axis=0) * 0.3 + random.uniform(-1, 1, 4)
+    jumps = random.random((n_frames, 4)) < 0.02
+    steps += np.cumsum(jumps * random.choice([-0.5, 0.5, 0.25], (n_frames, 4)), axis=0)
+    return steps * FULL_TURN[unit]
+
+
+@given(st.floats(-2e9, 2e9), st.floats(-2e9, 2e9), UNITS)
+def test_arc(y: float, x: float, unit: str) -> None:
+    found = arc(y, x, RULES[unit])
+    assert (
+        abs(found - np.arctan2(abs(y), x) * (-1 if y < 0 else 1) / RULES[unit].radians)
+        < (2e-14 if unit == "deg" else 4e-16) * 2
+    )
+    sine, cosine = sine_cosine(found, RULES[unit])
+    assert abs(sine * x - cosine * y) <= 1e-12 * np.hypot(x, y)
+
+
+def test_arc_of_axes_is_exact() -> None:
+    found = [arc(y, x, RULES["deg"]) for y, x in ((0, 1), (1, 1), (1, 0), (0, -1), (-1, 0), (0, 0))]
+    assert found == [0, 45, 90, 180, -90, 0]
+
+
+@given(SEQUENCE, CODES, UNITS, st.booleans(), st.lists(st.tuples(*[QUARTERS] * 3), min_size=1))
+def test_rotations_stay(
+    own: tuple[int, ...], code: int, unit: str, intrinsic: bool, quarters: list[tuple[float, ...]]
+) -> None:
+    skeleton = single(own, unit, intrinsic)
+    assert own_sequence(skeleton.joints[0], skeleton) == own
+    orders = Orders([code], skeleton)
+    source = np.insert(np.array(quarters) * FULL_TURN[unit] / 4, 1, 7.0, axis=1)
+    coded = orders.coded(source)
+    notes, decoded = orders.notes_and_values(source, coded)
+    before = rotations(skeleton, source, own)
+    assert np.abs(rotations(skeleton, coded, SEQUENCES[code - 1]) - before).max() < 1e-11
+    assert np.abs(rotations(skeleton, decoded, own) - before).max() < 1e-11
+    assert (coded[:, 1] == 7).all()
+    assert (decoded[:, 1] == 7).all()
+    told, rest = orders.take_notes(notes + b"rest", len(source), "here")
+    assert rest == b"rest"
+    assert np.array_equal(orders.values(coded, told), decoded)
+
+
+@given(SEQUENCE, CODES, UNITS, st.integers(0, 10**6), st.integers(1, 300))
+def test_angles_come_back(
+    own: tuple[int, ...], code: int, unit: str, seed: int, n_frames: int
+) -> None:
+    """Turns and solutions of the source, too, but for those that gimbal lock leaves open."""
+    skeleton, orders = single(own, unit), Orders([code], single(own, unit))
+    source = unwrap(wandering(unit, n_frames, seed), skeleton)
+    place = orders.places[0]
+    middle = source[:, place.columns[own[1]]] / FULL_TURN[unit]
+    clear = np.abs(middle * 2 - np.floor(middle * 2) - 0.5) > 1e-6
+    _, decoded = orders.notes_and_values(source, orders.coded(source))
+    off = np.abs(decoded - source)[clear].max(initial=0.0) / FULL_TURN[unit]
+    assert off < 1e-8
+
+
+def test_what_stands_in_gimbal_lock_stays_there() -> None:
+    skeleton = single((0, 1, 2), "deg")
+    source = np.tile([30.0, 5.0, 90.0, -20.0], (50, 1))
+    orders = Orders([5], skeleton)
+    notes, decoded = orders.notes_and_values(source, orders.coded(source))
+    assert np.isfinite(decoded).all()
+    assert (decoded == decoded[0]).all()
+    assert len(notes) < 10
+
+
+def test_a_calm_clip_needs_no_notes() -> None:
+    skeleton = single((2, 1, 0), "deg")
+    steps = np.linspace(0, 2 * np.pi, 400)
+    source = np.stack([20 * np.cos(steps), steps, 100 * np.sin(steps), 30 * np.sin(2 * steps)], 1)
+    orders = Orders([3], skeleton)
+    notes, decoded = orders.notes_and_values(source, orders.coded(source))
+    assert notes == b"\0"  # although it passes gimbal lock
+    assert np.abs(decoded - source).max() < 1e-9
+
+
+@given(CODES, UNITS, st.integers(0, 1000))
+def test_lossy_angles_stay_near(code: int, unit: str, seed: int) -> None:
+    """Errors of a reader's angles are told no turns off."""
+    skeleton, orders = single((2, 1, 0), unit), Orders([code], single((2, 1, 0), unit))
+    source = unwrap(wandering(unit, 200, seed), skeleton)
+    columns = orders.places[0].columns
+    coded = orders.coded(source)
+    coded[:, columns] += np.random.default_rng(seed).normal(0, 1e-4, (200, 3)) * FULL_TURN[unit]
+    _, decoded = orders.notes_and_values(source, coded)
+    off = np.abs(decoded - source)[:, columns] / FULL_TURN[unit]
+    assert off.max() < 1.5
+    middle = source[:, columns[1]] / FULL_TURN[unit]
+    assert off[np.abs(middle * 2 - np.floor(middle * 2) - 0.5) > 0.1].max(initial=0) < 0.01
+
+
+@given(st.binary(max_size=12), st.integers(1, 5))
+def test_wild_notes(data: bytes, n_frames: int) -> None:
+    orders = Orders([4], single((0, 1, 2), "deg"))
+    try:
+        told, _ = orders.take_notes(data, n_frames, "here")
+    except FormatError:
+        return
+    wild = np.random.default_rng(len(data)).choice([1e300, -1e30, 90.0, 0.0], (n_frames, 4))
+    assert np.isfinite(orders.values(wild, told)).all()
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"\x01\x14", "a note 20 of 20"),
+        (b"\x01\x01\x00", "0 for turns"),
+        (b"\x01\x01\x80\x80\x80\x80\x80\x80\x01", "4398046511104 for turns"),
+        (b"\x02\x00", "runs past the end"),
+    ],
+)
+def test_bad_notes(data: bytes, message: str) -> None:
+    with pytest.raises(FormatError, match=message):
+        Orders([4], single((0, 1, 2), "deg")).take_notes(data, 5, "here")
+
+
+def test_joints_that_have_no_order() -> None:
+    skeleton = single((0, 1, 2), "deg")
+    channels = skeleton.joints[0].channels
+    for joint, unit in (
+        (Joint("two", channels=channels[:3]), "deg"),
+        (Joint("twice", channels=(*channels, channels[0])), "deg"),
+        (Joint("of two axes", channels=(channels[0], channels[2], channels[0])), "deg"),
+        (Joint("with a quaternion", channels=(*channels, Channel("qw"))), "deg"),
+        (skeleton.joints[0], ""),
+    ):
+        assert own_sequence(joint, replace(skeleton, joints=(joint,), angle_unit=unit)) is None
+
+
+def source_of(skeleton: Skeleton, values: Floats) -> MemorySource:
+    """A motion as an encoder sees it."""
+    return MemorySource(Motion(skeleton, (Signal(values),)), 0, CODEC, 2**26)
+
+
+def turning(unit: str = "deg", n_frames: int = 3000) -> tuple[Skeleton, Floats]:
+    """Someone who turns about y, which is the middle one of the source's axes."""
+    steps = np.linspace(0, 20, n_frames)
+    true = np.stack([0.2 * np.sin(3 * steps), 2 * np.sin(steps), 0.1 * np.cos(2 * steps)], axis=1)
+    source = np.insert(Rotation.from_euler("YXZ", true[:, [1, 0, 2]]).as_euler("ZYX"), 1, steps, 1)
+    factor = FULL_TURN[unit] / (2 * np.pi)
+    skeleton = single((2, 1, 0), unit)
+    return skeleton, unwrap(source * [factor, 1, factor, factor], skeleton)
+
+
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_the_calm_order_is_found(unit: str) -> None:
+    skeleton, values = turning(unit)
+    assert SEQUENCES[choose_orders(source_of(skeleton, values))[0] - 1][0] == 1
+    assert choose_orders(source_of(skeleton, values * [1, 1, 0, 1])) == []
+    assert choose_orders(source_of(skeleton, values[:0])) == []
+    assert choose_orders(source_of(skeleton, values * [1, 1, 1e200, 1])) == []
+    assert choose_orders(source_of(replace(skeleton, angle_unit=""), values)) == []
+
+
+def test_codec() -> None:
+    skeleton, values = turning()
+    source = source_of(skeleton, values)
+    choice = choose(source, PARAMETERS)
+    header = parse_header(choice.header, source.layout)
+    assert any(header.orders)
+    streams, expected = encode_segment(header, skeleton, values, choice.weights)
+    plain = replace(header, orders=())
+    longer = encode_segment(plain, skeleton, values, choice.weights)[0]
+    assert sum(map(len, streams)) < 0.9 * sum(map(len, longer))
+    found = decode_segment(header, skeleton, streams, len(values), "here")
+    assert np.array_equal(found, expected)
+    error = positions_of(skeleton, found) - positions_of(skeleton, values)
+    assert np.abs(error).max() < 0.2
+    coarse = decode_segment(header, skeleton, streams[:2], len(values), "here")
+    error = positions_of(skeleton, coarse) - positions_of(skeleton, values)
+    assert np.abs(error).max() < 1
+    wild = values.copy()
+    wild[7, 3] = 2.0**40
+    with pytest.raises(MotionError, match="an angle of"):
+        encode_segment(header, skeleton, wild, choice.weights)
+
+
+@pytest.mark.parametrize(
+    ("orders", "message"),
+    [
+        ([3, 3], "2 of orders, 1 are due"),
+        ([7], "orders"),
+        ([1], "order 1 of joint 0"),
+    ],
+)
+def test_bad_headers(orders: list[int], message: str) -> None:
+    skeleton, values = turning(n_frames=100)
+    channels = skeleton.joints[0].channels[:3]
+    if orders == [1]:  # two rotations only
+        skeleton = replace(skeleton, joints=(replace(skeleton.joints[0], channels=channels),))
+        values = values[:, :3]
+    source = source_of(skeleton, values)
+    data = choose(source, PARAMETERS).header
+    fields = parse_header(data, source.layout)
+    rest = data[: -1 - len(fields.orders)]  # they are last
+    with pytest.raises(FormatError, match=message):
+        parse_header(rest + bytes([len(orders), *orders]), source.layout)
+
+
+@given(SEQUENCE, CODES, st.integers(0, 100))
+def test_metric_of_coded_angles(own: tuple[int, ...], code: int, seed: int) -> None:
+    """It is that of a skeleton whose channels have the coded order."""
+    skeleton, other = single(own, "deg"), single(SEQUENCES[code - 1], "deg")
+    values = np.random.default_rng(seed).uniform(-180, 180, (1, 4))
+    there = values.copy()
+    there[:, Orders([1], other).places[0].columns] = values[
+        :, Orders([1], skeleton).places[0].columns
+    ]
+    kept, added = np.array([False, True, False, False]), np.ones(1)
+    for kind in ROTATION_KINDS:
+        found = []
+        for one, pose, orders in ((skeleton, values, [code]), (other, there, [])):
+            kept = np.array([channel.kind == kind for channel in one.channels])
+            plan = make_plan(one, kept, added, radius=1.0, orders=orders)
+            found.append(factor(plan, pose))
+        assert np.array_equal(found[0], found[1])
+
+
+@pytest.mark.real
+def test_real_clips(data: Path) -> None:
+    for name in ("cmu/amc/135_02.amc", "cmu/amc/14_08.amc"):
+        motion = mcz.read(data / name)
+        skeleton, values = motion.skeleton, unwrap(np.asarray(motion.values), motion.skeleton)
+        codes = [
+            1 + j % 6 if own_sequence(x, skeleton) else 0 for j, x in enumerate(skeleton.joints)
+        ]
+        orders = Orders(codes, skeleton)
+        _, found = orders.notes_and_values(values, orders.coded(values))
+        assert np.abs(found - values).max() < 1e-7
+        off = positions_of(skeleton, found) - positions_of(skeleton, values)
+        assert np.abs(off).max() < 1e-9
+
+
+def bits_of_orders() -> str:
+    found = []
+    for unit in ("deg", "rad"):
+        for code, own in enumerate(SEQUENCES, 1):
+            skeleton = single(own, unit)
+            source = unwrap(wandering(unit, 40, code), skeleton)
+            for other in (code, code % 6 + 1):
+                orders = Orders([other], skeleton)
+                coded = orders.coded(source)
+                coded += np.random.default_rng(code).normal(0, 1e-3, coded.shape)
+                notes, decoded = orders.notes_and_values(source, coded)
+                found += [notes, coded.tobytes(), decoded.tobytes()]
+    return b"".join(found).hex()
+
+
+def test_interpreted_loops_give_the_same_bits() -> None:
+    program = "from tests.codecs.test_posewave_orders import bits_of_orders as b; print(b())"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=Path(__file__).parents[2],
+        env={**os.environ, "MCZ_LOOPS": "interpreted"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == bits_of_orders()

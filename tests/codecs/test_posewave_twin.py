@@ -1,0 +1,134 @@
+"""The pose metric in JavaScript, written from SPEC.md alone, gives the same bits."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mcz
+from mcz.codecs.posewave.metric_kernels import factor, from_metric
+from mcz.codecs.posewave.orders import own_sequence
+from mcz.codecs.posewave.skeleton_plan import make_plan
+from mcz.motion import CHANNEL_KINDS, Skeleton
+from tests.codecs.test_posewave_metric import REAL, chain
+from tests.skeletons import skeletons, values_for
+
+pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
+
+FOLDER = Path(__file__).parents[2] / "tools" / "js"
+PROGRAM = """
+import { readFileSync } from "node:fs";
+import { PoseMetric } from "./pose-metric.js";
+
+const hex = (numbers) => Buffer.from(numbers.buffer).toString("hex");
+for (const line of readFileSync(0, "utf8").trim().split("\\n")) {
+  const { skeleton, kept, reg, shell, values, rows } = JSON.parse(line);
+  const metric = new PoseMetric(skeleton, kept, reg, shell);
+  const factors = values.map((pose) => metric.factor(pose));
+  const back = factors.map((entries, i) => metric.fromMetric(entries, rows[i]));
+  console.log(JSON.stringify([factors.map(hex), back.map(hex)]));
+}
+"""
+ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+Case = tuple[list[list[str]], dict[str, Any]]
+
+
+def as_javascript(skeleton: Skeleton) -> dict[str, Any]:
+    joints = [
+        {
+            "parent": joint.parent,
+            "offset": joint.offset,
+            "axis": joint.axis,
+            "axisOrder": ORDERS.index(joint.axis_order),
+            "tails": joint.tails,
+            "positionsAdd": joint.adds_to_offset,
+            "firstColumn": skeleton.columns(index).start,
+            "channels": [
+                {"kind": CHANNEL_KINDS.index(c.kind) + 1 if c.kind else 0} for c in joint.channels
+            ],
+        }
+        for index, joint in enumerate(skeleton.joints)
+    ]
+    return {
+        "joints": joints,
+        "channels": [channel for joint in joints for channel in joint["channels"]],
+        "intrinsic": skeleton.intrinsic,
+        "angleUnit": ("", "deg", "rad").index(skeleton.angle_unit),
+    }
+
+
+def case(skeleton: Skeleton, values: np.ndarray, seed: int) -> Case:
+    """What Python gives of some poses, and what JavaScript is asked."""
+    random = np.random.default_rng(seed)
+    kept = random.random(skeleton.n_channels) < 0.9
+    reg = random.choice([0.0, 1e-6, 1e-2], int(kept.sum()))
+    weights = random.uniform(0, 3, skeleton.n_joints)
+    rows = random.normal(size=(len(values), len(reg)))
+    orders = [
+        int(random.integers(0, 7)) if own_sequence(joint, skeleton) else 0
+        for joint in skeleton.joints
+    ]
+    plan = make_plan(
+        skeleton, kept, reg, radius=0.7, kappa=0.3, joint_weights=weights, orders=orders
+    )
+    packed = factor(plan, values)
+    by_pose = packed.transpose(0, 2, 1).reshape(len(packed) * packed.shape[2], plan.n_entries)
+    flat = by_pose[: len(values)]
+    back = from_metric(plan, packed, rows)
+    return [[row.tobytes().hex() for row in array] for array in (flat, back)], {
+        "skeleton": as_javascript(skeleton),
+        "kept": np.flatnonzero(kept).tolist(),
+        "reg": reg.tolist(),
+        "shell": {"radius": 0.7, "kappa": 0.3, "weights": weights.tolist(), "orders": orders},
+        "values": values.tolist(),
+        "rows": rows.tolist(),
+    }
+
+
+def check(cases: list[Case]) -> None:
+    done = subprocess.run(
+        ["node", "--input-type=module", "-e", PROGRAM],
+        cwd=FOLDER,
+        input="\n".join(json.dumps(asked) for _, asked in cases),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    answers = [json.loads(line) for line in done.stdout.splitlines()]
+    assert answers == [expected for expected, _ in cases]
+
+
+def test_generated_skeletons() -> None:
+    cases: list[Case] = []
+
+    @settings(max_examples=100, database=None)
+    @given(skeletons(), st.integers(0, 1000), st.sampled_from([1.0, 1.0, 1e4, 1e11]))
+    def add(skeleton: Skeleton, seed: int, scale: float) -> None:
+        cases.append(case(skeleton, values_for(skeleton, 2, seed) * scale, seed))
+
+    add()
+    for size in (0, 1, 40):  # 120 channels on a path of at most 96
+        skeleton = chain(size) if size else Skeleton(())
+        cases.append(case(skeleton, values_for(skeleton, 2), size))
+    check(cases)
+
+
+@pytest.mark.real
+def test_real_clips(data: Path) -> None:
+    cases = []
+    for seed, name in enumerate(REAL):
+        motion = mcz.read(data / name)
+        values = np.nan_to_num(np.asarray(motion.values, np.float64))
+        random = np.random.default_rng(seed)
+        chosen = values[random.integers(0, len(values), 20)]
+        chosen[10:] += random.normal(0, 90, (10, chosen.shape[1]))
+        cases.append(case(motion.skeleton, chosen, seed))
+    check(cases)

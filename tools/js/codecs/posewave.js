@@ -1,0 +1,245 @@
+// SPEC.md, "Codec 13: posewave": wavelets in time, in the metric of the pose.
+
+import { AxisOrders } from "../axis-orders.js";
+import { ByteReader } from "../bytes.js";
+import { RangeDecoder } from "../entropy.js";
+import { Refused } from "../errors.js";
+import { holdContacts } from "../pose-contacts.js";
+import { readHead } from "../pose-head.js";
+import { Pyramid, Walk } from "../pose-levels.js";
+import { readContacts } from "../pose-limbs.js";
+import { RowDecoder } from "../pose-rows.js";
+import { HEAD, startTable } from "../pose-start.js";
+import { stepOf } from "../scales.js";
+
+export const id = 13;
+export const name = "posewave";
+export const version = 0;
+
+const MAX_LEVELS = 8;
+const MAX_SHELL = 16;
+const MAX_FINE = 24;
+const MAX_START = 1;
+const MAX_ORDER = 6;
+const GREATEST_LENGTH = 2 ** 60;
+
+/** Kinds of channels of the registry, where positions, rotations and others begin. */
+const TX = 1;
+const RX = 4;
+const SX = 7;
+
+/** From so many joints on that a rotation moves its class is another. */
+const MANY = [2, 4, 8];
+
+/** Kinds of channels. */
+const ROTATION = 0;
+const POSITION = 1;
+const PLAIN = 2;
+
+/**
+ * Opens a signal.
+ *
+ * @param {Uint8Array} header POSEWAVE_HEADER
+ * @param {object} layout the signal, as CLIP has it
+ * @returns {PoseDecoder}
+ * @throws {Refused} for a header, or a signal, that the codec does not have
+ */
+export function open(header, layout) {
+  const { skeleton, groups, nResolutions, samplesPerFrame } = layout;
+  if (groups.length > 1) throw new Refused(`${name}: ${groups.length} groups`);
+  if (samplesPerFrame !== 1) throw new Refused(`${name}: ${samplesPerFrame} rows a frame`);
+  if (skeleton === null) throw new Refused(`${name}: channels that are not those of the skeleton`);
+  const fields = readHeader(header, skeleton);
+  if (nResolutions > fields.levels + 1) {
+    throw new Refused(`${name}: ${nResolutions} resolutions of ${fields.levels} levels`);
+  }
+  return new PoseDecoder(fields, skeleton, nResolutions);
+}
+
+function readHeader(bytes, skeleton) {
+  const { channels, joints } = skeleton;
+  const reader = new ByteReader(bytes, "POSEWAVE_HEADER");
+  const levels = upTo(reader, MAX_LEVELS, "levels");
+  const borrowing = upTo(reader, levels, "borrowed levels");
+  const start = upTo(reader, MAX_START, "is a start table");
+  const refining = upTo(reader, 1, "for refining") === 1;
+  const step = reader.f32();
+  if (!(step >= 1 / GREATEST_LENGTH && step <= GREATEST_LENGTH)) reader.refuse(`a step of ${step}`);
+  const radius = reader.f32();
+  if (!(radius >= 0 && radius <= GREATEST_LENGTH)) reader.refuse(`a radius of ${radius}`);
+  const kappa = upTo(reader, MAX_SHELL, "sixteenths") / MAX_SHELL;
+  const steps = [stepOf(reader.u8()), stepOf(reader.u8())];
+  const first = upTo(reader, MAX_FINE, "halvings");
+  const constant = upTo(reader, MAX_FINE, "halvings");
+  const kinds = Uint8Array.from(channels, kindOf);
+  const plain = readSteps(reader, kinds.filter((kind) => kind === PLAIN).length);
+  const weights = readSteps(reader, joints.length);
+  const orders = reader.counted(() => upTo(reader, MAX_ORDER, "is an axis order"));
+  if (orders.length !== 0 && orders.length !== joints.length) {
+    reader.refuse(`${orders.length} axis orders of ${joints.length} joints`);
+  }
+  const axisOrders = new AxisOrders(skeleton, orders);
+  const contacts = reader.optional(() => readContacts(reader, skeleton, orders));
+  reader.end();
+  let at = 0;
+  const greatest = Float64Array.from(kinds, (kind) => steps[kind] ?? plain[at++]);
+  const firstStep = greatest.map((x) => x * 2 ** -first);
+  const constantStep = firstStep.map((x) => x * 2 ** -constant);
+  return {
+    ...{ levels, borrowing, start, refining, step, radius, kappa, weights, orders, axisOrders, contacts },
+    ...{ kinds, greatest, firstStep, constantStep },
+    classes: classesOf(joints),
+  };
+}
+
+function upTo(reader, most, what) {
+  const value = reader.u8();
+  if (value > most) reader.refuse(`${value} ${what}`);
+  return value;
+}
+
+/** What counted step codes stand for, of `due` things; all are 1 where there are none. */
+function readSteps(reader, due) {
+  const codes = reader.take(reader.varint());
+  if (codes.length !== 0 && codes.length !== due) reader.refuse(`${codes.length} codes of ${due}`);
+  return codes.length > 0 ? Array.from(codes, stepOf) : new Array(due).fill(1);
+}
+
+function kindOf({ kind }) {
+  if (kind >= TX && kind < RX) return POSITION;
+  return kind >= RX && kind < SX ? ROTATION : PLAIN;
+}
+
+/**
+ * What each channel is to the model of rows: a rotation of a root 1, of another joint 2 to 5, by how
+ * many joints it moves; any other channel 0.
+ *
+ * @param {import("../skel.js").Joint[]} joints
+ * @returns {Uint8Array}
+ */
+function classesOf(joints) {
+  const moved = new Array(joints.length).fill(1);
+  for (let j = joints.length - 1; j >= 0; j--) {
+    const { parent } = joints[j];
+    if (parent >= 0) moved[parent] += moved[j];
+  }
+  return Uint8Array.from(
+    joints.flatMap(({ parent, channels }, j) => {
+      const own = parent < 0 ? 1 : 2 + MANY.filter((many) => moved[j] >= many).length;
+      return channels.map((channel) => (kindOf(channel) === ROTATION ? own : 0));
+    }),
+  );
+}
+
+/** The decoder of one signal. */
+class PoseDecoder {
+  constructor(header, skeleton, nResolutions) {
+    this.decodes = "values";
+    this.alone = true;
+    this.header = header;
+    this.skeleton = skeleton;
+    this.nResolutions = nResolutions;
+  }
+
+  /**
+   * What must hold of all stored segments, also of those that are not decoded.
+   *
+   * @param {object[]} segments
+   * @throws {Refused}
+   */
+  check(segments) {
+    for (const { firstFrame, lead, tail, fresh } of segments) {
+      const where = `segment at frame ${firstFrame}`;
+      if (lead !== 0 || tail !== 0) throw new Refused(`${where}: has a lead or tail`);
+      if (!fresh) throw new Refused(`${where}: does not start fresh`);
+    }
+  }
+
+  /**
+   * Decodes segments, each by itself.
+   *
+   * @param {object[]} segments with their streams
+   * @param {{dropped: number}} options how many of the finest resolutions are left out
+   * @returns {Float64Array} the rows of all these segments
+   * @throws {Refused}
+   */
+  decode(segments, { dropped }) {
+    const nChannels = this.skeleton.channels.length;
+    const nRows = segments.reduce((sum, { nFrames }) => sum + nFrames, 0);
+    const out = new Float64Array(nRows * nChannels);
+    if (nChannels === 0) return out;
+    let at = 0;
+    for (const { firstFrame, nFrames, streams } of segments) {
+      const size = nFrames * nChannels;
+      const given = streams.slice(0, this.nResolutions - dropped).map(([stream]) => stream);
+      const what = `${name}: segment at frame ${firstFrame}`;
+      this.segment(given, nFrames, out.subarray(at, at + size), what);
+      at += size;
+    }
+    return out;
+  }
+
+  /** Decodes a segment from the streams that are there, the coarsest first. */
+  segment(given, nFrames, out, what) {
+    const { header, skeleton } = this;
+    const pyramid = new Pyramid(nFrames, header);
+    const streams = this.streamsOfLevels(given, pyramid, what);
+    const start = startTable(header.start);
+    const model = start.small.copy();
+    const reader = new ByteReader(streams[0], what);
+    const notes = header.axisOrders.takeNotes(reader, nFrames);
+    let coder = new RangeDecoder(reader.rest());
+    const { first, kept } = this.head(coder, model, what);
+    fillRows(out, first);
+    const walk = kept.length > 0 ? new Walk(header, skeleton, pyramid, kept, first) : null;
+    const classes = Uint8Array.from(kept, (c) => header.classes[c]);
+    const rows = walk && new RowDecoder(model, start, classes, header.refining);
+    for (let level = 0; level < streams.length; level++) {
+      const where = `${what}, level ${level}`;
+      if (level > 0) coder = new RangeDecoder(streams[level]);
+      const [kind, nRows] = [pyramid.kind(level), pyramid.nRows(level)];
+      walk?.take(level, rows.decode(coder, level, kind, nRows, where));
+      if (level < pyramid.nDetails || header.contacts === null) coder.finish(where);
+    }
+    for (let level = streams.length; level <= pyramid.nDetails; level++) walk?.take(level, null);
+    if (walk) putColumns(walk.signal, kept, out);
+    const { length } = skeleton.channels;
+    if (header.contacts !== null && streams.length > pyramid.nDetails) {
+      holdContacts(coder, header.contacts, out, length, what);
+      coder.finish(`${what}, contacts`);
+    }
+    header.axisOrders.restore(out, length, notes);
+  }
+
+  /** The streams of levels 0, 1, ... that are there. */
+  streamsOfLevels(given, { nDetails }, what) {
+    const nEmpty = this.header.levels - nDetails;
+    const empty = given.slice(1, 1 + nEmpty);
+    if (empty.some(({ length }) => length > 0)) {
+      throw new Refused(`${what}: a stream of a level that it has not`);
+    }
+    return [given[0], ...given.slice(1 + nEmpty)];
+  }
+
+  /** The first pose, and the columns of the kept channels. */
+  head(coder, model, what) {
+    const { kinds, firstStep, constantStep } = this.header;
+    const { kept, numbers } = readHead(coder, model, HEAD, kinds, what);
+    const first = numbers.map((x, c) => x * (kept[c] ? firstStep[c] : constantStep[c]));
+    const columns = Int32Array.from(kept.keys()).filter((c) => kept[c] === 1);
+    return { first, kept: columns };
+  }
+}
+
+/** Fills the rows with one row. */
+function fillRows(out, row) {
+  for (let at = 0; at < out.length; at += row.length) out.set(row, at);
+}
+
+/** Puts rows of some columns into those of all. */
+function putColumns(rows, columns, out) {
+  const width = (out.length * columns.length) / rows.length;
+  for (let from = 0, to = 0; from < rows.length; to += width) {
+    for (let c = 0; c < columns.length; c++, from++) out[to + columns[c]] = rows[from];
+  }
+}
