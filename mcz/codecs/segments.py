@@ -145,3 +145,14 @@ def gather(
             out[rows, column : column + n] = decode_group(index, group)[cut]
             column += n
     return out
+
+
+def sample(source: SignalSource, most: int) -> NDArray[np.float64]:
+    """At most so many frames of a signal, evenly spread; what is invalid is NaN."""
+    layout = source.layout
+    rows = [np.zeros((0, layout.n_channels))]
+    for frame in range(0, layout.n_frames, max(1, -(-layout.n_frames // most))):
+        values = np.asarray(source.values(frame, frame + 1), np.float64)
+        valid = source.valid(frame, frame + 1)
+        rows.append(values if valid is None else np.where(valid, values, np.nan))
+    return np.concatenate(rows)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -232,18 +231,10 @@ def test_a_joint_that_would_exceed_the_path_begins_a_block() -> None:
 
 
 def test_cost_is_linear() -> None:
-    def seconds(n_joints: int) -> float:
-        skeleton = chain(n_joints)
-        plan, values = plan_of(skeleton), values_for(skeleton, LANES)
-        factor(plan, values)
-        taken = []
-        for _ in range(3):
-            start = time.perf_counter()
-            factor(plan, values)
-            taken.append(time.perf_counter() - start)
-        return min(taken)
-
-    assert seconds(683) < 40 * seconds(43)  # a channel costs up to 2 * 96^2 products in either
+    """A channel has at most 96 entries, so a factor takes at most 96 * 96 products of it."""
+    for n_joints in (43, 683):
+        plan = plan_of(chain(n_joints))
+        assert len(plan.path) <= 96 * plan.n_kept
 
 
 def test_nothing_to_do() -> None:

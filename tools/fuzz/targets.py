@@ -90,6 +90,7 @@ TARGETS: dict[str, Target] = {
         _decoder("pca", "pca", "pca-rdo", "mdtt"),
         _decoder("lsdt", "lsdt-frame", "lsdt-clip"),
         _decoder("online", "online"),
+        _decoder("posewave", "posewave"),
         _decoder("sources", "sources", "skeletons"),
         _decoder("others", "filtered", "cut", "container", "packets", "clip", "data", "shared"),
     )

@@ -71,17 +71,6 @@ export class Walk {
   }
 
   /**
-   * Takes the rows of the next level.
-   *
-   * @param {number} level
-   * @param {Float64Array | null} rows in steps of the level; null where they are left out
-   */
-  take(level, rows) {
-    if (level === 0) this.approximations(rows);
-    else this.details(level, rows);
-  }
-
-  /**
    * "Approximations".
    *
    * @param {Float64Array} rows of level 0, in steps of the level

@@ -31,7 +31,7 @@ const isRotation = ({ kind }) => kind >= RX && kind < SX;
 const clamp = (v, least, greatest) => (v < least ? least : v > greatest ? greatest : v);
 
 /** v, or 0 where it is not below 2^40 in magnitude, or not a number. */
-export const limited = (v) => (Math.abs(v) < BEYOND ? v : 0);
+const limited = (v) => (Math.abs(v) < BEYOND ? v : 0);
 
 /** The factors of a Taylor series. */
 const factors = (...ks) => ks.map((k) => 1 / (k * (k + 1)));
@@ -82,10 +82,10 @@ export function rotate(M, axis, [s, c], at = 0) {
 }
 
 /** The transpose of M times v. */
-export const back = (M, v) => [0, 1, 2].map((k) => M[k] * v[0] + M[k + 3] * v[1] + M[k + 6] * v[2]);
+const back = (M, v) => [0, 1, 2].map((k) => M[k] * v[0] + M[k + 3] * v[1] + M[k + 6] * v[2]);
 
 /** The matrix that begins at `at` times a vector. */
-export function timesAt(M, at, v, out) {
+function timesAt(M, at, v, out) {
   const [x, y, z] = [v[0], v[1], v[2]];
   for (let i = 0, row = at; i < 3; i++, row += 3) {
     out[i] = M[row] * x + M[row + 1] * y + M[row + 2] * z;
@@ -144,7 +144,6 @@ export class PoseMetric {
       const light = (kappa / (3 * joints.length)) * weight;
       return {
         parent: joint.parent,
-        frame: C[j],
         change: [0, 1, 2].map((k) => back(above, column(C[j], k))),
         arm: back(above, armOf(joint)),
         moves: this.movesOf(joint, above),

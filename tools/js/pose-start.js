@@ -18,7 +18,7 @@ export const N_OWN = 36;
 export const N_SETS = 64;
 export const N_SCALES = 16;
 
-/** Single bits of a segment: contexts of its rows, of which the last begin even, those of its head. */
+/** Single bits of a segment: contexts of its rows, then those of its head. */
 export const HEAD = 676;
 const N_SMALL_MIXERS = 12;
 
@@ -49,25 +49,31 @@ const parsed = new WeakMap();
  */
 export function startTable(index) {
   const document = annexJson("posewave_start.json");
-  if (!parsed.has(document)) parsed.set(document, document.sets.map(startOf));
+  if (!parsed.has(document)) {
+    parsed.set(
+      document,
+      document.sets.map((table) => startOf(table, document.counts)),
+    );
+  }
   return parsed.get(document)[index];
 }
 
-function startOf(table) {
+/** `counts` are what digits of counts stand for. */
+function startOf(table, counts) {
   const probabilities = Uint16Array.from(bytes(table.probabilities), middle);
-  const counts = bytes(table.counts);
+  const known = countsOf(table.counts, counts);
   const weights = Float64Array.from(bytes(table.weights), (byte) => (byte - 128) * 1024);
   const [shared, own] = [N_SHARED * N_SLOTS, N_OWN * N_SLOTS];
   const [sets, set] = [N_SETS * N_SLOTS * N_INPUTS, N_SLOTS * N_INPUTS];
   return {
     probabilities: probabilities.subarray(0, shared),
-    counts: counts.subarray(0, shared),
+    counts: known.subarray(0, shared),
     ownProbabilities: parts(probabilities.subarray(shared), own),
-    ownCounts: parts(counts.subarray(shared), own),
+    ownCounts: parts(known.subarray(shared), own),
     weights: weights.subarray(0, sets),
     ownWeights: parts(weights.subarray(sets), set),
     second: Int32Array.from(bytes(table.second), middle),
-    small: smallOf(table),
+    small: smallOf(table, counts),
     taps: fractions(table.taps),
     levelSizes: fractions(table.level_sizes),
     ownSizes: parts(fractions(table.own_sizes), N_FEATURES),
@@ -75,15 +81,17 @@ function startOf(table) {
   };
 }
 
-function smallOf(table) {
+function smallOf(table, counts) {
   const small = Model.even(HEAD + HEAD_CONTEXTS, N_SMALL_MIXERS);
   small.probabilities.set(Array.from(bytes(table.small_probabilities), middle));
-  small.counts.set(bytes(table.small_counts));
+  small.counts.set(countsOf(table.small_counts, counts));
   small.weights.set(table.small_weights);
   return small;
 }
 
 const bytes = (lines) => Uint8Array.from(lines.join("").match(/../g), (x) => parseInt(x, 16));
+const countsOf = (lines, counts) =>
+  Uint8Array.from(lines.join(""), (digit) => counts[parseInt(digit, 16)]);
 const middle = (byte) => 256 * byte + 128;
 const fractions = (integers) => Float64Array.from(integers, (x) => x / 1024);
 

@@ -16,6 +16,7 @@ from tools.vectors.build.files import Vector
 FIRST = "0.2"  # 0.1 is no longer read
 SINCE_03 = ("lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo")
 SINCE_04 = ("online",)
+SINCE_09 = ("posewave",)
 BASES = b"\1"  # the kind of a MODL
 # What the first bytes of a file do not tell, or tell only where they are not at fault.
 SINCE = {"valid/filtered/": "0.4", "invalid/packets/REPT": "0.4", "invalid/packets/numbered": "0.4"}
@@ -57,6 +58,7 @@ def since(vector: Vector) -> str:
     own = [version for start, version in SINCE.items() if vector.name.startswith(start)]
     names = codecs_of(vector)
     own += ["0.4"] * any(name in SINCE_04 for name in names)
+    own += ["0.9"] * any(name in SINCE_09 for name in names)
     own += ["0.3"] * any(name in SINCE_03 for name in names)
     own += ["0.4"] * any(True for _ in _payloads(vector.data, REPEAT))
     own += ["0.9"] * any(True for _ in _payloads(vector.data, COPY))

@@ -15,7 +15,9 @@ MOST_CHECKSUMS = 3  # vectors in which nothing is wrong but a checksum, beside t
 PARTS = "invalid/parts/"  # is about checksums
 SHARED = "*"  # the folder of rows that count in every folder of a codec
 KIN = {"dwt": "mrdwt", "awt": "mrdwt", "mdtt": "lsdt-clip", "pca-rdo": "lsdt-clip"}
-CODECS = "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online".split()
+CODECS = tuple(
+    "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online posewave".split()
+)
 
 
 class Fault(NamedTuple):

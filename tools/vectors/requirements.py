@@ -12,7 +12,12 @@ from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from tools.vectors import requirements_codecs, requirements_container, requirements_points
+from tools.vectors import (
+    requirements_codecs,
+    requirements_container,
+    requirements_points,
+    requirements_pose,
+)
 
 CAUGHT = Path(__file__).with_suffix(".txt")
 
@@ -21,12 +26,14 @@ VECTORS: dict[str, tuple[str, ...]] = {
     **requirements_container.VECTORS,
     **requirements_codecs.VECTORS,
     **requirements_points.VECTORS,
+    **requirements_pose.VECTORS,
 }
 
 ARGUED: dict[str, str] = {
     **requirements_container.ARGUED,
     **requirements_codecs.ARGUED,
     **requirements_points.ARGUED,
+    **requirements_pose.ARGUED,
 }
 
 ID = re.compile(r"[A-Z][A-Z0-9]*(?:-[A-Z0-9]+)*-[0-9]{2,}")

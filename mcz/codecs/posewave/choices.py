@@ -1,4 +1,7 @@
-"""What the encoder of ``posewave`` chooses before the first segment; a decoder needs none of it."""
+"""What the encoder of ``posewave`` chooses before the first segment.
+
+mcz/codecs/posewave/README.md describes it; a decoder needs none of it.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +15,17 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
-from mcz.codecs.posewave.contact_choice import choose_contacts, runs_of
-from mcz.codecs.posewave.contact_keeper import Keeper
-from mcz.codecs.posewave.header import NAME, Header, build_header, parse_header
-from mcz.codecs.posewave.metric import Metric
+from mcz.codecs.posewave.header import MAX_FINE, NAME, Header, build_header, parse_header
 from mcz.codecs.posewave.order_choices import choose_orders
-from mcz.codecs.posewave.orders import Orders
+from mcz.codecs.posewave.orders import N_NOTES, Orders
 from mcz.codecs.posewave.segment import Weights, encode_coded
-from mcz.codecs.segments import skeleton_of
+from mcz.codecs.posewave.skeleton_plan import has_kinematics
+from mcz.codecs.segments import sample, skeleton_of
 from mcz.codecs.steps import code_of
+from mcz.errors import MotionError
 from mcz.kinematics import reach
-from mcz.motion import Skeleton
+from mcz.kinematics.chain import chain_of
+from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +34,9 @@ PROPORTION = 1 / 30  # of the shell to the skeleton where the unit is unknown: 3
 GREATEST_DEGREES, GREATEST_CM = 4.0, 20.0  # steps beyond which the metric says nothing any more
 SHELL = 8  # sixteenths
 COARSE_CM = 0.065  # a step from which on the second start table is nearer
+SHARE_OF_CONSTANT = 0.25  # of a step: how far a constant channel may move points
+SPREAD_CM = 2.0  # a step of so much would be as large as a plain channel spreads
+SAMPLED_FRAMES = 128  # where it is measured
 FINE_CM = 0.08  # a step below which first poses are told more exactly
 LEVELS = (2, 3, 4, 5)  # that are tried
 TRIAL_FRAMES = 2048
@@ -49,7 +55,6 @@ class Choice:
 
     header: bytes
     weights: Weights
-    keeper: Keeper | None = None
 
 
 def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
@@ -61,12 +66,7 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
     step_cm = step * (unit or RADIUS_CM / PROPORTION / (reach(skeleton) or 1.0))
     weights = weights_of(step_cm)
     fields = _fields(skeleton, step, step_cm)
-    keeper = None
-    if params["contacts"]:
-        tolerance = params["contact_tolerance"] * step / step_cm
-        runs = runs_of(source, params["contacts"])
-        wanted = choose_contacts(skeleton, runs, tolerance, moving_of(source))
-        fields["contacts"], keeper = [wanted.fields], Keeper(tolerance, wanted.pieces)
+    fields |= _plain_steps(source, skeleton, step_cm)
     octaves = params.get("refinement")
     fields["refining"] = int(octaves is not None and bool(np.any(octaves)))
     fields["orders"] = choose_orders(source)
@@ -76,17 +76,7 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
     if fields["levels"] is None:
         fields["levels"] = best_levels(source, skeleton, fields, weights)
     fields["borrowing"] = min(1, fields["levels"])
-    return Choice(build_header(**fields), weights, keeper)
-
-
-def moving_of(source: SignalSource) -> NDArray[np.bool_]:
-    """Which channels change in the beginning of the clip, (n_channels,)."""
-    n_frames = min(TRIAL_FRAMES, source.layout.n_frames, source.layout.most_frames)
-    if not n_frames:
-        return np.zeros(source.layout.n_channels, np.bool_)
-    values = FrameReader(NAME, source).next(n_frames)
-    found: NDArray[np.bool_] = values.max(axis=0) > values.min(axis=0)
-    return found
+    return Choice(build_header(**fields), weights)
 
 
 def guess(target: str, limit: float) -> float | None:
@@ -116,7 +106,7 @@ def weights_of(step_cm: float) -> Weights:
 def _fields(skeleton: Skeleton, step: float, step_cm: float) -> dict[str, Any]:
     in_cm = step / step_cm  # length units a centimeter
     degree = math.pi / 180 if skeleton.angle_unit == "rad" else 1.0
-    is_fine = step_cm <= FINE_CM
+    first = 2 if step_cm <= FINE_CM else 0
     return {
         "start": 0 if step_cm < COARSE_CM else 1,
         "refining": 0,
@@ -125,11 +115,52 @@ def _fields(skeleton: Skeleton, step: float, step_cm: float) -> dict[str, Any]:
         "shell": SHELL,
         "rotation": code_of(GREATEST_DEGREES * degree),
         "position": code_of(GREATEST_CM * in_cm),
-        "first": 2 if is_fine else 0,
-        "constant": 8 if is_fine else 6,
+        "first": first,
+        "constant": _halvings(skeleton, step, in_cm) - first,
         "plain": [],
         "weights": [],
         "orders": [],
+    }
+
+
+def _halvings(skeleton: Skeleton, step: float, in_cm: float) -> int:
+    """From the greatest steps to those with which a constant channel moves no point by a step."""
+    moved = max(GREATEST_CM * in_cm, math.radians(GREATEST_DEGREES) * reach(skeleton))
+    needed = math.log2(max(moved / (SHARE_OF_CONSTANT * step), 1.0))
+    return min(max(math.ceil(needed), 6), MAX_FINE)
+
+
+def _spreads(rows: Floats) -> Floats:
+    """The deviation of each channel from its mean, (n_channels,); 0 where nothing is known."""
+    known = np.isfinite(rows)
+    n = np.maximum(known.sum(axis=0), 1)
+    means = np.where(known, rows, 0.0).sum(axis=0) / n
+    found: Floats = np.sqrt((np.where(known, rows - means, 0.0) ** 2).sum(axis=0) / n)
+    return found
+
+
+def _plain_steps(source: SignalSource, skeleton: Skeleton, step_cm: float) -> dict[str, Any]:
+    """Steps of channels that move nothing: a share of how far they spread."""
+    spreads = _spreads(sample(source, SAMPLED_FRAMES))
+    share = step_cm / SPREAD_CM
+    kinds = [channel.kind for channel in skeleton.channels]
+
+    def code(some: tuple[str, ...]) -> int:
+        own = [s for kind, s in zip(kinds, spreads, strict=True) if kind in some and s > 0]
+        return code_of(float(np.median(own)) * share) if own else code_of(1.0)
+
+    spatial = (*ROTATION_KINDS, *POSITION_KINDS)
+    plain = [
+        code_of(float(spread) * share) if spread > 0 else code_of(1.0)
+        for kind, spread in zip(kinds, spreads, strict=True)
+        if kind not in spatial
+    ]
+    if has_kinematics(skeleton):
+        return {"plain": plain}
+    return {
+        "plain": plain,
+        "rotation": code(ROTATION_KINDS),
+        "position": code(POSITION_KINDS),
     }
 
 
@@ -142,26 +173,34 @@ def best_levels(
     if not layout.n_channels or n_frames < 1 << min(LEVELS):
         return min(LEVELS)
     values = FrameReader(NAME, source).next(n_frames)
-    values = Orders(fields["orders"], skeleton).coded(values)
+    orders = Orders(fields["orders"], skeleton)
+    coded = orders.coded(values)
+    no_notes = np.zeros((-(-n_frames // SAMPLED), len(orders.places), N_NOTES), np.int64)
 
     def score(levels: int) -> float:
         header = parse_header(
             build_header(**{**fields, "levels": levels, "borrowing": min(1, levels)}), layout
         )
-        streams, found = encode_coded(header, skeleton, values, weights)
-        error = distortion(header, skeleton, values[::SAMPLED], found[::SAMPLED])
+        streams, found = encode_coded(header, skeleton, coded, weights)
+        found = orders.values(found[::SAMPLED], no_notes)
+        error = distortion(header, skeleton, values[::SAMPLED], found)
         return math.log(sum(map(len, streams))) + EXCHANGE * math.log(max(error, 1e-300))
 
     return min(LEVELS, key=score)
 
 
 def distortion(header: Header, skeleton: Skeleton, values: Floats, found: Floats) -> float:
-    """How far points and axes of decoded frames are off: a root of a mean square, about."""
-    kept = (values != found).any(axis=0)
-    if not kept.any():
-        return 0.0
-    metric = Metric(header, skeleton, kept, values[0])
-    rows = metric.into(
-        metric.factors(values[:, kept]), (found - values)[:, kept], np.arange(len(values))
-    )
-    return float(np.sqrt(np.mean(np.sum(rows * rows, axis=1))))
+    """How far joints and points on their axes are off on average, by the weights of joints."""
+    try:
+        chain = chain_of(skeleton)
+    except MotionError:  # without angles that mean something: by channel
+        return float(np.mean(np.abs(values - found) / header.greatest)) * header.step
+    away = []
+    for (_, _, ours), (_, _, theirs) in zip(chain.poses(values), chain.poses(found), strict=True):
+        for joint in range(skeleton.n_joints):
+            moved = (ours.origins[joint] - theirs.origins[joint])[:, None]
+            turned = header.radius * (ours.axes[joint] - theirs.axes[joint])
+            points = moved + np.pad(turned, ((0, 0), (1, 0), (0, 0)))
+            mean = float(np.sqrt(np.sum(points * points, axis=0)).mean())
+            away.append(mean * math.sqrt(header.weights[joint]))
+    return float(np.mean(away)) if away else 0.0

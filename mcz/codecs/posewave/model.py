@@ -25,10 +25,8 @@ from mcz.codecs.posewave.state import (
     N_SETS,
     N_SHARED,
     N_SLOTS,
-    N_SMALL,
     N_SMALL_MIXERS,
     N_TAPS,
-    N_TRAINED,
     USUAL,
     Floats,
     Ints,
@@ -41,15 +39,16 @@ N_SECOND = 33
 START_ENERGY = 500.0
 
 N_LOGS = 1024
+N_MIXER_WEIGHTS = mixing.MODELS - mixing.WEIGHTS
 
 
 class Start(NamedTuple):
     """A start table: what is known before a clip, of channels by their class.
 
     ``shared`` and ``own`` are slots, the latter (classes, slots); ``small`` the mixers and contexts
-    of ``coder``; ``weights`` (sets, slots, inputs) and ``own_weights`` (classes, slots, inputs);
-    ``second`` (slots, 33); ``taps`` (2 levels, 5); ``level_sizes`` (levels, 16), ``own_sizes`` and
-    ``usual`` by class.
+    of ``coder``, those of a segment's head too; ``weights`` (sets, slots, inputs) and
+    ``own_weights`` (classes, slots, inputs); ``second`` (slots, 33); ``taps`` (2 levels, 5);
+    ``level_sizes`` (levels, 16), ``own_sizes`` and ``usual`` by class.
     """
 
     shared: Ints
@@ -68,21 +67,21 @@ class Start(NamedTuple):
 def start_tables() -> tuple[Start, ...]:
     """The start tables of the annex; nobody writes to them."""
     document = json.loads(annex_bytes("posewave_start.json"))
-    return tuple(start_of(table) for table in document["sets"])
+    counts = np.array(document["counts"], np.int64)
+    return tuple(start_of(table, counts) for table in document["sets"])
 
 
-def start_of(table: Mapping[str, Any]) -> Start:
-    """A start table as arrays."""
-    slots = _bytes(table["probabilities"]) * 65536 + 32768 + _bytes(table["counts"])
+def start_of(table: Mapping[str, Any], counts: Ints) -> Start:
+    """A start table as arrays; ``counts`` (16,) are what its digits of counts stand for."""
+    slots = _bytes(table["probabilities"]) * 65536 + 32768 + counts[_digits(table["counts"])]
     own = slots[N_SHARED * N_SLOTS :].reshape(-1, N_OWN * N_SLOTS)
-    small = np.empty(3 * 64 + 2 * N_SMALL, np.int64)
-    small[: 3 * 64] = 0
-    small[: 3 * N_SMALL_MIXERS] = table["small_weights"]
-    small[3 * 64 :: 2] = 32768
-    small[3 * 64 + 1 :: 2] = 0
-    trained = slice(3 * 64, 3 * 64 + 2 * N_TRAINED)
-    small[trained][::2] = _bytes(table["small_probabilities"]) * 256 + 128
-    small[trained][1::2] = _bytes(table["small_counts"])
+    mixers = np.zeros(N_MIXER_WEIGHTS, np.int64)
+    mixers[: 3 * N_SMALL_MIXERS] = table["small_weights"]
+    contexts = [
+        _bytes(table["small_probabilities"]) * 256 + 128,
+        counts[_digits(table["small_counts"])],
+    ]
+    small = np.concatenate([mixers, np.stack(contexts, axis=1).ravel()])
     weights = (_bytes(table["weights"]) - 128).reshape(-1, N_SLOTS, N_INPUTS) * 1024
     return Start(
         shared=slots[: N_SHARED * N_SLOTS],
@@ -100,6 +99,12 @@ def start_of(table: Mapping[str, Any]) -> Start:
 
 def _bytes(lines: list[str]) -> Ints:
     return np.frombuffer(bytes.fromhex("".join(lines)), "u1").astype(np.int64)
+
+
+def _digits(lines: list[str]) -> Ints:
+    text = np.frombuffer("".join(lines).encode(), "u1").astype(np.int64)
+    found: Ints = np.where(text < ord("a"), text - ord("0"), text - ord("a") + 10)
+    return found
 
 
 def wide_of(n_channels: int) -> int:
@@ -163,7 +168,7 @@ def make_model(classes: Ints, start: Start, coder: Ints | None = None) -> Model:
 
 def start_coder(start: Start) -> Ints:
     """The state of the coder before the first stream."""
-    coder = np.zeros(mixing.MODELS + 2 * N_SMALL, np.int64)
+    coder = np.zeros(mixing.WEIGHTS + len(start.small), np.int64)
     coder[mixing.SQUASH : mixing.SQUASH + 4096] = squash_table()
     coder[mixing.STRETCH : mixing.STRETCH + 4096] = stretch_table()
     rates = rate_table()

@@ -31,11 +31,10 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.gaps import SegmentReader
 from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
-from mcz.codecs.posewave.choices import Choice, choose, guess
-from mcz.codecs.posewave.contact_choice import parse_runs
+from mcz.codecs.posewave.choices import choose, guess
 from mcz.codecs.posewave.header import NAME, Header, parse_header
 from mcz.codecs.posewave.limits import joint_limits
-from mcz.codecs.posewave.segment import decode_segment, encode_segment
+from mcz.codecs.posewave.segment import Weights, decode_segment, encode_segment
 from mcz.codecs.segments import (
     SEGMENT_FRAMES_PARAMETER,
     Lengths,
@@ -68,12 +67,12 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     layout = source.layout
     choice = choose(source, params)
     header = parse_header(choice.header, layout)
-    segments = _segments(source, header, choice, params)
+    segments = _segments(source, header, choice.weights, params)
     return Encoded(choice.header, segments, header.levels + 1)
 
 
 def _segments(
-    source: SignalSource, header: Header, choice: Choice, params: Mapping[str, Any]
+    source: SignalSource, header: Header, weights: Weights, params: Mapping[str, Any]
 ) -> Iterator[Segment]:
     layout = source.layout
     skeleton = skeleton_of(NAME, layout)
@@ -86,19 +85,14 @@ def _segments(
     lengths = Lengths(length, bool(wanted), least=LEAST_FRAMES)
     reader = SegmentReader(NAME, source)
 
-    octaves, keeper = params["refinement"], choice.keeper
+    octaves = params["refinement"]
 
     def code(first: int, stop: int) -> tuple[bytes, ...]:
         own = None if octaves is None else octaves[first:stop]
-        if keeper:
-            keeper.first = first
-        values = reader(first, stop)
-        return encode_segment(header, skeleton, values, choice.weights, own, keeper)[0]
+        return encode_segment(header, skeleton, reader(first, stop), weights, own)[0]
 
     for first, stop, streams in halving(layout.n_frames, lengths, code):
         yield Segment(first, stop - first, streams)
-    if keeper and header.contacts:
-        keeper.warn(skeleton, header.contacts)
 
 
 def decode(
@@ -156,18 +150,6 @@ CODEC = Codec(
             number("step", 1e-9, 1e9),
         ),
         Parameter("levels", None, "levels; default: what suits the clip", integer("levels", 0, 8)),
-        Parameter(
-            "contacts",
-            None,
-            "feet that stand keep their place: feet, or lfoot:120+45,rfoot:160+52",
-            parse_runs,
-        ),
-        Parameter(
-            "contact_tolerance",
-            0.01,
-            "cm that the displacement of a joint in a contact may be off",
-            number("contact_tolerance", 1e-6, 1e6),
-        ),
         Parameter(
             "quality",
             None,

@@ -26,7 +26,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 MOST_WANTED = 2.0**29
-EVEN = 32768, 0  # a probability that nobody has used yet
 
 
 @cache
@@ -66,16 +65,15 @@ class Stream:
             raise AssertionError(f"{used} bytes in {len(self.data)}")
         return self.data[:used].tobytes()
 
-    def check_whole(self, where: str) -> None:
-        """Raises FormatError unless all bytes were due, after the last bit was decoded."""
-        if _coding().coded_size(self.coder) != len(self.data):
-            raise FormatError(f"{where}: {len(self.data)} bytes are too many")
+    @property
+    def is_whole(self) -> bool:
+        """Whether all bytes were due, after the last bit was decoded."""
+        return bool(_coding().coded_size(self.coder) == len(self.data))
 
 
 def fresh_coder(start: Start) -> Ints:
     """The coder's state before the first stream of a segment."""
-    head = np.tile(np.array(EVEN, np.int64), _head().N_CONTEXTS)
-    return np.concatenate([start_coder(start), head])
+    return start_coder(start)
 
 
 def code_head(stream: Stream, classes: Ints, kept: Ints, numbers: Ints, where: str) -> None:
@@ -122,6 +120,10 @@ class RowCoder:
     def decode(self) -> Floats:
         """All rows of the level, (n_rows, n_kept), in steps."""
         self._run(0, len(self.indices), np.zeros((1, self.n_kept)), -1.0)
+        if not self.stream.is_whole:
+            raise FormatError(
+                f"{self.where}: rows of kind {self.kind} do not take {len(self.stream.data)} bytes"
+            )
         return self._decoded(0, len(self.indices))
 
     def _run(self, first: int, stop: int, targets: Floats, rate_weight: float) -> None:

@@ -12,8 +12,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.posewave.contact_keeper import Keeper
-from mcz.codecs.posewave.contacts import decode_contacts, room_of
 from mcz.codecs.posewave.header import NAME, Header
 from mcz.codecs.posewave.orders import Orders
 from mcz.codecs.posewave.pyramid import Pyramid
@@ -26,6 +24,7 @@ from mcz.transforms import lifting
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+MOST_STILL = 4.0  # steps of constants: a channel that leaves its middle no farther is one
 MAX_NUMBER = 2.0**40  # of a first value
 
 
@@ -59,17 +58,15 @@ def encode_segment(
     values: Floats,
     weights: Weights,
     refinement: Ints | None = None,
-    contacts: Keeper | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
     """The streams of a segment of unwrapped ``values``, and what a decoder will have of them.
 
     Both are (n_frames, n_channels). ``refinement`` (n_frames,) asks for steps of 2^-r of the
-    usual ones where rows bear on these frames, ``contacts`` has what is to keep its place. Raises
-    MotionError for values that are too large.
+    usual ones where rows bear on these frames. Raises MotionError for values that are too large.
     """
     orders = Orders(header.orders, skeleton)
     coded = orders.coded(values)
-    streams, found = encode_coded(header, skeleton, coded, weights, refinement, contacts)
+    streams, found = encode_coded(header, skeleton, coded, weights, refinement)
     notes, found = orders.notes_and_values(values, found)
     return (notes + streams[0], *streams[1:]), found
 
@@ -80,26 +77,24 @@ def encode_coded(
     values: Floats,
     weights: Weights,
     refinement: Ints | None = None,
-    contacts: Keeper | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
     """As ``encode_segment``, of ``values`` whose angles are in the orders of the header."""
-    head = choose_head(header, values)
     pyramid = Pyramid(len(values), header.levels, header.borrowing)
     if refinement is None or not header.refining:
         refinement = np.zeros(len(values), np.int64)
-    approx, details = values[:, head.kept], []
+    kept = choose_kept(header, values)
+    approx, details = values[:, kept], []
     for _ in range(pyramid.n_details):
         approx, detail = lifting.split(approx)
         details.append(detail)
     bands = [approx, *reversed(details)]
+    head = choose_head(header, values, kept, approx)
     classes, coder = classes_of(skeleton), fresh_coder(header.start)
     rows = RowCoder(classes[head.kept], header.start, coder, NAME, refining=header.refining)
     walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
     streams = []
     for level, band in enumerate(bands):
-        is_last = level == pyramid.n_details
-        room = _room(pyramid, level, head) + (is_last and room_of(header.contacts, len(values)))
-        stream = Stream(coder, room, None)
+        stream = Stream(coder, _room(pyramid, level, head), None)
         if level == 0:
             code_head(
                 stream, kinds_of(skeleton), head.kept.astype(np.int64), head.numbers.copy(), NAME
@@ -108,14 +103,9 @@ def encode_coded(
         rows.exponents[:] = pyramid.exponents(level, refinement)
         code = partial(rows.encode, weights.of(level))
         (walk.code_details if level else walk.code_coarsest)(level, code, band, rows.exponents)
-        if not is_last:
-            streams.append(stream.finish())
-    found = walk.values()
-    if header.contacts:
-        (contacts or Keeper()).encode(header.contacts, walk.metric.plan, stream, values, found)
-    streams.append(stream.finish())
+        streams.append(stream.finish())
     empty = [b""] * (header.levels - pyramid.n_details)
-    return (streams[0], *empty, *streams[1:]), found
+    return (streams[0], *empty, *streams[1:]), walk.values()
 
 
 def _room(pyramid: Pyramid, level: int, head: Head) -> int:
@@ -150,13 +140,7 @@ def decode_segment(
         rows.begin(level, pyramid.kind(level), pyramid.rows(level), stream)
         found = rows.decode()
         (walk.take_details if level else walk.take_coarsest)(level, found, rows.exponents)
-        if level < pyramid.n_details or not header.contacts:
-            stream.check_whole(f"{where}: level {level}")
-    values = walk.values()
-    if header.contacts and len(streams) > pyramid.n_details:
-        decode_contacts(header.contacts, walk.metric.plan, stream, values, where)
-        stream.check_whole(f"{where}: contacts")
-    return orders.values(values, notes)
+    return orders.values(walk.values(), notes)
 
 
 def kinds_of(skeleton: Skeleton) -> Ints:
@@ -180,11 +164,17 @@ def classes_of(skeleton: Skeleton) -> Ints:
     return np.array(found, np.int64)
 
 
-def choose_head(header: Header, values: Floats) -> Head:
-    """A channel that hardly leaves its middle is constant."""
-    low, high = values.min(axis=0), values.max(axis=0)
-    kept = high - low > 0.5 * header.constant
-    numbers = np.where(kept, values[0] / header.first, 0.5 * (low + high) / header.constant)
+def choose_kept(header: Header, values: Floats) -> NDArray[np.bool_]:
+    """All channels but those that hardly leave their middle."""
+    moved: NDArray[np.bool_] = np.ptp(values, axis=0) > MOST_STILL * header.constant
+    return moved
+
+
+def choose_head(header: Header, values: Floats, kept: NDArray[np.bool_], approx: Floats) -> Head:
+    """Kept channels begin near their first approximation, others stay in their middle."""
+    first = 0.5 * (values.min(axis=0) + values.max(axis=0))
+    first[kept] = approx[0]
+    numbers = first / np.where(kept, header.first, header.constant)
     if not (np.abs(numbers) < MAX_NUMBER).all():
         raise MotionError(f"{NAME}: a value exceeds 2^40 steps of {header.first.max():g}")
     return Head(kept, np.rint(numbers).astype(np.int64))

@@ -39,8 +39,7 @@ N_CLASSES = 6
 # Contexts and mixers in ``coder``, as those of ``coding.mixing``.
 C_FLAG, C_SIGN, C_EXTRA, C_ESCAPE, C_EXPONENT = 0, 208, 416, 428, 620
 MAX_EXPONENT = 7
-N_TRAINED = C_EXPONENT  # small contexts of the start tables; those behind them begin even
-N_SMALL = C_EXPONENT + (MAX_EXPONENT + 1) * MAX_EXPONENT
+N_SMALL = C_EXPONENT + (MAX_EXPONENT + 1) * MAX_EXPONENT  # behind them are those of the head
 M_FLAG, M_SIGN, N_SMALL_MIXERS = 0, N_LEVELS, 2 * N_LEVELS
 
 

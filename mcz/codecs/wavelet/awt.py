@@ -30,7 +30,7 @@ from mcz.codecs.parameters import (
     number,
     preset_parameter,
 )
-from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, segment_frames_of, skeleton_of
+from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
 from mcz.codecs.wavelet import shared
 from mcz.codecs.wavelet.awt_choices import choose, coefficients_of, quantizer_of
 from mcz.codecs.wavelet.recoding import recoder
@@ -41,7 +41,6 @@ from mcz.codecs.wavelet.shared import (
     Q,
     transform_of,
 )
-from mcz.codecs.wavelet.windows import sample
 from mcz.codecs.weights import SAMPLED_FRAMES, weights_of
 
 Floats = NDArray[np.float64]

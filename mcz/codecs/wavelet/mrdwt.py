@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Encoded, SignalSource
 from mcz.codecs.parameters import Dial, Parameter, choice, chosen_of, number, preset_parameter
-from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, segment_frames_of, skeleton_of
+from mcz.codecs.segments import SEGMENT_FRAMES_PARAMETER, sample, segment_frames_of, skeleton_of
 from mcz.codecs.wavelet import shared
 from mcz.codecs.wavelet.quantizer import make_quantizer
 from mcz.codecs.wavelet.recoding import recoder
@@ -32,7 +32,6 @@ from mcz.codecs.wavelet.shared import (
     Q,
     transform_of,
 )
-from mcz.codecs.wavelet.windows import sample
 from mcz.codecs.weights import RULES, SAMPLED_FRAMES, weights_of
 
 Floats = NDArray[np.float64]

@@ -40,14 +40,3 @@ class Frames:
         all_ = np.concatenate([self.history, self.block[: stop - first]])
         self.history = all_[max(0, len(all_) - n_kept) :]
         self.block = self.block[stop - first :]
-
-
-def sample(source: SignalSource, most: int) -> Floats:
-    """At most so many frames of a signal, evenly spread; what is invalid is NaN."""
-    layout = source.layout
-    rows = [np.zeros((0, layout.n_channels))]
-    for frame in range(0, layout.n_frames, max(1, -(-layout.n_frames // most))):
-        values = np.asarray(source.values(frame, frame + 1), np.float64)
-        valid = source.valid(frame, frame + 1)
-        rows.append(values if valid is None else np.where(valid, values, np.nan))
-    return np.concatenate(rows)

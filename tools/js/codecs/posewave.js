@@ -4,10 +4,8 @@ import { AxisOrders } from "../axis-orders.js";
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder } from "../entropy.js";
 import { Refused } from "../errors.js";
-import { holdContacts } from "../pose-contacts.js";
 import { readHead } from "../pose-head.js";
 import { Pyramid, Walk } from "../pose-levels.js";
-import { readContacts } from "../pose-limbs.js";
 import { RowDecoder } from "../pose-rows.js";
 import { HEAD, startTable } from "../pose-start.js";
 import { stepOf } from "../scales.js";
@@ -78,15 +76,14 @@ function readHeader(bytes, skeleton) {
   if (orders.length !== 0 && orders.length !== joints.length) {
     reader.refuse(`${orders.length} axis orders of ${joints.length} joints`);
   }
-  const axisOrders = new AxisOrders(skeleton, orders);
-  const contacts = reader.optional(() => readContacts(reader, skeleton, orders));
   reader.end();
   let at = 0;
   const greatest = Float64Array.from(kinds, (kind) => steps[kind] ?? plain[at++]);
   const firstStep = greatest.map((x) => x * 2 ** -first);
   const constantStep = firstStep.map((x) => x * 2 ** -constant);
   return {
-    ...{ levels, borrowing, start, refining, step, radius, kappa, weights, orders, axisOrders, contacts },
+    ...{ levels, borrowing, start, refining, step, radius, kappa, weights, orders },
+    axisOrders: new AxisOrders(skeleton, orders),
     ...{ kinds, greatest, firstStep, constantStep },
     classes: classesOf(joints),
   };
@@ -188,27 +185,38 @@ class PoseDecoder {
     const model = start.small.copy();
     const reader = new ByteReader(streams[0], what);
     const notes = header.axisOrders.takeNotes(reader, nFrames);
-    let coder = new RangeDecoder(reader.rest());
+    const coder = new RangeDecoder(reader.rest());
     const { first, kept } = this.head(coder, model, what);
     fillRows(out, first);
-    const walk = kept.length > 0 ? new Walk(header, skeleton, pyramid, kept, first) : null;
-    const classes = Uint8Array.from(kept, (c) => header.classes[c]);
-    const rows = walk && new RowDecoder(model, start, classes, header.refining);
-    for (let level = 0; level < streams.length; level++) {
+    if (kept.length > 0) {
+      const classes = Uint8Array.from(kept, (c) => header.classes[c]);
+      const rows = new RowDecoder(model, start, classes, header.refining);
+      const walk = new Walk(header, skeleton, pyramid, kept, first);
+      this.levels(coder, streams, rows, walk, what);
+      putColumns(walk.signal, kept, out);
+    } else {
+      coder.finish(what);
+      if (streams.slice(1).some(({ length }) => length > 0)) {
+        throw new Refused(`${what}: rows of no channel`);
+      }
+    }
+    header.axisOrders.restore(out, skeleton.channels.length, notes);
+  }
+
+  /** Decodes the rows of all levels, the first of them with `coder`, which has decoded the head. */
+  levels(coder, streams, rows, walk, what) {
+    const { pyramid } = walk;
+    for (let level = 0; level <= pyramid.nDetails; level++) {
       const where = `${what}, level ${level}`;
-      if (level > 0) coder = new RangeDecoder(streams[level]);
-      const [kind, nRows] = [pyramid.kind(level), pyramid.nRows(level)];
-      walk?.take(level, rows.decode(coder, level, kind, nRows, where));
-      if (level < pyramid.nDetails || header.contacts === null) coder.finish(where);
+      let decoded = null;
+      if (level < streams.length) {
+        const own = level === 0 ? coder : new RangeDecoder(streams[level]);
+        decoded = rows.decode(own, level, pyramid.kind(level), pyramid.nRows(level), where);
+        own.finish(where);
+      }
+      if (level === 0) walk.approximations(decoded);
+      else walk.details(level, decoded);
     }
-    for (let level = streams.length; level <= pyramid.nDetails; level++) walk?.take(level, null);
-    if (walk) putColumns(walk.signal, kept, out);
-    const { length } = skeleton.channels;
-    if (header.contacts !== null && streams.length > pyramid.nDetails) {
-      holdContacts(coder, header.contacts, out, length, what);
-      coder.finish(`${what}, contacts`);
-    }
-    header.axisOrders.restore(out, length, notes);
   }
 
   /** The streams of levels 0, 1, ... that are there. */

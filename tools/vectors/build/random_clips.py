@@ -24,6 +24,7 @@ from tools.vectors.build import (
     online_clips,
     online_units,
     pca_clips,
+    pose_clips,
     spatial_clips,
     wavelet_clips,
 )
@@ -264,6 +265,41 @@ def _online(chance: Chance, name: str) -> Clip:
     return _lossy(chance, codec, values, "all", partition(chance, plan.n_channels))
 
 
+def _poses(chance: Chance, name: str) -> Clip:
+    """Any skeleton and header; what is coded is a walk at random."""
+    sizes = partition(chance, chance.randrange(1, 30))
+    bones = skeleton(chance, sizes)
+    n_frames = chance.choice((1, 2, 3, 9, 24, 45))
+    levels = chance.choice((0, 1, 2, 3, 5, 8))
+    source = np.array([_walk(chance, n_frames) for _ in range(bones.n_channels)]).T
+    fields = {
+        "levels": levels,
+        "borrowing": chance.randrange(levels + 1),
+        "start": chance.randrange(2),
+        "step": 2.0 ** chance.randrange(-8, 3),
+        "radius": chance.choice((0.0, 0.25, 3.0, 40.0)),
+        "shell": chance.randrange(17),
+        "rotation": chance.randrange(110, 150),
+        "position": chance.randrange(110, 150),
+        "first": chance.randrange(10),
+        "constant": chance.randrange(10),
+        "weights": [chance.randrange(110, 150) for _ in bones.joints] * chance.randrange(2),
+    }
+    plan = pose_clips.Plan(
+        bones, source, fields, ends(split(chance, n_frames)), chance.randrange(levels + 1)
+    )
+    values = pose_clips.values_of(plan)
+    made = _lossy(chance, pose_clips.codec_of(plan), values, "all", sizes)
+    return replace(made, motion=replace(made.motion, skeleton=bones))
+
+
+def _walk(chance: Chance, n_frames: int) -> list[float]:
+    still = chance.random() < 0.2
+    steps = [0 if still else chance.randrange(-20, 21) for _ in range(n_frames)]
+    found: list[int] = np.cumsum(steps).tolist()
+    return [value / 8 for value in found]
+
+
 _MAKERS: dict[str, Callable[[Chance, str], Clip]] = {
     "mrdwt": _waves,
     "dwt": _waves,
@@ -271,4 +307,5 @@ _MAKERS: dict[str, Callable[[Chance, str], Clip]] = {
     "qbc": _curves,
     "pca": _parts,
     "online": _online,
+    "posewave": _poses,
 }

@@ -22,6 +22,7 @@ from tools.vectors.invalid import (
     parts,
     pca,
     pca_rdo,
+    posewave,
     qbc,
     raw,
     shared,
@@ -53,5 +54,6 @@ MODULES = (
     mdtt,
     pca_rdo,
     online,
+    posewave,
     sources,
 )

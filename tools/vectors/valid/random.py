@@ -27,10 +27,11 @@ from mcz.writing.clip_writer import write_skeleton
 from tools.vectors.build.edits import both, plus, put
 from tools.vectors.build.files import Crafter, Vector, arrays, partial
 from tools.vectors.build.random_clips import clip
-from tools.vectors.build.random_parts import LETTERS, NAMES, Chance, Clip, skeleton, split, text
+from tools.vectors.build.random_parts import LETTERS, OLDER, Chance, Clip, skeleton, split, text
 from tools.vectors.build.source_files import ODD, PLAIN, take
 
-COUNT = 80  # vectors
+OLD_COUNT = 80  # files that are older than codec 13, and stay as they are
+COUNT = OLD_COUNT + 8  # vectors
 SPEC = ("Grammar", "CLIP", "DATA")
 TYPES = (b"xtra", b"zVOL", b"Qnot", b"NOTE")
 
@@ -76,7 +77,8 @@ def _parts(chance: Chance, motions: Sequence[Motion]) -> Iterator[Any]:
 
 def random_file(seed: int) -> Made:
     """The file of this seed."""
-    return _Maker(random.Random(f"file {seed}"), first=NAMES[seed % len(NAMES)]).file()
+    first = "posewave" if OLD_COUNT <= seed < COUNT else OLDER[seed % len(OLDER)]
+    return _Maker(random.Random(f"file {seed}"), first=first).file()
 
 
 @dataclass
@@ -197,7 +199,7 @@ class _Maker:
             self.aliases.append((f"c/{name}", data))
 
     def clip(self) -> None:
-        codec = self.first or self.chance.choice(NAMES)
+        codec = self.first or self.chance.choice(OLDER)
         self.first = ""
         made = clip(self.chance, self.name(), codec)
         self.traits.append(f"codec {made.codec.name}")

@@ -22,6 +22,7 @@ from tools.vectors.build import (
     online_clips,
     online_units,
     pca_clips,
+    pose_clips,
     spatial_clips,
     wavelet_clips,
 )
@@ -33,7 +34,9 @@ from tools.vectors.build.motions import HUNDREDTHS, dance, numbers
 from tools.vectors.build.pca_clips import Part, part_of
 from tools.vectors.build.spatial_clips import CLIP, FRAME, MDTT, PCA_RDO
 
-NAMES = tuple("raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online".split())
+NAMES = tuple(
+    "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online posewave".split()
+)
 WAVES = ("mrdwt", "dwt", "awt")
 WINDOWS = (CLIP, MDTT, PCA_RDO)
 LONG = 66_000  # frames, more than 65,535
@@ -149,11 +152,20 @@ def _online(segments: Sequence[int], seed: int) -> Sample:
     return Sample(online_clips.codec_of(plan), online_clips.motion_of(plan), "all")
 
 
+def _posed(segments: Sequence[int], seed: int) -> Sample:
+    skeleton = _bones(3)
+    source = pose_clips.waves(sum(segments), skeleton, 4.0, seed)
+    fields = {"levels": 0, "step": 0.25 + seed}
+    plan = pose_clips.Plan(skeleton, source, fields, ends=_ends(segments))
+    return Sample(pose_clips.codec_of(plan), pose_clips.motion_of(plan), "all")
+
+
 _WITH: dict[str, Callable[[Sequence[int], int], Sample]] = {
     **{name: _waves(name) for name in WAVES},
     "qbc": _curved,
     "pca": _components,
     "online": _online,
+    "posewave": _posed,
 }
 
 
@@ -274,6 +286,9 @@ def _nothing(name: str) -> Codec:
     """A codec of seven frames without a channel."""
     if name in WAVES:
         return _waved(name, wavelet_clips.Plan(7, wavelet_clips.DB2), ()).codec
+    if name == "posewave":
+        still = Skeleton((Joint("rock"),))
+        return pose_clips.codec_of(pose_clips.Plan(still, np.zeros((7, 0))))
     if name == "pca":
         encoded = Encoded(bytes((2,)), iter([Segment(0, 7, ())]))
         return replace(_components((7,), 0).codec, encode=lambda source, params: encoded)

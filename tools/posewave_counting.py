@@ -1,0 +1,64 @@
+"""The model of codec 13, counting the bits that it codes; see ``train_posewave.py``.
+
+Models and coders that count have an array three times as long: behind what they know there is how
+many zeros, then how many ones each context has seen, at the same places.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+
+# Loops that count are other loops: their machine code must not lie where that of the codec's does.
+os.environ["MCZ_CACHE_DIR"] = tempfile.mkdtemp()
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.posewave import decision_kernels, rows, segment
+from mcz.codecs.posewave.model import Start, make_model
+from mcz.codecs.posewave.state import N_OPINIONS, Model
+from mcz.coding import mixing
+from mcz.jit import inner
+
+Ints = NDArray[np.int64]
+
+plain_learn, plain_learn_small = decision_kernels.learn, mixing._learn
+
+
+@inner
+def counting_learn(
+    model: Model, slot: int, one: Ints, other: Ints, second: Ints, bit: int, chance: int, x: int
+) -> None:
+    """``decision_kernels.learn``, counting."""
+    plain_learn(model, slot, one, other, second, bit, chance, x)
+    slots, at = model.slots, model.at
+    for k in range(N_OPINIONS):
+        slots[len(slots) // 3 * (1 + bit) + at[k] + slot] += 1
+
+
+@inner
+def counting_learn_small(state: Ints, context: int, target: int) -> None:
+    """``mixing._learn``, counting."""
+    plain_learn_small(state, context, target)
+    state[len(state) // 3 * (2 if target else 1) + context] += 1
+
+
+def tripled(states: Ints) -> Ints:
+    return np.concatenate([states, np.zeros(2 * len(states), np.int64)])
+
+
+class Counting:
+    """Makes the codec's coders count, and keeps the model of the last segment."""
+
+    def __init__(self) -> None:
+        fresh = rows.fresh_coder
+        decision_kernels.learn = counting_learn
+        mixing._learn = counting_learn_small
+        segment.fresh_coder = lambda start: tripled(fresh(start))
+        rows.make_model = self.make_model
+
+    def make_model(self, classes: Ints, start: Start, coder: Ints) -> Model:
+        model = make_model(classes, start, coder)
+        self.model = model._replace(slots=tripled(model.slots))
+        return self.model

@@ -1,0 +1,249 @@
+"""Clips of codec 13, ``posewave``, to order: any skeleton, header and steps of rows.
+
+Streams are those of the encoder of one segment: binary64 + - * / alone, so that the bytes do not
+depend on a machine's arithmetic. Values are those of the decoder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import raw
+from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
+from mcz.codecs.posewave import posewave
+from mcz.codecs.posewave.header import Header, build_header, parse_header
+from mcz.codecs.posewave.segment import Weights, encode_segment
+from mcz.motion import Joint, Motion, Signal, Skeleton
+from tools.vectors.build.files import Whole, file_of, partial
+from tools.vectors.build.motions import channels, wave
+
+HEADING = "Codec 13: posewave"
+Floats = NDArray[np.float64]
+
+PLAIN_FIELDS: dict[str, Any] = {
+    "levels": 2,
+    "borrowing": 1,
+    "start": 0,
+    "refining": 0,
+    "step": 0.03125,
+    "radius": 3.0,
+    "shell": 8,
+    "rotation": 136,
+    "position": 145,
+    "first": 2,
+    "constant": 8,
+    "plain": [],
+    "weights": [],
+    "orders": [],
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """``source`` (n_frames, n_channels) is what is encoded; ``ends`` of segments but the last.
+
+    ``fields`` are those of the header that are not the plain ones; ``cut``: finest resolutions that
+    are not stored; ``price`` of a bit in squared steps; ``streams``: those of a segment in the
+    place of its own.
+    """
+
+    skeleton: Skeleton
+    source: Floats
+    fields: dict[str, Any] = field(default_factory=dict)
+    ends: tuple[int, ...] = ()
+    cut: int = 0
+    price: float = 0.0625
+    refinement: Sequence[int] | None = None
+    streams: dict[int, tuple[bytes, ...]] = field(default_factory=dict)
+
+    @property
+    def n_frames(self) -> int:
+        return len(self.source)
+
+    @property
+    def levels(self) -> int:
+        return int((PLAIN_FIELDS | self.fields)["levels"])
+
+    @property
+    def n_resolutions(self) -> int:
+        return self.levels + 1 - self.cut
+
+
+def header_of(plan: Plan, **changes: Any) -> bytes:
+    fields = PLAIN_FIELDS | plan.fields | changes
+    fields["borrowing"] = min(fields["borrowing"], fields["levels"])
+    return build_header(**fields)
+
+
+def layout_of(plan: Plan) -> Layout:
+    groups = (tuple(range(plan.skeleton.n_channels)),) if plan.skeleton.n_channels else ()
+    return Layout(plan.n_frames, groups, skeleton=plan.skeleton, n_resolutions=plan.n_resolutions)
+
+
+def parsed(plan: Plan) -> Header:
+    return parse_header(header_of(plan), layout_of(plan))
+
+
+def segments_of(plan: Plan) -> list[Segment]:
+    header, found = parsed(plan), []
+    edges = [0, *plan.ends, plan.n_frames] if plan.n_frames else []
+    for index, (start, stop) in enumerate(zip(edges, edges[1:], strict=False)):
+        found.append(Segment(start, stop - start, _streams(plan, header, index, start, stop)))
+    return found
+
+
+def _streams(plan: Plan, header: Header, index: int, start: int, stop: int) -> tuple[bytes, ...]:
+    if index in plan.streams:
+        return plan.streams[index]
+    if not plan.skeleton.n_channels:
+        return ()
+    own = plan.refinement
+    octaves = None if own is None else np.array(own[start:stop], np.int64)
+    weights = Weights(plan.price, plan.price)
+    streams, _ = encode_segment(header, plan.skeleton, plan.source[start:stop], weights, octaves)
+    return streams[: plan.n_resolutions]
+
+
+def codec_of(plan: Plan) -> Codec:
+    """Codec 13 with this content, whatever the values of the motion."""
+
+    def encode(source: Any, params: Any) -> Encoded:
+        return Encoded(header_of(plan), iter(segments_of(plan)), plan.n_resolutions)
+
+    return replace(
+        posewave.CODEC,
+        encode=encode,
+        parameters=raw.CODEC.parameters,
+        dial=None,
+        promise=None,
+    )
+
+
+def values_of(plan: Plan, resolution: int = 0) -> Floats:
+    made, layout = segments_of(plan), layout_of(plan)
+    request = Request(0, plan.n_frames, (0,) if layout.groups else (), resolution)
+    return posewave.CODEC.decode(
+        header_of(plan),
+        layout,
+        [Span(s.first, s.n_frames) for s in made],
+        request,
+        lambda segment, stream, _: made[segment].streams[stream],
+    )
+
+
+def motion_of(plan: Plan, resolution: int = 0, **more: Any) -> Motion:
+    """The clip as it is decoded."""
+    fields: dict[str, Any] = {"name": "pose", "signals": (Signal(values_of(plan, resolution)),)}
+    return Motion(plan.skeleton, **(fields | more))
+
+
+def file_with(plan: Plan, motion: Motion | None = None, **edits: Any) -> bytes:
+    motion = motion_of(plan) if motion is None else motion
+    return file_of(motion, codec=codec_of(plan), grouping="all", **edits)
+
+
+class Poses(Whole):
+    """A Shelf of files of one clip that codec 13 codes."""
+
+    def plan(
+        self,
+        name: str,
+        purpose: str,
+        plan: Plan,
+        spec: str = "",
+        requests: Sequence[tuple[int, tuple[int, int], Sequence[int] | None]] = (),
+        **edits: Any,
+    ) -> None:
+        """Add a file; ``requests`` are (finest resolutions left out, frames, joints)."""
+        motion = motion_of(plan)
+        parts = []
+        for left_out, frames, joints in requests:
+            coarse = motion_of(plan, left_out) if left_out else motion
+            arguments, found = partial(coarse, frames, joints)
+            option = ("--resolution", str(left_out)) if left_out else ()
+            parts.append(((*arguments, *option), found))
+        data = file_with(plan, motion, **edits)
+        self.hold(name, spec or HEADING, purpose, data, motion, parts=tuple(parts))
+
+
+# Skeletons and how they move
+
+
+def waves(n_frames: int, skeleton: Skeleton, size: float = 0.25, seed: int = 0) -> Floats:
+    """A smooth curve with some noise for each channel, no two alike."""
+    columns = [wave(n_frames, seed + 3 * c) for c in range(skeleton.n_channels)]
+    return size * np.array(columns, np.float64).T.reshape(n_frames, len(columns))
+
+
+def acclaim() -> Skeleton:
+    """Fixed axes in degrees, with orientations and tails."""
+    return Skeleton(
+        (
+            Joint("root", channels=channels("tx ty tz rx ry rz")),
+            Joint(
+                "hip",
+                0,
+                (1.5, -2.0, 0.25),
+                ((0.5, -6.0, 1.0),),
+                axis=(0.0, 0.0, 20.0),
+                channels=channels("rx ry rz"),
+            ),
+            Joint(
+                "knee",
+                1,
+                (0.5, -6.0, 1.0),
+                ((0.25, -5.5, 0.5),),
+                axis=(10.0, 20.0, 30.0),
+                axis_order="ZXY",
+                channels=channels("rx"),
+            ),
+            Joint(
+                "spine",
+                0,
+                (0.0, 2.0, 0.0),
+                ((0.0, 4.5, 0.0), (0.5, 5.0, 0.0)),
+                axis=(0.0, -15.0, 0.0),
+                channels=channels("rx rz"),
+            ),
+        ),
+        name="acclaim",
+        unit_cm=5.644444444444444,
+        angle_unit="deg",
+        up_axis="y",
+    )
+
+
+def biovision(unit: str = "deg") -> Skeleton:
+    """Intrinsic rotations, offsets of the parent's axes."""
+    return Skeleton(
+        (
+            Joint("hips", channels=channels("tx ty tz rz rx ry")),
+            Joint("chest", 0, (0.0, 5.0, 0.5), channels=channels("rz rx ry")),
+            Joint("arm", 1, (4.0, 1.0, 0.0), channels=channels("rz rx ry")),
+            Joint("hand", 2, (6.0, 0.0, 0.0), ((2.0, 0.0, 0.0),), channels=channels("rz rx ry")),
+            Joint("leg", 0, (1.5, -7.0, 0.0), ((0.0, -8.0, 0.0),), channels=channels("rz rx ry")),
+        ),
+        name="biovision",
+        angle_unit=unit,
+        up_axis="y",
+        intrinsic=True,
+    )
+
+
+def chain(kinds: Sequence[str], intrinsic: bool = True, **more: Any) -> Skeleton:
+    """Joints of these channels, each below the one before."""
+    joints = tuple(
+        Joint(
+            f"link {j}",
+            j - 1,
+            (0.0, 1.0 + j % 3, 0.5) if j else (0.0, 0.0, 0.0),
+            channels=channels(own),
+        )
+        for j, own in enumerate(kinds)
+    )
+    return Skeleton(joints, **({"angle_unit": "deg", "intrinsic": intrinsic} | more))
