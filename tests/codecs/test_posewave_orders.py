@@ -78,7 +78,7 @@ def wandering(unit: str, n_frames: int, seed: int, speed: float = 0.05) -> Float
 def test_arc(y: float, x: float, unit: str) -> None:
     found = arc(y, x, RULES[unit])
     assert (
-        abs(found - np.arctan2(abs(y), x) * (-1 if y < 0 else 1) / RULES[unit].radians)
+        abs(found - np.arctan2(abs(y), x + 0.0) * (-1 if y < 0 else 1) / RULES[unit].radians)
         < (2e-14 if unit == "deg" else 4e-16) * 2
     )
     sine, cosine = sine_cosine(found, RULES[unit])

@@ -16,7 +16,7 @@ from tools.vectors import (
     requirements_codecs,
     requirements_container,
     requirements_points,
-    requirements_pose,
+    requirements_poses,
 )
 
 CAUGHT = Path(__file__).with_suffix(".txt")
@@ -26,14 +26,14 @@ VECTORS: dict[str, tuple[str, ...]] = {
     **requirements_container.VECTORS,
     **requirements_codecs.VECTORS,
     **requirements_points.VECTORS,
-    **requirements_pose.VECTORS,
+    **requirements_poses.VECTORS,
 }
 
 ARGUED: dict[str, str] = {
     **requirements_container.ARGUED,
     **requirements_codecs.ARGUED,
     **requirements_points.ARGUED,
-    **requirements_pose.ARGUED,
+    **requirements_poses.ARGUED,
 }
 
 ID = re.compile(r"[A-Z][A-Z0-9]*(?:-[A-Z0-9]+)*-[0-9]{2,}")

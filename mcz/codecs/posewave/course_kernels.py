@@ -67,8 +67,8 @@ def go_on(course: Course, difference: Floats) -> None:
             course.above[k] = course.above[k] * MEMORY + moved * course.moved[k]
             course.below[k] = course.below[k] * MEMORY + course.moved[k] * course.moved[k]
         share = min(max(course.above[k] / course.below[k], 0.0), 1.0)
-        course.pose[0, c] = value
-        course.expected[k] = value + (share * moved if n_rows >= 1 else 0.0)
+        course.pose[0, c] = value  # PWAVE-21
+        course.expected[k] = value + (share * moved if n_rows >= 1 else 0.0)  # PWAVE-21
         course.moved[k] = moved if n_rows >= 1 else 0.0
     course.n_rows[0] = n_rows + 1
 

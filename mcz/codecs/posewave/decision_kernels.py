@@ -77,7 +77,7 @@ def learn(
         p += ((target - p) * rates[n]) >> 16
         slots[where] = p << 8 | min(n + 1, COUNT_LIMIT)
     node, share = (x >> 7) & 31, x & 127
-    second[node] += ((target - second[node]) * (128 - share)) >> 14
+    second[node] += ((target - second[node]) * (128 - share)) >> 14  # ROWS-05
     second[node + 1] += ((target - second[node + 1]) * share) >> 14
 
 

@@ -30,7 +30,7 @@ def code_head(
     before = 1
     for c in range(len(classes)):
         before = adaptive(state, data, kept[c], first + C_KEPT + 2 * classes[c] + before)
-        kept[c] = before
+        kept[c] = before  # PWAVE-18
         own = 2 * classes[c] + before
         found = code_number(state, data, first, own, numbers[c])
         if abs(found) >= 1 << MAX_LENGTH:
@@ -49,7 +49,7 @@ def code_number(state: Ints, data: Bytes, first: int, own: int, value: int) -> i
     at = first + C_LENGTH + MAX_LENGTH * own
     while adaptive(state, data, 1 if size >> length else 0, at + length):
         length += 1
-        if length == MAX_LENGTH:
+        if length == MAX_LENGTH:  # PWAVE-19
             return 1 << MAX_LENGTH
     if length == 0:
         return 0

@@ -29,32 +29,34 @@ WHOLE_SHARE = 16
 N_STARTS = 2
 
 POSEWAVE_HEADER = Struct(
-    "levels" / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_LEVELS) * "levels, 0 to 8",
+    "levels"
+    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_LEVELS)  # PWAVE-05
+    * "levels, 0 to 8",
     "borrowing"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= ctx.levels)
+    / ExprValidator(Int8ul, lambda n, ctx: n <= ctx.levels)  # PWAVE-06
     * "finest levels of details that take the metric of the next coarser one",
     "start"
-    / ExprValidator(Int8ul, lambda n, ctx: n < N_STARTS)
+    / ExprValidator(Int8ul, lambda n, ctx: n < N_STARTS)  # PWAVE-07
     * "start table of the model, 0 or 1",
     "refining"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= 1)
+    / ExprValidator(Int8ul, lambda n, ctx: n <= 1)  # PWAVE-08
     * "1: rows may have finer steps of their own; 0: none has",
     "step"
-    / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)
+    / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)  # PWAVE-09
     * "quantizer step of a row in the metric, in length units, 2^-60 to 2^60",
     "radius"
-    / ExprValidator(Float32l, lambda x, ctx: 0 <= x <= 2.0**60)
+    / ExprValidator(Float32l, lambda x, ctx: 0 <= x <= 2.0**60)  # PWAVE-10
     * "of the shell, in length units, 0 to 2^60",
     "shell"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= WHOLE_SHARE)
+    / ExprValidator(Int8ul, lambda n, ctx: n <= WHOLE_SHARE)  # PWAVE-11
     * "share of the shell in the metric, in sixteenths",
     "rotation" / Int8ul * "step code of the greatest step of a rotation channel",
     "position" / Int8ul * "step code of the greatest step of a position channel",
     "first"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_FINE)
+    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_FINE)  # PWAVE-12
     * "halvings from the greatest step to that of a segment's first values, 0 to 24",
     "constant"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_FINE)
+    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_FINE)  # PWAVE-12
     * "halvings from there to the step of constant channels, 0 to 24",
     "plain"
     / counted(Int8ul, 2**14)
@@ -97,11 +99,12 @@ def parse_header(header: bytes, layout: Layout) -> Header:
     """Raises FormatError where ``header`` does not fit the skeleton of ``layout``."""
     fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
     skeleton = layout.skeleton
+    # PWAVE-01, PWAVE-02, PWAVE-04
     if skeleton is None or layout.samples_per_frame != 1 or len(layout.groups) > 1:
         raise FormatError(
             f"{NAME}: {layout.samples_per_frame} samples a frame, {len(layout.groups)} groups"
         )
-    if layout.n_resolutions > fields.levels + 1:
+    if layout.n_resolutions > fields.levels + 1:  # PWAVE-16
         raise FormatError(f"{NAME}: {layout.n_resolutions} resolutions, {fields.levels} levels")
     kinds = [channel.kind for channel in skeleton.channels]
     n_plain = sum(kind not in (*ROTATION_KINDS, *POSITION_KINDS) for kind in kinds)
@@ -110,7 +113,7 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         ("weights", skeleton.n_joints),
         ("orders", skeleton.n_joints),
     ):
-        if len(fields[name]) not in (0, due):
+        if len(fields[name]) not in (0, due):  # PWAVE-13, PWAVE-14, PWAVE-15
             raise FormatError(f"{NAME}: {len(fields[name])} of {name}, {due} are due")
     check_orders(fields.orders, skeleton, NAME)
     plain = iter(fields.plain or [code_of(1.0)] * n_plain)

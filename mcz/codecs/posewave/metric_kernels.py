@@ -218,7 +218,7 @@ def _take_pivot(
     least = 0.5 * added
     for p in range(lanes):
         pivots[p] = min(max(entries[start + above, p] + added, least), GREATEST)
-        own[above, p] = 1.0 / pivots[p]
+        own[above, p] = 1.0 / pivots[p]  # POSE-01
     for i in range(above):
         for p in range(lanes):
             entry = min(max(entries[start + i, p], -GREATEST), GREATEST)

@@ -150,7 +150,7 @@ def code_rows(
         )
         if cost == FAULTY:
             return row
-        model.seen[0] = model.seen[0] * MEMORY + 1.0
+        model.seen[0] = model.seen[0] * MEMORY + 1.0  # ROWS-02
     return -1
 
 
@@ -332,12 +332,12 @@ def code_row(
         if not trial:
             error = code_error(model, data, error, where)
         value = rounded + error
-        if abs(value) > MAX_INDEX:
+        if abs(value) > MAX_INDEX:  # ROWS-04
             return FAULTY
         q[c], means[c], values[c] = value, mean, float(value) / gain
         miss = (float(value) - mean) / gain
         side_4, side_3, side_2 = side_3, side_2, side_1
-        side_1 = min(0.5 * abs(miss) + 0.5 * abs(values[c]), MOST_SIZE)
+        side_1 = min(0.5 * abs(miss) + 0.5 * abs(values[c]), MOST_SIZE)  # ROWS-03
         if value == 0 and rounded == 0:
             side_1 = 0.0
         magnitudes[c], found[c] = side_1, min(abs(miss), MOST_SIZE)

@@ -102,10 +102,10 @@ def follow(angles: Floats, sequence: Ints, full: float, told: Ints) -> None:
             before[axis] = value
             value = other(value, p, 0.5 * full) if second else value
             if f > 0:
-                turns[axis] -= whole_turns(value - last[axis], full)
+                turns[axis] -= whole_turns(value - last[axis], full)  # PWAVE-27
             turns[axis] += told[f, 1 + axis]
             last[axis] = value
-            row[axis] = value + full * turns[axis]
+            row[axis] = value + full * turns[axis]  # PWAVE-27
 
 
 @kernel

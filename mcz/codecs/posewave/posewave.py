@@ -101,7 +101,7 @@ def decode(
     """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
     fields = parse_header(header, layout)
     for span in spans:
-        if span.lead or span.tail or not span.fresh:
+        if span.lead or span.tail or not span.fresh:  # PWAVE-03
             raise FormatError(f"{NAME}: the segment at {span.first} bears upon others")
     skeleton = layout.skeleton
     assert skeleton is not None  # the header was checked against it

@@ -125,7 +125,7 @@ def take_in(columns: Floats, variances: Floats, rest: Floats, size: int, share: 
         after = before + share * miss * miss
         gain = share * miss / after
         share *= before / after
-        variances[a] = after
+        variances[a] = after  # ROWS-06
         line = columns[a]
         for b in range(BLOCK):
             left = rest[b] - miss * line[b]

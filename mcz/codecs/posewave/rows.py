@@ -120,7 +120,7 @@ class RowCoder:
     def decode(self) -> Floats:
         """All rows of the level, (n_rows, n_kept), in steps."""
         self._run(0, len(self.indices), np.zeros((1, self.n_kept)), -1.0)
-        if not self.stream.is_whole:
+        if not self.stream.is_whole:  # ROWS-01
             raise FormatError(
                 f"{self.where}: rows of kind {self.kind} do not take {len(self.stream.data)} bytes"
             )

@@ -119,7 +119,7 @@ def decode_segment(
     """The values, (n_frames, n_channels); details of which there is no stream are zero."""
     pyramid = Pyramid(n_frames, header.levels, header.borrowing)
     n_empty = header.levels - pyramid.n_details
-    if any(streams[1 : 1 + n_empty]):
+    if any(streams[1 : 1 + n_empty]):  # PWAVE-17
         raise FormatError(f"{where}: a stream of a level that {n_frames} frames have not")
     orders = Orders(header.orders, skeleton)
     notes, coarsest = orders.take_notes(streams[0], n_frames, where)

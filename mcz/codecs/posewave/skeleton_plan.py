@@ -244,7 +244,7 @@ def _rows(
         path = paths[joint.parent] if joint.parent >= 0 else []
         pairs = zip(joint.channels, numbers[column:], strict=False)
         own = [n for channel, n in pairs if n >= 0 and channel.kind in kinds]
-        if len(path) + len(own) > MAX_PATH:
+        if len(path) + len(own) > MAX_PATH:  # POSE-02
             path = []
         for number in own:
             path = [number] if len(path) == MAX_PATH else [*path, number]

@@ -36,7 +36,7 @@ def kernels() -> Any:
 def between(approx: Floats, n_rows: int) -> Floats:
     """The poses halfway from each approximation to the next: those of the details."""
     after = np.concatenate([approx[1:], approx[-1:]])
-    found: Floats = (approx[:n_rows] + after[:n_rows]) * 0.5
+    found: Floats = (approx[:n_rows] + after[:n_rows]) * 0.5  # PWAVE-22
     return found
 
 
@@ -107,7 +107,7 @@ class Walk:
         """Of each row the number of its pose, which is that of a coarser level's where borrowed."""
         pyramid = self.pyramid
         n_rows = pyramid.rows(level)
-        if pyramid.depth(level) > pyramid.borrowing:
+        if pyramid.depth(level) > pyramid.borrowing:  # PWAVE-22
             self.poses, self.level = between(self.approx, n_rows), level
         found: Ints = np.minimum(np.arange(n_rows) >> (level - self.level), len(self.poses) - 1)
         return found

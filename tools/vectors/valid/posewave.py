@@ -1,4 +1,4 @@
-"""Valid: codec 13, ``posewave``: skeletons, levels, metric, heads, orders of axes, cuts."""
+"""Valid: codec 13, ``posewave``: skeletons, levels, metric, heads, orders, segments, cuts."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def vectors() -> Iterable[Vector]:
 def _skeletons(shelf: Poses) -> None:
     cases: dict[str, tuple[str, Skeleton]] = {
         "fixed-axes": ("Fixed axes in degrees, orientations and tails", acclaim()),
-        "fixed-axes-rad": ("The same skeleton in radians", replace(acclaim(), angle_unit="rad")),
+        "fixed-axes-rad": ("Fixed axes, in radians", replace(acclaim(), angle_unit="rad")),
         "intrinsic": ("Intrinsic rotations in degrees", biovision()),
         "intrinsic-rad": ("The same skeleton in radians", biovision("rad")),
         "fixed": ("The same rotations about fixed axes", replace(biovision(), intrinsic=False)),
@@ -156,8 +156,9 @@ def _paths(shelf: Poses) -> None:
 
 
 def _degenerate(shelf: Poses) -> None:
-    turning = (Joint("all", channels=channels("rz rx ry")),)
-    still = Skeleton(turning, angle_unit="deg", intrinsic=True)
+    still = Skeleton(
+        (Joint("all", channels=channels("rz rx ry")),), angle_unit="deg", intrinsic=True
+    )
     moving = Skeleton((Joint("all", channels=channels("tx ty tz rz rx ry")),), angle_unit="deg")
     cases: dict[str, tuple[str, Skeleton, dict[str, Any]]] = {
         "no-extent": ("No extent and radius 0: pivots are reg", still, {"radius": 0.0}),
