@@ -16,7 +16,7 @@
         └── LostFrameError   they need a frame that did not come
 
 A message says where (file, chunk, offset, line) and shows the value that was found. What is no
-error but should be known is a warning: SkeletonWarning.
+error but should be known is a warning: SkeletonWarning, ContactWarning.
 """
 
 from __future__ import annotations
@@ -85,3 +85,7 @@ class LostFrameError(FormatError):
 
 class SkeletonWarning(UserWarning):
     """An AMC was given a skeleton whose name or dofs are not its own."""
+
+
+class ContactWarning(UserWarning):
+    """A lossy codec could not keep a point in its place as it was asked to."""

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
+from mcz.codecs.posewave.contact_choice import choose_contacts, runs_of
+from mcz.codecs.posewave.contact_keeper import Keeper
 from mcz.codecs.posewave.header import MAX_FINE, NAME, Header, build_header, parse_header
 from mcz.codecs.posewave.order_choices import choose_orders
 from mcz.codecs.posewave.orders import N_NOTES, Orders
@@ -51,10 +53,11 @@ COARSEST_WEIGHT = 0.12  # of a bit at level 0, whose errors later rows are predi
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The header of a clip, and the weight of a bit against a squared step."""
+    """The header of a clip, the weight of a bit against a squared step, contacts to keep."""
 
     header: bytes
     weights: Weights
+    keeper: Keeper | None = None
 
 
 def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
@@ -76,7 +79,21 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
     if fields["levels"] is None:
         fields["levels"] = best_levels(source, skeleton, fields, weights)
     fields["borrowing"] = min(1, fields["levels"])
-    return Choice(build_header(**fields), weights)
+    fields["contacts"], keeper = _contacts(source, params, step / step_cm)
+    return Choice(build_header(**fields), weights, keeper)
+
+
+def _contacts(
+    source: SignalSource, params: Mapping[str, Any], in_cm: float
+) -> tuple[list[dict[str, Any]], Keeper | None]:
+    """The header's field, and what is to be kept; ``in_cm``: length units a centimeter."""
+    if not params.get("contacts") or not source.layout.n_frames:
+        return [], None
+    skeleton, rate = skeleton_of(NAME, source.layout), source.layout.frame_rate
+    tolerance = params["contact_tolerance"] * in_cm
+    runs = runs_of(source, params["contacts"])
+    wanted = choose_contacts(skeleton, runs, tolerance, None if rate is None else float(rate))
+    return ([wanted.fields], Keeper(tolerance, wanted.pieces)) if wanted else ([], None)
 
 
 def guess(target: str, limit: float) -> float | None:

@@ -13,6 +13,7 @@ from construct import ExprValidator, Float32l, Int8ul, Struct
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
+from mcz.codecs.posewave.contact_plan import CONTACTS, Contacts, parse_contacts
 from mcz.codecs.posewave.model import Start, start_tables
 from mcz.codecs.posewave.orders import N_ORDERS, check_orders
 from mcz.codecs.steps import code_of, ratio_of
@@ -65,6 +66,7 @@ POSEWAVE_HEADER = Struct(
     "orders"
     / counted(ExprValidator(Int8ul, lambda n, ctx: n < N_ORDERS), 2**14)
     * "of each joint the code of its axis order, 0 to 6; none: all 0",
+    "contacts" / counted(CONTACTS, 1) * "none, or what the contacts of segments rest on",
 )
 
 
@@ -89,10 +91,11 @@ class Header:
     constant: Floats
     weights: Floats
     orders: tuple[int, ...]
+    contacts: Contacts | None = None
 
 
 def build_header(**fields: Any) -> bytes:
-    return build(POSEWAVE_HEADER, fields, f"{NAME} header")
+    return build(POSEWAVE_HEADER, {"contacts": [], **fields}, f"{NAME} header")
 
 
 def parse_header(header: bytes, layout: Layout) -> Header:
@@ -143,4 +146,5 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         constant=first * 2.0**-fields.constant,
         weights=np.array([ratio_of(s) for s in fields.weights] or [1.0] * skeleton.n_joints),
         orders=tuple(fields.orders),
+        contacts=parse_contacts(fields.contacts, skeleton, NAME),
     )

@@ -31,10 +31,11 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.gaps import SegmentReader
 from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
-from mcz.codecs.posewave.choices import choose, guess
+from mcz.codecs.posewave.choices import Choice, choose, guess
+from mcz.codecs.posewave.contact_choice import parse_runs
 from mcz.codecs.posewave.header import NAME, Header, parse_header
 from mcz.codecs.posewave.limits import joint_limits
-from mcz.codecs.posewave.segment import Weights, decode_segment, encode_segment
+from mcz.codecs.posewave.segment import decode_segment, encode_segment
 from mcz.codecs.segments import (
     SEGMENT_FRAMES_PARAMETER,
     Lengths,
@@ -67,12 +68,12 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     layout = source.layout
     choice = choose(source, params)
     header = parse_header(choice.header, layout)
-    segments = _segments(source, header, choice.weights, params)
+    segments = _segments(source, header, choice, params)
     return Encoded(choice.header, segments, header.levels + 1)
 
 
 def _segments(
-    source: SignalSource, header: Header, weights: Weights, params: Mapping[str, Any]
+    source: SignalSource, header: Header, choice: Choice, params: Mapping[str, Any]
 ) -> Iterator[Segment]:
     layout = source.layout
     skeleton = skeleton_of(NAME, layout)
@@ -85,14 +86,19 @@ def _segments(
     lengths = Lengths(length, bool(wanted), least=LEAST_FRAMES)
     reader = SegmentReader(NAME, source)
 
-    octaves = params["refinement"]
+    octaves, keeper = params["refinement"], choice.keeper
 
     def code(first: int, stop: int) -> tuple[bytes, ...]:
         own = None if octaves is None else octaves[first:stop]
-        return encode_segment(header, skeleton, reader(first, stop), weights, own)[0]
+        if keeper:
+            keeper.first = first
+        values = reader(first, stop)
+        return encode_segment(header, skeleton, values, choice.weights, own, keeper)[0]
 
     for first, stop, streams in halving(layout.n_frames, lengths, code):
         yield Segment(first, stop - first, streams)
+    if keeper and header.contacts:
+        keeper.warn(skeleton, header.contacts)
 
 
 def decode(
@@ -150,6 +156,18 @@ CODEC = Codec(
             number("step", 1e-9, 1e9),
         ),
         Parameter("levels", None, "levels; default: what suits the clip", integer("levels", 0, 8)),
+        Parameter(
+            "contacts",
+            None,
+            "points that stand keep their place: auto, or lfoot:120+45,rfoot:160+52",
+            parse_runs,
+        ),
+        Parameter(
+            "contact_tolerance",
+            0.01,
+            "cm that the displacement of a joint within a contact may be off",
+            number("contact_tolerance", 1e-6, 1e6),
+        ),
         Parameter(
             "quality",
             None,

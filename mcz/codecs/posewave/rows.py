@@ -65,10 +65,11 @@ class Stream:
             raise AssertionError(f"{used} bytes in {len(self.data)}")
         return self.data[:used].tobytes()
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether all bytes were due, after the last bit was decoded."""
-        return bool(_coding().coded_size(self.coder) == len(self.data))
+    def check_whole(self, where: str) -> None:
+        """Raises FormatError unless all bytes were due, after the last bit was decoded."""
+        due = int(_coding().coded_size(self.coder))
+        if due != len(self.data):  # ROWS-01
+            raise FormatError(f"{where}: {len(self.data)} bytes, of which {due} were due")
 
 
 def fresh_coder(start: Start) -> Ints:
@@ -120,10 +121,6 @@ class RowCoder:
     def decode(self) -> Floats:
         """All rows of the level, (n_rows, n_kept), in steps."""
         self._run(0, len(self.indices), np.zeros((1, self.n_kept)), -1.0)
-        if not self.stream.is_whole:  # ROWS-01
-            raise FormatError(
-                f"{self.where}: rows of kind {self.kind} do not take {len(self.stream.data)} bytes"
-            )
         return self._decoded(0, len(self.indices))
 
     def _run(self, first: int, stop: int, targets: Floats, rate_weight: float) -> None:

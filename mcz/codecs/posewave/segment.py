@@ -12,6 +12,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.posewave.contact_keeper import Keeper
+from mcz.codecs.posewave.contacts import decode_contacts, room_of
 from mcz.codecs.posewave.header import NAME, Header
 from mcz.codecs.posewave.orders import Orders
 from mcz.codecs.posewave.pyramid import Pyramid
@@ -58,15 +60,17 @@ def encode_segment(
     values: Floats,
     weights: Weights,
     refinement: Ints | None = None,
+    contacts: Keeper | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
     """The streams of a segment of unwrapped ``values``, and what a decoder will have of them.
 
     Both are (n_frames, n_channels). ``refinement`` (n_frames,) asks for steps of 2^-r of the
-    usual ones where rows bear on these frames. Raises MotionError for values that are too large.
+    usual ones where rows bear on these frames, ``contacts`` has what is to keep its place. Raises
+    MotionError for values that are too large.
     """
     orders = Orders(header.orders, skeleton)
     coded = orders.coded(values)
-    streams, found = encode_coded(header, skeleton, coded, weights, refinement)
+    streams, found = encode_coded(header, skeleton, coded, weights, refinement, contacts)
     notes, found = orders.notes_and_values(values, found)
     return (notes + streams[0], *streams[1:]), found
 
@@ -77,6 +81,7 @@ def encode_coded(
     values: Floats,
     weights: Weights,
     refinement: Ints | None = None,
+    contacts: Keeper | None = None,
 ) -> tuple[tuple[bytes, ...], Floats]:
     """As ``encode_segment``, of ``values`` whose angles are in the orders of the header."""
     pyramid = Pyramid(len(values), header.levels, header.borrowing)
@@ -94,7 +99,8 @@ def encode_coded(
     walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
     streams = []
     for level, band in enumerate(bands):
-        stream = Stream(coder, _room(pyramid, level, head), None)
+        room = _room(pyramid, level, head) + room_of(header.contacts, len(values))
+        stream = Stream(coder, room, None)
         if level == 0:
             code_head(
                 stream, kinds_of(skeleton), head.kept.astype(np.int64), head.numbers.copy(), NAME
@@ -103,9 +109,17 @@ def encode_coded(
         rows.exponents[:] = pyramid.exponents(level, refinement)
         code = partial(rows.encode, weights.of(level))
         (walk.code_details if level else walk.code_coarsest)(level, code, band, rows.exponents)
-        streams.append(stream.finish())
+        if level < pyramid.n_details:
+            streams.append(stream.finish())
+    found = walk.values()
+    if header.contacts and head.kept.any():
+        held = walk.held(header.contacts)
+        (contacts or Keeper()).encode(
+            header.contacts, walk.metric.plan, held, stream, values, found
+        )
+    streams.append(stream.finish())
     empty = [b""] * (header.levels - pyramid.n_details)
-    return (streams[0], *empty, *streams[1:]), walk.values()
+    return (streams[0], *empty, *streams[1:]), found
 
 
 def _room(pyramid: Pyramid, level: int, head: Head) -> int:
@@ -131,6 +145,7 @@ def decode_segment(
     code_head(stream, kinds_of(skeleton), kept, numbers, where)
     head = Head(kept == 1, numbers)
     walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
+    held = walk.held(header.contacts) if header.contacts and head.kept.any() else None  # HOLD-05
     rows = RowCoder(classes[head.kept], header.start, coder, where, refining=header.refining)
     for level in range(pyramid.n_details + 1):
         if level >= len(streams):
@@ -140,7 +155,15 @@ def decode_segment(
         rows.begin(level, pyramid.kind(level), pyramid.rows(level), stream)
         found = rows.decode()
         (walk.take_details if level else walk.take_coarsest)(level, found, rows.exponents)
-    return orders.values(walk.values(), notes)
+        if level < pyramid.n_details or not held:
+            stream.check_whole(f"{where}: level {level}")
+    values = walk.values()
+    if held and len(streams) > pyramid.n_details:
+        assert header.contacts is not None
+        plan = walk.metric.plan
+        decode_contacts(header.contacts, plan, held, stream, values, f"{where}: contacts")
+        stream.check_whole(f"{where}: contacts")
+    return orders.values(values, notes)
 
 
 def kinds_of(skeleton: Skeleton) -> Ints:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.posewave.contact_plan import Contacts, Held, make_held
 from mcz.codecs.posewave.header import Header
 from mcz.codecs.posewave.metric import Metric
 from mcz.codecs.posewave.pyramid import Pyramid
@@ -62,6 +63,11 @@ class Walk:
         found = np.repeat(self.still[None], len(self.approx), axis=0)
         found[:, self.kept] = self.approx
         return found
+
+    def held(self, contacts: Contacts) -> Held:
+        """The points of contacts, as they hang from the kept channels."""
+        greatest = self.header.greatest[self.kept]
+        return make_held(contacts, self.metric.plan, self.kept, greatest)
 
     def steps(self, level: int, exponents: Ints) -> Floats:
         """The step of each row, (n_rows, 1)."""

@@ -1,0 +1,157 @@
+"""What the encoder of ``posewave`` makes of contacts: points, and the pieces that hold each.
+
+A decoder needs none of it. SPEC.md, "Held contacts", says what comes of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mcz.codecs.contract import SignalSource
+from mcz.codecs.gaps import FrameReader
+from mcz.codecs.parameters import in_range
+from mcz.codecs.posewave.contact_keeper import Piece
+from mcz.codecs.posewave.contact_plan import MAX_POINTS, MAX_RAMP, path_of
+from mcz.codecs.posewave.header import NAME
+from mcz.codecs.posewave.skeleton_plan import has_kinematics
+from mcz.codecs.segments import skeleton_of
+from mcz.errors import OptionError
+from mcz.kinematics.contacts import USUAL_RATE, FootTracks
+from mcz.kinematics.points import points_of, positions_of
+from mcz.motion import Skeleton
+
+Run = tuple[str, int, int]  # a joint whose first point stands, its first frame, how many there are
+Runs = tuple[Run, ...] | str
+
+AUTO = "auto"
+BLOCK = 1024  # frames that are looked at together
+
+SPREAD = 0.866  # of the grid against the tolerance: no place is farther from it than 0.97
+ROUNDS = 4
+RAMP_SECONDS = 1 / 15
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Fields of CONTACTS, and the pieces to hold, in the order of their points and frames."""
+
+    fields: dict[str, Any]
+    pieces: tuple[Piece, ...]
+
+
+def parse_runs(given: Any) -> Runs:
+    """Contacts as "lfoot:120+45,rfoot:160+52", or as tuples of a name and two numbers.
+
+    "auto": wherever a foot stands, by the usual rule.
+    """
+    if given == AUTO:
+        return AUTO
+    try:
+        if isinstance(given, str):
+            parts = [part.strip().rpartition(":") for part in given.split(",") if part.strip()]
+            given = [(name, *span.split("+")) for name, _, span in parts]
+        runs = tuple((str(name), int(first), int(count)) for name, first, count in given)
+    except (TypeError, ValueError):
+        raise OptionError(
+            f"contacts are {given!r}, not auto and not like lfoot:120+45,rfoot:160+52"
+        ) from None
+    for name, first, count in runs:
+        if first < 0 or count < 1:
+            raise OptionError(f"contacts: {count} frames of {name} from frame {first} on")
+    return runs
+
+
+in_range("auto, or joint:first+frames, ...", parse_runs)
+
+
+def runs_of(source: SignalSource, wanted: Runs) -> tuple[Run, ...]:
+    """What is ``wanted``, found by the rule where nobody says it.
+
+    Raises OptionError for what is beyond the clip, or where angles or lengths have no known unit,
+    and MotionError where no joint is a foot.
+    """
+    layout = source.layout
+    skeleton, n_frames = skeleton_of(NAME, layout), layout.n_frames
+    if not has_kinematics(skeleton):
+        raise OptionError(f"contacts: skeleton {skeleton.name!r} has angles of an unknown unit")
+    if isinstance(wanted, tuple):
+        for name, first, count in wanted:
+            if first + count > n_frames:
+                raise OptionError(f"contacts: {name}:{first}+{count} goes beyond {n_frames} frames")
+        return wanted
+    tracks, reader = FootTracks(skeleton, None, n_frames), FrameReader(NAME, source)
+    for start in range(0, n_frames, BLOCK):
+        values = reader.next(min(start + BLOCK, n_frames))
+        tracks.add(start, positions_of(skeleton, values))
+    rate = None if layout.frame_rate is None else float(layout.frame_rate)
+    found = tracks.contacts(rate, skeleton.up_axis)
+    return tuple((run.joint, run.first, run.n_frames) for run in found.runs)
+
+
+def choose_contacts(
+    skeleton: Skeleton, runs: Iterable[Run], tolerance: float, frame_rate: float | None
+) -> Wanted | None:
+    """What keeps the places of ``runs`` to ``tolerance``, in length units; None without runs.
+
+    Raises OptionError for a joint that is not there, or for too many.
+    """
+    by_joint: dict[int, list[tuple[int, int]]] = {}
+    for name, first, count in runs:
+        by_joint.setdefault(_joint(skeleton, name), []).append((first, first + count))
+    if not by_joint:
+        return None
+    if len(by_joint) > MAX_POINTS:
+        raise OptionError(f"contacts: {len(by_joint)} joints, {MAX_POINTS} at most")
+    step = float(np.float32(SPREAD * tolerance))
+    points: list[dict[str, Any]] = []
+    pieces: list[Piece] = []
+    for joint in sorted(by_joint):
+        tail = points_of(skeleton)[joint][0] + 1
+        points.append({"joint": joint, "tail": tail, "step": step})
+    n_stances = 0
+    for group in _groups(skeleton, sorted(by_joint)):
+        stances = _joined([span for joint in group for span in by_joint[joint]])
+        for joint in group:
+            for first, stop in _joined(by_joint[joint]):
+                stance = n_stances + sum(end <= first for _, end in stances)
+                point = sorted(by_joint).index(joint)
+                pieces.append(Piece(point, first, stop - first, first, stance))
+        n_stances += len(stances)
+    ramp = min(round(RAMP_SECONDS * (frame_rate or USUAL_RATE)), MAX_RAMP)
+    return Wanted({"rounds": ROUNDS, "ramp": ramp, "points": points}, tuple(pieces))
+
+
+def _groups(skeleton: Skeleton, joints: Sequence[int]) -> list[list[int]]:
+    """Joints of which one hangs from the other, as a toe from its foot."""
+    groups: list[list[int]] = []
+    for joint in joints:
+        path = set(path_of(skeleton.parents, joint))
+        for group in groups:
+            if not path.isdisjoint(group):
+                group.append(joint)
+                break
+        else:
+            groups.append([joint])
+    return groups
+
+
+def _joint(skeleton: Skeleton, name: str) -> int:
+    addresses = list(skeleton.addresses())
+    if name not in addresses:
+        raise OptionError(f"contacts: there is no joint {name!r}")
+    return addresses.index(name)
+
+
+def _joined(spans: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """In order, those that touch as one."""
+    found: list[tuple[int, int]] = []
+    for first, stop in sorted(spans):
+        if found and first <= found[-1][1]:
+            found[-1] = found[-1][0], max(stop, found[-1][1])
+        else:
+            found.append((first, stop))
+    return found

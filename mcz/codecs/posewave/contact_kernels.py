@@ -1,0 +1,233 @@
+"""Compiled: where points are, and the least change of a pose that brings them to their places.
+
+SPEC.md, "Held contacts", is normative. How large a change is says the metric of the pose: so no
+knee is bent far where the body can move by a hair instead. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mcz.codecs.posewave.apply_kernels import row_out_of
+from mcz.codecs.posewave.contact_plan import START_UNITS, Held
+from mcz.codecs.posewave.displacement_kernels import Track
+from mcz.codecs.posewave.metric_kernels import factor_rows
+from mcz.codecs.posewave.pose_kernels import Lanes, place_joints
+from mcz.codecs.posewave.skeleton_plan import Floats, Ints, Plan
+from mcz.codecs.posewave.turns import BEYOND
+from mcz.jit import inner, kernel
+
+DAMPING = 2.0**-14  # of the trace of the normal equations
+LEAST_DAMPING = 2.0**-100
+GREATEST_PULL = 2.0**100
+LEANING, STANDING = 1, 2  # a point before or after a contact, and in one
+
+
+@kernel
+def place(plan: Plan, held: Held, values: Floats, found: Floats) -> None:
+    """Fill ``found`` (n_points, n_frames, 3) with places in frames ``values`` (n_frames, ...)."""
+    batch = (
+        np.empty((len(plan.turns), 1)),
+        np.empty((len(plan.turns), 1)),
+        np.empty((9, 1)),
+        np.empty((len(plan.parents) + 1, 9, 1)),
+        np.empty((len(plan.parents) + 1, 3, 1)),
+        np.zeros((len(plan.joints), 6, 1)),
+    )
+    for n in range(found.shape[1]):
+        place_joints(plan, values, n, batch, 1)
+        for k in range(len(held.joints)):
+            _place_point(plan, held, k, values[n], batch, found[k, n])
+
+
+@kernel
+def aim(
+    places: Floats, contacts: Track, step: float, ramp: int, shifts: Floats, active: Ints
+) -> None:
+    """How far a point, at ``places`` (n_frames, 3), is to be from there, and when.
+
+    ``shifts`` (n_frames, 3) and ``active`` (n_frames,) are filled.
+    """
+    stands, starts, moves = contacts
+    n_frames, first = len(stands), 0
+    for f in range(n_frames):
+        if stands[f] == 0:
+            continue
+        first = f if stands[f] == 1 else first
+        active[f] = STANDING
+        for i in range(3):
+            start = places[first, i] + starts[first, i] / START_UNITS * step
+            shifts[f, i] = (start + moves[f, i] * step) - places[f, i]
+    last = -1 - ramp
+    for f in range(n_frames):
+        if stands[f] == 1 and (starts[f, 0] != 0 or starts[f, 1] != 0 or starts[f, 2] != 0):
+            span = min(ramp, f - 1 - last)
+            for n in range(1, min(span, f) + 1):
+                _lean(f, f - n, 1.0 - n / (span + 1.0), shifts, active)
+        if stands[f] != 0 and (f == n_frames - 1 or stands[f + 1] != 2):
+            last, span = f, 0
+            while span < ramp and (f + span + 1 >= n_frames or stands[f + span + 1] == 0):
+                span += 1
+            for n in range(1, min(span, n_frames - 1 - f) + 1):
+                _lean(f, f + n, 1.0 - n / (span + 1.0), shifts, active)
+
+
+@inner
+def _lean(end: int, f: int, share: float, shifts: Floats, active: Ints) -> None:
+    """Shift a frame in no contact by a share of what one at the end of a contact is shifted by."""
+    active[f] = LEANING
+    for i in range(3):
+        shifts[f, i] += share * shifts[end, i]
+
+
+@kernel
+def correct(
+    plan: Plan, held: Held, values: Floats, active: Ints, shifts: Floats, rounds: int
+) -> None:
+    """Shift the points in frames ``values`` (n_frames, n_channels), in place.
+
+    ``active`` (n_points, n_frames) is not 0 where a point is to be ``shifts`` (n_points, n_frames,
+    3) away from where it is. Points that only lean to a contact are left alone after a round.
+    """
+    n_points, n_kept = len(held.joints), len(plan.joints)
+    batch = (
+        np.empty((len(plan.turns), 1)),
+        np.empty((len(plan.turns), 1)),
+        np.empty((9, 1)),
+        np.empty((len(plan.parents) + 1, 9, 1)),
+        np.empty((len(plan.parents) + 1, 3, 1)),
+        np.zeros((n_kept, 6, 1)),
+    )
+    pose, packed = np.empty((1, values.shape[1])), np.empty((1, len(plan.path), 1))
+    points, goals = np.empty((n_points, 3)), np.empty((n_points, 3))
+    pulls, square = np.zeros((3 * n_points, n_kept)), np.zeros((3 * n_points, 3 * n_points))
+    wanted, pivots = np.zeros(3 * n_points), np.zeros(3 * n_points)
+    row, change, total = np.zeros(n_kept), np.zeros(n_kept), np.zeros(n_kept)
+    which = np.zeros(n_points, np.int64)
+    for n in range(len(values)):
+        n_active = _note_active(active, n, LEANING, which)
+        if n_active == 0:
+            continue
+        for c in range(values.shape[1]):
+            pose[0, c] = values[n, c]
+        for c in range(n_kept):
+            total[c] = 0.0
+        factor_rows(plan, pose, packed, 1, 1)
+        factor = packed[0, :, 0]
+        n_next = 0
+        for turn in range(rounds):
+            place_joints(plan, pose, 0, batch, 1)
+            for a in range(n_active):
+                k = which[a]
+                _place_point(plan, held, k, pose[0], batch, points[k])
+                for i in range(3):
+                    if turn == 0:
+                        goals[k, i] = points[k, i] + shifts[k, n, i]
+                    wanted[3 * a + i] = goals[k, i] - points[k, i]
+                _note_pulls(plan, held, k, batch, factor, pulls[3 * a :])
+            if turn == 0:
+                n_next = _note_active(active, n, STANDING, which)
+            _solve(pulls, wanted, square, pivots, 3 * n_active)
+            for c in range(n_kept):
+                row[c] = 0.0
+            for a in range(3 * n_active):
+                for c in range(n_kept):
+                    row[c] += pulls[a, c] * wanted[a]
+            row_out_of(plan, factor, row, change)
+            for c in range(n_kept):
+                limit = held.limits[c]
+                total[c] = min(max(total[c] + change[c], -limit), limit)
+                pose[0, held.columns[c]] = values[n, held.columns[c]] + total[c]
+            n_active = n_next
+            if n_active == 0:
+                break
+        for c in range(n_kept):
+            values[n, held.columns[c]] = pose[0, held.columns[c]]
+
+
+@inner
+def _note_active(active: Ints, n: int, least: int, which: Ints) -> int:
+    """Which points are that active in a frame, and how many."""
+    found = 0
+    for k in range(len(active)):
+        if active[k, n] >= least:
+            which[found] = k
+            found += 1
+    return found
+
+
+@inner
+def _place_point(plan: Plan, held: Held, k: int, row: Floats, batch: Lanes, point: Floats) -> None:
+    """Where point ``k`` is: from its root on as the joints are placed, and where the root is."""
+    joint, root = held.joints[k], held.roots[k]
+    own, origin = batch[3][joint + 1], batch[4][joint + 1]
+    x, y, z = held.tails[k, 0], held.tails[k, 1], held.tails[k, 2]
+    for i in range(3):
+        way = own[3 * i, 0] * x + own[3 * i + 1, 0] * y + own[3 * i + 2, 0] * z
+        point[i] = origin[i, 0] + way
+    for move in range(plan.move_starts[root], plan.move_starts[root + 1]):
+        value = row[plan.moves[move, 0]]
+        value = value if abs(value) < BEYOND else 0.0
+        for i in range(3):
+            point[i] += value * plan.directions[move, i]
+
+
+@inner
+def _note_pulls(
+    plan: Plan, held: Held, k: int, batch: Lanes, factor: Floats, pulls: Floats
+) -> None:
+    """How the channels move point ``k``, in the metric: three rows of J R^-1."""
+    joint = held.joints[k]
+    own, origin, motions = batch[3][joint + 1], batch[4][joint + 1], batch[5]
+    x, y, z = held.tails[k, 0], held.tails[k, 1], held.tails[k, 2]
+    a = origin[0, 0] + (own[0, 0] * x + own[1, 0] * y + own[2, 0] * z)
+    b = origin[1, 0] + (own[3, 0] * x + own[4, 0] * y + own[5, 0] * z)
+    c = origin[2, 0] + (own[6, 0] * x + own[7, 0] * y + own[8, 0] * z)
+    for i in range(3):
+        for number in range(pulls.shape[1]):
+            pulls[i, number] = 0.0
+    for at in range(held.starts[k], held.starts[k + 1]):
+        number = held.chains[at]
+        motion = motions[number]
+        u, v, w = motion[0, 0], motion[1, 0], motion[2, 0]
+        pulls[0, number] = motion[3, 0] + (v * c - w * b)
+        pulls[1, number] = motion[4, 0] + (w * a - u * c)
+        pulls[2, number] = motion[5, 0] + (u * b - v * a)
+    for i in range(3):
+        for back in range(held.starts[k + 1] - held.starts[k]):
+            number = held.chains[held.starts[k + 1] - 1 - back]
+            last = plan.starts[number + 1] - 1
+            pull = min(max(pulls[i, number], -GREATEST_PULL), GREATEST_PULL)
+            for at in range(plan.starts[number], last):
+                pulls[i, plan.path[at]] -= factor[at] * pull
+            pulls[i, number] = min(max(pull * factor[last], -GREATEST_PULL), GREATEST_PULL)
+
+
+@inner
+def _solve(pulls: Floats, wanted: Floats, square: Floats, pivots: Floats, n: int) -> None:
+    """Make ``wanted`` the solution of (pulls pulls' + damping) x = wanted, by L D L'."""
+    trace = 0.0
+    for i in range(n):
+        for k in range(i + 1):
+            entry = 0.0
+            for c in range(pulls.shape[1]):
+                entry += pulls[i, c] * pulls[k, c]
+            square[i, k] = entry
+        trace += square[i, i]
+    damping = DAMPING * trace + LEAST_DAMPING
+    for i in range(n):
+        for k in range(i + 1):
+            entry = square[i, k] + (damping if i == k else 0.0)
+            for m in range(k):
+                entry -= square[i, m] * square[k, m] * pivots[m]
+            if i == k:
+                pivots[i] = max(entry, damping)
+            else:
+                square[i, k] = entry / pivots[k]
+        for k in range(i):
+            wanted[i] -= square[i, k] * wanted[k]
+    for back in range(n):
+        i = n - 1 - back
+        wanted[i] = wanted[i] / pivots[i]
+        for k in range(i + 1, n):
+            wanted[i] -= square[k, i] * wanted[k]

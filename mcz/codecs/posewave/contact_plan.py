@@ -1,0 +1,125 @@
+"""What contacts of a segment rest on: the points that are held, and the channels that move them.
+
+SPEC.md, "Held contacts", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from construct import ExprValidator, Float32l, Int8ul, Struct
+
+from mcz.codecs.posewave.skeleton_plan import PLAIN, Floats, Ints, Plan, limited, orientation
+from mcz.codecs.posewave.turns import RULES
+from mcz.errors import FormatError
+from mcz.motion import Skeleton
+from mcz.schema import UVARINT, counted
+
+MAX_POINTS = 8
+MAX_ROUNDS = 8
+MAX_RAMP = 64
+START_UNITS = 16  # of a step, in which the place is told that a contact begins with
+MOST_STEPS = 4.0  # greatest steps by which a channel may be corrected
+
+POINT = Struct(
+    "joint" / UVARINT * "whose point it is",
+    "tail" / UVARINT * "0: the origin of the joint; else the number of a tail, from 1",
+    "step"
+    / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)  # HOLD-03
+    * "grid of its displacements, in length units, 2^-60 to 2^60",
+)
+CONTACTS = Struct(
+    "rounds"
+    / ExprValidator(Int8ul, lambda n, ctx: 1 <= n <= MAX_ROUNDS)  # HOLD-01
+    * "in which a pose is corrected, 1 to 8",
+    "ramp"
+    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_RAMP)  # HOLD-01
+    * "frames before and after a contact in which its correction comes and goes, 0 to 64",
+    "points" / counted(POINT, MAX_POINTS) * "that are held, 1 to 8",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """The fields of CONTACTS, checked against a skeleton.
+
+    ``joints`` and ``steps`` of the points, and their places ``tails`` (n_points, 3) along the
+    joint's B.
+    """
+
+    rounds: int
+    ramp: int
+    joints: tuple[int, ...]
+    tails: Floats
+    steps: tuple[float, ...]
+
+
+class Held(NamedTuple):
+    """The points of contacts in a segment, as the kernels want them.
+
+    ``joints`` (n_points,) and ``tails`` (n_points, 3), along the joint's B; ``roots`` (n_points,)
+    are the joints that they hang from. ``chains`` are the kept channels that move a point,
+    ascending, those of point k from ``starts[k]`` on. ``limits`` (n_kept,): how far a channel may
+    be corrected; ``columns`` (n_kept,).
+    """
+
+    joints: Ints
+    tails: Floats
+    roots: Ints
+    chains: Ints
+    starts: Ints
+    limits: Floats
+    columns: Ints
+
+
+def parse_contacts(fields: Sequence[Any], skeleton: Skeleton, where: str) -> Contacts | None:
+    """Raises FormatError where the fields do not fit the skeleton."""
+    for found in fields:
+        if not found.points:  # HOLD-02
+            raise FormatError(f"{where}: contacts of no point")
+        return Contacts(
+            rounds=found.rounds,
+            ramp=found.ramp,
+            joints=tuple(point.joint for point in found.points),
+            tails=np.array([_place(skeleton, p.joint, p.tail, where) for p in found.points]),
+            steps=tuple(point.step for point in found.points),
+        )
+    return None
+
+
+def _place(skeleton: Skeleton, joint: int, tail: int, where: str) -> tuple[float, float, float]:
+    if joint >= skeleton.n_joints or tail > len(skeleton.joints[joint].tails):  # HOLD-04
+        raise FormatError(f"{where}: contacts of point {tail} of joint {joint}")
+    if not tail:
+        return 0.0, 0.0, 0.0
+    x, y, z = (limited(x) for x in skeleton.joints[joint].tails[tail - 1])
+    m = orientation(skeleton.joints[joint], RULES[skeleton.angle_unit])
+    a, b, c = (m[0][k] * x + m[1][k] * y + m[2][k] * z for k in range(3))
+    return a, b, c
+
+
+def path_of(parents: Sequence[int] | Ints, joint: int) -> list[int]:
+    """The joints from the root down to ``joint``."""
+    path = [joint]
+    while parents[path[-1]] >= 0:
+        path.append(int(parents[path[-1]]))
+    return path[::-1]
+
+
+def make_held(contacts: Contacts, plan: Plan, columns: Ints, greatest: Floats) -> Held:
+    """The points on a plan; ``columns`` and ``greatest`` steps are those of the kept channels."""
+    paths = [path_of(plan.parents, joint) for joint in contacts.joints]
+    moving = plan.joints != PLAIN
+    chains = [np.flatnonzero(moving & np.isin(plan.joints, path)) for path in paths]
+    return Held(
+        joints=np.array(contacts.joints, np.int64),
+        tails=contacts.tails,
+        roots=np.array([path[0] for path in paths], np.int64),
+        chains=np.concatenate(chains).astype(np.int64),
+        starts=np.cumsum([0, *map(len, chains)], dtype=np.int64),
+        limits=MOST_STEPS * greatest,
+        columns=columns.astype(np.int64),
+    )

@@ -1,0 +1,164 @@
+"""Contacts: frames in which a point keeps the displacement that it has in the source.
+
+SPEC.md, "Held contacts", is normative. They come after the finest details. A stream tells how a
+point moves, on a fine grid, and a decoder changes the pose as little as it can to put it there.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.posewave.contact_plan import Contacts, Held
+from mcz.codecs.posewave.rows import Stream
+from mcz.codecs.posewave.skeleton_plan import Plan
+from mcz.coding.logistic import rate_table, squash_table, stretch_table
+from mcz.errors import FormatError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+USUAL = 0.4375, -0.3125, 0.15625, 0.4375, 0.3125, -0.0625, -0.3125
+# Of a mean magnitude, class by class: how likely one is not 0, and how likely it is greater yet.
+SOME = (
+    *(3840, 7424, 11008, 15616, 21760, 29184, 36864, 44544),
+    *(50688, 55296, 58624, 60928, 62464, 63488, 64256, 64512),
+)
+MORE = (
+    *(2048, 4096, 5888, 8960, 13056, 18688, 25856, 33536),
+    *(41216, 47872, 52992, 56832, 59648, 61440, 62720, 63744),
+)
+ROOM = 64  # bytes of a frame
+CERTAIN = 8  # as if each had been seen so often
+WEIGHT = 26214  # of each opinion, in 2^-16
+
+
+@cache
+def _kernels() -> Any:
+    from mcz.codecs.posewave import contact_kernels
+
+    return contact_kernels
+
+
+@cache
+def _coding() -> Any:
+    from mcz.codecs.posewave import displacement_kernels
+
+    return displacement_kernels
+
+
+@cache
+def _mixing() -> Any:
+    from mcz.coding import mixing
+
+    return mixing
+
+
+class Coder:
+    """Codes contacts behind the rows of a stream, with contexts of its own."""
+
+    def __init__(self, stream: Stream) -> None:
+        coding, mixing = _coding(), _mixing()
+        self.stream = stream
+        models = np.tile(np.array([32768, 0], np.int64), coding.N_CONTEXTS)
+        likely = np.repeat(np.array([MORE], np.int64).T, coding.N_BITS, axis=1)
+        likely[:, 0] = SOME
+        for first in (coding.C_FAST, coding.C_SLOW, coding.C_OTHER):
+            own = slice(2 * first, 2 * (first + likely.size))
+            models[own] = np.stack([likely.ravel(), np.full(likely.size, CERTAIN)], axis=1).ravel()
+        self.state = np.zeros(mixing.MODELS, np.int64)
+        self.state[mixing.SQUASH : mixing.SQUASH + 4096] = squash_table()
+        self.state[mixing.STRETCH : mixing.STRETCH + 4096] = stretch_table()
+        self.state[mixing.RATES : mixing.RATES + len(rate_table())] = rate_table()
+        self.state[mixing.WEIGHTS : mixing.MODELS] = WEIGHT
+        self.state = np.concatenate([self.state, models])
+        self.state[: mixing.SQUASH] = stream.coder[: mixing.SQUASH]
+        shape = coding.N_FEATURES
+        self.learner = coding.Learner(
+            squares=np.zeros((3, shape, shape)),
+            products=np.zeros((3, shape)),
+            weights=np.tile(np.array(USUAL), (3, 1)),
+            usual=np.array(USUAL),
+            sizes=np.full((3, 2), 2.0),
+            features=np.zeros((3, shape)),
+            means=np.zeros(3),
+            scratch=np.zeros((9, shape)),
+        )
+
+    def point(
+        self,
+        places: Floats,
+        step: float,
+        track: tuple[Ints, Ints, Ints],
+        wanted: Floats,
+        radii: Floats,
+    ) -> int:
+        """Code the contacts of a point in place; -1, or the frame of one that is impossible."""
+        args = self.learner, places, step, track, wanted, radii
+        return int(_coding().code_point(self.state, self.stream.data, *args))
+
+    def close(self) -> None:
+        """Let the stream go on, or end."""
+        self.stream.coder[: _mixing().SQUASH] = self.state[: _mixing().SQUASH]
+
+
+class Corrections:
+    """Where points are and where contacts have them.
+
+    By point and frame: ``places`` (..., 3), in length units, ``stands``, ``starts`` (..., 3) and
+    ``moves`` (..., 3), as ``displacement_kernels`` has them.
+    """
+
+    def __init__(self, contacts: Contacts, plan: Plan, held: Held, values: Floats) -> None:
+        self.contacts, self.plan, self.held, self.values = contacts, plan, held, values
+        self.places = self.placed(values)
+        self.stands = np.zeros(self.places.shape[:2], np.int64)
+        self.starts = np.zeros(self.places.shape, np.int64)
+        self.moves = np.zeros(self.places.shape, np.int64)
+
+    def placed(self, values: Floats) -> Floats:
+        """Where the points are in frames ``values``, (n_points, n_frames, 3)."""
+        found = np.empty((len(self.contacts.joints), len(values), 3))
+        _kernels().place(self.plan, self.held, values, found)
+        return found
+
+    def track(self, point: int) -> tuple[Ints, Ints, Ints]:
+        return self.stands[point], self.starts[point], self.moves[point]
+
+    def code(self, coder: Coder, point: int, wanted: Floats, radii: Floats) -> int:
+        """As ``Coder.point``."""
+        places = np.pad(self.places[point], ((1, 1), (0, 0)), "edge")
+        return coder.point(places, self.contacts.steps[point], self.track(point), wanted, radii)
+
+    def correct(self) -> None:
+        """Change the values so that the points are where they should be."""
+        shifts, active = np.zeros(self.places.shape), np.zeros_like(self.stands)
+        for point, step in enumerate(self.contacts.steps):
+            goal = shifts[point], active[point]
+            _kernels().aim(self.places[point], self.track(point), step, self.contacts.ramp, *goal)
+        rounds = self.contacts.rounds
+        _kernels().correct(self.plan, self.held, self.values, active, shifts, rounds)
+
+
+def room_of(contacts: Contacts | None, n_frames: int) -> int:
+    """As many bytes as the contacts of a segment may take."""
+    return ROOM * (n_frames + 1) * len(contacts.joints) + 64 if contacts else 0
+
+
+def decode_contacts(
+    contacts: Contacts, plan: Plan, held: Held, stream: Stream, values: Floats, where: str
+) -> None:
+    """Correct ``values`` (n_frames, n_channels) in place."""
+    corrections, coder = Corrections(contacts, plan, held, values), Coder(stream)
+    nothing = np.zeros((1, 3)), np.zeros(1)
+    for point in range(len(contacts.joints)):
+        fault = corrections.code(coder, point, *nothing)
+        if fault >= 0:
+            raise FormatError(
+                f"{where}: a contact of point {point} at or after frame {fault} is out of range"
+            )
+    coder.close()
+    corrections.correct()

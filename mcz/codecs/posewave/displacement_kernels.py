@@ -1,0 +1,313 @@
+"""Compiled: contacts in a stream: when they are, and how their points move.
+
+SPEC.md, "Held contacts", is normative. One function serves encoder and decoder. Imported on first
+use only.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mcz.codecs.posewave import head_kernels as head
+from mcz.codecs.posewave.contact_plan import START_UNITS
+from mcz.codecs.posewave.head_kernels import code_number
+from mcz.codecs.posewave.skeleton_plan import Floats
+from mcz.coding.mixing import ENCODING, Bytes, Ints, adaptive, mixed
+from mcz.jit import inner, kernel
+
+# What a number is about, of the contexts of ``code_number``.
+COUNT, GAP, LENGTH, START, ESCAPE = range(5)
+N_SIZES, N_BITS = 16, 16  # classes of magnitudes; bits of a magnitude before it escapes
+C_FAST = head.N_CONTEXTS
+C_SLOW = C_FAST + N_SIZES * N_BITS
+C_OTHER = C_SLOW + N_SIZES * N_BITS
+C_SIGN = C_OTHER + N_SIZES * N_BITS
+C_MOVED = C_SIGN + 8
+N_CONTEXTS = C_MOVED + 1
+
+MAX_DISPLACEMENT = 1 << 30  # in steps
+N_FEATURES = 7
+DECAY = 255.0 / 256.0
+RIDGE = 64.0
+FARTHEST = 4096.0  # steps of a frame's movement
+
+
+class Learner(NamedTuple):
+    """What was learned of how points move, axis by axis.
+
+    ``squares`` (3, 7, 7) and ``products`` (3, 7) of features; ``weights`` (3, 7); ``usual`` (7,),
+    what they begin with; ``sizes`` (3, 2) of residuals, fast and slow; ``features`` (3, 7) and
+    ``means`` (3,) of the next move; ``scratch`` (9, 7).
+    """
+
+    squares: Floats
+    products: Floats
+    weights: Floats
+    usual: Floats
+    sizes: Floats
+    features: Floats
+    means: Floats
+    scratch: Floats
+
+
+# Of a point, frame by frame: ``stands`` (n_frames,), 1 in the first frame of a contact, 2 in the
+# others; ``starts`` (n_frames, 3), how far the contact begins from the decoded place, in
+# ``START_UNITS`` of a step, and ``moves`` (n_frames, 3), displacements from there, in steps.
+Track = tuple[Ints, Ints, Ints]
+
+
+@kernel
+def code_point(
+    state: Ints,
+    data: Bytes,
+    learner: Learner,
+    places: Floats,
+    step: float,
+    contacts: Track,
+    wanted: Floats,
+    radii: Floats,
+) -> int:
+    """Code the contacts of a point, in place; -1, or the frame where one is impossible.
+
+    ``places`` (n_frames + 2, 3), the first and the last of them twice, ``wanted`` (n_frames, 3),
+    displacements, and ``radii`` (n_frames,) are in length units. Of displacements an encoder
+    chooses what is cheap among what is no farther than ``radii`` from ``wanted``.
+    """
+    stands, starts, moves = contacts
+    n_frames, before = len(stands), 0
+    place = np.zeros((n_frames + 2, 3))
+    for f in range(n_frames + 2):
+        for i in range(3):
+            place[f, i] = places[f, i] / step
+    goals, anchor = np.zeros(wanted.shape), np.zeros(3)
+    for f in range(len(wanted)):
+        for i in range(3):
+            goals[f, i] = wanted[f, i] / step
+    count = 0
+    if state[ENCODING]:
+        for f in range(n_frames):
+            count += 1 if stands[f] == 1 else 0
+    count = code_number(state, data, 0, COUNT, count)
+    if count < 0 or count > n_frames:  # HOLD-06
+        return 0
+    for _ in range(count):
+        first = length = 0
+        if state[ENCODING]:
+            first = _next_first(stands, before)
+            length = _length(stands, first)
+        first = before + code_number(state, data, 0, GAP, first - before)
+        length = 1 + code_number(state, data, 0, LENGTH, length - 1)
+        if first < before or length < 1 or first + length > n_frames:  # HOLD-07
+            return before
+        for t in range(length):
+            stands[first + t] = 2 if t else 1
+        fault = _code_start(state, data, starts[first])
+        for i in range(3):
+            anchor[i] = place[first + 1, i] + starts[first, i] / START_UNITS
+        for t in range(1, length):
+            if fault == 0:
+                at = first + t
+                _note_features(learner, place, anchor, moves, first, t, learner.features)
+                if state[ENCODING]:
+                    _choose(learner, moves[at - 1], goals[at], radii[at] / step, moves[at])
+                fault = _code_move(state, data, learner, moves[at - 1], moves[at])
+        if fault:
+            return first
+        before = first + length
+    return -1
+
+
+@inner
+def _next_first(stands: Ints, before: int) -> int:
+    first = before
+    while stands[first] != 1:
+        first += 1
+    return first
+
+
+@inner
+def _length(stands: Ints, first: int) -> int:
+    length = 1
+    while first + length < len(stands) and stands[first + length] == 2:
+        length += 1
+    return length
+
+
+@inner
+def _code_start(state: Ints, data: Bytes, move: Ints) -> int:
+    """Code the displacement that a contact begins with."""
+    moved = 1 if move[0] != 0 or move[1] != 0 or move[2] != 0 else 0
+    if adaptive(state, data, moved, C_MOVED):
+        for i in range(3):
+            found = code_number(state, data, 0, START, move[i])
+            if abs(found) > MAX_DISPLACEMENT:  # HOLD-08
+                return 1
+            move[i] = found
+    return 0
+
+
+@inner
+def _code_move(state: Ints, data: Bytes, learner: Learner, last: Ints, move: Ints) -> int:
+    """Code a displacement after the ``last`` in place; 1 where it is too large."""
+    other, odd = 0.0, 0
+    for axis in range(3):
+        mean = learner.means[axis] + last[axis]
+        middle = _nearest(mean, axis, odd)
+        unit = 1 if axis == 0 else 2
+        side = int(np.floor((mean - middle) * 4.0 / unit)) + 2  # 0 to 4
+        residual = (move[axis] - middle) // unit
+        found = _code_residual(state, data, residual, learner.sizes[axis], other, side)
+        move[axis] = middle + unit * found
+        if abs(move[axis]) > MAX_DISPLACEMENT:  # HOLD-09
+            return 1
+        odd = move[0] & 1
+        size = float(min(abs(found), 1024))
+        other = size if axis == 0 else 0.5 * (other + size)
+        learner.sizes[axis, 0] += (size - learner.sizes[axis, 0]) * 0.25
+        learner.sizes[axis, 1] += (size - learner.sizes[axis, 1]) * 0.03125
+        _learn(learner, axis, learner.features[axis], float(move[axis] - last[axis]))
+    return 0
+
+
+@inner
+def _nearest(value: float, axis: int, odd: int) -> int:
+    """The integer next to ``value``; of y and z that which is odd or even as x is."""
+    if axis == 0:
+        return int(np.floor(value + 0.5))
+    return 2 * int(np.floor((value - odd) * 0.5 + 0.5)) + odd
+
+
+@inner
+def _limit(value: float) -> float:
+    return min(max(value, -FARTHEST), FARTHEST)
+
+
+@inner
+def _note_features(
+    learner: Learner,
+    places: Floats,
+    anchor: Floats,
+    moves: Ints,
+    first: int,
+    t: int,
+    features: Floats,
+) -> None:
+    """The last three moves, those of the decoded point around, and how far it is to be moved.
+
+    ``places[f + 1]`` is where it is in frame f.
+    """
+    at = first + t
+    for axis in range(3):
+        for back in range(3):
+            moved = 0.0
+            if t > back + 1:
+                moved = float(moves[at - 1 - back, axis] - moves[at - 2 - back, axis])
+            features[axis, back] = _limit(moved)
+            features[axis, 3 + back] = _limit(places[at + back, axis] - places[at + back - 1, axis])
+        features[axis, 6] = _limit(anchor[axis] + moves[at - 1, axis] - places[at, axis])
+        learner.means[axis] = _expect(learner, axis, features[axis])
+
+
+@inner
+def _expect(learner: Learner, axis: int, features: Floats) -> float:
+    mean = 0.0
+    for i in range(N_FEATURES):
+        mean += learner.weights[axis, i] * features[i]
+    return _limit(mean)
+
+
+@inner
+def _learn(learner: Learner, axis: int, features: Floats, moved: float) -> None:
+    """Weights of least squares, drawn to the usual ones."""
+    rest = _limit(moved)
+    for i in range(N_FEATURES):
+        rest -= learner.usual[i] * features[i]
+    squares, products = learner.squares[axis], learner.products[axis]
+    for i in range(N_FEATURES):
+        products[i] = products[i] * DECAY + rest * features[i]
+        for k in range(i + 1):
+            squares[i, k] = squares[i, k] * DECAY + features[i] * features[k]
+    _solve(squares, products, learner.weights[axis], learner.scratch)
+    for i in range(N_FEATURES):
+        learner.weights[axis, i] += learner.usual[i]
+
+
+@inner
+def _solve(squares: Floats, products: Floats, found: Floats, scratch: Floats) -> None:
+    """(squares + ridge) found = products, by L D L'; row 7 of ``scratch`` has D."""
+    for i in range(N_FEATURES):
+        for k in range(i + 1):
+            entry = squares[i, k] + (RIDGE if i == k else 0.0)
+            for n in range(k):
+                entry -= scratch[i, n] * scratch[k, n] * scratch[7, n]
+            if i == k:
+                scratch[7, i] = max(entry, RIDGE)
+            else:
+                scratch[i, k] = entry / scratch[7, k]
+    for i in range(N_FEATURES):
+        entry = products[i]
+        for n in range(i):
+            entry -= scratch[i, n] * scratch[8, n]
+        scratch[8, i] = entry
+    for back in range(N_FEATURES):
+        i = N_FEATURES - 1 - back
+        entry = scratch[8, i] / scratch[7, i]
+        for n in range(i + 1, N_FEATURES):
+            entry -= scratch[n, i] * found[n]
+        found[i] = entry
+
+
+@inner
+def _choose(learner: Learner, before: Ints, wanted: Floats, radius: float, chosen: Ints) -> None:
+    """The displacement near ``wanted`` that the expected one makes cheapest."""
+    best = -1.0
+    for place in range(54):
+        odd = place // 27
+        x = 2 * int(np.floor((wanted[0] - odd) * 0.5 + 0.5)) + odd + 2 * (place % 3 - 1)
+        y = _nearest(wanted[1], 1, odd) + 2 * (place // 3 % 3 - 1)
+        z = _nearest(wanted[2], 2, odd) + 2 * (place // 9 % 3 - 1)
+        a, b, c = wanted[0] - x, wanted[1] - y, wanted[2] - z
+        off = a * a + b * b + c * c
+        cost = abs(x - before[0] - learner.means[0]) / (1.0 + learner.sizes[0, 0])
+        cost += abs(y - before[1] - learner.means[1]) / (2.0 + 2.0 * learner.sizes[1, 0])
+        cost += abs(z - before[2] - learner.means[2]) / (2.0 + 2.0 * learner.sizes[2, 0])
+        if off > radius * radius:
+            cost += 1e6 * off
+        if best < 0.0 or cost < best:
+            best = cost
+            chosen[0], chosen[1], chosen[2] = x, y, z
+
+
+@inner
+def _class_of(size: float) -> int:
+    """0 to 15, about two to an octave of a mean magnitude."""
+    found, limit = 0, 0.1
+    while size > limit and found < N_SIZES - 1:
+        limit = limit * 1.5
+        found += 1
+    return found
+
+
+@inner
+def _code_residual(
+    state: Ints, data: Bytes, residual: int, sizes: Floats, other: float, side: int
+) -> int:
+    """Code an integer: its magnitude in unary, its sign."""
+    a = C_FAST + N_BITS * _class_of(sizes[0])
+    b = C_SLOW + N_BITS * _class_of(sizes[1])
+    c = C_OTHER + N_BITS * _class_of(other)
+    magnitude, size = abs(residual), 0
+    while size < N_BITS:
+        more = 1 if magnitude > size else 0
+        if not mixed(state, data, more, size, a + size, b + size, c + size):
+            break
+        size += 1
+    if size == N_BITS:
+        more = code_number(state, data, 0, ESCAPE, magnitude - N_BITS)
+        size = N_BITS + more if 0 <= more < MAX_DISPLACEMENT else 4 * MAX_DISPLACEMENT
+    if size == 0:
+        return 0
+    negative = adaptive(state, data, 1 if residual < 0 else 0, C_SIGN + side)
+    return -size if negative else size
