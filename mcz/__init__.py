@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mcz.errors import (
         AccessError,
         ChecksumError,
+        ContactWarning,
         ExistsError,
         FormatError,
         LimitError,
@@ -63,6 +64,7 @@ _HOMES = {
     "mcz.errors": (
         "AccessError",
         "ChecksumError",
+        "ContactWarning",
         "ExistsError",
         "FormatError",
         "LimitError",
@@ -103,6 +105,7 @@ __all__ = [
     "Clip",
     "Comparison",
     "Contact",
+    "ContactWarning",
     "Contacts",
     "Event",
     "Exceptions",

@@ -25,7 +25,14 @@ from mcz.cli.terminal import printable as printable
 from mcz.cli.terminal import say as say
 from mcz.cli.terminal import say_json
 from mcz.cli.terminal import text_output as text_output
-from mcz.errors import AccessError, ExistsError, MczError, OptionError, SkeletonWarning
+from mcz.errors import (
+    AccessError,
+    ContactWarning,
+    ExistsError,
+    MczError,
+    OptionError,
+    SkeletonWarning,
+)
 
 if TYPE_CHECKING:
     from mcz.reading.file import File
@@ -113,15 +120,19 @@ def run(command: click.Command, prog: str, arguments: Sequence[str] | None = Non
     return int(result or Exit.FINE)
 
 
+OURS = SkeletonWarning, ContactWarning
+
+
 @contextmanager
 def _warnings_said() -> Iterator[None]:
     """Let what the library warns of become lines on standard error, each once."""
     with warnings.catch_warnings():
-        warnings.simplefilter("once", SkeletonWarning)
+        for category in OURS:
+            warnings.simplefilter("once", category)
         show = warnings.showwarning
 
         def said(message: Warning | str, category: type[Warning], *where: Any, **to: Any) -> None:
-            if issubclass(category, SkeletonWarning):
+            if issubclass(category, OURS):
                 say(str(message))
             else:
                 show(message, category, *where, **to)

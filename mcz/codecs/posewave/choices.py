@@ -24,7 +24,7 @@ from mcz.codecs.posewave.segment import Weights, encode_coded
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
 from mcz.codecs.steps import code_of
-from mcz.errors import MotionError
+from mcz.errors import MotionError, OptionError
 from mcz.kinematics import reach
 from mcz.kinematics.chain import chain_of
 from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
@@ -90,6 +90,11 @@ def _contacts(
     if not params.get("contacts") or not source.layout.n_frames:
         return [], None
     skeleton, rate = skeleton_of(NAME, source.layout), source.layout.frame_rate
+    if skeleton.unit_cm is None:
+        raise OptionError(
+            f"contacts: skeleton {skeleton.name!r}: its length unit is unknown, and a tolerance is "
+            "in cm; give the unit (--unit)"
+        )
     tolerance = params["contact_tolerance"] * in_cm
     runs = runs_of(source, params["contacts"])
     wanted = choose_contacts(skeleton, runs, tolerance, None if rate is None else float(rate))

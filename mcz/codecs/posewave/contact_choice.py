@@ -5,6 +5,7 @@ A decoder needs none of it. SPEC.md, "Held contacts", says what comes of it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,10 +25,11 @@ from mcz.kinematics.contacts import USUAL_RATE, FootTracks
 from mcz.kinematics.points import points_of, positions_of
 from mcz.motion import Skeleton
 
-Run = tuple[str, int, int]  # a joint whose first point stands, its first frame, how many there are
+Run = tuple[str, int, int]  # a joint whose first point stands, its first frame, how many frames
 Runs = tuple[Run, ...] | str
 
 AUTO = "auto"
+_ENTRY = re.compile(r"(?P<name>.+?)(?::(?P<first>\d+)\+(?P<count>\d+))?")
 BLOCK = 1024  # frames that are looked at together
 
 SPREAD = 0.866  # of the grid against the tolerance: no place is farther from it than 0.97
@@ -44,32 +46,41 @@ class Wanted:
 
 
 def parse_runs(given: Any) -> Runs:
-    """Contacts as "lfoot:120+45,rfoot:160+52", or as tuples of a name and two numbers.
+    """Contacts as text or, from Python, as tuples of a joint, a first frame and a count.
 
-    "auto": wherever a foot stands, by the usual rule.
+    "auto": wherever a foot stands by the usual rule. A joint without frames: where that one does.
+
+    >>> parse_runs("lfoot, rfoot:160+52")
+    (('lfoot', 0, 0), ('rfoot', 160, 52))
     """
     if given == AUTO:
         return AUTO
     try:
         if isinstance(given, str):
-            parts = [part.strip().rpartition(":") for part in given.split(",") if part.strip()]
-            given = [(name, *span.split("+")) for name, _, span in parts]
+            given = [_entry(part.strip()) for part in given.split(",")]
         runs = tuple((str(name), int(first), int(count)) for name, first, count in given)
     except (TypeError, ValueError):
         raise OptionError(
-            f"contacts are {given!r}, not auto and not like lfoot:120+45,rfoot:160+52"
+            f"contacts are {given!r}, not auto and not like lfoot,rfoot:160+52"
         ) from None
     for name, first, count in runs:
-        if first < 0 or count < 1:
-            raise OptionError(f"contacts: {count} frames of {name} from frame {first} on")
+        if first < 0 or count < 0 or not name or (not count and first):
+            raise OptionError(f"contacts: {count} frames of {name!r} from frame {first} on")
     return runs
 
 
-in_range("auto, or joint:first+frames, ...", parse_runs)
+in_range("auto, or joints, each with frames (joint:first+count) or without", parse_runs)
+
+
+def _entry(text: str) -> Run:
+    match = _ENTRY.fullmatch(text)
+    if match is None:
+        raise ValueError(text)
+    return match["name"], int(match["first"] or 0), int(match["count"] or 0)
 
 
 def runs_of(source: SignalSource, wanted: Runs) -> tuple[Run, ...]:
-    """What is ``wanted``, found by the rule where nobody says it.
+    """What is ``wanted``, found by the rule where nobody says the frames.
 
     Raises OptionError for what is beyond the clip, or where angles or lengths have no known unit,
     and MotionError where no joint is a foot.
@@ -78,14 +89,24 @@ def runs_of(source: SignalSource, wanted: Runs) -> tuple[Run, ...]:
     skeleton, n_frames = skeleton_of(NAME, layout), layout.n_frames
     if not has_kinematics(skeleton):
         raise OptionError(f"contacts: skeleton {skeleton.name!r} has angles of an unknown unit")
-    if isinstance(wanted, tuple):
-        for name, first, count in wanted:
-            if first + count > n_frames:
-                raise OptionError(f"contacts: {name}:{first}+{count} goes beyond {n_frames} frames")
-        return wanted
-    tracks, reader = FootTracks(skeleton, None, n_frames), FrameReader(NAME, source)
-    for start in range(0, n_frames, BLOCK):
-        values = reader.next(min(start + BLOCK, n_frames))
+    if isinstance(wanted, str):
+        return _found(source, skeleton, None)
+    for name, first, count in wanted:
+        _joint(skeleton, name)
+        if first + count > n_frames:
+            raise OptionError(f"contacts: {name}:{first}+{count} goes beyond {n_frames} frames")
+    given = tuple(run for run in wanted if run[2])
+    alone = [name for name, _, count in wanted if not count]
+    return (*given, *_found(source, skeleton, alone)) if alone else given
+
+
+def _found(
+    source: SignalSource, skeleton: Skeleton, joints: Sequence[str] | None
+) -> tuple[Run, ...]:
+    layout = source.layout
+    tracks, reader = FootTracks(skeleton, joints, layout.n_frames), FrameReader(NAME, source)
+    for start in range(0, layout.n_frames, BLOCK):
+        values = reader.next(min(start + BLOCK, layout.n_frames))
         tracks.add(start, positions_of(skeleton, values))
     rate = None if layout.frame_rate is None else float(layout.frame_rate)
     found = tracks.contacts(rate, skeleton.up_axis)
@@ -107,19 +128,18 @@ def choose_contacts(
     if len(by_joint) > MAX_POINTS:
         raise OptionError(f"contacts: {len(by_joint)} joints, {MAX_POINTS} at most")
     step = float(np.float32(SPREAD * tolerance))
-    points: list[dict[str, Any]] = []
-    pieces: list[Piece] = []
-    for joint in sorted(by_joint):
+    joints, points, pieces, n_stances = sorted(by_joint), [], [], 0
+    for joint in joints:
+        above = [j for j in path_of(skeleton.parents, joint)[:-1] if j in by_joint]
+        follows = joints.index(above[-1]) + 1 if above else 0
         tail = points_of(skeleton)[joint][0] + 1
-        points.append({"joint": joint, "tail": tail, "step": step})
-    n_stances = 0
-    for group in _groups(skeleton, sorted(by_joint)):
+        points.append({"joint": joint, "tail": tail, "step": step, "follows": follows})
+    for group in _groups(skeleton, joints):
         stances = _joined([span for joint in group for span in by_joint[joint]])
         for joint in group:
             for first, stop in _joined(by_joint[joint]):
                 stance = n_stances + sum(end <= first for _, end in stances)
-                point = sorted(by_joint).index(joint)
-                pieces.append(Piece(point, first, stop - first, first, stance))
+                pieces.append(Piece(joints.index(joint), first, stop - first, first, stance))
         n_stances += len(stances)
     ramp = min(round(RAMP_SECONDS * (frame_rate or USUAL_RATE)), MAX_RAMP)
     return Wanted({"rounds": ROUNDS, "ramp": ramp, "points": points}, tuple(pieces))

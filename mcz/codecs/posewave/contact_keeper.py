@@ -23,8 +23,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SLACK = 0.02  # of the tolerance that is left to the decoder's last round
-TRIALS = 6  # of a segment, with less room for displacements where a point was off
+TRIALS = 10  # of a segment, with less room for displacements where a point was off
 LESS_ROOM = 0.7
+COUNTERED = 0.5  # of what a point is off
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +50,15 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """By frame of a piece, how far its displacement is off, in length units."""
+    """How far the displacement of a piece is ``off``, (n_frames, 3), in length units."""
 
     piece: Piece
-    errors: Floats
+    off: Floats
+
+    @property
+    def errors(self) -> Floats:
+        found: Floats = np.sqrt((self.off * self.off).sum(axis=1))
+        return found
 
 
 @dataclass(slots=True)
@@ -88,18 +94,20 @@ class Keeper:
         targets = corrections.placed(source)
         self._choose_shifts(corrections, pieces, targets)
         radii = np.full(targets.shape[:2], (1.0 - 2 * SLACK) * self.tolerance)
+        aims = np.zeros(targets.shape)
         for _ in range(TRIALS):
             corrections.values[:] = values
-            coder = self._code(corrections, stream, pieces, targets, radii)
+            coder = self._code(corrections, stream, pieces, targets, aims, radii)
             corrections.correct()
             outcomes = self._outcomes(corrections, pieces, targets)
             worst = max((float(o.errors.max()) for o in outcomes), default=0.0)
             if worst <= self.tolerance:
                 break
             for outcome in outcomes:
-                piece = outcome.piece
-                own = radii[:, piece.first : piece.stop]  # of others, too, which may be fastened
-                own[:, outcome.errors > self.tolerance] *= LESS_ROOM
+                piece, missed = outcome.piece, outcome.errors > self.tolerance
+                rows = slice(piece.first, piece.stop)
+                radii[:, rows][:, missed] *= LESS_ROOM  # of others, too, which may be fastened
+                aims[piece.point, rows][missed] -= COUNTERED * outcome.off[missed]
         coder.close()
         values[:] = corrections.values
         for outcome in outcomes:
@@ -151,9 +159,13 @@ class Keeper:
         stream: Stream,
         pieces: Sequence[Piece],
         targets: Floats,
+        aims: Floats,
         radii: Floats,
     ) -> Coder:
-        """Code the pieces, their points as near to ``targets`` as ``radii`` allow."""
+        """Code the pieces, their points as near to ``targets`` as ``radii`` allow.
+
+        ``aims`` are how far beside them an encoder aims, to counter what others do.
+        """
         coder = Coder(stream)
         wanted = np.zeros(targets.shape)
         for array in (corrections.stands, corrections.starts, corrections.moves):
@@ -166,7 +178,9 @@ class Keeper:
             goal = targets[point, rows] + self.shifts[piece.stance][1]
             here = corrections.places[point, first]
             corrections.starts[point, first] = np.rint((goal[0] - here) / unit)
-            wanted[point, rows] = goal - (here + corrections.starts[point, first] * unit)
+            wanted[point, rows] = (
+                goal + aims[point, rows] - (here + corrections.starts[point, first] * unit)
+            )
         for point in range(len(targets)):
             corrections.code(coder, point, wanted[point], radii[point])
         return coder
@@ -184,5 +198,5 @@ class Keeper:
             if piece.first + self.first == piece.origin:
                 self.origins[origin] = off[0].copy()
             off -= self.origins[origin]
-            found.append(Outcome(piece, np.sqrt((off * off).sum(axis=1))))
+            found.append(Outcome(piece, off))
         return found

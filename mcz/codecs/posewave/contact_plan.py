@@ -30,6 +30,7 @@ POINT = Struct(
     "step"
     / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)  # HOLD-03
     * "grid of its displacements, in length units, 2^-60 to 2^60",
+    "follows" / UVARINT * "0, or the number of an earlier point that moves alike, from 1",
 )
 CONTACTS = Struct(
     "rounds"
@@ -47,7 +48,7 @@ class Contacts:
     """The fields of CONTACTS, checked against a skeleton.
 
     ``joints`` and ``steps`` of the points, and their places ``tails`` (n_points, 3) along the
-    joint's B.
+    joint's B. ``follows``: the number of another point, from 1, or 0.
     """
 
     rounds: int
@@ -55,6 +56,7 @@ class Contacts:
     joints: tuple[int, ...]
     tails: Floats
     steps: tuple[float, ...]
+    follows: tuple[int, ...]
 
 
 class Held(NamedTuple):
@@ -80,12 +82,16 @@ def parse_contacts(fields: Sequence[Any], skeleton: Skeleton, where: str) -> Con
     for found in fields:
         if not found.points:  # HOLD-02
             raise FormatError(f"{where}: contacts of no point")
+        for number, point in enumerate(found.points):
+            if point.follows > number:  # HOLD-04
+                raise FormatError(f"{where}: point {number + 1} follows point {point.follows}")
         return Contacts(
             rounds=found.rounds,
             ramp=found.ramp,
             joints=tuple(point.joint for point in found.points),
             tails=np.array([_place(skeleton, p.joint, p.tail, where) for p in found.points]),
             steps=tuple(point.step for point in found.points),
+            follows=tuple(point.follows for point in found.points),
         )
     return None
 

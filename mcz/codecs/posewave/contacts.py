@@ -21,7 +21,7 @@ from mcz.errors import FormatError
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-USUAL = 0.4375, -0.3125, 0.15625, 0.4375, 0.3125, -0.0625, -0.3125
+USUAL = 0.25, -0.125, 0.0625, 0.0, 0.6875, 0.125, -0.25, 0.75, 0.1875
 # Of a mean magnitude, class by class: how likely one is not 0, and how likely it is greater yet.
 SOME = (
     *(3840, 7424, 11008, 15616, 21760, 29184, 36864, 44544),
@@ -85,7 +85,7 @@ class Coder:
             sizes=np.full((3, 2), 2.0),
             features=np.zeros((3, shape)),
             means=np.zeros(3),
-            scratch=np.zeros((9, shape)),
+            scratch=np.zeros((shape + 2, shape)),
         )
 
     def point(
@@ -93,11 +93,12 @@ class Coder:
         places: Floats,
         step: float,
         track: tuple[Ints, Ints, Ints],
+        leader: tuple[Ints, Floats],
         wanted: Floats,
         radii: Floats,
     ) -> int:
         """Code the contacts of a point in place; -1, or the frame of one that is impossible."""
-        args = self.learner, places, step, track, wanted, radii
+        args = self.learner, places, step, track, leader, wanted, radii
         return int(_coding().code_point(self.state, self.stream.data, *args))
 
     def close(self) -> None:
@@ -109,7 +110,8 @@ class Corrections:
     """Where points are and where contacts have them.
 
     By point and frame: ``places`` (..., 3), in length units, ``stands``, ``starts`` (..., 3) and
-    ``moves`` (..., 3), as ``displacement_kernels`` has them.
+    ``moves`` (..., 3), as ``displacement_kernels`` has them, ``shifts`` (..., 3) and ``active`` as
+    ``contact_kernels``.
     """
 
     def __init__(self, contacts: Contacts, plan: Plan, held: Held, values: Floats) -> None:
@@ -118,6 +120,8 @@ class Corrections:
         self.stands = np.zeros(self.places.shape[:2], np.int64)
         self.starts = np.zeros(self.places.shape, np.int64)
         self.moves = np.zeros(self.places.shape, np.int64)
+        self.shifts = np.zeros(self.places.shape)
+        self.active = np.zeros_like(self.stands)
 
     def placed(self, values: Floats) -> Floats:
         """Where the points are in frames ``values``, (n_points, n_frames, 3)."""
@@ -130,17 +134,22 @@ class Corrections:
 
     def code(self, coder: Coder, point: int, wanted: Floats, radii: Floats) -> int:
         """As ``Coder.point``."""
-        places = np.pad(self.places[point], ((1, 1), (0, 0)), "edge")
-        return coder.point(places, self.contacts.steps[point], self.track(point), wanted, radii)
+        contacts, places = self.contacts, self.places[point]
+        step, followed = contacts.steps[point], contacts.follows[point] - 1
+        leader = np.zeros(len(places), np.int64), self.shifts[0]
+        if followed >= 0:
+            leader = self.stands[followed], self.shifts[followed]
+        padded = np.pad(places, ((1, 1), (0, 0)), "edge")
+        fault = coder.point(padded, step, self.track(point), leader, wanted, radii)
+        goal = self.shifts[point], self.active[point]
+        goal[0][:], goal[1][:] = 0.0, 0
+        _kernels().aim(places, self.track(point), step, contacts.ramp, *goal)
+        return fault
 
     def correct(self) -> None:
         """Change the values so that the points are where they should be."""
-        shifts, active = np.zeros(self.places.shape), np.zeros_like(self.stands)
-        for point, step in enumerate(self.contacts.steps):
-            goal = shifts[point], active[point]
-            _kernels().aim(self.places[point], self.track(point), step, self.contacts.ramp, *goal)
-        rounds = self.contacts.rounds
-        _kernels().correct(self.plan, self.held, self.values, active, shifts, rounds)
+        args = self.held, self.values, self.active, self.shifts, self.contacts.rounds
+        _kernels().correct(self.plan, *args)
 
 
 def room_of(contacts: Contacts | None, n_frames: int) -> int:

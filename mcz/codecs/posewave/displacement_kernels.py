@@ -28,7 +28,7 @@ C_MOVED = C_SIGN + 8
 N_CONTEXTS = C_MOVED + 1
 
 MAX_DISPLACEMENT = 1 << 30  # in steps
-N_FEATURES = 7
+N_FEATURES = 9
 DECAY = 255.0 / 256.0
 RIDGE = 64.0
 FARTHEST = 4096.0  # steps of a frame's movement
@@ -37,9 +37,9 @@ FARTHEST = 4096.0  # steps of a frame's movement
 class Learner(NamedTuple):
     """What was learned of how points move, axis by axis.
 
-    ``squares`` (3, 7, 7) and ``products`` (3, 7) of features; ``weights`` (3, 7); ``usual`` (7,),
-    what they begin with; ``sizes`` (3, 2) of residuals, fast and slow; ``features`` (3, 7) and
-    ``means`` (3,) of the next move; ``scratch`` (9, 7).
+    ``squares`` (3, 9, 9) and ``products`` (3, 9) of features; ``weights`` (3, 9); ``usual`` (7,),
+    what they begin with; ``sizes`` (3, 2) of residuals, fast and slow; ``features`` (3, 9) and
+    ``means`` (3,) of the next move; ``scratch`` (11, 9).
     """
 
     squares: Floats
@@ -56,6 +56,8 @@ class Learner(NamedTuple):
 # others; ``starts`` (n_frames, 3), how far the contact begins from the decoded place, in
 # ``START_UNITS`` of a step, and ``moves`` (n_frames, 3), displacements from there, in steps.
 Track = tuple[Ints, Ints, Ints]
+# Of the point that another follows: ``stands``, and how far it is shifted, (n_frames, 3).
+Leader = tuple[Ints, Floats]
 
 
 @kernel
@@ -66,6 +68,7 @@ def code_point(
     places: Floats,
     step: float,
     contacts: Track,
+    leader: Leader,
     wanted: Floats,
     radii: Floats,
 ) -> int:
@@ -109,7 +112,10 @@ def code_point(
         for t in range(1, length):
             if fault == 0:
                 at = first + t
-                _note_features(learner, place, anchor, moves, first, t, learner.features)
+                _note_features(learner, place, anchor, moves, first, t)
+                _note_leader(learner, leader, at, step)
+                for axis in range(3):
+                    learner.means[axis] = _expect(learner, axis, learner.features[axis])
                 if state[ENCODING]:
                     _choose(learner, moves[at - 1], goals[at], radii[at] / step, moves[at])
                 fault = _code_move(state, data, learner, moves[at - 1], moves[at])
@@ -192,13 +198,12 @@ def _note_features(
     moves: Ints,
     first: int,
     t: int,
-    features: Floats,
 ) -> None:
     """The last three moves, those of the decoded point around, and how far it is to be moved.
 
     ``places[f + 1]`` is where it is in frame f.
     """
-    at = first + t
+    at, features = first + t, learner.features
     for axis in range(3):
         for back in range(3):
             moved = 0.0
@@ -207,7 +212,18 @@ def _note_features(
             features[axis, back] = _limit(moved)
             features[axis, 3 + back] = _limit(places[at + back, axis] - places[at + back - 1, axis])
         features[axis, 6] = _limit(anchor[axis] + moves[at - 1, axis] - places[at, axis])
-        learner.means[axis] = _expect(learner, axis, features[axis])
+
+
+@inner
+def _note_leader(learner: Learner, leader: Leader, at: int, step: float) -> None:
+    """How the shift of a point changes that this one hangs from, and what it was."""
+    stands, shifts = leader
+    features = learner.features
+    for axis in range(3):
+        features[axis, 7], features[axis, 8] = 0.0, 0.0
+        if stands[at] == 2:
+            features[axis, 7] = _limit((shifts[at, axis] - shifts[at - 1, axis]) / step)
+            features[axis, 8] = _limit(shifts[at - 1, axis] / step - features[axis, 6])
 
 
 @inner
@@ -236,24 +252,24 @@ def _learn(learner: Learner, axis: int, features: Floats, moved: float) -> None:
 
 @inner
 def _solve(squares: Floats, products: Floats, found: Floats, scratch: Floats) -> None:
-    """(squares + ridge) found = products, by L D L'; row 7 of ``scratch`` has D."""
+    """(squares + ridge) found = products, by L D L'; row 9 of ``scratch`` has D."""
     for i in range(N_FEATURES):
         for k in range(i + 1):
             entry = squares[i, k] + (RIDGE if i == k else 0.0)
             for n in range(k):
-                entry -= scratch[i, n] * scratch[k, n] * scratch[7, n]
+                entry -= scratch[i, n] * scratch[k, n] * scratch[N_FEATURES, n]
             if i == k:
-                scratch[7, i] = max(entry, RIDGE)
+                scratch[N_FEATURES, i] = max(entry, RIDGE)
             else:
-                scratch[i, k] = entry / scratch[7, k]
+                scratch[i, k] = entry / scratch[N_FEATURES, k]
     for i in range(N_FEATURES):
         entry = products[i]
         for n in range(i):
-            entry -= scratch[i, n] * scratch[8, n]
-        scratch[8, i] = entry
+            entry -= scratch[i, n] * scratch[N_FEATURES + 1, n]
+        scratch[N_FEATURES + 1, i] = entry
     for back in range(N_FEATURES):
         i = N_FEATURES - 1 - back
-        entry = scratch[8, i] / scratch[7, i]
+        entry = scratch[N_FEATURES + 1, i] / scratch[N_FEATURES, i]
         for n in range(i + 1, N_FEATURES):
             entry -= scratch[n, i] * found[n]
         found[i] = entry

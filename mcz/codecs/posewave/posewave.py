@@ -159,7 +159,7 @@ CODEC = Codec(
         Parameter(
             "contacts",
             None,
-            "points that stand keep their place: auto, or lfoot:120+45,rfoot:160+52",
+            "feet that stand keep their place: auto, joints (lfoot,rfoot) or frames (lfoot:120+45)",
             parse_runs,
         ),
         Parameter(
