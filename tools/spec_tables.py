@@ -38,6 +38,7 @@ MODULES = (
     "mcz.codecs.spatial.lsdt_frame",
     "mcz.codecs.online.coder",
     "mcz.codecs.posewave.header",
+    "mcz.codecs.posewave.contact_plan",
     "mcz.formats.layout",
     "mcz.formats.notes",
     "mcz.formats.c3d_layout",

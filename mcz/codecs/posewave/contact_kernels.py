@@ -57,7 +57,7 @@ def aim(
         active[f] = STANDING
         for i in range(3):
             start = places[first, i] + starts[first, i] / START_UNITS * step
-            shifts[f, i] = (start + moves[f, i] * step) - places[f, i]
+            shifts[f, i] = (start + moves[f, i] * step) - places[f, i]  # HOLD-14
     last = -1 - ramp
     for f in range(n_frames):
         if stands[f] == 1 and (starts[f, 0] != 0 or starts[f, 1] != 0 or starts[f, 2] != 0):
@@ -127,7 +127,7 @@ def correct(
                 _note_pulls(plan, held, k, batch, factor, pulls[3 * a :])
             if turn == 0:
                 n_next = _note_active(active, n, STANDING, which)
-            _solve(pulls, wanted, square, pivots, 3 * n_active)
+            _solve(pulls, wanted, square, pivots, 3 * n_active)  # HOLD-15
             for c in range(n_kept):
                 row[c] = 0.0
             for a in range(3 * n_active):

@@ -19,7 +19,7 @@ from mcz.motion import Skeleton
 from mcz.schema import UVARINT, counted
 
 MAX_POINTS = 8
-MAX_ROUNDS = 8
+MAX_ROUNDS = 6
 MAX_RAMP = 64
 START_UNITS = 16  # of a step, in which the place is told that a contact begins with
 MOST_STEPS = 4.0  # greatest steps by which a channel may be corrected
@@ -28,18 +28,20 @@ POINT = Struct(
     "joint" / UVARINT * "whose point it is",
     "tail" / UVARINT * "0: the origin of the joint; else the number of a tail, from 1",
     "step"
-    / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)  # HOLD-03
+    / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)  # HOLD-04
     * "grid of its displacements, in length units, 2^-60 to 2^60",
     "follows" / UVARINT * "0, or the number of an earlier point that moves alike, from 1",
 )
 CONTACTS = Struct(
     "rounds"
-    / ExprValidator(Int8ul, lambda n, ctx: 1 <= n <= MAX_ROUNDS)  # HOLD-01
-    * "in which a pose is corrected, 1 to 8",
+    / ExprValidator(Int8ul, lambda n, ctx: 1 <= n <= MAX_ROUNDS)  # HOLD-02
+    * "in which a pose is corrected, 1 to 6",
     "ramp"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_RAMP)  # HOLD-01
+    / ExprValidator(Int8ul, lambda n, ctx: n <= MAX_RAMP)  # HOLD-02
     * "frames before and after a contact in which its correction comes and goes, 0 to 64",
-    "points" / counted(POINT, MAX_POINTS) * "that are held, 1 to 8",
+    "points"
+    / counted(POINT, MAX_POINTS)  # HOLD-03
+    * "that are held, 1 to 8",
 )
 
 
@@ -80,10 +82,10 @@ class Held(NamedTuple):
 def parse_contacts(fields: Sequence[Any], skeleton: Skeleton, where: str) -> Contacts | None:
     """Raises FormatError where the fields do not fit the skeleton."""
     for found in fields:
-        if not found.points:  # HOLD-02
+        if not found.points:  # HOLD-03
             raise FormatError(f"{where}: contacts of no point")
         for number, point in enumerate(found.points):
-            if point.follows > number:  # HOLD-04
+            if point.follows > number:  # HOLD-06
                 raise FormatError(f"{where}: point {number + 1} follows point {point.follows}")
         return Contacts(
             rounds=found.rounds,
@@ -97,7 +99,7 @@ def parse_contacts(fields: Sequence[Any], skeleton: Skeleton, where: str) -> Con
 
 
 def _place(skeleton: Skeleton, joint: int, tail: int, where: str) -> tuple[float, float, float]:
-    if joint >= skeleton.n_joints or tail > len(skeleton.joints[joint].tails):  # HOLD-04
+    if joint >= skeleton.n_joints or tail > len(skeleton.joints[joint].tails):  # HOLD-05
         raise FormatError(f"{where}: contacts of point {tail} of joint {joint}")
     if not tail:
         return 0.0, 0.0, 0.0

@@ -93,7 +93,7 @@ def code_point(
         for f in range(n_frames):
             count += 1 if stands[f] == 1 else 0
     count = code_number(state, data, 0, COUNT, count)
-    if count < 0 or count > n_frames:  # HOLD-06
+    if count < 0 or count > n_frames:  # HOLD-09
         return 0
     for _ in range(count):
         first = length = 0
@@ -102,7 +102,7 @@ def code_point(
             length = _length(stands, first)
         first = before + code_number(state, data, 0, GAP, first - before)
         length = 1 + code_number(state, data, 0, LENGTH, length - 1)
-        if first < before or length < 1 or first + length > n_frames:  # HOLD-07
+        if first < before or length < 1 or first + length > n_frames:  # HOLD-10
             return before
         for t in range(length):
             stands[first + t] = 2 if t else 1
@@ -115,7 +115,7 @@ def code_point(
                 _note_features(learner, place, anchor, moves, first, t)
                 _note_leader(learner, leader, at, step)
                 for axis in range(3):
-                    learner.means[axis] = _expect(learner, axis, learner.features[axis])
+                    learner.means[axis] = _expect(learner, axis, learner.features[axis])  # HOLD-12
                 if state[ENCODING]:
                     _choose(learner, moves[at - 1], goals[at], radii[at] / step, moves[at])
                 fault = _code_move(state, data, learner, moves[at - 1], moves[at])
@@ -148,7 +148,7 @@ def _code_start(state: Ints, data: Bytes, move: Ints) -> int:
     if adaptive(state, data, moved, C_MOVED):
         for i in range(3):
             found = code_number(state, data, 0, START, move[i])
-            if abs(found) > MAX_DISPLACEMENT:  # HOLD-08
+            if abs(found) > MAX_DISPLACEMENT:  # HOLD-11
                 return 1
             move[i] = found
     return 0
@@ -166,7 +166,7 @@ def _code_move(state: Ints, data: Bytes, learner: Learner, last: Ints, move: Int
         residual = (move[axis] - middle) // unit
         found = _code_residual(state, data, residual, learner.sizes[axis], other, side)
         move[axis] = middle + unit * found
-        if abs(move[axis]) > MAX_DISPLACEMENT:  # HOLD-09
+        if abs(move[axis]) > MAX_DISPLACEMENT:  # HOLD-13
             return 1
         odd = move[0] & 1
         size = float(min(abs(found), 1024))

@@ -145,7 +145,7 @@ def decode_segment(
     code_head(stream, kinds_of(skeleton), kept, numbers, where)
     head = Head(kept == 1, numbers)
     walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
-    held = walk.held(header.contacts) if header.contacts and head.kept.any() else None  # HOLD-05
+    held = walk.held(header.contacts) if header.contacts and head.kept.any() else None  # HOLD-07
     rows = RowCoder(classes[head.kept], header.start, coder, where, refining=header.refining)
     for level in range(pyramid.n_details + 1):
         if level >= len(streams):
