@@ -30,6 +30,7 @@ from mcz.codecs.posewave import choices
 from mcz.errors import OptionError
 from mcz.motion import Motion
 from tests.codecs.lossy import gapped, markers, rough, saved, wandering
+from tests.codecs.test_posewave_contacts import RUNS, walking
 from tests.motions import smooth
 from tests.test_vector_tools import vector_of
 from tools import make_vectors
@@ -111,6 +112,12 @@ POSEWAVE = (
     {"step": 0.5, "levels": 0},
     {"step": 0.3, "levels": 8},
     {"preset": "preview", "levels": 1},
+)
+CONTACTS: tuple[dict[str, Any], ...] = (
+    {"step": 0.1},
+    {"step": 1, "contact_tolerance": 0.1, "segment_frames": 64},
+    {"step": 0.1, "levels": 0},
+    {"step": 0.3, "levels": 8},
 )
 SETTINGS: dict[str, tuple[dict[str, Any], ...]] = {
     "raw": ({}, {"segment_frames": 17}),
@@ -237,6 +244,14 @@ def test_axis_orders_of_posewave(
     monkeypatch.setattr(choices, "choose_orders", lambda source: [*codes, 0, 0])
     for step in (0.01, 1.0):
         check(saved("posewave", smooth(90), step=step, segment_frames=50), other, step)
+
+
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_contacts_of_posewave(unit: str, other: Server) -> None:
+    """Points of feet that keep their places."""
+    for seed, params in enumerate(CONTACTS):
+        motion = walking(150, seed, unit)
+        check(saved("posewave", motion, contacts=RUNS, **params), other, params)
 
 
 @pytest.mark.parametrize("part", range(4))

@@ -1,17 +1,17 @@
-// SPEC.md, "Held contacts": points that keep their places, frame by frame.
+// SPEC.md, "Held contacts": when points stand, how they move, and how far they are to be shifted.
 
 import { Model, clamp } from "./entropy.js";
 import { Refused } from "./errors.js";
 import { readNumber } from "./pose-head.js";
+import { DisplacementModel, N_FEATURES } from "./pose-displacements.js";
 
 // Contexts; those of numbers come first.
 const FAST = 492;
 const SLOW = 748;
 const OTHER = 1004;
 const SIGN = 1260;
-const USUAL = 1268;
-const FINE = 1269;
-const N_CONTEXTS = 1270;
+const MOVED = 1268;
+const N_CONTEXTS = 1269;
 const N_MIXERS = 16;
 const N_CLASSES = 16;
 const FIRST_COUNT = 8;
@@ -28,19 +28,52 @@ const LATER = [
   62720, 63744,
 ];
 
-// What a number says: counts, frames, lengths, anchors, what is too large.
-const [COUNT, START, LENGTH, ANCHOR, ESCAPE] = [0, 1, 2, 3, 4];
+// What a number says: counts, frames, lengths, starts, what is too large.
+const [COUNT, GAP, LENGTH, START, ESCAPE] = [0, 1, 2, 3, 4];
 
-const MAX_ANCHOR = 2 ** 30;
-const USUAL_FRAMES = 8;
+const GREATEST = 2 ** 30;
+const START_UNITS = 16;
 const MAX_UNARY = 16;
 const MOST = 4096;
-const N_FEATURES = 7;
-const MEMORY = 255 / 256;
-const RIDGE = 64;
-const USUAL_WEIGHTS = [0.4375, -0.3125, 0.15625, 0.4375, 0.3125, -0.0625, -0.3125];
+const MAX_POINTS = 8;
+const MAX_ROUNDS = 6;
+const MAX_RAMP = 64;
+const GREATEST_STEP = 2 ** 60;
+
+/** What a point does in a frame of a segment. */
+export const LEANS = 1;
+export const STANDS = 2;
 
 const limited = (x) => clamp(x, -MOST, MOST);
+
+/**
+ * @param {import("./bytes.js").ByteReader} reader at CONTACTS
+ * @param {import("./skel.js").Skeleton} skeleton
+ * @returns {{rounds: number, ramp: number, points: object[]}}
+ * @throws {Refused}
+ */
+export function readContacts(reader, skeleton) {
+  const rounds = reader.u8();
+  if (rounds < 1 || rounds > MAX_ROUNDS) reader.refuse(`${rounds} rounds`);
+  const ramp = reader.u8();
+  if (ramp > MAX_RAMP) reader.refuse(`a ramp of ${ramp} frames`);
+  let number = 0;
+  const points = reader.counted(() => readPoint(reader, skeleton, number++));
+  if (points.length < 1 || points.length > MAX_POINTS) reader.refuse(`${points.length} points`);
+  return { rounds, ramp, points };
+}
+
+function readPoint(reader, { joints }, number) {
+  const joint = reader.varint();
+  if (joint >= joints.length) reader.refuse(`joint ${joint} of ${joints.length}`);
+  const tail = reader.varint();
+  if (tail > joints[joint].tails.length) reader.refuse(`tail ${tail} of joint ${joint}`);
+  const step = reader.f32();
+  if (!(step >= 1 / GREATEST_STEP && step <= GREATEST_STEP)) reader.refuse(`a step of ${step}`);
+  const follows = reader.varint();
+  if (follows > number) reader.refuse(`point ${number + 1} follows point ${follows}`);
+  return { joint, tail, step, follows };
+}
 
 function startModel() {
   const model = Model.even(N_CONTEXTS, N_MIXERS);
@@ -64,26 +97,30 @@ function classOf(size) {
 }
 
 /**
- * Decodes the contacts of a segment, and corrects its frames.
+ * Decodes the contacts of a segment.
  *
  * @param {import("./entropy.js").RangeDecoder} coder which has decoded the rows
- * @param {{rounds: number, limbs: object[]}} contacts of the header
- * @param {Float64Array} values of all frames of the segment, changed in place
- * @param {number} nChannels
+ * @param {{ramp: number, points: object[]}} contacts of the header
+ * @param {Float64Array[]} places of each point in all frames
  * @param {string} what names the segment in messages
+ * @returns {{shifts: Float64Array, active: Uint8Array}[]} of each point how far it is to be from
+ *   its places, and in which frames it leans or stands
  * @throws {Refused}
  */
-export function holdContacts(coder, contacts, values, nChannels, what) {
-  const reader = new ContactReader(coder, contacts.rounds, values, nChannels, what);
-  for (const limb of contacts.limbs) reader.limb(limb);
+export function decodeShifts(coder, contacts, places, what) {
+  const reader = new ContactReader(coder, contacts.ramp, what);
+  const tracks = [];
+  contacts.points.forEach((point, k) => {
+    tracks.push(reader.point(point, places[k], tracks[point.follows - 1]));
+  });
+  return tracks;
 }
 
 class ContactReader {
-  constructor(coder, rounds, values, nChannels, what) {
-    Object.assign(this, { coder, rounds, values, nChannels, what });
-    this.nFrames = values.length / nChannels;
+  constructor(coder, ramp, what) {
+    Object.assign(this, { coder, ramp, what });
     this.model = startModel();
-    this.axes = [0, 1, 2].map(() => new Predictor());
+    this.axes = [0, 1, 2].map(() => new DisplacementModel());
     this.fast = new Float64Array(3).fill(2);
     this.slow = new Float64Array(3).fill(2);
   }
@@ -96,58 +133,71 @@ class ContactReader {
     throw new Refused(`${this.what}, contacts: ${message}`);
   }
 
-  limb(limb) {
+  point({ step }, places, leader) {
+    const nFrames = places.length / 3;
+    const track = { shifts: new Float64Array(places.length), active: new Uint8Array(nFrames) };
+    track.begins = new Uint8Array(nFrames);
+    const spans = [];
     const count = this.coded(COUNT);
-    if (count < 0 || count > this.nFrames) this.refuse(`${count} of a limb`);
+    if (count < 0 || count > nFrames) this.refuse(`${count} of a point`);
     let before = 0;
-    for (let i = 0; i < count; i++) before = this.contact(limb, before);
+    for (let i = 0; i < count; i++) {
+      const span = this.contact(step, places, leader, before, track);
+      spans.push(span);
+      before = span.stop;
+    }
+    lean(spans, this.ramp, track);
+    return track;
   }
 
-  /** A contact not before a frame; returns the frame behind it. */
-  contact(limb, before) {
-    const { coder, model, nFrames } = this;
-    const first = before + this.coded(START);
+  /** A contact not before a frame. */
+  contact(step, places, leader, before, track) {
+    const nFrames = places.length / 3;
+    const first = before + this.coded(GAP);
     const length = 1 + this.coded(LENGTH);
     if (first < before || length < 1 || first + length > nFrames) {
       this.refuse(`frames ${first} to ${first + length - 1} of ${nFrames}`);
     }
-    let lead = USUAL_FRAMES;
-    let fade = USUAL_FRAMES;
-    if (!model.adaptive(coder, USUAL)) {
-      lead = coder.number(4);
-      fade = coder.number(4);
+    const moved = this.model.adaptive(this.coder, MOVED) === 1;
+    const S = moved ? [this.coded(START), this.coded(START), this.coded(START)] : [0, 0, 0];
+    if (S.some((x) => Math.abs(x) > GREATEST)) this.refuse(`a start of ${S}`);
+    const D = this.displacements(step, places, leader, { first, length, S });
+    for (let t = 0; t < length; t++) {
+      const f = first + t;
+      track.active[f] = STANDS;
+      for (let i = 0; i < 3; i++) {
+        const start = places[3 * first + i] + (S[i] / START_UNITS) * step;
+        track.shifts[3 * f + i] = start + D[t][i] * step - places[3 * f + i];
+      }
     }
-    const unit = (model.adaptive(coder, FINE) ? 1 / 16 : 4) * limb.step;
-    const anchor = [this.coded(ANCHOR), this.coded(ANCHOR), this.coded(ANCHOR)];
-    if (anchor.some((x) => Math.abs(x) > MAX_ANCHOR)) this.refuse(`an anchor of ${anchor}`);
-    const place = this.place(limb, first);
-    const A = anchor.map((x, k) => place[k] + x * unit);
-    const D = this.displacements(limb, first, length, A);
-    this.correct(limb, first, length, { A, D, lead, fade });
-    return first + length;
+    track.begins[first] = 1;
+    return { first, stop: first + length, moved: S.some((x) => x !== 0) };
   }
 
-  place(limb, frame) {
-    const at = clamp(frame, 0, this.nFrames - 1) * this.nChannels;
-    return limb.place(this.values, at);
-  }
-
-  /** D: of each frame of a contact by how many steps the point is away from its anchor place. */
-  displacements(limb, first, length, A) {
-    const { step } = limb;
-    const q = [];
-    // q[t + 1] is where the point is in frame t of the contact, in steps.
-    for (let t = -1; t <= length; t++) q.push(this.place(limb, first + t).map((x) => x / step));
-    const a = A.map((x) => x / step);
+  /** D: of each frame of a contact by how many steps the point has moved since the first. */
+  displacements(step, places, leader, { first, length, S }) {
+    const last = places.length / 3 - 1;
+    const q = (f, i) => places[3 * clamp(f, 0, last) + i] / step;
     const D = [[0, 0, 0]];
+    const x = new Float64Array(N_FEATURES);
     for (let t = 1; t < length; t++) {
-      this.axes.forEach((axis, k) => {
-        const v = (b) => (t < b + 1 ? 0 : D[t - b][k] - D[t - b - 1][k]);
-        axis.expect([
-          ...[v(1), v(2), v(3)],
-          ...[q[t][k] - q[t - 1][k], q[t + 1][k] - q[t][k], q[t + 2][k] - q[t + 1][k]],
-          a[k] + D[t - 1][k] - q[t][k],
-        ]);
+      const f = first + t;
+      const leads = leader && leader.active[f] === STANDS && !leader.begins[f];
+      this.axes.forEach((axis, i) => {
+        const v = (b) => (t < b + 1 ? 0 : D[t - b][i] - D[t - b - 1][i]);
+        for (let b = 0; b < 3; b++) {
+          x[b] = limited(v(b + 1));
+          x[3 + b] = limited(q(f + b - 1, i) - q(f + b - 2, i));
+        }
+        x[6] = limited(q(first, i) + S[i] / START_UNITS + D[t - 1][i] - q(f - 1, i));
+        x[7] = 0;
+        x[8] = 0;
+        if (leads) {
+          const [now, then] = [leader.shifts[3 * f + i], leader.shifts[3 * f - 3 + i]];
+          x[7] = limited((now - then) / step);
+          x[8] = limited(then / step - x[6]);
+        }
+        axis.expect(x);
       });
       D.push(this.displacement(D[t - 1]));
     }
@@ -160,20 +210,20 @@ class ContactReader {
     const D = [0, 0, 0];
     let other = 0;
     let odd = 0;
-    for (let k = 0; k < 3; k++) {
-      const e = axes[k].mean + before[k];
-      const u = k === 0 ? 1 : 2;
-      const c = k === 0 ? Math.floor(e + 0.5) : 2 * Math.floor((e - odd) * 0.5 + 0.5) + odd;
+    for (let i = 0; i < 3; i++) {
+      const e = axes[i].mean + before[i];
+      const u = i === 0 ? 1 : 2;
+      const c = i === 0 ? Math.floor(e + 0.5) : 2 * Math.floor((e - odd) * 0.5 + 0.5) + odd;
       const side = Math.floor(((e - c) * 4) / u) + 2;
-      const r = this.residual(fast[k], slow[k], other, side);
-      D[k] = c + u * r;
-      if (Math.abs(D[k]) > MAX_ANCHOR) this.refuse(`a displacement of ${D[k]}`);
+      const r = this.residual(fast[i], slow[i], other, side);
+      D[i] = c + u * r;
+      if (Math.abs(D[i]) > GREATEST) this.refuse(`a displacement of ${D[i]}`);
       odd = Math.abs(D[0] % 2);
       const z = Math.min(Math.abs(r), 1024);
-      other = k === 0 ? z : 0.5 * (other + z);
-      fast[k] += (z - fast[k]) * 0.25;
-      slow[k] += (z - slow[k]) * 0.03125;
-      axes[k].learn(D[k] - before[k]);
+      other = i === 0 ? z : 0.5 * (other + z);
+      fast[i] += (z - fast[i]) * 0.25;
+      slow[i] += (z - slow[i]) * 0.03125;
+      axes[i].learn(D[i] - before[i]);
     }
     return D;
   }
@@ -187,102 +237,25 @@ class ContactReader {
     while (n < MAX_UNARY && model.mixed(coder, n, a + n, b + n, c + n)) n++;
     if (n === MAX_UNARY) {
       const more = this.coded(ESCAPE);
-      if (more < 0 || more >= MAX_ANCHOR) this.refuse(`a residual of ${more} more`);
+      if (more < 0 || more >= GREATEST) this.refuse(`a residual of ${more} more`);
       n += more;
     }
     if (n === 0) return 0;
     return model.adaptive(coder, SIGN + side) ? -n : n;
   }
-
-  /** Puts the point where it is to be, and leads values in and out. */
-  correct(limb, first, length, { A, D, lead, fade }) {
-    const { values, nChannels, nFrames, rounds } = this;
-    const c = new Float64Array(limb.columns.length);
-    let cFirst = c;
-    for (let t = 0; t < length; t++) {
-      const target = A.map((x, k) => x + D[t][k] * limb.step);
-      limb.reach(values, (first + t) * nChannels, c, target, rounds);
-      if (t === 0) cFirst = c.slice();
-      this.add(limb, first + t, c, 1);
-    }
-    for (let n = 1; n <= lead && first - n >= 0; n++) {
-      this.add(limb, first - n, cFirst, 1 - n / (lead + 1));
-    }
-    const last = first + length - 1;
-    for (let n = 1; n <= fade && last + n < nFrames; n++) {
-      this.add(limb, last + n, c, 1 - n / (fade + 1));
-    }
-  }
-
-  add({ columns }, frame, c, share) {
-    const at = frame * this.nChannels;
-    columns.forEach((column, i) => (this.values[at + column] += c[i] * share));
-  }
 }
 
-/** How displacements go on along an axis: least squares that forget. */
-class Predictor {
-  constructor() {
-    this.w = Float64Array.from(USUAL_WEIGHTS);
-    this.S = new Float64Array(N_FEATURES * N_FEATURES);
-    this.P = new Float64Array(N_FEATURES);
-    this.L = new Float64Array(N_FEATURES * N_FEATURES);
-    this.d = new Float64Array(N_FEATURES);
-    this.b = new Float64Array(N_FEATURES);
-    this.x = new Float64Array(N_FEATURES);
-    this.mean = 0;
-  }
-
-  /** Sets `mean`, how far the displacement is to move. */
-  expect(features) {
-    const { w, x } = this;
-    let sum = 0;
-    for (let i = 0; i < N_FEATURES; i++) {
-      x[i] = limited(features[i]);
-      sum += w[i] * x[i];
-    }
-    this.mean = limited(sum);
-  }
-
-  /** Learns how far it has moved. */
-  learn(moved) {
-    const { x, P, S } = this;
-    let y = limited(moved);
-    for (let i = 0; i < N_FEATURES; i++) y -= USUAL_WEIGHTS[i] * x[i];
-    for (let i = 0; i < N_FEATURES; i++) {
-      P[i] = P[i] * MEMORY + y * x[i];
-      for (let j = 0; j <= i; j++) {
-        S[i * N_FEATURES + j] = S[i * N_FEATURES + j] * MEMORY + x[i] * x[j];
-      }
-    }
-    this.factor();
-    this.solve();
-  }
-
-  /** S and a ridge as L d L'. */
-  factor() {
-    const { S, L, d } = this;
-    for (let i = 0; i < N_FEATURES; i++) {
-      for (let j = 0; j <= i; j++) {
-        let s = S[i * N_FEATURES + j];
-        if (i === j) s += RIDGE;
-        for (let n = 0; n < j; n++) s -= L[i * N_FEATURES + n] * L[j * N_FEATURES + n] * d[n];
-        if (i === j) d[i] = Math.max(s, RIDGE);
-        else L[i * N_FEATURES + j] = s / d[j];
-      }
-    }
-  }
-
-  solve() {
-    const { P, L, d, b, w } = this;
-    for (let i = 0; i < N_FEATURES; i++) {
-      b[i] = P[i];
-      for (let n = 0; n < i; n++) b[i] -= L[i * N_FEATURES + n] * b[n];
-    }
-    for (let i = N_FEATURES - 1; i >= 0; i--) {
-      b[i] /= d[i];
-      for (let n = i + 1; n < N_FEATURES; n++) b[i] -= L[n * N_FEATURES + i] * b[n];
-    }
-    for (let i = 0; i < N_FEATURES; i++) w[i] = b[i] + USUAL_WEIGHTS[i];
-  }
+/** Lets a point lean to each of its contacts in the frames around it. */
+function lean(spans, ramp, { shifts, active }) {
+  const add = (f, end, share) => {
+    if (f < 0 || f >= active.length) return;
+    active[f] = LEANS;
+    for (let i = 0; i < 3; i++) shifts[3 * f + i] += share * shifts[3 * end + i];
+  };
+  spans.forEach(({ first, stop, moved }, at) => {
+    const back = at > 0 ? Math.min(ramp, first - spans[at - 1].stop) : ramp;
+    const on = at + 1 < spans.length ? Math.min(ramp, spans[at + 1].first - stop) : ramp;
+    if (moved) for (let n = 1; n <= back; n++) add(first - n, first, 1 - n / (back + 1));
+    for (let n = 1; n <= on; n++) add(stop - 1 + n, stop - 1, 1 - n / (on + 1));
+  });
 }

@@ -33,11 +33,21 @@ export function readHead(coder, model, first, kinds, what) {
   return { kept, numbers };
 }
 
-function readNumber(coder, model, first, own, what) {
+/**
+ * A number of some bits.
+ *
+ * @param {import("./entropy.js").RangeDecoder} coder
+ * @param {import("./entropy.js").Model} model
+ * @param {number} first context of the head
+ * @param {number} own 0 to 5: whose contexts it has
+ * @param {string} what names the stream in messages
+ * @throws {Refused} where it has 40 bits or more
+ */
+export function readNumber(coder, model, first, own, what) {
   let length = 0;
   while (model.adaptive(coder, first + LENGTH + MAX_LENGTH * own + length)) {
     length++;
-    if (length === MAX_LENGTH) throw new Refused(`${what}: a first value of ${length} bits`);
+    if (length === MAX_LENGTH) throw new Refused(`${what}: a number of ${length} bits`);
   }
   if (length === 0) return 0;
   let size = 1;

@@ -137,6 +137,7 @@ export class PoseMetric {
       for (const k of [...AXIS_ORDERS[axisOrder]].reverse()) rotate(M, k, turn(axis[k], this.rule));
       return M;
     });
+    this.frames = C;
     this.joints = joints.map((joint, j) => {
       const above = joint.parent < 0 ? IDENTITY : C[joint.parent];
       const weight = limited(weights ? weights[j] : 1);
@@ -215,7 +216,7 @@ export class PoseMetric {
    */
   factor(values) {
     const { joints, inertia, motions, path, starts } = this;
-    joints.forEach((joint, j) => this.place(joint, j, values));
+    this.placeAll(values);
     joints.forEach((joint, j) => this.gather(joint, j));
     for (let j = joints.length - 1; j >= 0; j--) {
       const { parent } = joints[j];
@@ -240,6 +241,16 @@ export class PoseMetric {
     }
     this.eliminate(entries);
     return entries;
+  }
+
+  /** The place of a joint's origin, 0, or of one of its tails, from 1, along its B. */
+  tailOf({ tails }, j, tail) {
+    return tail === 0 ? [0, 0, 0] : back(this.frames[j], tails[tail - 1].map(limited));
+  }
+
+  /** Makes a pose that of the moment. */
+  placeAll(values) {
+    this.joints.forEach((joint, j) => this.place(joint, j, values));
   }
 
   /** Origin and axes of joint j, and what its kept channels do. */

@@ -170,4 +170,5 @@ def decode_contacts(
                 f"{where}: a contact of point {point} at or after frame {fault} is out of range"
             )
     coder.close()
+    stream.check_whole(where)
     corrections.correct()

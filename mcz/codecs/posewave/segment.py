@@ -162,7 +162,6 @@ def decode_segment(
         assert header.contacts is not None
         plan = walk.metric.plan
         decode_contacts(header.contacts, plan, held, stream, values, f"{where}: contacts")
-        stream.check_whole(f"{where}: contacts")
     return orders.values(values, notes)
 
 

@@ -4,7 +4,9 @@ import { AxisOrders } from "../axis-orders.js";
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder } from "../entropy.js";
 import { Refused } from "../errors.js";
+import { decodeShifts, readContacts } from "../pose-contacts.js";
 import { readHead } from "../pose-head.js";
+import { Holder } from "../pose-holding.js";
 import { Pyramid, Walk } from "../pose-levels.js";
 import { RowDecoder } from "../pose-rows.js";
 import { HEAD, startTable } from "../pose-start.js";
@@ -76,6 +78,8 @@ function readHeader(bytes, skeleton) {
   if (orders.length !== 0 && orders.length !== joints.length) {
     reader.refuse(`${orders.length} axis orders of ${joints.length} joints`);
   }
+  const contacts = reader.counted(() => readContacts(reader, skeleton));
+  if (contacts.length > 1) reader.refuse(`${contacts.length} times contacts`);
   reader.end();
   let at = 0;
   const greatest = Float64Array.from(kinds, (kind) => steps[kind] ?? plain[at++]);
@@ -84,6 +88,7 @@ function readHeader(bytes, skeleton) {
   return {
     ...{ levels, borrowing, start, refining, step, radius, kappa, weights, orders },
     axisOrders: new AxisOrders(skeleton, orders),
+    contacts: contacts[0] ?? null,
     ...{ kinds, greatest, firstStep, constantStep },
     classes: classesOf(joints),
   };
@@ -192,8 +197,9 @@ class PoseDecoder {
       const classes = Uint8Array.from(kept, (c) => header.classes[c]);
       const rows = new RowDecoder(model, start, classes, header.refining);
       const walk = new Walk(header, skeleton, pyramid, kept, first);
-      this.levels(coder, streams, rows, walk, what);
+      const rest = this.levels(coder, streams, rows, walk, what);
       putColumns(walk.signal, kept, out);
+      if (rest) this.hold(rest, walk, out, what);
     } else {
       coder.finish(what);
       if (streams.slice(1).some(({ length }) => length > 0)) {
@@ -203,19 +209,37 @@ class PoseDecoder {
     header.axisOrders.restore(out, skeleton.channels.length, notes);
   }
 
-  /** Decodes the rows of all levels, the first of them with `coder`, which has decoded the head. */
+  /**
+   * Decodes the rows of all levels, the first of them with `coder`, which has decoded the head.
+   * Returns the coder of contacts that follow the last, or null.
+   */
   levels(coder, streams, rows, walk, what) {
     const { pyramid } = walk;
+    let rest = null;
     for (let level = 0; level <= pyramid.nDetails; level++) {
       const where = `${what}, level ${level}`;
       let decoded = null;
       if (level < streams.length) {
         const own = level === 0 ? coder : new RangeDecoder(streams[level]);
         decoded = rows.decode(own, level, pyramid.kind(level), pyramid.nRows(level), where);
-        own.finish(where);
+        if (level === pyramid.nDetails && this.header.contacts) rest = own;
+        else own.finish(where);
       }
       if (level === 0) walk.approximations(decoded);
       else walk.details(level, decoded);
+    }
+    return rest;
+  }
+
+  /** Puts the points of contacts where they should be. */
+  hold(coder, { metric, kept, greatest }, values, what) {
+    const { contacts } = this.header;
+    const nChannels = this.skeleton.channels.length;
+    const holder = new Holder(contacts, this.skeleton, metric, kept, greatest);
+    const tracks = decodeShifts(coder, contacts, holder.places(values, nChannels), what);
+    coder.finish(`${what}, contacts`);
+    for (let f = 0; f * nChannels < values.length; f++) {
+      holder.correct(values.subarray(f * nChannels, (f + 1) * nChannels), f, tracks);
     }
   }
 

@@ -1,0 +1,398 @@
+"""Contacts of codec 13: feet keep their place, straight legs, points that cannot, hostile bytes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mcz
+from mcz.codecs import by_name
+from mcz.codecs.posewave.contact_choice import choose_contacts, parse_runs, runs_of
+from mcz.codecs.posewave.contact_keeper import Keeper, Outcome, Piece
+from mcz.codecs.posewave.contact_kernels import LEANING, STANDING, aim, correct, place
+from mcz.codecs.posewave.contact_plan import MOST_STEPS, Contacts, Held, make_held, parse_contacts
+from mcz.codecs.posewave.contacts import decode_contacts
+from mcz.codecs.posewave.rows import Stream
+from mcz.codecs.posewave.skeleton_plan import Plan, make_plan
+from mcz.coding.mixing import SQUASH
+from mcz.errors import ContactWarning, FormatError, OptionError
+from mcz.kinematics.points import first_points, positions_of
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.writing.signal_source import MemorySource
+from tests.codecs.lossy import Direct, amc
+
+Runs = Sequence[tuple[str, int, int]]
+
+TOLERANCE = 0.01  # cm
+TURNS = tuple(Channel(kind) for kind in ("rz", "rx", "ry"))
+MOVES = tuple(Channel(kind) for kind in ("tx", "ty", "tz"))
+
+
+def biped(angle_unit: str = "deg") -> Skeleton:
+    """Hips and two legs of thigh, shin, foot and toe."""
+    joints = [Joint("hips", channels=MOVES + TURNS)]
+    for side, x in (("Left", 3.0), ("Right", -3.0)):
+        hips = len(joints)
+        joints += [
+            Joint(f"{side}UpLeg", 0, (x, -1.0, 0.2), channels=TURNS),
+            Joint(f"{side}Leg", hips, (0.0, -20.0, 0.0), channels=TURNS),
+            Joint(f"{side}Foot", hips + 1, (0.0, -20.0, -1.0), channels=TURNS),
+            Joint(f"{side}Toe", hips + 2, (0.0, -3.0, 6.0), ((0.0, 0.0, 3.0),), channels=TURNS),
+        ]
+    return Skeleton(tuple(joints), unit_cm=2.0, angle_unit=angle_unit)
+
+
+def walking(n_frames: int = 150, seed: int = 0, angle_unit: str = "deg") -> Motion:
+    """Knees bent, all channels smooth, some noise."""
+    skeleton = biped(angle_unit)
+    random = np.random.default_rng(seed)
+    time = np.arange(n_frames)[:, None] / 40
+    n = skeleton.n_channels
+    values = 12 * np.sin(time * random.uniform(0.5, 3, n) + random.uniform(0, 6, n))
+    values += random.normal(0, 0.2, values.shape)
+    for side in ("Left", "Right"):
+        values[:, skeleton.columns(skeleton.find(f"{side}Leg"))[1]] += 45
+    if skeleton.angle_unit == "rad":
+        values[:, 3:] *= np.pi / 180
+    return Motion(skeleton, (Signal(values),), frame_rate=Fraction(120), name="walk")
+
+
+def errors_cm(motion: Motion, found: np.ndarray, runs: Runs) -> np.ndarray:
+    """How far displacements from the first frame of each run are off, at most, (n_runs,)."""
+    skeleton = motion.skeleton
+    names, firsts = skeleton.addresses(), first_points(skeleton)
+    off = positions_of(skeleton, found) - positions_of(skeleton, np.asarray(motion.values))
+    greatest = []
+    for name, first, count in runs:
+        own = off[first : first + count, firsts[names.index(name)]]
+        greatest.append(np.linalg.norm(own - own[0], axis=1).max() * (skeleton.unit_cm or 1.0))
+    return np.array(greatest)
+
+
+RUNS = ("LeftFoot", 5, 40), ("RightFoot", 30, 60), ("LeftFoot", 50, 3), ("LeftFoot", 60, 90)
+
+
+@pytest.mark.parametrize("step", [0.03, 0.3])
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_feet_keep_their_places(step: float, unit: str) -> None:
+    motion = walking(angle_unit=unit)
+    coded = Direct("posewave", motion, step=step, contacts=RUNS)
+    found = coded.read()
+    assert errors_cm(motion, found, RUNS).max() <= TOLERANCE
+    without = Direct("posewave", motion, step=step)
+    assert errors_cm(motion, without.read(), RUNS).min() > TOLERANCE
+    # No point is farther off than without contacts, or hardly.
+    source = positions_of(motion.skeleton, np.asarray(motion.values))
+    off, usual = (
+        np.linalg.norm(positions_of(motion.skeleton, values) - source, axis=2)
+        for values in (found, without.read())
+    )
+    assert off.mean() < usual.mean() and off.max() < 1.5 * usual.max()
+    # Coarser requests know nothing of contacts.
+    assert np.array_equal(coded.read(resolution=1), without.read(resolution=1))
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 10**6), st.sampled_from([0.02, 0.2]), st.sampled_from([0.003, 0.02, 0.1]))
+def test_whatever_runs(seed: int, step: float, tolerance: float) -> None:
+    random = np.random.default_rng(seed)
+    motion = walking(100, seed)
+    runs = [
+        (str(random.choice(["LeftFoot", "RightFoot"])), int(first), int(random.integers(1, 30)))
+        for first in random.integers(0, 70, random.integers(1, 6))
+    ]
+    coded = Direct("posewave", motion, step=step, contacts=runs, contact_tolerance=tolerance)
+    # Runs that touch count as one; each still keeps its displacement, to twice the tolerance.
+    assert errors_cm(motion, coded.read(), runs).max() <= 2 * tolerance
+
+
+def test_contacts_go_on_across_segments() -> None:
+    motion = walking(400)
+    runs = ("LeftFoot", 5, 300), ("RightFoot", 120, 250)
+    coded = Direct("posewave", motion, step=0.2, contacts=runs, segment_frames=64)
+    assert len(coded.segments) == 7
+    found = coded.read()
+    assert errors_cm(motion, found, runs).max() <= TOLERANCE
+    assert np.array_equal(coded.read(150, 260), found[150:260])
+
+
+def test_two_points_of_a_foot() -> None:
+    """The toe's second contact begins and ends within one of its foot, the first does not."""
+    motion = walking()
+    runs = ("LeftFoot", 5, 60), ("LeftToe", 40, 60), ("LeftToe", 110, 30), ("LeftFoot", 80, 10)
+    coded = Direct("posewave", motion, step=0.2, contacts=runs)
+    assert errors_cm(motion, coded.read(), runs).max() <= TOLERANCE
+
+
+@pytest.mark.parametrize("name", ["16_02", "05_01"])
+def test_real_clips(name: str, data: Path) -> None:
+    motion = amc(data, name)
+    coded = Direct("posewave", motion, step=0.1, contacts="auto")
+    runs = runs_of(MemorySource(motion, 0, coded.codec, 2**26), "auto")
+    assert [run[:3] for run in runs] == [
+        (run.joint, run.first, run.n_frames) for run in mcz.contacts(motion).runs
+    ]
+    found = coded.read()
+    assert errors_cm(motion, found, runs).max() <= TOLERANCE
+    usual = Direct("posewave", motion, step=0.1)
+    n_frames = sum(count for _, _, count in runs)
+    assert coded.n_bytes - usual.n_bytes < 1.75 * n_frames
+    source = positions_of(motion.skeleton, np.asarray(motion.values))
+    off, before = (
+        np.linalg.norm(positions_of(motion.skeleton, values) - source, axis=2)
+        for values in (found, usual.read())
+    )
+    assert off.mean() < before.mean() and off.max() <= 1.25 * before.max()
+
+
+def test_a_straight_leg_is_not_bent(data: Path) -> None:
+    """Of this clip a knee once went out by centimeters."""
+    motion = mcz.read(data / "cmu/bvh/05_01.bvh", unit="in")
+    found = [Direct("posewave", motion, step=0.05, contacts=c).read() for c in ((), "auto")]
+    source = positions_of(motion.skeleton, np.asarray(motion.values))
+    without, with_contacts = (
+        np.linalg.norm(positions_of(motion.skeleton, values) - source, axis=2).max()
+        for values in found
+    )
+    assert with_contacts < 1.1 * without
+
+
+def test_contacts_are_found_of_joints_by_name() -> None:
+    motion = walking(1100)
+    values = np.array(motion.values)
+    values[500:] = values[500]
+    still = replace(motion, signals=(Signal(values),))
+    source = MemorySource(still, 0, by_name("posewave"), 2**26)
+    found = runs_of(source, "auto")
+    assert {run[0] for run in found} <= {"LeftFoot", "RightFoot", "LeftToe", "RightToe"}
+    assert max(first + count for _, first, count in found) == 1100
+    some = runs_of(source, (("RightFoot", 0, 0), ("LeftToe", 7, 3)))
+    assert set(some) == {run for run in found if run[0] == "RightFoot"} | {("LeftToe", 7, 3)}
+
+
+def test_no_contacts_cost_a_byte() -> None:
+    motion = walking()
+    coded = Direct("posewave", motion, step=0.1, contacts=())
+    assert coded.header == Direct("posewave", motion, step=0.1).header
+    assert coded.header.endswith(b"\0")
+
+
+def contacts_of(skeleton: Skeleton, *points: tuple[int, int], rounds: int = 4) -> Contacts:
+    """Of points by joint and tail, steps of 0.01."""
+    fields = [Named(joint=j, tail=t, step=0.01, follows=0) for j, t in points]
+    found = parse_contacts([Named(rounds=rounds, ramp=5, points=fields)], skeleton, "test")
+    assert found is not None
+    return found
+
+
+class Named:
+    """What a parser gives."""
+
+    def __init__(self, **fields: object) -> None:
+        self.__dict__.update(fields)
+
+
+def leg(bend: float, *points: tuple[int, int]) -> tuple[Plan, Held, np.ndarray]:
+    """Two legs of 40, the left knee bent by ``bend`` degrees, as plan, points and a frame."""
+    skeleton = biped()
+    n = skeleton.n_channels
+    plan = make_plan(skeleton, np.ones(n, np.bool_), np.full(n, 1e-6), radius=1.0)
+    held = make_held(contacts_of(skeleton, *(points or [(3, 0)])), plan, np.arange(n), np.ones(n))
+    values = np.zeros((1, n))
+    values[0, skeleton.columns(2)[1]] = bend
+    return plan, held, values
+
+
+def shifted(
+    plan: Plan, held: Held, values: np.ndarray, shifts: np.ndarray, kind: int = STANDING
+) -> np.ndarray:
+    """How far points have come, (n_points, n_frames, 3); ``values`` are corrected."""
+    n = len(held.joints), len(values)
+    before, after = np.empty((*n, 3)), np.empty((*n, 3))
+    place(plan, held, values, before)
+    correct(plan, held, values, np.full(n, kind), np.broadcast_to(shifts, (*n, 3)).copy(), 4)
+    place(plan, held, values, after)
+    return after - before
+
+
+@pytest.mark.parametrize("bend", [0.0, 1e-9, 1e-3, 0.5, 5.0, 90.0, 180.0])
+@pytest.mark.parametrize("way", [(0.0, -0.1, 0.0), (0.0, 0.1, 0.0), (0.1, 0.1, 0.1)])
+def test_a_point_comes_to_its_place_by_small_turns(bend: float, way: tuple[float, ...]) -> None:
+    plan, held, values = leg(bend)
+    before = values.copy()
+    assert np.allclose(shifted(plan, held, values, np.array(way)), way, atol=1e-7)
+    skeleton = biped()
+    off = positions_of(skeleton, values) - positions_of(skeleton, before)
+    assert np.linalg.norm(off, axis=2).max() < 1.5 * np.linalg.norm(way)  # no point goes farther
+
+
+@pytest.mark.parametrize("bend", [0.0, 1e-9, 30.0])
+@pytest.mark.parametrize("far", [1e3, 1e12, 1e30])
+def test_what_is_out_of_reach_stays_bounded(bend: float, far: float) -> None:
+    plan, held, values = leg(bend, (3, 0), (4, 1), (7, 0), (3, 0))
+    before = values.copy()
+    shifted(plan, held, values, np.array([far, far, -far]))
+    assert np.abs(values - before).max() <= MOST_STEPS + 1e-9
+
+
+def test_both_feet_and_a_toe_at_once() -> None:
+    plan, held, values = leg(20.0, (3, 0), (4, 1), (7, 0))
+    wanted = np.array([[[0.1, 0.05, 0.0]], [[0.1, 0.05, 0.0]], [[-0.1, 0.05, 0.02]]])
+    assert np.allclose(shifted(plan, held, values, wanted), wanted, atol=1e-6)
+
+
+def test_points_that_lean_give_way() -> None:
+    """A foot and its own toe that cannot both be where they are asked to."""
+    plan, held, values = leg(20.0, (3, 0), (4, 0))
+    before, after = np.empty((2, 1, 3)), np.empty((2, 1, 3))
+    place(plan, held, values, before)
+    shifts = np.array([[[0.1, 0.1, 0.1]], [[0.0, 0.0, 0.0]]])
+    correct(plan, held, values, np.array([[STANDING], [LEANING]]), shifts, 4)
+    place(plan, held, values, after)
+    assert np.allclose((after - before)[0], shifts[0], atol=1e-7)
+
+
+def test_shifts_come_and_go() -> None:
+    stands = np.array([0, 0, 0, 1, 2, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0])
+    starts, moves = np.zeros((2, 15, 3), np.int64)
+    starts[3], starts[8], moves[4] = (16, 0, 0), (0, 16, 0), (1, -1, 3)
+    shifts, active = np.zeros((15, 3)), np.zeros(15, np.int64)
+    aim(np.zeros((15, 3)), (stands, starts, moves), 2.0, 4, shifts, active)
+    assert active.tolist() == [1, 1, 1, 2, 2, 1, 1, 1, 2, 1, 1, 1, 1, 0, 0]
+    assert np.allclose(shifts[:5, 0], [0.8, 1.2, 1.6, 2.0, 4.0])
+    assert np.allclose(shifts[4:9, 0], [4.0, 3.0, 2.0, 1.0, 0.0])  # of 3 frames, not of 4
+    assert np.allclose(shifts[4:9, 1], [-2.0, -1.0, 0.0, 1.0, 2.0])
+    assert np.allclose(shifts[8:14, 1], [2.0, 1.6, 1.2, 0.8, 0.4, 0.0])
+
+
+def test_points_without_angles_do_nothing() -> None:
+    skeleton = biped(angle_unit="")
+    n = skeleton.n_channels
+    plan = make_plan(skeleton, np.ones(n, np.bool_), np.ones(n), radius=1.0)
+    held = make_held(contacts_of(skeleton, (3, 0)), plan, np.arange(n), np.ones(n))
+    values = np.zeros((2, n))
+    shifted(plan, held, values, np.ones(3))
+    assert not values.any()
+
+
+def test_points_that_no_skeleton_has() -> None:
+    skeleton = biped()
+    for joint, tail in ((99, 0), (4, 2), (3, 1)):
+        with pytest.raises(FormatError, match="test: contacts of point"):
+            contacts_of(skeleton, (joint, tail))
+    with pytest.raises(FormatError, match="no point"):
+        contacts_of(skeleton)
+    points = [Named(joint=3, tail=0, step=1.0, follows=1)]
+    with pytest.raises(FormatError, match="point 1 follows point 1"):
+        parse_contacts([Named(rounds=1, ramp=0, points=points)], skeleton, "test")
+
+
+def test_runs_that_cannot_be() -> None:
+    for wrong in ("", "lfoot,", "lfoot:-1+2,", 7, [(1, 2)], [("a", -1, 2)], [("a", 3, 0)]):
+        with pytest.raises(OptionError, match="contacts"):
+            parse_runs(wrong)
+    assert parse_runs("a:1+2, b:c:3+4") == (("a", 1, 2), ("b:c", 3, 4))
+    assert parse_runs("m:LeftFoot,b") == (("m:LeftFoot", 0, 0), ("b", 0, 0))
+    with pytest.raises(OptionError, match="no joint 'nobody'"):
+        choose_contacts(biped(), [("nobody", 0, 5)], 0.01, None)
+    with pytest.raises(OptionError, match="9 joints, 8 at most"):
+        names = list(biped().addresses())
+        choose_contacts(biped(), [(name, 0, 5) for name in names], 0.01, None)
+    for contacts in ("LeftFoot:149+2", "LeftFoot,RightFoot:0+151"):
+        with pytest.raises(OptionError, match="beyond 150 frames"):
+            Direct("posewave", walking(), contacts=contacts)
+    with pytest.raises(OptionError, match="no joint 'nobody'"):
+        Direct("posewave", walking(), contacts="nobody")
+
+
+def test_skeletons_without_a_unit() -> None:
+    motion = walking()
+    for change in ({"unit_cm": None}, {"angle_unit": ""}):
+        other = replace(motion, skeleton=replace(motion.skeleton, **change))
+        for contacts in ("auto", RUNS):
+            with pytest.raises(OptionError, match="unknown"):
+                Direct("posewave", other, step=0.1, contacts=contacts)
+
+
+def test_what_cannot_be_held_is_said() -> None:
+    skeleton = biped()
+    keeper = Keeper(0.01, outcomes=[Outcome(Piece(0, 10, 5, 10, 0), np.full((5, 3), 0.02))])
+    with pytest.warns(ContactWarning, match="LeftFoot .* 1 contacts; .* 0.0346 .* 10 to 14"):
+        keeper.warn(skeleton, contacts_of(skeleton, (3, 0)))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_hostile_bytes(seed: int) -> None:
+    motion = walking(80)
+    coded = Direct("posewave", motion, step=0.2, contacts="LeftFoot:5+40,RightFoot:20+60")
+    random = np.random.default_rng(seed)
+    finest = coded.places()[-1]
+    stream = coded.stream(*finest)
+    for _ in range(20):
+        data = bytearray(stream)
+        for at in random.integers(len(data) // 2, len(data), random.integers(1, 20)):
+            data[at] = int(random.integers(256))
+        try:
+            coded.read(changes=coded.with_stream(finest, bytes(data)))  # checks that all is finite
+        except FormatError:
+            continue
+    for extra in (b"\0", b"\1"):
+        with pytest.raises(FormatError, match="bytes, of which"):
+            coded.read(changes=coded.with_stream(finest, stream + extra))
+
+
+def bits_of_contacts() -> str:
+    """What a stream of contacts alone has, and what comes of it."""
+    motion = walking(60)
+    skeleton, source = motion.skeleton, np.asarray(motion.values)
+    n = skeleton.n_channels
+    plan = make_plan(skeleton, np.ones(n, np.bool_), np.full(n, 1e-4), radius=1.0)
+    runs = ("LeftFoot", 3, 20), ("LeftToe", 10, 20), ("RightFoot", 20, 40)
+    wanted = choose_contacts(skeleton, runs, 0.01, None)
+    assert wanted is not None
+    points = [Named(**point) for point in wanted.fields["points"]]
+    contacts = parse_contacts([Named(rounds=4, ramp=5, points=points)], skeleton, "test")
+    assert contacts is not None
+    held = make_held(contacts, plan, np.arange(n), np.full(n, 4.0))
+    rough = np.round(source, 0)
+    values = rough.copy()
+    stream = Stream(np.zeros(SQUASH, np.int64), 20000, None)
+    keeper = Keeper(0.01, wanted.pieces)
+    keeper.encode(contacts, plan, held, stream, source, values)
+    assert max(outcome.errors.max() for outcome in keeper.outcomes) <= 0.01
+    data = stream.finish()
+    again = Stream(np.zeros(SQUASH, np.int64), 0, data)
+    decode_contacts(contacts, plan, held, again, rough, "test")
+    assert np.array_equal(rough, values)
+    return f"{data.hex()} {values.tobytes().hex()}"
+
+
+def test_interpreted_loops_give_the_same_bits() -> None:
+    program = "from tests.codecs.test_posewave_contacts import bits_of_contacts as b; print(b())"
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=Path(__file__).parents[2],
+        env={**os.environ, "MCZ_LOOPS": "interpreted"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == bits_of_contacts()
+
+
+def test_a_file(tmp_path: Path) -> None:
+    motion = walking()
+    path = tmp_path / "walk.mcz"
+    mcz.write(motion, path, codec="posewave", step=0.1, contacts="LeftFoot:5+40")
+    found = np.asarray(mcz.read(path).values)
+    assert errors_cm(motion, found, [("LeftFoot", 5, 40)]).max() <= TOLERANCE
