@@ -90,6 +90,11 @@ class Header:
     weights: Floats
     orders: tuple[int, ...]
 
+    @property
+    def may_go_on(self) -> bool:
+        """Whether a segment may go on where the one before it ended."""
+        return self.levels == 0 and not any(self.orders)  # PWAVE-28
+
 
 def build_header(**fields: Any) -> bytes:
     return build(POSEWAVE_HEADER, fields, f"{NAME} header")

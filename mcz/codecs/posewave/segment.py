@@ -94,7 +94,7 @@ def encode_coded(
     walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
     streams = []
     for level, band in enumerate(bands):
-        stream = Stream(coder, _room(pyramid, level, head), None)
+        stream = Stream(coder, room_of(pyramid, level, head), None)
         if level == 0:
             code_head(
                 stream, kinds_of(skeleton), head.kept.astype(np.int64), head.numbers.copy(), NAME
@@ -108,7 +108,7 @@ def encode_coded(
     return (streams[0], *empty, *streams[1:]), walk.values()
 
 
-def _room(pyramid: Pyramid, level: int, head: Head) -> int:
+def room_of(pyramid: Pyramid, level: int, head: Head) -> int:
     """As many bytes as the stream of a level may take."""
     return 8 * len(head.kept) + pyramid.rows(level) * (8 * int(head.kept.sum()) + 1) + 1024
 
