@@ -152,7 +152,7 @@ class Corrections:
         _kernels().correct(self.plan, *args)
 
 
-def room_of(contacts: Contacts | None, n_frames: int) -> int:
+def room_of_contacts(contacts: Contacts | None, n_frames: int) -> int:
     """As many bytes as the contacts of a segment may take."""
     return ROOM * (n_frames + 1) * len(contacts.joints) + 64 if contacts else 0
 

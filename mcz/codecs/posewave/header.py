@@ -93,6 +93,11 @@ class Header:
     orders: tuple[int, ...]
     contacts: Contacts | None = None
 
+    @property
+    def may_go_on(self) -> bool:
+        """Whether a segment may go on where the one before it ended."""
+        return self.levels == 0 and not any(self.orders) and not self.contacts  # PWAVE-28
+
 
 def build_header(**fields: Any) -> bytes:
     return build(POSEWAVE_HEADER, {"contacts": [], **fields}, f"{NAME} header")

@@ -13,7 +13,7 @@ states). A stream holds one resolution of one segment; a segment decodes by itse
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,10 +31,12 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.gaps import SegmentReader
 from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
-from mcz.codecs.posewave.choices import Choice, choose, guess
+from mcz.codecs.posewave.chain import Chain
+from mcz.codecs.posewave.choices import PRESETS, Choice, choose, guess
 from mcz.codecs.posewave.contact_choice import parse_runs
 from mcz.codecs.posewave.header import NAME, Header, parse_header
 from mcz.codecs.posewave.limits import joint_limits
+from mcz.codecs.posewave.live import LiveDecoder, LiveEncoder
 from mcz.codecs.posewave.segment import decode_segment, encode_segment
 from mcz.codecs.segments import (
     SEGMENT_FRAMES_PARAMETER,
@@ -44,15 +46,12 @@ from mcz.codecs.segments import (
     skeleton_of,
 )
 from mcz.errors import FormatError
+from mcz.motion import Skeleton
 
 Floats = NDArray[np.float64]
 
 MOST_FRAMES = 8192  # of a segment, where the caller leaves it open
 LEAST_FRAMES = 512
-
-
-# What a preset promises: that no point is farther off in any frame.
-PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}
 
 
 def promise(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -107,28 +106,48 @@ def decode(
     """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
     fields = parse_header(header, layout)
     for span in spans:
-        if span.lead or span.tail or not span.fresh:  # PWAVE-03
+        if span.lead or span.tail:  # PWAVE-03
             raise FormatError(f"{NAME}: the segment at {span.first} bears upon others")
-    skeleton = layout.skeleton
-    assert skeleton is not None  # the header was checked against it
+        if not (span.fresh or fields.may_go_on):  # PWAVE-28
+            raise FormatError(f"{NAME}: the segment at {span.first} goes on from the one before")
     n_channels = layout.n_channels if request.groups else 0
     out = np.zeros((request.stop - request.start, n_channels))
     if not n_channels:
         return out
-    for index, span in enumerate(spans):
-        start, stop = max(span.first, request.start), min(span.stop, request.stop)
-        if start >= stop:
-            continue
+    decode_one = _decoder(fields, skeleton_of(NAME, layout))
+    for index in _needed(spans, request):
+        span = spans[index]
         streams = [
             fetch(index, resolution, 0)
             for resolution in range(layout.n_resolutions - request.resolution)
         ]
-        where = f"{NAME}: segment at {span.first}"
-        values = decode_segment(fields, skeleton, streams, span.n_frames, where)
-        out[start - request.start : stop - request.start] = values[
-            start - span.first : stop - span.first
-        ]
+        values = decode_one(streams, span)
+        start, stop = max(span.first, request.start), min(span.stop, request.stop)
+        if start < stop:
+            out[start - request.start : stop - request.start] = values[
+                start - span.first : stop - span.first
+            ]
     return out
+
+
+def _needed(spans: Sequence[Span], request: Request) -> range:
+    """The segments with which the requested frames can be decoded."""
+    before = [i for i, span in enumerate(spans) if span.fresh and span.first <= request.start]
+    stop = sum(span.first < request.stop for span in spans)
+    return range(max(before, default=0), stop if request.start < request.stop else 0)
+
+
+def _decoder(header: Header, skeleton: Skeleton) -> Callable[[Sequence[bytes], Span], Floats]:
+    """What decodes one segment after the other, (n_frames, n_channels) of each."""
+    chain = Chain(header, skeleton)
+
+    def decode_one(streams: Sequence[bytes], span: Span) -> Floats:
+        where = f"{NAME}: segment at {span.first}"
+        if header.may_go_on:
+            return chain.decode(streams[0], span.n_frames, where, fresh=span.fresh)
+        return decode_segment(header, skeleton, streams, span.n_frames, where)
+
+    return decode_one
 
 
 CODEC = Codec(
@@ -142,6 +161,9 @@ CODEC = Codec(
     grouping="all",
     dial=Dial("step", 2.0**-30, 2.0**30, guess=guess),
     promise=promise,
+    live=LiveEncoder,
+    follow=LiveDecoder,
+    live_options={"levels": 0},
     parameters=(
         Parameter(
             "preset",
@@ -155,7 +177,12 @@ CODEC = Codec(
             "quantizer step in cm; default: what the preset takes",
             number("step", 1e-9, 1e9),
         ),
-        Parameter("levels", None, "levels; default: what suits the clip", integer("levels", 0, 8)),
+        Parameter(
+            "levels",
+            None,
+            "levels; default: what suits the clip; 0: no frame waits for a later one",
+            integer("levels", 0, 8),
+        ),
         Parameter(
             "contacts",
             None,

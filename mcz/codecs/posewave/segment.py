@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.posewave.contact_keeper import Keeper
-from mcz.codecs.posewave.contacts import decode_contacts, room_of
+from mcz.codecs.posewave.contacts import decode_contacts, room_of_contacts
 from mcz.codecs.posewave.header import NAME, Header
 from mcz.codecs.posewave.orders import Orders
 from mcz.codecs.posewave.pyramid import Pyramid
@@ -99,7 +99,7 @@ def encode_coded(
     walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
     streams = []
     for level, band in enumerate(bands):
-        room = _room(pyramid, level, head) + room_of(header.contacts, len(values))
+        room = room_of(pyramid, level, head) + room_of_contacts(header.contacts, len(values))
         stream = Stream(coder, room, None)
         if level == 0:
             code_head(
@@ -122,7 +122,7 @@ def encode_coded(
     return (streams[0], *empty, *streams[1:]), found
 
 
-def _room(pyramid: Pyramid, level: int, head: Head) -> int:
+def room_of(pyramid: Pyramid, level: int, head: Head) -> int:
     """As many bytes as the stream of a level may take."""
     return 8 * len(head.kept) + pyramid.rows(level) * (8 * int(head.kept.sum()) + 1) + 1024
 
@@ -153,10 +153,8 @@ def decode_segment(
             continue
         stream = Stream(coder, 0, streams[level]) if level else stream
         rows.begin(level, pyramid.kind(level), pyramid.rows(level), stream)
-        found = rows.decode()
+        found = rows.decode(ends=level < pyramid.n_details or not held)
         (walk.take_details if level else walk.take_coarsest)(level, found, rows.exponents)
-        if level < pyramid.n_details or not held:
-            stream.check_whole(f"{where}: level {level}")
     values = walk.values()
     if held and len(streams) > pyramid.n_details:
         assert header.contacts is not None
