@@ -68,9 +68,8 @@ class Stream:
 
     def check_whole(self, where: str) -> None:
         """Raises FormatError unless all bytes were due, after the last bit was decoded."""
-        due = int(_coding().coded_size(self.coder))
-        if due != len(self.data):  # ROWS-01
-            raise FormatError(f"{where}: {len(self.data)} bytes, of which {due} were due")
+        if _coding().coded_size(self.coder) != len(self.data):  # ROWS-01
+            raise FormatError(f"{where} do not take {len(self.data)} bytes")
 
 
 def fresh_coder(start: Start) -> Ints:
