@@ -114,7 +114,8 @@ def decode(
     out = np.zeros((request.stop - request.start, n_channels))
     if not n_channels:
         return out
-    decode_one = _decoder(fields, skeleton_of(NAME, layout))
+    assert layout.skeleton is not None  # the header was checked against it
+    decode_one = _decoder(fields, layout.skeleton)
     for index in _needed(spans, request):
         span = spans[index]
         streams = [

@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 
 from mcz.codecs.posewave.header import POSEWAVE_HEADER
+from mcz.codecs.posewave.pyramid import Pyramid
 from mcz.codecs.posewave.rows import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.segment import classes_of, kinds_of
+from mcz.codecs.posewave.walk import Walk
 from mcz.container import payloads
 from mcz.errors import FormatError
 from mcz.motion import Joint, Skeleton
@@ -26,6 +28,7 @@ from tools.vectors.build.files import Broken, Vector, rehash
 from tools.vectors.build.motions import channels
 from tools.vectors.build.pose_clips import (
     HEADING,
+    Floats,
     Plan,
     acclaim,
     biovision,
@@ -246,11 +249,21 @@ def _numbers(shelf: Broken) -> None:
         name = f"number-{'kept' if kept else 'constant'}-{column}-40-bits"
         purpose = f"A number of 40 bits of channel {column}."
         shelf.add(name, HEADING, purpose, file_with(plan, segments=stream(0, lambda _, d=data: d)))
+    plan = replace(plan, source=plan.source[:1])
     for value in (2**30 + 1, -(2**30) - 1, 2**31 + 5):
         data = _row_stream(plan, value)
         purpose = f"A coefficient of {value}."
         name = f"coefficient-{'below' if value < 0 else 'beyond'}-{abs(value):x}"
-        shelf.add(name, ROWS, purpose, file_with(plan, segments=stream(0, lambda _, d=data: d)))
+        edits = {"segments": stream(0, lambda _, d=data: d), "CEND": rehash(_taken(plan, value))}
+        shelf.add(name, ROWS, purpose, file_with(plan, **edits))
+
+
+def _taken(plan: Plan, value: int) -> Floats:
+    """The frame of a reader that takes such a coefficient."""
+    kept = np.arange(plan.skeleton.n_channels) == 0
+    walk = Walk(parsed(plan), plan.skeleton, Pyramid(1, 0, 0), kept, np.zeros(len(kept)))
+    walk.take_coarsest(0, np.full((1, 1), float(value)), np.zeros(1, np.int64))
+    return walk.values()
 
 
 def _head_stream(plan: Plan, column: int, is_kept: bool) -> bytes:
@@ -272,10 +285,10 @@ def _row_stream(plan: Plan, value: int) -> bytes:
     header = parsed(plan)
     classes = classes_of(plan.skeleton)[kept == 1]
     rows = RowCoder(classes, header.start, out.coder, "", refining=False)
-    rows.begin(0, 0, 2, out)
+    rows.begin(0, 0, 1, out)
     with suppress(FormatError):
         rows._wanted[:] = value
-        rows._run(0, 2, 0.0)
+        rows._run(0, 1, 0.0)
     return out.finish()
 
 
