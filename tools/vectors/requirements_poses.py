@@ -48,9 +48,37 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "PWAVE-25": ("invalid/posewave/notes-beyond*", "invalid/posewave/notes-many"),
     "PWAVE-26": ("invalid/posewave/notes-turns-*",),
     "PWAVE-27": ("valid/posewave/order*", "valid/posewave/notes-*"),
-    "PWAVE-28": ("invalid/posewave/segment-not-fresh", "invalid/posewave/on-orders"),
+    "PWAVE-28": (
+        "invalid/posewave/segment-not-fresh",
+        "invalid/posewave/on-orders",
+        "invalid/posewave/contacts-not-fresh",
+    ),
     "PWAVE-29": ("valid/posewave/on*", "valid/posewave/live*", "invalid/posewave/on-b*"),
     "PWAVE-30": ("invalid/posewave/on-none-kept-*",),
+    "HOLD-01": ("valid/posewave/contacts-*",),
+    "HOLD-02": ("invalid/posewave/contacts-rounds-*", "invalid/posewave/contacts-ramp-*"),
+    "HOLD-03": ("invalid/posewave/contacts-points-*",),
+    "HOLD-04": ("invalid/posewave/contacts-step-*", "valid/posewave/contacts-step-*"),
+    "HOLD-05": ("invalid/posewave/contacts-joint-*", "invalid/posewave/contacts-tail-*"),
+    "HOLD-06": ("invalid/posewave/contacts-follows-*",),
+    "HOLD-07": (
+        "invalid/posewave/contacts-byte-*",
+        "valid/posewave/contacts-cut",
+        "valid/posewave/contacts-segments",
+        "valid/posewave/contacts-levels-*",
+    ),
+    "HOLD-08": ("invalid/posewave/contacts-number-*",),
+    "HOLD-09": ("invalid/posewave/contacts-count-*", "valid/posewave/contacts-none"),
+    "HOLD-10": (
+        "invalid/posewave/contacts-gap-*",
+        "invalid/posewave/contacts-length-*",
+        "invalid/posewave/contacts-overlap",
+    ),
+    "HOLD-11": ("invalid/posewave/contacts-start-*",),
+    "HOLD-12": ("valid/posewave/contacts-*",),
+    "HOLD-13": ("invalid/posewave/contacts-displacement-*",),
+    "HOLD-14": ("valid/posewave/contacts-ramp-*", "valid/posewave/contacts-segments"),
+    "HOLD-15": ("valid/posewave/contacts-*",),
 }
 
 ARGUED: dict[str, str] = {

@@ -16,7 +16,7 @@ from mcz.codecs.posewave.contact_plan import START_UNITS, Contacts, Held
 from mcz.codecs.posewave.contacts import Coder, Corrections
 from mcz.codecs.posewave.rows import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan
-from mcz.errors import ContactWarning
+from mcz.errors import ContactWarning, MotionError
 from mcz.motion import Skeleton
 
 Floats = NDArray[np.float64]
@@ -182,7 +182,12 @@ class Keeper:
                 goal + aims[point, rows] - (here + corrections.starts[point, first] * unit)
             )
         for point in range(len(targets)):
-            corrections.code(coder, point, wanted[point], radii[point])
+            fault = corrections.code(coder, point, wanted[point], radii[point])
+            if fault >= 0:
+                raise MotionError(
+                    f"contacts: from frame {self.first + fault} on a point moves or is off by more "
+                    "than 2^30 steps of its grid; give a greater contact_tolerance"
+                )
         return coder
 
     def _outcomes(

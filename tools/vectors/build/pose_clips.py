@@ -18,6 +18,7 @@ from mcz.codecs import raw
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.posewave import posewave
 from mcz.codecs.posewave.chain import Chain
+from mcz.codecs.posewave.contact_keeper import Keeper, Piece
 from mcz.codecs.posewave.header import Header, build_header, parse_header
 from mcz.codecs.posewave.segment import Weights, encode_segment
 from mcz.motion import Joint, Motion, Signal, Skeleton
@@ -51,7 +52,8 @@ class Plan:
 
     ``fields`` are those of the header that are not the plain ones; ``cut``: finest resolutions that
     are not stored; ``price`` of a bit in squared steps; ``streams``: those of a segment in the
-    place of its own; ``on``: segments that go on where the one before ended.
+    place of its own; ``on``: segments that go on where the one before ended. ``pieces`` of contacts
+    are to keep their places to ``tolerance``.
     """
 
     skeleton: Skeleton
@@ -63,6 +65,8 @@ class Plan:
     refinement: Sequence[int] | None = None
     streams: dict[int, tuple[bytes, ...]] = field(default_factory=dict)
     on: Collection[int] = ()
+    pieces: tuple[Piece, ...] = ()
+    tolerance: float = 0.01
 
     @property
     def n_frames(self) -> int:
@@ -93,27 +97,32 @@ def parsed(plan: Plan) -> Header:
 
 
 def segments_of(plan: Plan) -> list[Segment]:
-    chain = Chain(parsed(plan), plan.skeleton)
+    chain, keeper = Chain(parsed(plan), plan.skeleton), Keeper(plan.tolerance, plan.pieces)
     edges = [0, *plan.ends, plan.n_frames] if plan.n_frames else []
     return [
-        Segment(start, stop - start, _streams(plan, chain, index, start, stop), fresh=fresh)
+        Segment(
+            start, stop - start, _streams(plan, chain, keeper, index, (start, stop)), fresh=fresh
+        )
         for index, (start, stop) in enumerate(zip(edges, edges[1:], strict=False))
         for fresh in (index not in plan.on,)
     ]
 
 
-def _streams(plan: Plan, chain: Chain, index: int, start: int, stop: int) -> tuple[bytes, ...]:
+def _streams(
+    plan: Plan, chain: Chain, keeper: Keeper, index: int, frames: tuple[int, int]
+) -> tuple[bytes, ...]:
     if index in plan.streams:
         return plan.streams[index]
     if not plan.skeleton.n_channels:
         return ()
-    own = plan.refinement
+    own, (start, stop) = plan.refinement, frames
+    keeper.first = start
     octaves = None if own is None else np.array(own[start:stop], np.int64)
     source, weights = plan.source[start:stop], Weights(plan.price, plan.price)
     if plan.on:
         octave = 0 if octaves is None else int(octaves[0])
         return chain.encode(source, plan.price, octave, fresh=index not in plan.on)[:1]
-    streams, _ = encode_segment(chain.header, plan.skeleton, source, weights, octaves)
+    streams, _ = encode_segment(chain.header, plan.skeleton, source, weights, octaves, keeper)
     return streams[: plan.n_resolutions]
 
 

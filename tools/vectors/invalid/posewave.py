@@ -40,6 +40,7 @@ from tools.vectors.build.pose_clips import (
     segments_of,
     waves,
 )
+from tools.vectors.invalid import posewave_contacts
 from tools.vectors.invalid.common import every_codec
 
 ORDERS = f"{HEADING}; Axis orders"
@@ -59,6 +60,7 @@ def vectors() -> Iterable[Vector]:
     _streams(shelf)
     _numbers(shelf)
     _notes(shelf)
+    posewave_contacts.add(shelf)
     every_codec.add(shelf, "posewave")
     return shelf.vectors
 
