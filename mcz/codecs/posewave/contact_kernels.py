@@ -167,7 +167,7 @@ def _place_point(plan: Plan, held: Held, k: int, row: Floats, batch: Lanes, poin
         point[i] = origin[i, 0] + way
     for move in range(plan.move_starts[root], plan.move_starts[root + 1]):
         value = row[plan.moves[move, 0]]
-        value = value if abs(value) < BEYOND else 0.0
+        value = value if abs(value) < BEYOND else 0.0  # HOLD-01
         for i in range(3):
             point[i] += value * plan.directions[move, i]
 

@@ -49,7 +49,7 @@ def code_number(state: Ints, data: Bytes, first: int, own: int, value: int) -> i
     at = first + C_LENGTH + MAX_LENGTH * own
     while adaptive(state, data, 1 if size >> length else 0, at + length):
         length += 1
-        if length == MAX_LENGTH:  # PWAVE-19
+        if length == MAX_LENGTH:  # PWAVE-19, HOLD-08
             return 1 << MAX_LENGTH
     if length == 0:
         return 0

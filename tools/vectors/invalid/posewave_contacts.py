@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from mcz.codecs.posewave import displacement_kernels as coding
+from mcz.codecs.posewave.contact_plan import MOST_STEPS
 from mcz.codecs.posewave.contacts import Coder
 from mcz.codecs.posewave.head_kernels import code_number
 from mcz.codecs.posewave.header import POSEWAVE_HEADER
@@ -19,7 +21,7 @@ from mcz.coding.mixing import adaptive
 from mcz.motion import Joint, Skeleton
 from mcz.schema import varint
 from tools.vectors.build.edits import headed, plus, put, says, stream
-from tools.vectors.build.files import Broken
+from tools.vectors.build.files import Broken, rehash
 from tools.vectors.build.motions import channels
 from tools.vectors.build.pose_clips import HEADING, Plan, acclaim, file_with, header_of, parsed
 
@@ -115,11 +117,17 @@ def _streams(shelf: Broken) -> None:
         data = _stream(plan, script)
         made = file_with(plan, segments=stream(0, _instead(data)))
         shelf.add(f"contacts-{name}", CONTACTS, f"{purpose}.", made)
-    for name, value in (("far", 2**30 + 2), ("below", -(2**30) - 2), ("residual", 2**32)):
-        data = _stream(plan, None, value)
-        made = file_with(plan, segments=stream(0, _instead(data)))
+    for name, value in (("far", 2**30 + 2), ("below", -(2**30) - 2)):
+        data = _stream(plan, partial(_moving, value=value))
+        taken = np.zeros((N_FRAMES, 1))
+        taken[2] = math.copysign(MOST_STEPS * parsed(plan).greatest[0], value)
+        made = file_with(plan, segments=stream(0, _instead(data)), CEND=rehash(taken))
         purpose = f"A displacement of {value} steps."
         shelf.add(f"contacts-displacement-{name}", CONTACTS, purpose, made)
+    data = _stream(plan, lambda s: _moving(s, 2**32))
+    made = file_with(plan, segments=stream(0, _instead(data)))
+    purpose = "A residual of more than 2^30 + 16."
+    shelf.add("contacts-displacement-residual", CONTACTS, purpose, made)
     good = _stream(plan, lambda s: _one(s, 1, 2))
     for name, purpose, edit in (
         ("byte-behind", "A byte 255 behind the bits.", plus(b"\xff")),
@@ -150,6 +158,14 @@ def _overlap(script: Script) -> None:
     script.contact(-1, 1)
 
 
+def _moving(script: Script, value: int) -> None:
+    """A contact in frames 1 and 2, from which the point moves along x."""
+    _one(script, 1, 2)
+    for residual, other in ((value, 0.0), (0, 1024.0), (0, 512.0)):
+        sizes = np.full(2, 2.0)
+        coding._code_residual(script.state, script.data, residual, sizes, other, 2)
+
+
 def _plan() -> Plan:
     """A joint that goes along x, and stays."""
     skeleton = Skeleton((Joint("one", channels=channels("tx")),), angle_unit="deg")
@@ -158,8 +174,8 @@ def _plan() -> Plan:
     return Plan(skeleton, np.zeros((N_FRAMES, 1)), fields)
 
 
-def _stream(plan: Plan, script: Callable[[Script], Any] | None, move: int = 0) -> bytes:
-    """Rows of zeros of the only channel, then contacts: a script, or one with such a move."""
+def _stream(plan: Plan, script: Callable[[Script], None]) -> bytes:
+    """Rows of zeros of the only channel, then contacts."""
     header, kept = parsed(plan), np.ones(1, np.int64)
     out = Stream(fresh_coder(header.start), ROOM, None)
     code_head(out, kinds_of(plan.skeleton), kept, np.zeros(1, np.int64), "")
@@ -167,13 +183,6 @@ def _stream(plan: Plan, script: Callable[[Script], Any] | None, move: int = 0) -
     rows.begin(0, 0, N_FRAMES, out)
     rows.encode(0.0, 0, np.zeros((N_FRAMES, 1)))
     coder = Coder(out)
-    if script is not None:
-        script(Script(coder))
-    else:
-        wanted = np.zeros((N_FRAMES, 3))
-        wanted[2:] = 0.01 * move
-        track = np.array([0, 1, 2, 2]), np.zeros((4, 3), np.int64), np.zeros((4, 3), np.int64)
-        leader = np.zeros(N_FRAMES, np.int64), np.zeros((N_FRAMES, 3))
-        coder.point(np.zeros((6, 3)), 0.01, track, leader, wanted, np.full(N_FRAMES, 0.01))
+    script(Script(coder))
     coder.close()
     return out.finish()
