@@ -170,5 +170,6 @@ def decode_contacts(
                 f"{where}: a contact of point {point} at or after frame {fault} is out of range"
             )
     coder.close()
-    stream.check_whole(where)
+    if not stream.is_whole:  # HOLD-07
+        raise FormatError(f"{where} do not take {len(stream.data)} bytes")
     corrections.correct()

@@ -66,10 +66,10 @@ class Stream:
             raise AssertionError(f"{used} bytes in {len(self.data)}")
         return self.data[:used].tobytes()
 
-    def check_whole(self, where: str) -> None:
-        """Raises FormatError unless all bytes were due, after the last bit was decoded."""
-        if _coding().coded_size(self.coder) != len(self.data):  # ROWS-01
-            raise FormatError(f"{where} do not take {len(self.data)} bytes")
+    @property
+    def is_whole(self) -> bool:
+        """Whether all bytes were due, after the last bit was decoded."""
+        return bool(_coding().coded_size(self.coder) == len(self.data))
 
 
 def fresh_coder(start: Start) -> Ints:
@@ -144,14 +144,20 @@ class RowCoder:
 
     def decode(self, *, ends: bool = True) -> Floats:
         """All rows of the level, (n_rows, n_kept), in steps; ``ends``: the stream does, too."""
+        if not self.n_kept:
+            if not self.stream.is_whole:  # PWAVE-20, PWAVE-30
+                raise FormatError(f"{self.where}: bytes of rows, but no channel is kept")
+            return self._decoded(self._n_known, len(self._indices))
         self._run(self._n_known, len(self._indices), -1.0)
-        if ends:
-            self.stream.check_whole(f"{self.where}: rows of kind {self.kind}")
+        if ends and not self.stream.is_whole:  # ROWS-01
+            raise FormatError(
+                f"{self.where}: rows of kind {self.kind} do not take {len(self.stream.data)} bytes"
+            )
         return self._decoded(self._n_known, len(self._indices))
 
     def _run(self, first: int, stop: int, rate_weight: float) -> None:
         if not self.n_kept:
-            return  # PWAVE-20
+            return
         fault = _model().code_rows(
             self.model,
             self.stream.data,

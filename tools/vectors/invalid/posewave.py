@@ -55,6 +55,7 @@ def vectors() -> Iterable[Vector]:
     _counts(shelf)
     _own_orders(shelf)
     _signal(shelf)
+    _nothing(shelf)
     _segments(shelf)
     _chains(shelf)
     _streams(shelf)
@@ -172,6 +173,18 @@ def _signal(shelf: Broken) -> None:
     )
     for name, purpose, edits in cases:
         shelf.add(name, spec, purpose, file_with(plan, **edits))
+
+
+def _nothing(shelf: Broken) -> None:
+    """Faults of clips of no frames, in which a decoder has nothing to stumble over."""
+    plan = _still(n_frames=0, levels=0)
+    twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
+    data = file_with(plan, CLIP=twice, row=two_rows)
+    shelf.add("frames-0-samples", f"{HEADING}; CLIP", "Two rows a frame, no frames.", data)
+    still = _still(_with("rx ry"), 0)
+    header = put(POSEWAVE_HEADER, "orders", b"\2\0\1")(header_of(still))
+    purpose = "An order of a joint with two rotations, no frames."
+    shelf.add("frames-0-order", ORDERS, purpose, file_with(still, CLIP=says(header)))
 
 
 def _more(count: int) -> Callable[[Any], Any]:
