@@ -25,7 +25,7 @@ from mcz.codecs.posewave.contacts import decode_contacts
 from mcz.codecs.posewave.rows import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan, make_plan
 from mcz.coding.mixing import SQUASH
-from mcz.errors import ContactWarning, FormatError, OptionError
+from mcz.errors import ContactWarning, FormatError, MotionError, OptionError
 from mcz.kinematics.points import first_points, positions_of
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.writing.signal_source import MemorySource
@@ -322,6 +322,23 @@ def test_skeletons_without_a_unit() -> None:
         for contacts in ("auto", RUNS):
             with pytest.raises(OptionError, match="unknown"):
                 Direct("posewave", other, step=0.1, contacts=contacts)
+
+
+def test_a_skeleton_without_feet() -> None:
+    motion = walking()
+    joints = tuple(replace(j, name=f"bone {n}") for n, j in enumerate(motion.skeleton.joints))
+    other = replace(motion, skeleton=replace(motion.skeleton, joints=joints))
+    with pytest.raises(OptionError, match="no joint .* is a foot by its name"):
+        Direct("posewave", other, step=0.1, contacts="auto")
+
+
+def test_a_tolerance_that_is_too_small() -> None:
+    motion = walking()
+    values = np.array(motion.values)
+    values[:, :3] *= 1000
+    far = replace(motion, signals=(Signal(values),))
+    with pytest.raises(MotionError, match="greater contact_tolerance"):
+        Direct("posewave", far, step=1.0, contacts=RUNS, contact_tolerance=1e-6)
 
 
 def test_what_cannot_be_held_is_said() -> None:

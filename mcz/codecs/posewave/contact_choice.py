@@ -22,6 +22,7 @@ from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import OptionError
 from mcz.kinematics.contacts import USUAL_RATE, FootTracks
+from mcz.kinematics.feet import feet_of
 from mcz.kinematics.points import points_of, positions_of
 from mcz.motion import Skeleton
 
@@ -82,14 +83,19 @@ def _entry(text: str) -> Run:
 def runs_of(source: SignalSource, wanted: Runs) -> tuple[Run, ...]:
     """What is ``wanted``, found by the rule where nobody says the frames.
 
-    Raises OptionError for what is beyond the clip, or where angles or lengths have no known unit,
-    and MotionError where no joint is a foot.
+    Raises OptionError for what is beyond the clip, where angles have no known unit, and where no
+    joint is a foot.
     """
     layout = source.layout
     skeleton, n_frames = skeleton_of(NAME, layout), layout.n_frames
     if not has_kinematics(skeleton):
         raise OptionError(f"contacts: skeleton {skeleton.name!r} has angles of an unknown unit")
     if isinstance(wanted, str):
+        if not feet_of(skeleton):
+            raise OptionError(
+                f"contacts: no joint of skeleton {skeleton.name!r} is a foot by its name; name "
+                "those that are, like contacts=ankle_l,ankle_r"
+            )
         return _found(source, skeleton, None)
     for name, first, count in wanted:
         _joint(skeleton, name)
