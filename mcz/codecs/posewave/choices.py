@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
+from mcz.codecs.posewave.exact import partition
 from mcz.codecs.posewave.header import MAX_FINE, NAME, Header, build_header, parse_header
 from mcz.codecs.posewave.order_choices import choose_orders
 from mcz.codecs.posewave.orders import N_NOTES, Orders
@@ -69,7 +70,10 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
     fields |= _plain_steps(source, skeleton, step_cm)
     octaves = params.get("refinement")
     fields["refining"] = int(octaves is not None and bool(np.any(octaves)))
-    fields["orders"] = choose_orders(source)
+    groups = partition(skeleton, params)
+    fields["exact"] = groups[1] if groups else ()
+    exact = {channel for group in fields["exact"] for channel in source.layout.groups[group]}
+    fields["orders"] = choose_orders(source, exact)
     if params.get("weights") is not None:
         fields["weights"] = [code_of(float(weight)) for weight in params["weights"]]
     fields["levels"] = params["levels"]
@@ -170,7 +174,7 @@ def best_levels(
     """How many levels make the beginning of the clip smallest for what they get wrong."""
     layout = source.layout
     n_frames = min(TRIAL_FRAMES, layout.n_frames, layout.most_frames)
-    if not layout.n_channels or n_frames < 1 << min(LEVELS):
+    if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(LEVELS):
         return min(LEVELS)
     values = FrameReader(NAME, source).next(n_frames)
     orders = Orders(fields["orders"], skeleton)
@@ -183,6 +187,7 @@ def best_levels(
         )
         streams, found = encode_coded(header, skeleton, coded, weights)
         found = orders.values(found[::SAMPLED], no_notes)
+        found[:, header.exact] = values[::SAMPLED, header.exact]
         error = distortion(header, skeleton, values[::SAMPLED], found)
         return math.log(sum(map(len, streams))) + EXCHANGE * math.log(max(error, 1e-300))
 

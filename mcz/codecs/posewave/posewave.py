@@ -13,6 +13,7 @@ states). A stream holds one resolution of one segment; a segment decodes by itse
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -32,7 +33,14 @@ from mcz.codecs.contract import (
 from mcz.codecs.gaps import SegmentReader
 from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
 from mcz.codecs.posewave.choices import choose, guess
-from mcz.codecs.posewave.header import NAME, Header, parse_header
+from mcz.codecs.posewave.exact import build_exact, decode_exact, joint_words, partition
+from mcz.codecs.posewave.header import (
+    NAME,
+    POSEWAVE_HEADER,
+    Header,
+    build_header,
+    parse_header,
+)
 from mcz.codecs.posewave.limits import joint_limits
 from mcz.codecs.posewave.segment import Weights, decode_segment, encode_segment
 from mcz.codecs.segments import (
@@ -42,7 +50,8 @@ from mcz.codecs.segments import (
     segment_frames_of,
     skeleton_of,
 )
-from mcz.errors import FormatError
+from mcz.errors import FormatError, OptionError
+from mcz.schema import parse
 
 Floats = NDArray[np.float64]
 
@@ -84,45 +93,98 @@ def _segments(
     length = min(wanted or MOST_FRAMES, layout.most_frames)
     lengths = Lengths(length, bool(wanted), least=LEAST_FRAMES)
     reader = SegmentReader(NAME, source)
-
-    octaves = params["refinement"]
+    octaves, lossy = params["refinement"], _lossy(header, layout)
 
     def code(first: int, stop: int) -> tuple[bytes, ...]:
         own = None if octaves is None else octaves[first:stop]
-        return encode_segment(header, skeleton, reader(first, stop), weights, own)[0]
+        streams = {
+            (0, group): stream
+            for group, stream in zip(
+                header.exact_groups,
+                build_exact(source, header.exact_groups, first, stop),
+                strict=True,
+            )
+        }
+        values = reader(first, stop)
+        if lossy:
+            levels = encode_segment(header, skeleton, values, weights, own)[0]
+            streams |= {(level, lossy[0]): stream for level, stream in enumerate(levels)}
+        places = itertools.product(range(header.levels + 1), range(len(layout.groups)))
+        return tuple(streams.get(place, b"") for place in places)
 
-    for first, stop, streams in halving(layout.n_frames, lengths, code):
+    breaks = source.breaks if header.exact_groups else ()
+    for first, stop, streams in halving(layout.n_frames, lengths, code, breaks):
         yield Segment(first, stop - first, streams)
+
+
+def _lossy(header: Header, layout: Layout) -> list[int]:
+    """The groups of lossy channels, the first of which has the streams."""
+    return [group for group in range(len(layout.groups)) if group not in header.exact_groups]
+
+
+def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int, ...]) -> bytes:
+    """Exact groups can be left alone; rows, of which all lossy joints have a part, cannot be cut.
+
+    Raises OptionError for other groups.
+    """
+    fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
+    if len(groups) == len(layout.groups):
+        return header
+    if not set(groups) <= set(fields.exact):
+        raise OptionError(
+            f"{NAME}: joints that are not coded exactly cannot be cut out or left out; all of them "
+            f"are coded in one"
+        )
+    left = {"plain": [], "orders": [], "exact": range(len(groups))}
+    return build_header(**{**fields, **left})
+
+
+def exact_groups(header: bytes, layout: Layout) -> tuple[int, ...]:
+    """The groups of ordinals; raises FormatError on bad bytes."""
+    return parse_header(header, layout).exact_groups
 
 
 def decode(
     header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
-) -> Floats:
-    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
+) -> NDArray[Any]:
+    """The values, (frames, channels of the groups), ordinals of exact groups.
+
+    Raises FormatError on bad bytes.
+    """
     fields = parse_header(header, layout)
     for span in spans:
         if span.lead or span.tail or not span.fresh:  # PWAVE-03
             raise FormatError(f"{NAME}: the segment at {span.first} bears upon others")
-    skeleton = layout.skeleton
-    assert skeleton is not None  # the header was checked against it
-    n_channels = layout.n_channels if request.groups else 0
-    out = np.zeros((request.stop - request.start, n_channels))
-    if not n_channels:
+    if request.groups and set(request.groups) <= set(fields.exact_groups):
+        return decode_exact(layout, spans, request, fetch, NAME)
+    columns = [column for group in request.groups for column in layout.groups[group]]
+    out = np.zeros((request.stop - request.start, len(columns)))
+    if not columns:
         return out
     for index, span in enumerate(spans):
         start, stop = max(span.first, request.start), min(span.stop, request.stop)
         if start >= stop:
             continue
-        streams = [
-            fetch(index, resolution, 0)
-            for resolution in range(layout.n_resolutions - request.resolution)
-        ]
-        where = f"{NAME}: segment at {span.first}"
-        values = decode_segment(fields, skeleton, streams, span.n_frames, where)
+        values = _lossy_values(fields, layout, index, span, request, fetch)
         out[start - request.start : stop - request.start] = values[
-            start - span.first : stop - span.first
+            start - span.first : stop - span.first, columns
         ]
     return out
+
+
+def _lossy_values(
+    fields: Header, layout: Layout, index: int, span: Span, request: Request, fetch: Fetch
+) -> Floats:
+    """All channels of a segment, in which exact ones are of no account."""
+    skeleton, where = layout.skeleton, f"{NAME}: segment at {span.first}"
+    assert skeleton is not None  # the header was checked against it
+    stored = range(layout.n_resolutions - request.resolution)
+    first, *others = _lossy(fields, layout)
+    for group in set(others) & set(request.groups):
+        if any(fetch(index, resolution, group) for resolution in stored):  # PWAVE-30
+            raise FormatError(f"{where}: a stream of the group {group}, whose rows {first} has")
+    streams = [fetch(index, resolution, first) for resolution in stored]
+    return decode_segment(fields, skeleton, streams, span.n_frames, where)
 
 
 CODEC = Codec(
@@ -136,6 +198,9 @@ CODEC = Codec(
     grouping="all",
     dial=Dial("step", 2.0**-30, 2.0**30, guess=guess),
     promise=promise,
+    cut=cut,
+    partition=partition,
+    exact=exact_groups,
     parameters=(
         Parameter(
             "preset",
@@ -155,6 +220,12 @@ CODEC = Codec(
             None,
             "mean errors of joints or groups of them, such as feet=0.5mm,head=1mm",
             joint_limits,
+        ),
+        Parameter(
+            "lossless",
+            None,
+            "joints or groups of them that are coded exactly, such as lfoot,ltoes or feet",
+            joint_words,
         ),
         Parameter("weights", None, "weight of each joint", np.asarray, inner=True),
         Parameter("refinement", None, "octaves of each frame", np.asarray, inner=True),
