@@ -50,6 +50,7 @@ CODECS = {
     "stairs": {"every": 10},
     "lsdt-frame": {"step": 0.02, "segment_frames": 10},
     "online": {"step": 0.02, "gof": 5, "intra_period": 2},
+    "posewave": {"step": 0.02, "segment_frames": 10},
 }
 CODEC = pytest.mark.parametrize("codec", CODECS)
 

@@ -71,9 +71,9 @@ def command(
 ) -> Exit:
     """Encode SRC (.bvh, .amc, .c3d or .asf) into OUT.mcz; an ASF alone makes one of a skeleton.
 
-    With SRC - standard input is read. A codec that works frame by frame (lsdt-frame) then writes
-    each frame of a BVH or AMC before it reads the next, to standard output unless -o says
-    otherwise.
+    With SRC - standard input is read. A codec that works frame by frame (lsdt-frame, or posewave
+    with levels=0) then writes each frame of a BVH or AMC before it reads the next, to standard
+    output unless -o says otherwise.
     """
     if source == "-":
         return _encode_piped(output, skeleton, force, as_json, format_name, **options)
@@ -96,7 +96,7 @@ def _encode_piped(
     from mcz.writing.inputs import refuse_inputs
 
     refuse_inputs(sys.stdout if output in (None, "-") else output, (sys.stdin, skeleton))
-    if options["codec"] is not None and codes_live(options["codec"]):
+    if options["codec"] is not None and codes_live(options["codec"], options["params"] or {}):
         if as_json:
             raise Failure("--json: what is coded frame by frame has no document", Exit.USAGE)
         encode_lines(output, force, format_name, skeleton, **options)

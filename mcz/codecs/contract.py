@@ -262,7 +262,8 @@ class Codec:
     ``positions``: it is made for positions of points; of a clip of channels it is given those of
     its points, unless its parameter ``domain`` says ``channels``. ``uses``: the models that a
     header names (None: there never are any). ``live`` and ``follow``: coding and decoding frame by
-    frame (None: the codec cannot).
+    frame (None: the codec cannot). ``live_options``: what a caller asks for who means that, where
+    frame by frame is not all that the codec can do.
 
     ``promise`` gives the targets that it meets where a caller asks for none and leaves its dial
     alone (None: none).
@@ -293,6 +294,7 @@ class Codec:
     uses: Uses | None = None
     live: Live | None = None
     follow: Follow | None = None
+    live_options: Mapping[str, Any] = field(default_factory=dict)
 
     def has(self, name: str) -> bool:
         """Whether it has a parameter of that name."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from mcz.codecs import by_name
 from mcz.container.writer import Sink
@@ -106,9 +107,16 @@ def _push_all(arriving: Arriving, writer: LiveWriter, report: LiveReport) -> Non
         report.n_frames += 1
 
 
-def codes_live(codec: str) -> bool:
-    """Whether the codec of that name codes frame by frame; raises OptionError without one."""
-    return by_name(codec).live is not None
+def codes_live(codec: str, params: Mapping[str, Any]) -> bool:
+    """Whether the codec of that name, with these parameters, codes frame by frame.
+
+    Raises OptionError for a codec or a parameter that there is not.
+    """
+    found = by_name(codec)
+    if found.live is None:
+        return False
+    options = found.options(params)
+    return all(options[name] == value for name, value in found.live_options.items())
 
 
 def format_name_of(data: bytes) -> str:

@@ -253,31 +253,35 @@ def _coders(
 
 
 class _Outlet:
-    """Collects what is written and sends it in one call."""
+    """Collects what is written and sends it in one call.
+
+    An interrupt may come between any two steps; what the sink took by then is not sent again.
+    """
 
     def __init__(self, sink: Sink) -> None:
         self._sink = sink
-        self._pending: list[bytes] = []
-        self._left = memoryview(b"")  # of what is being sent
+        self._parts: list[bytes] = []
+        self._taken: list[int | None] = []  # bytes of them at a time; None: all there were
 
     def write(self, data: bytes, /) -> None:
-        self._pending.append(data)
+        self._parts.append(data)
 
     @property
     def size(self) -> int:
         """The bytes that were collected and not sent."""
-        return len(self._left) + sum(map(len, self._pending))
+        size = sum(map(len, self._parts))
+        return 0 if None in self._taken else size - sum(filter(None, self._taken))
 
     def chunks(self, kinds: Sequence[bytes]) -> bytes:
         """Those of the chunks that were collected that are of these types, in order."""
-        return b"".join(part for part in self._pending if part[:4] in kinds)
+        return b"".join(part for part in self._parts if part[:4] in kinds)
 
     def send(self) -> None:
-        self._left = memoryview(b"".join((self._left, *self._pending)))
-        self._pending.clear()
-        while self._left:  # a raw stream may take a part alone
-            taken = self._sink.write(self._left)  # type: ignore[arg-type]  # any buffer will do
-            self._left = self._left[len(self._left) if taken is None else taken :]
+        while self.size:  # a raw stream may take a part alone
+            left = memoryview(b"".join(self._parts))[-self.size :]
+            # One step: no interrupt comes between what the sink takes and the note of it.
+            self._taken.extend(map(self._sink.write, (left,)))  # type: ignore[arg-type]  # any buffer
+        self._parts, self._taken = [], []
         flush = getattr(self._sink, "flush", None)
         if flush is not None:
             flush()

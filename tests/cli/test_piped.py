@@ -143,6 +143,23 @@ def test_positions_of_a_bvh_from_a_pipe(tmp_path: Path) -> None:
     assert run("encode", "-", *STEP, "-o", out, "--force", data=data)[0] == 0
 
 
+def test_lossy_goes_live_where_that_is_asked_for(tmp_path: Path) -> None:
+    """Without levels frame by frame; otherwise, as ever, when all frames are there."""
+    out, data = tmp_path / "out.mcz", HEADER + b"".join(LINES)
+    lossy = ("encode", "-", "--codec", "lossy", "--unit", "cm", "-o", out, "--force")
+    code, said, _ = run(*lossy, "--param", "levels=0", data=data)
+    assert (code, b"4 channels, live; " in said) == (0, True)
+    (tmp_path / "a.bvh").write_bytes(data)
+    wanted = mcz.read(tmp_path / "a.bvh", unit="cm")
+    with mcz.open(out) as file:
+        error = mcz.compare(wanted, file.clips["live"].motion(), virtual_markers=False)
+    assert error.max_position_error_cm is not None
+    assert error.max_position_error_cm <= 0.5
+    code, said, _ = run(*lossy, data=data)
+    assert (code, b", live; " in said) == (0, False)
+    assert run(*lossy, "--param", "level=0", data=data)[0] == 2
+
+
 def test_text_that_breaks_off_leaves_what_was_whole(tmp_path: Path) -> None:
     out = tmp_path / "out.mcz"
     data = HEADER + LINES[0] + LINES[1] + b"1 2 x 3\n"

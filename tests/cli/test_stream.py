@@ -27,6 +27,7 @@ NAMES = b"a,b\n"
 ROWS = np.arange(60).reshape(10, 6) / 4
 CODERS = {
     "online": ("--param", "step=0.01", "--param", "gof=2", "--param", "intra_period=2"),
+    "posewave": ("--codec", "lossy", "--param", "step=0.01", "--param", "segment_frames=4"),
     "lsdt-frame": ("--codec", "lsdt-frame", "--param", "step=0.01", "--param", "segment_frames=4"),
 }
 CODER = CODERS["lsdt-frame"]

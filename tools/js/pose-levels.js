@@ -68,41 +68,43 @@ export class Walk {
     this.signal = null;
     this.poses = null;
     this.posesLevel = 0;
-  }
-
-  /**
-   * "Approximations".
-   *
-   * @param {Float64Array} rows of level 0, in steps of the level
-   */
-  approximations(rows) {
-    const { kept, pose, metric } = this;
-    const n = kept.length;
-    const step = this.pyramid.step(0);
-    const expected = Float64Array.from(kept, (c) => pose[c]);
-    const moved = new Float64Array(n);
-    const below = this.greatest.map((greatest) => {
+    /** How approximations go on: how many there were, the next one, the last difference. */
+    this.nRows = 0;
+    this.expected = Float64Array.from(kept, (c) => first[c]);
+    this.moved = new Float64Array(kept.length);
+    this.below = this.greatest.map((greatest) => {
       const t = PRIOR * greatest;
       return 4 * t * t;
     });
-    const above = below.map((x) => 0.5 * x);
+    this.above = this.below.map((x) => 0.5 * x);
+  }
+
+  /**
+   * "Approximations": the first rows of level 0, or those that go on after these.
+   *
+   * @param {Float64Array} rows in steps of the level
+   */
+  approximations(rows) {
+    const { kept, pose, metric, expected, moved, below, above } = this;
+    const n = kept.length;
+    const step = this.pyramid.step(0);
     const y = new Float64Array(n);
     const signal = new Float64Array(rows.length);
-    for (let m = 0, at = 0; at < rows.length; m++) {
+    for (let at = 0; at < rows.length; this.nRows++) {
       inSteps(rows, at, step, y);
       const x = metric.fromMetric(metric.factor(pose), y);
       for (let c = 0; c < n; c++, at++) {
         const v = expected[c] + x[c];
         const u = v - pose[kept[c]];
-        if (m >= 2) {
+        if (this.nRows >= 2) {
           above[c] = above[c] * MEMORY + u * moved[c];
           below[c] = below[c] * MEMORY + moved[c] * moved[c];
         }
         const share = clamp(above[c] / below[c], 0, 1);
         signal[at] = v;
         pose[kept[c]] = v;
-        expected[c] = m === 0 ? v : v + share * u;
-        moved[c] = m === 0 ? 0 : u;
+        expected[c] = this.nRows === 0 ? v : v + share * u;
+        moved[c] = this.nRows === 0 ? 0 : u;
       }
     }
     this.signal = signal;

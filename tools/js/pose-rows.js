@@ -42,6 +42,15 @@ class Level {
     this.nothing = new Float64Array(n);
   }
 
+  /** Takes over the last rows of a level, to be followed by others. */
+  follow(level, nRows) {
+    const { n } = this;
+    const first = level.nRows - nRows;
+    this.values.set(level.values.subarray(first * n));
+    this.magnitudes.set(level.magnitudes.subarray(first * n));
+    this.means.set(level.means.subarray(first));
+  }
+
   /** Those of a row; there is nothing above the first. */
   magnitudesOf(row) {
     return row < 0 ? this.nothing : this.magnitudes.subarray(row * this.n, (row + 1) * this.n);
@@ -97,23 +106,39 @@ export class RowDecoder {
     this.grand = this.parent;
     this.parent = level > 1 ? this.here : this.none;
     this.here = new Level(nRows, this.n);
-    this.coder = coder;
     this.kind = kind;
     this.across.begin();
-    let exponent = 0;
-    for (let row = 0; row < nRows; row++) {
+    this.lastExponent = 0;
+    this.rows(coder, 0, what);
+    return this.here.values;
+  }
+
+  /** More rows of the same level, from another stream; gives these alone. */
+  goOn(coder, nRows, what) {
+    const { here, n } = this;
+    // Three rows are looked back to; numbers of rows stay even, or odd.
+    const nKnown = Math.min(here.nRows, 4 - (here.nRows % 2));
+    this.here = new Level(nKnown + nRows, n);
+    this.here.follow(here, nKnown);
+    this.rows(coder, nKnown, what);
+    return this.here.values.subarray(nKnown * n);
+  }
+
+  /** Decodes the rows of the level from one on. */
+  rows(coder, first, what) {
+    this.coder = coder;
+    for (let row = first; row < this.here.nRows; row++) {
       if (!this.isLive(row)) {
-        exponent = 0;
+        this.lastExponent = 0;
         continue;
       }
-      if (this.refining) exponent = this.exponent(exponent);
+      if (this.refining) this.lastExponent = this.exponent(this.lastExponent);
       /** How many steps of the row are one of the level. */
-      this.gain = 2 ** exponent;
+      this.gain = 2 ** this.lastExponent;
       this.begin(row);
       this.integers(row, `${what}, row ${row}`);
       this.learn(row);
     }
-    return this.here.values;
   }
 
   /** By how many octaves the step of a row is finer, after that of the row before. */

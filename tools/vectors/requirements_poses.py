@@ -24,7 +24,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "ROWS-06": ("valid/posewave/kept-*", "valid/posewave/noise"),
     "PWAVE-01": ("invalid/posewave/groups*",),
     "PWAVE-02": ("invalid/posewave/samples",),
-    "PWAVE-03": ("invalid/posewave/segment-*",),
+    "PWAVE-03": ("invalid/posewave/segment-lead", "invalid/posewave/segment-tail"),
     "PWAVE-05": ("invalid/posewave/levels-9",),
     "PWAVE-06": ("invalid/posewave/borrowing-*", "valid/posewave/borrowing-*"),
     "PWAVE-07": ("invalid/posewave/start-*",),
@@ -48,8 +48,13 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "PWAVE-25": ("invalid/posewave/notes-beyond*", "invalid/posewave/notes-many"),
     "PWAVE-26": ("invalid/posewave/notes-turns-*",),
     "PWAVE-27": ("valid/posewave/order*", "valid/posewave/notes-*"),
+    "PWAVE-28": ("invalid/posewave/segment-not-fresh", "invalid/posewave/on-orders"),
+    "PWAVE-29": ("valid/posewave/on*", "valid/posewave/live*", "invalid/posewave/on-b*"),
+    "PWAVE-30": ("invalid/posewave/on-none-kept-*",),
 }
 
 ARGUED: dict[str, str] = {
+    "PWAVE-31": "A rule for who goes on after a loss; shown by tests/codecs/test_posewave_live.py::"
+    "test_what_is_decoded_after_a_loss_is_right",
     "PWAVE-04": "no writer gives a lossy codec a signal with channels of its own",
 }

@@ -23,13 +23,15 @@ from mcz.codecs.posewave.segment import Weights, encode_coded
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import sample, skeleton_of
 from mcz.codecs.steps import code_of
-from mcz.errors import MotionError
+from mcz.errors import MotionError, OptionError
 from mcz.kinematics import reach
 from mcz.kinematics.chain import chain_of
 from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
 
 Floats = NDArray[np.float64]
 
+# What a preset promises: how far off a point may be in any frame, in cm.
+PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}
 RADIUS_CM = 3.0  # of the shell, as ACL measures it
 PROPORTION = 1 / 30  # of the shell to the skeleton where the unit is unknown: 3 cm of 90 cm
 GREATEST_DEGREES, GREATEST_CM = 4.0, 20.0  # steps beyond which the metric says nothing any more
@@ -47,6 +49,7 @@ STEPS_CM = 0.01, 0.3  # between these steps the weight of a bit goes from the fi
 RATE_WEIGHTS = 0.09, 0.2
 USUAL = (0.0047, 0.03, 0.1, 0.28, 1.0), (0.01, 0.048, 0.1, 0.19, 0.5)  # steps, mean errors
 MEAN_TO_BOUND = 0.22  # the mean error with which a bound takes the fewest bytes
+STEP_OF_BOUND = 0.2  # live, where rows of frames that are farther off get finer ones
 COARSEST_WEIGHT = 0.12  # of a bit at level 0, whose errors later rows are predicted from
 
 
@@ -67,7 +70,7 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
     step_cm = step * (unit or RADIUS_CM / PROPORTION / (reach(skeleton) or 1.0))
     weights = weights_of(step_cm)
     fields = _fields(skeleton, step, step_cm)
-    fields |= _plain_steps(source, skeleton, step_cm)
+    fields |= _plain_steps(skeleton, _spreads(sample(source, SAMPLED_FRAMES)), step_cm)
     octaves = params.get("refinement")
     fields["refining"] = int(octaves is not None and bool(np.any(octaves)))
     groups = partition(skeleton, params)
@@ -81,6 +84,24 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
         fields["levels"] = best_levels(source, skeleton, fields, weights)
     fields["borrowing"] = min(1, fields["levels"])
     return Choice(build_header(**fields), weights)
+
+
+def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) -> Choice:
+    """What suits frames that come one by one; ``step`` in cm or, where it is None, by the bound.
+
+    Raises OptionError where a bound is given that nobody could measure.
+    """
+    unit = skeleton.unit_cm
+    if step is None:
+        if bound_cm is None or not unit or not has_kinematics(skeleton):
+            raise OptionError(f"{NAME}: step has to be given, for lengths in cm are not known")
+        step = STEP_OF_BOUND * bound_cm
+    own = step / (unit or 1.0)
+    step_cm = own * (unit or RADIUS_CM / PROPORTION / (reach(skeleton) or 1.0))
+    fields = _fields(skeleton, own, step_cm)
+    fields |= _plain_steps(skeleton, np.ones(skeleton.n_channels), step_cm)
+    fields |= {"start": 1, "refining": int(bound_cm is not None), "levels": 0, "borrowing": 0}
+    return Choice(build_header(**fields), weights_of(step_cm))
 
 
 def guess(target: str, limit: float) -> float | None:
@@ -124,6 +145,7 @@ def _fields(skeleton: Skeleton, step: float, step_cm: float) -> dict[str, Any]:
         "plain": [],
         "weights": [],
         "orders": [],
+        "exact": [],
     }
 
 
@@ -143,9 +165,8 @@ def _spreads(rows: Floats) -> Floats:
     return found
 
 
-def _plain_steps(source: SignalSource, skeleton: Skeleton, step_cm: float) -> dict[str, Any]:
-    """Steps of channels that move nothing: a share of how far they spread."""
-    spreads = _spreads(sample(source, SAMPLED_FRAMES))
+def _plain_steps(skeleton: Skeleton, spreads: Floats, step_cm: float) -> dict[str, Any]:
+    """Steps of channels that move nothing: a share of how far they spread, (n_channels,)."""
     share = step_cm / SPREAD_CM
     kinds = [channel.kind for channel in skeleton.channels]
 

@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout, Request, SignalSource, Span
+from mcz.codecs.posewave.header import NAME, POSEWAVE_HEADER, build_header
 from mcz.codecs.segments import gather
 from mcz.coding.ordinals.heads import COPY, read_heads
 from mcz.coding.ordinals.streams import build_stream, parse_stream
 from mcz.errors import FormatError, OptionError
 from mcz.kinematics.words import joints_of
 from mcz.motion import Skeleton
+from mcz.schema import parse
 
 Ints = NDArray[np.int64]
 Groups = tuple[tuple[int, ...], ...]
@@ -62,6 +64,23 @@ def partition(
     return tuple(tuple(run) for _, run in runs), exact
 
 
+def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int, ...]) -> bytes:
+    """Exact groups can be left alone; rows, of which all lossy joints have a part, cannot be cut.
+
+    Raises OptionError for other groups.
+    """
+    fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
+    if len(groups) == len(layout.groups):
+        return header
+    if not set(groups) <= set(fields.exact):
+        raise OptionError(
+            f"{NAME}: joints that are not coded exactly cannot be cut out or left out; all of them "
+            f"are coded in one"
+        )
+    left = {"plain": [], "orders": [], "exact": range(len(groups))}
+    return build_header(**{**fields, **left})
+
+
 def build_exact(source: SignalSource, groups: Sequence[int], first: int, stop: int) -> list[bytes]:
     """The stream of each of these groups in the segment first <= f < stop."""
     layout, grids = source.layout, source.grids(first)
@@ -84,12 +103,12 @@ def decode_exact(
 
     def rows(index: int, group: int) -> Ints:
         for resolution in range(1, layout.n_resolutions - request.resolution):
-            if stream(index, resolution, group):  # PWAVE-31
+            if stream(index, resolution, group):  # PWAVE-35
                 raise FormatError(f"{where}: a detail of the exact group {group}")
         grids = [layout.grids[channel] for channel in layout.groups[group]]
         data = stream(index, 0, group)
-        if any(kind == COPY for kind, _, _ in read_heads(data, grids)[0]):  # PWAVE-33
+        if any(kind == COPY for kind, _, _ in read_heads(data, grids)[0]):  # PWAVE-37
             raise FormatError(f"{where}: a copy in the exact group {group}")
-        return parse_stream(data, grids, spans[index].n_frames)[0]  # PWAVE-32
+        return parse_stream(data, grids, spans[index].n_frames)[0]  # PWAVE-36
 
     return gather(layout, spans, request, rows)

@@ -96,6 +96,11 @@ class Header:
     exact: NDArray[np.bool_]
     exact_groups: tuple[int, ...]
 
+    @property
+    def may_go_on(self) -> bool:
+        """Whether a segment may go on where the one before it ended."""
+        return self.levels == 0 and not any(self.orders) and not self.exact_groups  # PWAVE-28
+
 
 def build_header(**fields: Any) -> bytes:
     return build(POSEWAVE_HEADER, fields, f"{NAME} header")
@@ -160,9 +165,9 @@ def _exact(groups: Sequence[int], layout: Layout) -> NDArray[np.bool_]:
     """Of each channel whether it is exact."""
     found = np.zeros(layout.n_channels, np.bool_)
     for before, group in pairwise([-1, *groups]):
-        if group <= before:  # PWAVE-28
+        if group <= before:  # PWAVE-32
             raise FormatError(f"{NAME}: group {group} is exact, named behind {before}")
-        if group >= len(layout.groups):  # PWAVE-29
+        if group >= len(layout.groups):  # PWAVE-33
             raise FormatError(f"{NAME}: group {group} of {len(layout.groups)} is exact")
         found[list(layout.groups[group])] = True
     return found

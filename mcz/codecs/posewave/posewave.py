@@ -14,7 +14,7 @@ states). A stream holds one resolution of one segment; a segment decodes by itse
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,16 +32,12 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.gaps import SegmentReader
 from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
-from mcz.codecs.posewave.choices import choose, guess
-from mcz.codecs.posewave.exact import build_exact, decode_exact, joint_words, partition
-from mcz.codecs.posewave.header import (
-    NAME,
-    POSEWAVE_HEADER,
-    Header,
-    build_header,
-    parse_header,
-)
+from mcz.codecs.posewave.chain import Chain
+from mcz.codecs.posewave.choices import PRESETS, choose, guess
+from mcz.codecs.posewave.exact import build_exact, cut, decode_exact, joint_words, partition
+from mcz.codecs.posewave.header import NAME, Header, parse_header
 from mcz.codecs.posewave.limits import joint_limits
+from mcz.codecs.posewave.live import LiveDecoder, LiveEncoder
 from mcz.codecs.posewave.segment import Weights, decode_segment, encode_segment
 from mcz.codecs.segments import (
     SEGMENT_FRAMES_PARAMETER,
@@ -50,17 +46,13 @@ from mcz.codecs.segments import (
     segment_frames_of,
     skeleton_of,
 )
-from mcz.errors import FormatError, OptionError
-from mcz.schema import parse
+from mcz.errors import FormatError
+from mcz.motion import Skeleton
 
 Floats = NDArray[np.float64]
 
 MOST_FRAMES = 8192  # of a segment, where the caller leaves it open
 LEAST_FRAMES = 512
-
-
-# What a preset promises: that no point is farther off in any frame.
-PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}
 
 
 def promise(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -122,23 +114,6 @@ def _lossy(header: Header, layout: Layout) -> list[int]:
     return [group for group in range(len(layout.groups)) if group not in header.exact_groups]
 
 
-def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int, ...]) -> bytes:
-    """Exact groups can be left alone; rows, of which all lossy joints have a part, cannot be cut.
-
-    Raises OptionError for other groups.
-    """
-    fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
-    if len(groups) == len(layout.groups):
-        return header
-    if not set(groups) <= set(fields.exact):
-        raise OptionError(
-            f"{NAME}: joints that are not coded exactly cannot be cut out or left out; all of them "
-            f"are coded in one"
-        )
-    left = {"plain": [], "orders": [], "exact": range(len(groups))}
-    return build_header(**{**fields, **left})
-
-
 def exact_groups(header: bytes, layout: Layout) -> tuple[int, ...]:
     """The groups of ordinals; raises FormatError on bad bytes."""
     return parse_header(header, layout).exact_groups
@@ -153,38 +128,54 @@ def decode(
     """
     fields = parse_header(header, layout)
     for span in spans:
-        if span.lead or span.tail or not span.fresh:  # PWAVE-03
+        if span.lead or span.tail:  # PWAVE-03
             raise FormatError(f"{NAME}: the segment at {span.first} bears upon others")
+        if not (span.fresh or fields.may_go_on):  # PWAVE-28
+            raise FormatError(f"{NAME}: the segment at {span.first} goes on from the one before")
     if request.groups and set(request.groups) <= set(fields.exact_groups):
         return decode_exact(layout, spans, request, fetch, NAME)
     columns = [column for group in request.groups for column in layout.groups[group]]
     out = np.zeros((request.stop - request.start, len(columns)))
     if not columns:
         return out
-    for index, span in enumerate(spans):
+    lossy = _lossy(fields, layout)
+    decode_one = _decoder(fields, skeleton_of(NAME, layout))
+    for index in _needed(spans, request):
+        span = spans[index]
+        stored = range(layout.n_resolutions - request.resolution)
+        for group in set(lossy[1:]) & set(request.groups):
+            if any(fetch(index, resolution, group) for resolution in stored):  # PWAVE-34
+                raise FormatError(f"{NAME}: segment at {span.first}: a stream of group {group}")
+        values = decode_one([fetch(index, resolution, lossy[0]) for resolution in stored], span)
         start, stop = max(span.first, request.start), min(span.stop, request.stop)
-        if start >= stop:
-            continue
-        values = _lossy_values(fields, layout, index, span, request, fetch)
-        out[start - request.start : stop - request.start] = values[
-            start - span.first : stop - span.first, columns
-        ]
+        if start < stop:
+            out[start - request.start : stop - request.start] = values[
+                start - span.first : stop - span.first, columns
+            ]
     return out
 
 
-def _lossy_values(
-    fields: Header, layout: Layout, index: int, span: Span, request: Request, fetch: Fetch
-) -> Floats:
-    """All channels of a segment, in which exact ones are of no account."""
-    skeleton, where = layout.skeleton, f"{NAME}: segment at {span.first}"
-    assert skeleton is not None  # the header was checked against it
-    stored = range(layout.n_resolutions - request.resolution)
-    first, *others = _lossy(fields, layout)
-    for group in set(others) & set(request.groups):
-        if any(fetch(index, resolution, group) for resolution in stored):  # PWAVE-30
-            raise FormatError(f"{where}: a stream of the group {group}, whose rows {first} has")
-    streams = [fetch(index, resolution, first) for resolution in stored]
-    return decode_segment(fields, skeleton, streams, span.n_frames, where)
+def _needed(spans: Sequence[Span], request: Request) -> range:
+    """The segments with which the requested frames can be decoded."""
+    before = [i for i, span in enumerate(spans) if span.fresh and span.first <= request.start]
+    stop = sum(span.first < request.stop for span in spans)
+    return range(max(before, default=0), stop if request.start < request.stop else 0)
+
+
+def _decoder(header: Header, skeleton: Skeleton) -> Callable[[Sequence[bytes], Span], Floats]:
+    """What decodes one segment after the other, (n_frames, n_channels) of each.
+
+    Of exact channels it gives something that is of no account.
+    """
+    chain = Chain(header, skeleton)
+
+    def decode_one(streams: Sequence[bytes], span: Span) -> Floats:
+        where = f"{NAME}: segment at {span.first}"
+        if header.may_go_on:
+            return chain.decode(streams[0], span.n_frames, where, fresh=span.fresh)
+        return decode_segment(header, skeleton, streams, span.n_frames, where)
+
+    return decode_one
 
 
 CODEC = Codec(
@@ -201,6 +192,9 @@ CODEC = Codec(
     cut=cut,
     partition=partition,
     exact=exact_groups,
+    live=LiveEncoder,
+    follow=LiveDecoder,
+    live_options={"levels": 0},
     parameters=(
         Parameter(
             "preset",
@@ -214,7 +208,12 @@ CODEC = Codec(
             "quantizer step in cm; default: what the preset takes",
             number("step", 1e-9, 1e9),
         ),
-        Parameter("levels", None, "levels; default: what suits the clip", integer("levels", 0, 8)),
+        Parameter(
+            "levels",
+            None,
+            "levels; default: what suits the clip; 0: no frame waits for a later one",
+            integer("levels", 0, 8),
+        ),
         Parameter(
             "quality",
             None,

@@ -5,6 +5,7 @@ SPEC.md, "Codec 13: posewave", is normative.
 
 from __future__ import annotations
 
+from copy import copy, deepcopy
 from functools import cache
 from typing import Any
 
@@ -88,6 +89,9 @@ class RowCoder:
     ``classes`` are those of the kept channels; ``where`` opens messages.
     """
 
+    stream: Stream
+    exponents: Ints  # (n_rows,) of the level, or of what it goes on with
+
     def __init__(
         self, classes: Ints, start: Start, coder: Ints, where: str, *, refining: bool
     ) -> None:
@@ -97,51 +101,72 @@ class RowCoder:
         self.here = nothing
         self.before = [nothing, nothing]  # the two levels of details before, the coarser one last
 
+    def copy(self) -> RowCoder:
+        """One that learns by itself, before it begins or goes on."""
+        found = copy(self)
+        found.model = deepcopy(self.model)
+        return found
+
     def begin(self, level: int, kind: int, n_rows: int, stream: Stream) -> None:
         """A level, whose ``kind`` says how large its coefficients are on the whole."""
         if level > 1:
             self.before = [self.here[3:], self.before[0]]
         self.kind, self.stream = kind, stream
         self.here = new_rows(n_rows, self.n_kept)
-        self.indices = np.zeros((n_rows, self.n_kept), np.int64)
-        self.exponents = np.zeros(n_rows, np.int64)
-        self.means = np.zeros((n_rows, self.n_kept))
+        self._make_room(0, n_rows)
         _model().begin_level(self.model, kind)
+
+    def go_on(self, n_rows: int, stream: Stream) -> None:
+        """More rows of the same level, in another stream."""
+        n_known = 2 - len(self._indices) % 2  # so that numbers of rows stay even, or odd
+        last, known = self._exponents[-1], self.here[-3 - n_known :]
+        self.here = np.concatenate([known, new_rows(n_rows, self.n_kept)[3:]])
+        self.stream = stream
+        self._make_room(n_known, n_rows)
+        self._exponents[n_known - 1] = last
+
+    def _make_room(self, n_known: int, n_rows: int) -> None:
+        """For rows that come, behind ``n_known`` ones that a stream before this one had."""
+        self._n_known = n_known
+        self._indices = np.zeros((n_known + n_rows, self.n_kept), np.int64)
+        self._wanted, self._means = np.zeros((2, *self._indices.shape))
+        self._exponents = np.zeros(n_known + n_rows, np.int64)
+        self.exponents = self._exponents[n_known:]
 
     def encode(self, rate_weight: float, first: int, wanted: Floats) -> Floats:
         """Rows of coefficients, in steps, as a decoder will have them."""
-        targets = np.zeros(self.indices.shape)
-        targets[first : first + len(wanted)] = wanted
+        first += self._n_known
+        self._wanted[first : first + len(wanted)] = wanted
         if not (np.abs(wanted) < MOST_WANTED).all():  # NaN too
             raise MotionError(f"{NAME}: a coefficient exceeds 2^29 quantizer steps")
-        self._run(first, first + len(wanted), targets, rate_weight)
+        self._run(first, first + len(wanted), rate_weight)
         return self._decoded(first, first + len(wanted))
 
     def decode(self) -> Floats:
         """All rows of the level, (n_rows, n_kept), in steps."""
-        self._run(0, len(self.indices), np.zeros((1, self.n_kept)), -1.0)
+        self._run(self._n_known, len(self._indices), -1.0)
         if not self.stream.is_whole:  # ROWS-01
             raise FormatError(
                 f"{self.where}: rows of kind {self.kind} do not take {len(self.stream.data)} bytes"
             )
-        return self._decoded(0, len(self.indices))
+        return self._decoded(self._n_known, len(self._indices))
 
-    def _run(self, first: int, stop: int, targets: Floats, rate_weight: float) -> None:
+    def _run(self, first: int, stop: int, rate_weight: float) -> None:
         if not self.n_kept:
             return  # PWAVE-20
         fault = _model().code_rows(
             self.model,
             self.stream.data,
-            self.indices,
-            targets,
-            self.means,
+            self._indices,
+            self._wanted,
+            self._means,
             self.here,
             *self.before,
             self.kind,
             first,
             stop,
             rate_weight,
-            self.exponents,
+            self._exponents,
             1 if self.refining else 0,
         )
         if fault >= 0:
@@ -150,4 +175,4 @@ class RowCoder:
             )
 
     def _decoded(self, first: int, stop: int) -> Floats:
-        return self.indices[first:stop].astype(np.float64)
+        return self._indices[first:stop].astype(np.float64)

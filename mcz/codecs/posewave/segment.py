@@ -48,7 +48,7 @@ class Head:
 
     def kept(self, header: Header) -> NDArray[np.bool_]:
         """The channels that are coded in rows."""
-        return self.moving & ~header.exact  # PWAVE-34
+        return self.moving & ~header.exact  # PWAVE-38
 
     def values(self, header: Header) -> Floats:
         """The pose that the numbers stand for, (n_channels,)."""
@@ -99,7 +99,7 @@ def encode_coded(
     walk = Walk(header, skeleton, pyramid, kept, head.values(header))
     streams = []
     for level, band in enumerate(bands):
-        stream = Stream(coder, _room(pyramid, level, kept), None)
+        stream = Stream(coder, room_of(pyramid, level, kept), None)
         if level == 0:
             moving = head.moving.astype(np.int64)
             code_head(stream, kinds_of(skeleton), moving, head.numbers.copy(), NAME)
@@ -112,7 +112,7 @@ def encode_coded(
     return (streams[0], *empty, *streams[1:]), walk.values()
 
 
-def _room(pyramid: Pyramid, level: int, kept: NDArray[np.bool_]) -> int:
+def room_of(pyramid: Pyramid, level: int, kept: NDArray[np.bool_]) -> int:
     """As many bytes as the stream of a level may take."""
     return 8 * len(kept) + pyramid.rows(level) * (8 * int(kept.sum()) + 1) + 1024
 

@@ -7,6 +7,7 @@ are coded at the pose that a decoder has by then, so an encoder decodes what it 
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy, deepcopy
 from functools import cache
 from typing import Any
 
@@ -56,6 +57,13 @@ class Walk:
         self.kept = np.flatnonzero(kept)
         self.metric = Metric(header, skeleton, kept, first)
         self.poses = self.approx = np.zeros((0, len(self.kept)))
+        self.course = kernels().course_of(first, self.kept, header.greatest[self.kept])
+
+    def copy(self) -> Walk:
+        """One that goes on by itself."""
+        found = copy(self)
+        found.course = deepcopy(self.course)
+        return found
 
     def values(self) -> Floats:
         """The frames, (n_frames, n_channels), after the last level."""
@@ -68,12 +76,9 @@ class Walk:
         halved: Floats = np.ldexp(1.0, -exponents).astype(np.float64)
         return self.pyramid.step(level, self.header.step) * halved[:, None]
 
-    def course(self) -> Any:
-        return kernels().course_of(self.still, self.kept, self.header.greatest[self.kept])
-
     def code_coarsest(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
         """Level 0, a row at a time: ``code`` gives what a decoder will have of it."""
-        course, steps = self.course(), self.steps(level, exponents)
+        course, steps = self.course, self.steps(level, exponents)
         packed = self.metric.empty()
         self.approx = np.empty((len(rows), len(self.kept)))
         for m, row in enumerate(rows):
@@ -86,7 +91,7 @@ class Walk:
         """Level 0 from all of its rows in the metric, in steps."""
         self.approx = np.empty((len(rows), len(self.kept)))
         scaled = rows * self.steps(level, exponents)
-        kernels().take_rows(self.metric.plan, self.course(), scaled, self.approx)
+        kernels().take_rows(self.metric.plan, self.course, scaled, self.approx)
 
     def code_details(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
         """A level of details, all rows at once: ``code`` gives what a decoder will have."""

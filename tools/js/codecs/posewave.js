@@ -132,7 +132,9 @@ function classesOf(joints) {
 class PoseDecoder {
   constructor(header, skeleton, nResolutions) {
     this.decodes = "values";
-    this.alone = true;
+    /** Whether a segment may go on where the one before it ended. */
+    this.mayGoOn = header.levels === 0 && header.orders.every((code) => code === 0);
+    this.alone = !this.mayGoOn;
     this.header = header;
     this.skeleton = skeleton;
     this.nResolutions = nResolutions;
@@ -148,12 +150,12 @@ class PoseDecoder {
     for (const { firstFrame, lead, tail, fresh } of segments) {
       const where = `segment at frame ${firstFrame}`;
       if (lead !== 0 || tail !== 0) throw new Refused(`${where}: has a lead or tail`);
-      if (!fresh) throw new Refused(`${where}: does not start fresh`);
+      if (!fresh && !this.mayGoOn) throw new Refused(`${where}: does not start fresh`);
     }
   }
 
   /**
-   * Decodes segments, each by itself.
+   * Decodes segments, of which the first one starts fresh.
    *
    * @param {object[]} segments with their streams
    * @param {{dropped: number}} options how many of the finest resolutions are left out
@@ -166,17 +168,19 @@ class PoseDecoder {
     const out = new Float64Array(nRows * nChannels);
     if (nChannels === 0) return out;
     let at = 0;
-    for (const { firstFrame, nFrames, streams } of segments) {
-      const size = nFrames * nChannels;
+    let before = null;
+    for (const { firstFrame, nFrames, streams, fresh } of segments) {
       const given = streams.slice(0, this.nResolutions - dropped).map(([stream]) => stream);
       const what = `${name}: segment at frame ${firstFrame}`;
-      this.segment(given, nFrames, out.subarray(at, at + size), what);
-      at += size;
+      const values = out.subarray(at, at + nFrames * nChannels);
+      if (fresh) before = this.segment(given, nFrames, values, what);
+      else this.goOn(before, given[0], nFrames, values, what);
+      at += values.length;
     }
     return out;
   }
 
-  /** Decodes a segment from the streams that are there, the coarsest first. */
+  /** Decodes a segment from the streams that are there, the coarsest first; returns what it leaves. */
   segment(given, nFrames, out, what) {
     const { header, skeleton } = this;
     const pyramid = new Pyramid(nFrames, header);
@@ -188,10 +192,12 @@ class PoseDecoder {
     const coder = new RangeDecoder(reader.rest());
     const { first, kept } = this.head(coder, model, what);
     fillRows(out, first);
+    let left = { first, kept };
     if (kept.length > 0) {
       const classes = Uint8Array.from(kept, (c) => header.classes[c]);
       const rows = new RowDecoder(model, start, classes, header.refining);
       const walk = new Walk(header, skeleton, pyramid, kept, first);
+      left = { first: first.slice(), kept, rows, walk };
       this.levels(coder, streams, rows, walk, what);
       putColumns(walk.signal, kept, out);
     } else {
@@ -201,6 +207,16 @@ class PoseDecoder {
       }
     }
     header.axisOrders.restore(out, skeleton.channels.length, notes);
+    return left;
+  }
+
+  /** Decodes a segment that goes on after one that has left its rows and its walk. */
+  goOn({ first, kept, rows, walk }, stream, nFrames, out, what) {
+    fillRows(out, first);
+    const coder = new RangeDecoder(stream);
+    if (kept.length > 0) walk.approximations(rows.goOn(coder, nFrames, what));
+    coder.finish(what);
+    if (kept.length > 0) putColumns(walk.signal, kept, out);
   }
 
   /** Decodes the rows of all levels, the first of them with `coder`, which has decoded the head. */

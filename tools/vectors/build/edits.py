@@ -169,13 +169,13 @@ def table(n_groups: int, **changes: bytes) -> Edit:
     return edit
 
 
-def stream(index: int, edit: Callable[[bytes], bytes]) -> Callable[[Any], Any]:
-    """Edit stream ``index`` of the first segment."""
+def stream(index: int, edit: Callable[[bytes], bytes], *, segment: int = 0) -> Callable[[Any], Any]:
+    """Edit stream ``index`` of a segment."""
 
     def edit_segments(made: Made) -> Any:
-        header, streams = made[0]
+        header, streams = made[segment]
         changed = [edit(s) if i == index else s for i, s in enumerate(streams)]
-        return [(header, changed), *made[1:]]
+        return [*made[:segment], (header, changed), *made[segment + 1 :]]
 
     return edit_segments
 

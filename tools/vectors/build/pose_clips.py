@@ -6,8 +6,9 @@ depend on a machine's arithmetic. Values are those of the decoder.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from mcz.codecs import raw
 from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
 from mcz.codecs.posewave import posewave
+from mcz.codecs.posewave.chain import Chain
 from mcz.codecs.posewave.header import Header, build_header, parse_header
 from mcz.codecs.posewave.segment import Weights, encode_segment
 from mcz.motion import Joint, Motion, Signal, Skeleton
@@ -49,7 +51,7 @@ class Plan:
 
     ``fields`` are those of the header that are not the plain ones; ``cut``: finest resolutions that
     are not stored; ``price`` of a bit in squared steps; ``streams``: those of a segment in the
-    place of its own.
+    place of its own; ``on``: segments that go on where the one before ended.
     """
 
     skeleton: Skeleton
@@ -60,6 +62,7 @@ class Plan:
     price: float = 0.0625
     refinement: Sequence[int] | None = None
     streams: dict[int, tuple[bytes, ...]] = field(default_factory=dict)
+    on: Collection[int] = ()
 
     @property
     def n_frames(self) -> int:
@@ -90,22 +93,27 @@ def parsed(plan: Plan) -> Header:
 
 
 def segments_of(plan: Plan) -> list[Segment]:
-    header, found = parsed(plan), []
+    chain = Chain(parsed(plan), plan.skeleton)
     edges = [0, *plan.ends, plan.n_frames] if plan.n_frames else []
-    for index, (start, stop) in enumerate(zip(edges, edges[1:], strict=False)):
-        found.append(Segment(start, stop - start, _streams(plan, header, index, start, stop)))
-    return found
+    return [
+        Segment(start, stop - start, _streams(plan, chain, index, start, stop), fresh=fresh)
+        for index, (start, stop) in enumerate(zip(edges, edges[1:], strict=False))
+        for fresh in (index not in plan.on,)
+    ]
 
 
-def _streams(plan: Plan, header: Header, index: int, start: int, stop: int) -> tuple[bytes, ...]:
+def _streams(plan: Plan, chain: Chain, index: int, start: int, stop: int) -> tuple[bytes, ...]:
     if index in plan.streams:
         return plan.streams[index]
     if not plan.skeleton.n_channels:
         return ()
     own = plan.refinement
     octaves = None if own is None else np.array(own[start:stop], np.int64)
-    weights = Weights(plan.price, plan.price)
-    streams, _ = encode_segment(header, plan.skeleton, plan.source[start:stop], weights, octaves)
+    source, weights = plan.source[start:stop], Weights(plan.price, plan.price)
+    if plan.on:
+        octave = 0 if octaves is None else int(octaves[0])
+        return chain.encode(source, plan.price, octave, fresh=index not in plan.on)[:1]
+    streams, _ = encode_segment(chain.header, plan.skeleton, source, weights, octaves)
     return streams[: plan.n_resolutions]
 
 
@@ -130,7 +138,7 @@ def values_of(plan: Plan, resolution: int = 0) -> Floats:
     return posewave.CODEC.decode(
         header_of(plan),
         layout,
-        [Span(s.first, s.n_frames) for s in made],
+        [Span(s.first, s.n_frames, fresh=s.fresh) for s in made],
         request,
         lambda segment, stream, _: made[segment].streams[stream],
     )
@@ -157,13 +165,17 @@ class Poses(Whole):
         plan: Plan,
         spec: str = "",
         requests: Sequence[tuple[int, tuple[int, int], Sequence[int] | None]] = (),
+        more: Mapping[str, Any] = MappingProxyType({}),
         **edits: Any,
     ) -> None:
-        """Add a file; ``requests`` are (finest resolutions left out, frames, joints)."""
-        motion = motion_of(plan)
+        """Add a file; ``requests`` are (finest resolutions left out, frames, joints).
+
+        ``more`` are fields of its motion.
+        """
+        motion = motion_of(plan, **more)
         parts = []
         for left_out, frames, joints in requests:
-            coarse = motion_of(plan, left_out) if left_out else motion
+            coarse = motion_of(plan, left_out, **more) if left_out else motion
             arguments, found = partial(coarse, frames, joints)
             option = ("--resolution", str(left_out)) if left_out else ()
             parts.append(((*arguments, *option), found))

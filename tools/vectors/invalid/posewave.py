@@ -40,6 +40,7 @@ from tools.vectors.build.pose_clips import (
 from tools.vectors.invalid.common import every_codec
 
 ORDERS = f"{HEADING}; Axis orders"
+CHAINS = f"{HEADING}; Segments that go on"
 ROWS = f"{HEADING}; Rows in the metric"
 ROOM = 2**16  # bytes, more than any crafted stream has
 
@@ -51,6 +52,7 @@ def vectors() -> Iterable[Vector]:
     _own_orders(shelf)
     _signal(shelf)
     _segments(shelf)
+    _chains(shelf)
     _streams(shelf)
     _numbers(shelf)
     _notes(shelf)
@@ -184,6 +186,32 @@ def _segments(shelf: Broken) -> None:
         shelf.add(name, f"{HEADING}; DATA", purpose, file_with(plan, motion, segments=edit))
 
 
+def _chains(shelf: Broken) -> None:
+    """Segments that go on."""
+    skeleton = acclaim()
+    plan = Plan(skeleton, waves(10, skeleton), {"levels": 0}, (4, 5), on={1, 2})
+    motion = motion_of(plan)
+    for name, purpose, edit in (
+        ("byte-behind", "A byte 255 behind the bits", plus(b"\xff")),
+        ("byte-0-behind", "A byte 0 behind the bits", plus(b"\0")),
+        ("byte-missing", "Bits without their last byte", lambda data: data[:-1]),
+        ("bits-missing", "No bits", lambda data: b""),
+    ):
+        data = file_with(plan, motion, segments=stream(0, edit, segment=2))
+        shelf.add(f"on-{name}", CHAINS, f"{purpose} of a segment that goes on.", data)
+    bones = biovision()
+    turned = _still(bones, 10, levels=0, orders=[0, 0, 1, 0, 0])
+    turned = replace(turned, ends=(4,))
+    data = file_with(turned, segments=headed(1, flags=0))
+    shelf.add("on-orders", CHAINS, "A segment goes on, though a joint has another order.", data)
+    first = segments_of(_still(skeleton, 4, levels=0))[0].streams
+    still = _still(skeleton, 8, levels=0)
+    still = replace(still, ends=(4,), streams={0: first, 1: (b"",)}, on={1})
+    data = file_with(still, segments=stream(0, plus(b"\0"), segment=1))
+    purpose = "A byte for nothing in a segment that goes on, where no channel is kept."
+    shelf.add("on-none-kept-byte-for-nothing", CHAINS, purpose, data)
+
+
 def _streams(shelf: Broken) -> None:
     skeleton = acclaim()
     plan = Plan(skeleton, waves(20, skeleton), {"levels": 3})
@@ -246,7 +274,8 @@ def _row_stream(plan: Plan, value: int) -> bytes:
     rows = RowCoder(classes, header.start, out.coder, "", refining=False)
     rows.begin(0, 0, 2, out)
     with suppress(FormatError):
-        rows._run(0, 2, np.full((2, 1), float(value)), 0.0)
+        rows._wanted[:] = value
+        rows._run(0, 2, 0.0)
     return out.finish()
 
 

@@ -1,4 +1,4 @@
-"""Valid: codec 13, ``posewave``: skeletons, levels, metric, heads, orders, segments, cuts."""
+"""Clips with levels: skeletons, metric, heads, orders, segments, cuts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 from mcz.container import payloads
 from mcz.motion import Channel, Joint, Skeleton
 from tools.vectors.build.edits import put
-from tools.vectors.build.files import Vector
 from tools.vectors.build.motions import UNROUNDED, channels
 from tools.vectors.build.pose_clips import (
     HEADING,
@@ -25,15 +24,13 @@ from tools.vectors.build.pose_clips import (
     motion_of,
     waves,
 )
-from tools.vectors.valid.common import every_codec
 
 METRIC = f"{HEADING}; Pose metric"
 ROWS = f"{HEADING}; Rows in the metric"
 ORDERS = f"{HEADING}; Axis orders"
 
 
-def vectors() -> Iterable[Vector]:
-    shelf = Poses("valid/posewave")
+def add(shelf: Poses) -> None:
     _skeletons(shelf)
     _positions(shelf)
     _plain(shelf)
@@ -48,8 +45,6 @@ def vectors() -> Iterable[Vector]:
     _notes(shelf)
     _segments(shelf)
     _signals(shelf)
-    every_codec.add(shelf, "posewave")
-    return shelf.vectors
 
 
 def _skeletons(shelf: Poses) -> None:

@@ -1,0 +1,96 @@
+"""Segments without levels, each of which may go on where the one before it ended.
+
+SPEC.md, "Codec 13: posewave", "Segments that go on", is normative.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.posewave.header import NAME, Header
+from mcz.codecs.posewave.pyramid import Pyramid
+from mcz.codecs.posewave.rows import RowCoder, Stream, code_head, fresh_coder
+from mcz.codecs.posewave.segment import Head, choose_head, classes_of, kinds_of, room_of
+from mcz.codecs.posewave.walk import Walk
+from mcz.errors import FormatError
+from mcz.motion import Skeleton
+
+Floats = NDArray[np.float64]
+
+
+class Chain:
+    """What a segment leaves to the next one; after one that is refused only a fresh one decodes."""
+
+    def __init__(self, header: Header, skeleton: Skeleton) -> None:
+        self.header, self.skeleton = header, skeleton
+        self._classes, self._kinds = classes_of(skeleton), kinds_of(skeleton)
+        self._walk: Walk | None = None  # None: nothing can go on
+        self._rows: RowCoder | None = None
+
+    def copy(self) -> Chain:
+        """One that goes on by itself."""
+        found = copy(self)
+        if self._walk is not None and self._rows is not None:
+            found._walk, found._rows = self._walk.copy(), self._rows.copy()
+        return found
+
+    def decode(self, stream: bytes, n_frames: int, where: str, *, fresh: bool) -> Floats:
+        """The values of a segment, (n_frames, n_channels); raises FormatError for bad bytes."""
+        if fresh:
+            coding = Stream(fresh_coder(self.header.start), 0, stream)
+            kept, numbers = np.zeros((2, len(self._classes)), np.int64)
+            code_head(coding, self._kinds, kept, numbers, where)
+            walk, rows = self._begin(Head(kept == 1, numbers), n_frames, coding)
+        else:
+            walk, rows = self._so_far(where)
+            rows.go_on(n_frames, Stream(rows.model.coder, 0, stream))  # PWAVE-29
+        self._walk = None
+        rows.where = where
+        walk.take_coarsest(0, rows.decode(), rows.exponents)
+        self._walk, self._rows = walk, rows
+        return walk.values()
+
+    def encode(
+        self, values: Floats, weight: float, exponent: int, *, fresh: bool
+    ) -> tuple[bytes, Floats]:
+        """The stream of a segment of unwrapped ``values``, and what a decoder will have of them.
+
+        Both are (n_frames, n_channels). A bit costs ``weight`` squared steps; the step is
+        2^-``exponent`` of the usual one. Raises MotionError for values that are too large.
+        """
+        n_frames = len(values)
+        if fresh:
+            head = choose_head(self.header, values, np.ones(values.shape[1], np.bool_), values)
+            coder = fresh_coder(self.header.start)
+            coding = Stream(coder, room_of(Pyramid(n_frames, 0, 0), 0, head.moving), None)
+            code_head(coding, self._kinds, head.moving.astype(np.int64), head.numbers.copy(), NAME)
+            walk, rows = self._begin(head, n_frames, coding)
+        else:
+            walk, rows = self._so_far(NAME)
+            room = n_frames * (8 * rows.n_kept + 1) + 1024
+            rows.go_on(n_frames, Stream(rows.model.coder, room, None))
+        rows.exponents[:] = exponent
+
+        def code(first: int, wanted: Floats) -> Floats:
+            return rows.encode(weight, first, wanted)
+
+        walk.code_coarsest(0, code, values[:, walk.kept], rows.exponents)
+        self._walk, self._rows = walk, rows
+        return rows.stream.finish(), walk.values()
+
+    def _so_far(self, where: str) -> tuple[Walk, RowCoder]:
+        if self._walk is None or self._rows is None:  # DATA-11
+            raise FormatError(f"{where}: goes on from a segment that is not there")
+        return self._walk, self._rows
+
+    def _begin(self, head: Head, n_frames: int, coding: Stream) -> tuple[Walk, RowCoder]:
+        header = self.header
+        pyramid = Pyramid(n_frames, 0, 0)
+        walk = Walk(header, self.skeleton, pyramid, head.moving, head.values(header))
+        classes = self._classes[head.moving]
+        rows = RowCoder(classes, header.start, coding.coder, NAME, refining=header.refining)
+        rows.begin(0, pyramid.kind(0), n_frames, coding)
+        return walk, rows
