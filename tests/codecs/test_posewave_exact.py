@@ -148,7 +148,10 @@ def test_an_exact_joint_needs_its_stream_alone(coded: Coded) -> None:
     coded.fetched.clear()
     assert coded.read(1).dtype == np.int64
     assert {group for _, _, group in coded.fetched} == {1}
-    assert {place for place in tuple(coded.fetched) if coded.stream(*place)} == {(0, 0, 1), (1, 0, 1)}
+    assert {place for place in tuple(coded.fetched) if coded.stream(*place)} == {
+        (0, 0, 1),
+        (1, 0, 1),
+    }
     coded.fetched.clear()
     knee = coded.read(2)
     assert {group for _, _, group in coded.fetched} == {0, 2}

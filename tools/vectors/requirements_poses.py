@@ -22,7 +22,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "ROWS-04": ("invalid/posewave/coefficient-*",),
     "ROWS-05": ("valid/posewave/fine", "valid/posewave/escapes*", "valid/posewave/start-*"),
     "ROWS-06": ("valid/posewave/kept-*", "valid/posewave/noise"),
-    "PWAVE-01": ("invalid/posewave/groups*",),
+    "PWAVE-01": ("invalid/posewave/groups*", "invalid/posewave/exact-none"),
     "PWAVE-02": ("invalid/posewave/samples",),
     "PWAVE-03": ("invalid/posewave/segment-lead", "invalid/posewave/segment-tail"),
     "PWAVE-05": ("invalid/posewave/levels-9",),
@@ -48,9 +48,21 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "PWAVE-25": ("invalid/posewave/notes-beyond*", "invalid/posewave/notes-many"),
     "PWAVE-26": ("invalid/posewave/notes-turns-*",),
     "PWAVE-27": ("valid/posewave/order*", "valid/posewave/notes-*"),
-    "PWAVE-28": ("invalid/posewave/segment-not-fresh", "invalid/posewave/on-orders"),
+    "PWAVE-28": (
+        "invalid/posewave/segment-not-fresh",
+        "invalid/posewave/on-orders",
+        "invalid/posewave/on-exact",
+    ),
     "PWAVE-29": ("valid/posewave/on*", "valid/posewave/live*", "invalid/posewave/on-b*"),
     "PWAVE-30": ("invalid/posewave/on-none-kept-*",),
+    "PWAVE-32": ("invalid/posewave/exact-descending", "invalid/posewave/exact-twice"),
+    "PWAVE-33": ("invalid/posewave/exact-*beyond",),
+    "PWAVE-34": ("invalid/posewave/exact-*elsewhere", "valid/posewave/exact-apart"),
+    "PWAVE-35": ("invalid/posewave/exact-detail",),
+    "PWAVE-36": ("valid/posewave/exact-*",),
+    "PWAVE-37": ("invalid/posewave/exact-copies",),
+    "PWAVE-38": ("valid/posewave/exact-one", "valid/posewave/exact-order"),
+    "CODEC-06": ("valid/posewave/exact-of-text",),
 }
 
 ARGUED: dict[str, str] = {

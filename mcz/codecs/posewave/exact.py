@@ -5,7 +5,7 @@ SPEC.md, "Exact channels", is normative.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -47,20 +47,26 @@ def joint_words(text: Any) -> tuple[str, ...]:
 def partition(
     skeleton: Skeleton, options: Mapping[str, Any]
 ) -> tuple[Groups, tuple[int, ...]] | None:
-    """The groups of a clip and the numbers of the exact ones; None where no joint is exact.
-
-    Each exact joint is a group, and so are the lossy channels from one to the next.
-    """
+    """The groups of a clip and the numbers of the exact ones; None where no joint is exact."""
     words = options[OPTION]
     if words is None:
         return None
     joints = {joint for word in words for joint in joints_of(skeleton, word, OPTION)}
+    groups, exact = groups_of(skeleton, joints)
+    if not exact:
+        raise OptionError(f"{OPTION}: {', '.join(words)} have no channels")
+    return groups, exact
+
+
+def groups_of(skeleton: Skeleton, joints: Collection[int]) -> tuple[Groups, tuple[int, ...]]:
+    """Each of these joints is a group, and so are the channels of others from one to the next.
+
+    Also returns the numbers of the groups of these joints.
+    """
     owners = [joint for joint in range(skeleton.n_joints) for _ in skeleton.columns(joint)]
     keys = [owner if owner in joints else -1 for owner in owners]
     runs = [(key, list(run)) for key, run in groupby(range(len(keys)), key=keys.__getitem__)]
     exact = tuple(number for number, (key, _) in enumerate(runs) if key >= 0)
-    if not exact:
-        raise OptionError(f"{OPTION}: {', '.join(words)} have no channels")
     return tuple(tuple(run) for _, run in runs), exact
 
 

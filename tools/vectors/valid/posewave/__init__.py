@@ -7,12 +7,13 @@ from collections.abc import Iterable
 from tools.vectors.build.files import Vector
 from tools.vectors.build.pose_clips import Poses
 from tools.vectors.valid.common import every_codec
-from tools.vectors.valid.posewave import chains, clips
+from tools.vectors.valid.posewave import chains, clips, exact
 
 
 def vectors() -> Iterable[Vector]:
     shelf = Poses("valid/posewave")
     clips.add(shelf)
     chains.add(shelf)
+    exact.add(shelf)
     every_codec.add(shelf, "posewave")
     return shelf.vectors
