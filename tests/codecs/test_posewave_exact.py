@@ -234,3 +234,15 @@ def test_a_live_encoder_has_none() -> None:
     assert codec.live is not None
     with pytest.raises(mcz.OptionError, match="lossless"):
         codec.live(layout, codec.options({"lossless": "spine", "levels": 0}))
+
+
+def test_commands_name_exact_joints(data: Path, tmp_path: Path) -> None:
+    path = tmp_path / "clip.mcz"
+    path.write_bytes(saved(NAME, amc(data, "16_02"), step=0.5, lossless="rfoot,rtoes"))
+    runner = CliRunner()
+    info = runner.invoke(main.cli, ["info", str(path)]).output
+    assert "  exact      rfoot, rtoes\n" in info
+    source = str(data / "cmu/amc/16_02.amc")
+    said = runner.invoke(main.cli, ["diff", source, str(path)]).output
+    (line,) = [line for line in said.split("\n") if "equal in every bit" in line]
+    assert "rfoot, rtoes" in line and "lfoot" not in line
