@@ -14,6 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
 from mcz.codecs import by_name
 from mcz.codecs.contract import Encoded, Request, Span
 from mcz.codecs.posewave.header import POSEWAVE_HEADER
@@ -236,13 +238,14 @@ def test_a_live_encoder_has_none() -> None:
         codec.live(layout, codec.options({"lossless": "spine", "levels": 0}))
 
 
-def test_commands_name_exact_joints(data: Path, tmp_path: Path) -> None:
+def test_commands_name_exact_joints(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "clip.mcz"
     path.write_bytes(saved(NAME, amc(data, "16_02"), step=0.5, lossless="rfoot,rtoes"))
-    runner = CliRunner()
-    info = runner.invoke(main.cli, ["info", str(path)]).output
-    assert "  exact      rfoot, rtoes\n" in info
-    source = str(data / "cmu/amc/16_02.amc")
-    said = runner.invoke(main.cli, ["diff", source, str(path)]).output
+    assert run(cli, "mcz", ["info", str(path)]) == 0
+    assert "  exact      rfoot, rtoes\n" in capsys.readouterr().out
+    assert run(cli, "mcz", ["diff", str(data / "cmu/amc/16_02.amc"), str(path)]) == 0
+    said = capsys.readouterr().out
     (line,) = [line for line in said.split("\n") if "equal in every bit" in line]
     assert "rfoot, rtoes" in line and "lfoot" not in line
