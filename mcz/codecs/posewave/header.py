@@ -28,7 +28,6 @@ NAME = "posewave"
 MAX_LEVELS = 8
 MAX_FINE = 24
 WHOLE_SHARE = 16
-N_STARTS = 2
 
 POSEWAVE_HEADER = Struct(
     "levels"
@@ -37,9 +36,7 @@ POSEWAVE_HEADER = Struct(
     "borrowing"
     / ExprValidator(Int8ul, lambda n, ctx: n <= ctx.levels)  # PWAVE-06
     * "finest levels of details that take the metric of the next coarser one",
-    "start"
-    / ExprValidator(Int8ul, lambda n, ctx: n < N_STARTS)  # PWAVE-07
-    * "start table of the model, 0 or 1",
+    "start" / Int8ul * "start table of the model, 0 or 1",
     "refining"
     / ExprValidator(Int8ul, lambda n, ctx: n <= 1)  # PWAVE-08
     * "1: rows may have finer steps of their own; 0: none has",
@@ -118,6 +115,9 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         )
     if layout.n_resolutions > fields.levels + 1:  # PWAVE-16
         raise FormatError(f"{NAME}: {layout.n_resolutions} resolutions, {fields.levels} levels")
+    start, last = fields.start, len(start_tables()) - 1
+    if start > last:  # PWAVE-07
+        raise FormatError(f"{NAME}: start table {start}, the last is {last}")
     kinds = [channel.kind for channel in skeleton.channels]
     n_plain = sum(kind not in (*ROTATION_KINDS, *POSITION_KINDS) for kind in kinds)
     for name, due in (
@@ -146,7 +146,7 @@ def parse_header(header: bytes, layout: Layout) -> Header:
     return Header(
         levels=fields.levels,
         borrowing=fields.borrowing,
-        start=start_tables()[fields.start],
+        start=start_tables()[start],
         refining=fields.refining == 1,
         step=fields.step,
         radius=fields.radius,

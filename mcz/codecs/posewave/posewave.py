@@ -138,8 +138,8 @@ def decode(
     out = np.zeros((request.stop - request.start, len(columns)))
     if not columns:
         return out
-    lossy = _lossy(fields, layout)
-    decode_one = _decoder(fields, skeleton_of(NAME, layout))
+    assert layout.skeleton is not None  # the header was checked against it
+    lossy, decode_one = _lossy(fields, layout), _decoder(fields, layout.skeleton)
     for index in _needed(spans, request):
         span = spans[index]
         stored = range(layout.n_resolutions - request.resolution)

@@ -144,6 +144,10 @@ class RowCoder:
 
     def decode(self) -> Floats:
         """All rows of the level, (n_rows, n_kept), in steps."""
+        if not self.n_kept:
+            if not self.stream.is_whole:  # PWAVE-20, PWAVE-30
+                raise FormatError(f"{self.where}: bytes of rows, but no channel is kept")
+            return self._decoded(self._n_known, len(self._indices))
         self._run(self._n_known, len(self._indices), -1.0)
         if not self.stream.is_whole:  # ROWS-01
             raise FormatError(
@@ -153,7 +157,7 @@ class RowCoder:
 
     def _run(self, first: int, stop: int, rate_weight: float) -> None:
         if not self.n_kept:
-            return  # PWAVE-20
+            return
         fault = _model().code_rows(
             self.model,
             self.stream.data,

@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 
 from mcz.codecs.posewave.header import POSEWAVE_HEADER
+from mcz.codecs.posewave.pyramid import Pyramid
 from mcz.codecs.posewave.rows import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.segment import classes_of, kinds_of
+from mcz.codecs.posewave.walk import Walk
 from mcz.container import payloads
 from mcz.errors import FormatError
 from mcz.motion import Joint, Skeleton
@@ -26,6 +28,7 @@ from tools.vectors.build.files import Broken, Vector, rehash
 from tools.vectors.build.motions import channels
 from tools.vectors.build.pose_clips import (
     HEADING,
+    Floats,
     Plan,
     acclaim,
     biovision,
@@ -52,6 +55,7 @@ def vectors() -> Iterable[Vector]:
     _counts(shelf)
     _own_orders(shelf)
     _signal(shelf)
+    _nothing(shelf)
     _segments(shelf)
     _chains(shelf)
     _exact(shelf)
@@ -171,6 +175,18 @@ def _signal(shelf: Broken) -> None:
         shelf.add(name, spec, purpose, file_with(plan, **edits))
 
 
+def _nothing(shelf: Broken) -> None:
+    """Faults of clips of no frames, in which a decoder has nothing to stumble over."""
+    plan = _still(n_frames=0, levels=0)
+    twice = put(payloads.CLIP, "signals.0.samples_per_frame", b"\2")
+    data = file_with(plan, CLIP=twice, row=two_rows)
+    shelf.add("frames-0-samples", f"{HEADING}; CLIP", "Two rows a frame, no frames.", data)
+    still = _still(_with("rx ry"), 0)
+    header = put(POSEWAVE_HEADER, "orders", b"\2\0\1")(header_of(still))
+    purpose = "An order of a joint with two rotations, no frames."
+    shelf.add("frames-0-order", ORDERS, purpose, file_with(still, CLIP=says(header)))
+
+
 def _more(count: int) -> Callable[[Any], Any]:
     """Empty streams more."""
     return lambda made: [(header, [*streams, *[b""] * count]) for header, streams in made]
@@ -278,11 +294,21 @@ def _numbers(shelf: Broken) -> None:
         name = f"number-{'kept' if kept else 'constant'}-{column}-40-bits"
         purpose = f"A number of 40 bits of channel {column}."
         shelf.add(name, HEADING, purpose, file_with(plan, segments=stream(0, lambda _, d=data: d)))
+    plan = replace(plan, source=plan.source[:1])
     for value in (2**30 + 1, -(2**30) - 1, 2**31 + 5):
         data = _row_stream(plan, value)
         purpose = f"A coefficient of {value}."
         name = f"coefficient-{'below' if value < 0 else 'beyond'}-{abs(value):x}"
-        shelf.add(name, ROWS, purpose, file_with(plan, segments=stream(0, lambda _, d=data: d)))
+        edits = {"segments": stream(0, lambda _, d=data: d), "CEND": rehash(_taken(plan, value))}
+        shelf.add(name, ROWS, purpose, file_with(plan, **edits))
+
+
+def _taken(plan: Plan, value: int) -> Floats:
+    """The frame of a reader that takes such a coefficient."""
+    kept = np.arange(plan.skeleton.n_channels) == 0
+    walk = Walk(parsed(plan), plan.skeleton, Pyramid(1, 0, 0), kept, np.zeros(len(kept)))
+    walk.take_coarsest(0, np.full((1, 1), float(value)), np.zeros(1, np.int64))
+    return walk.values()
 
 
 def _head_stream(plan: Plan, column: int, is_kept: bool) -> bytes:
@@ -304,10 +330,10 @@ def _row_stream(plan: Plan, value: int) -> bytes:
     header = parsed(plan)
     classes = classes_of(plan.skeleton)[kept == 1]
     rows = RowCoder(classes, header.start, out.coder, "", refining=False)
-    rows.begin(0, 0, 2, out)
+    rows.begin(0, 0, 1, out)
     with suppress(FormatError):
         rows._wanted[:] = value
-        rows._run(0, 2, 0.0)
+        rows._run(0, 1, 0.0)
     return out.finish()
 
 
