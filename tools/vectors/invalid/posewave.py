@@ -238,12 +238,16 @@ def _exact(shelf: Broken) -> None:
     for name, purpose, numbers in (
         ("descending", "Exact groups 3 and 1, in this order.", b"\2\3\1"),
         ("twice", "Exact group 1 twice.", b"\2\1\1"),
-        ("beyond", "Exact groups 1 and 4 of 4.", b"\2\1\4"),
-        ("far-beyond", "Exact groups 1 and 2^40.", b"\2\1" + varint(2**40)),
         ("none", "Four groups, none of which is exact.", b"\0"),
     ):
         header = put(POSEWAVE_HEADER, "exact", numbers)(header_of(plan))
         shelf.add(f"exact-{name}", EXACT, purpose, file_with(plan, motion, CLIP=says(header)))
+    one = replace(plan, exact=(1,))
+    for name, number in (("beyond", 3), ("far-beyond", 2**40)):
+        numbers = b"\2\1" + varint(number)
+        header = put(POSEWAVE_HEADER, "exact", numbers)(header_of(one))
+        purpose = f"Exact groups 1, which is, and {number} of 3 groups."
+        shelf.add(f"exact-{name}", EXACT, purpose, file_with(one, CLIP=says(header)))
     copies = b"\1" + b"\2\1\0" * 2  # a constant 0, and two copies of it
     still = replace(plan, source=np.where(np.isin(np.arange(12), [6, 7, 8]), 0, plan.source))
     for name, purpose, own, place, edit in (
