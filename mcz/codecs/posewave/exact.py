@@ -48,7 +48,7 @@ def partition(
     skeleton: Skeleton, options: Mapping[str, Any]
 ) -> tuple[Groups, tuple[int, ...]] | None:
     """The groups of a clip and the numbers of the exact ones; None where no joint is exact."""
-    words = options[OPTION]
+    words = options.get(OPTION)
     if words is None:
         return None
     joints = {joint for word in words for joint in joints_of(skeleton, word, OPTION)}
