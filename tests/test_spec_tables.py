@@ -14,10 +14,10 @@ import pytest
 
 from mcz.codecs import CODECS
 from mcz.codecs.curves import kernels as qbc_kernels
-from mcz.codecs.lossless import kernels as lossless_kernels
 from mcz.codecs.online import kernels as online_kernels
 from mcz.codecs.posewave import header as posewave
 from mcz.coding import logistic, mixing, residuals, space_kernels
+from mcz.coding.ordinals import kernels as lossless_kernels
 from mcz.container import chunks
 from mcz.formats import FORMATS, amc, c3d_restore
 from mcz.formats.c3d_layout import Kind

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import mcz
-from mcz.codecs.lossless import lossless
+from mcz.coding.ordinals import streams
 from tools.start_tables import Kept, table, untrained
 
 MAX_COUNT = 20
@@ -23,8 +23,8 @@ MAX_COUNT = 20
 
 def train(paths: list[Path]) -> np.ndarray:
     """The mean state after the files of the second round."""
-    state = untrained(lossless._start_state())
-    lossless._start_state = lambda: state.view(Kept)  # type: ignore[assignment]
+    state = untrained(streams.start_states("lossless")[0])
+    streams.start_states = lambda _: (state.view(Kept),)  # type: ignore[assignment]
     total = np.zeros_like(state)
     for number, path in enumerate([*paths, *paths]):
         out = io.BytesIO()
@@ -36,6 +36,6 @@ def train(paths: list[Path]) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    loops, _ = lossless._kernels()
+    loops, _ = streams.loops()
     result = table(train([Path(name) for name in sys.argv[2:]]), loops.N_MIXERS, MAX_COUNT)
     Path(sys.argv[1]).write_text(json.dumps(result, indent=1) + "\n")

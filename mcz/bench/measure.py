@@ -168,21 +168,28 @@ def work_of(
     wanted = as_coded(motion, codec, options)
 
     def encode() -> tuple[Any, list[Any]]:
-        encoded = codec.encode(MemorySource(wanted, 0, codec, BASE.segment_bytes), options)
+        source = MemorySource(wanted, 0, codec, BASE.segment_bytes, options)
+        encoded = codec.encode(source, options)
         return encoded, list(encoded.segments)
 
     encoded, segments = encode()
     find_model = model_finder((*encoded.models, *encoded.known))
 
     def decode() -> Any:
-        layout = MemorySource(wanted, 0, codec, BASE.segment_bytes).layout
+        layout = MemorySource(wanted, 0, codec, BASE.segment_bytes, options).layout
         layout = replace(layout, n_resolutions=encoded.n_resolutions, find_model=find_model)
         spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
         n = len(layout.groups)
-        request = Request(0, layout.n_frames, tuple(range(n)))
-        return codec.decode(
-            encoded.header, layout, spans, request, lambda s, r, g: segments[s].streams[r * n + g]
-        )
+        exact = codec.exact(encoded.header, layout) if codec.exact else ()
+        for groups in (set(range(n)) - set(exact), exact):
+            request = Request(0, layout.n_frames, tuple(sorted(groups)))
+            codec.decode(
+                encoded.header,
+                layout,
+                spans,
+                request,
+                lambda s, r, g: segments[s].streams[r * n + g],
+            )
 
     return encode, decode
 

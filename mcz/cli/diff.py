@@ -276,6 +276,7 @@ def _compared(
         document["contact_list"] = [
             asdict(slide) | {"first": slide.first + one.start} for slide in slides
         ]
+    document["equal_joints"] = _equal_joints(one.motion, other.motion)
     document["joints"] = _by_joints(one.motion, other.motion, found, one.start)
     document |= {"notes": list(found.notes), "ratios_a": one.ratios, "ratios_b": other.ratios}
     return document
@@ -301,6 +302,28 @@ def _feet(found: Comparison) -> dict[str, Any] | None:
         "frame_rate": contacts.frame_rate,
         "rate_assumed": contacts.rate_assumed,
     }
+
+
+def _equal_joints(a: Motion, b: Motion) -> list[str]:
+    """The joints of the same name whose channels are the same in every bit of every frame."""
+    if any(motion.signals[0].channels is not None for motion in (a, b)):
+        return []
+    theirs = {name: joint for joint, name in enumerate(b.skeleton.addresses())}
+    found = []
+    for joint, name in enumerate(a.skeleton.addresses()):
+        kinds = [channel.kind for channel in a.skeleton.joints[joint].channels]
+        other = theirs.get(name)
+        if other is None or not kinds:
+            continue
+        if kinds != [channel.kind for channel in b.skeleton.joints[other].channels]:
+            continue
+        both = ((a, a.skeleton.columns(joint)), (b, b.skeleton.columns(other)))
+        bits = [
+            motion.signals[0].masked()[:, list(columns)].astype("<f8").tobytes()
+            for motion, columns in both
+        ]
+        found += [name] if bits[0] == bits[1] else []
+    return found
 
 
 def _by_joints(a: Motion, b: Motion, found: Comparison, start: int) -> dict[str, Any] | None:

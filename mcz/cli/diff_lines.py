@@ -19,8 +19,13 @@ def lines_of(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
     notes, ratios = entries.pop("notes"), [entries.pop("ratios_a"), entries.pop("ratios_b")]
     yield f"{a} ({names[0]}) and {b} ({names[1]})"
     joints, feet = entries.pop("joints"), entries.pop("feet")
+    equal = entries.pop("equal_joints")
     by_joint, contacts = entries.pop("by_joint", []), entries.pop("contact_list", [])
+    is_same = entries.get("mse_raw") == 0.0
     yield from (f"  {line}" for line in figure_lines(entries))
+    if equal and not is_same:
+        more = f" and {len(equal) - FEW} more" if len(equal) > FEW else ""
+        yield f"  joints equal in every bit: {', '.join(equal[:FEW])}{more}"
     if feet is not None:
         yield f"  {_feet_line(feet)}"
     if joints is not None:

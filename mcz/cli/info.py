@@ -223,7 +223,10 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
         f"{plural(clip['n_channels'], 'channel')}, {plural(clip['n_joints'], 'joint')}"
     )
     yield f"  skeleton   {clip['skeleton'][:8]}"
-    yield from (_codec(clip["codec"], signal) for signal in clip["codecs"])
+    for signal in clip["codecs"]:
+        yield _codec(clip["codec"], signal)
+        if signal["exact_joints"]:
+            yield f"  exact      {', '.join(signal['exact_joints'])}"
     for model in clip["models"]:
         known = f"{model['name']}, well known" if model["name"] else "in the file"
         yield f"  model      {model['id'][:8]} ({known})"

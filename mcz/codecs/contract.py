@@ -225,6 +225,15 @@ Follow = Callable[[bytes, Layout], LiveDecoder]  # a header
 # (header) -> the ids of the models that it names; raises FormatError for bad bytes.
 Uses = Callable[[bytes], tuple[bytes, ...]]
 
+# (skeleton, options) -> the groups of an encoder, and the numbers of those of ordinals; None: as
+# ``grouping`` says, none of ordinals. Raises OptionError.
+Partition = Callable[
+    [Skeleton, Mapping[str, Any]], tuple[tuple[tuple[int, ...], ...], tuple[int, ...]] | None
+]
+
+# (header, layout) -> the groups of ordinals, ascending; raises FormatError for bad bytes.
+Exact = Callable[[bytes, Layout], tuple[int, ...]]
+
 # (header, layout, spans) -> the stored frames, ascending, that the coarsest resolution alone gives
 # exactly as all resolutions do.
 Preview = Callable[[bytes, Layout, Sequence[Span]], NDArray[np.int64]]
@@ -237,6 +246,9 @@ class Codec:
     ``decode`` returns int64 ordinals or binary64 values, as ``domain`` says, of shape
     (rows, channels of the requested groups in the order requested). It checks the header also where
     no frame is requested.
+
+    A codec of values may have groups of ordinals beside them, which are ``exact``: a request is for
+    groups of one sort. ``partition`` says which groups an encoder makes (both None: no such codec).
 
     A clip may be cut without the codec's help, SPEC.md, "Cutting without re-encoding": whole
     segments at its ends, groups, and the streams of the finest resolutions are left out, and what
@@ -276,6 +288,8 @@ class Codec:
     regroup: Regroup | None = None
     recode: Recode | None = None
     preview: Preview | None = None
+    partition: Partition | None = None
+    exact: Exact | None = None
     positions: bool = False
     uses: Uses | None = None
     live: Live | None = None

@@ -54,11 +54,16 @@ class Lengths:
         return shorter if self.least <= shorter < length else length
 
 
-def halving(n_frames: int, lengths: Lengths, code: Code) -> Iterator[tuple[int, int, Streams]]:
-    """Segments first <= f < stop of a signal of ``n_frames``, and their streams."""
+def halving(
+    n_frames: int, lengths: Lengths, code: Code, breaks: Sequence[int] = ()
+) -> Iterator[tuple[int, int, Streams]]:
+    """Segments first <= f < stop of a signal of ``n_frames``, and their streams.
+
+    One begins at each of the ``breaks``, too.
+    """
     length, first = lengths.length, 0
     while first < n_frames:
-        stop = min(first + length, n_frames)
+        stop = min(first + length, *(end for end in (*breaks, n_frames) if end > first))
         streams = code(first, stop)
         shorter = lengths.halved(length)
         if not lengths.fixed and shorter < length and _size(streams) > TARGET_BYTES:

@@ -22,6 +22,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.layout import layout as layout
 from mcz.reading.recording_report import document_of
+from mcz.reading.signal_info import SignalInfo
 from mcz.reading.sizes import Sizes, clip_sizes, models_used
 from mcz.schema import parse
 
@@ -122,6 +123,7 @@ def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
                 "segments": len(s.rows),
                 "groups": s.counts.n_groups,
                 "resolutions": s.counts.n_resolutions,
+                "exact_joints": _exact_joints(clip, s),
                 "stored_frames": s.layout.n_frames,
             }
             for s in clip.signals
@@ -154,6 +156,17 @@ def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
         "damage": [*clip.damage, *unread],
     }
     return document | _ratios(file, clip, sizes)
+
+
+def _exact_joints(clip: Clip, signal: SignalInfo) -> list[str]:
+    """The joints that have exact channels beside lossy ones, where they are known."""
+    try:
+        columns = {c for group in signal.exact for c in signal.layout.groups[group]}
+    except FormatError:
+        return []
+    skeleton = clip.skeleton
+    pairs = enumerate(skeleton.addresses())
+    return [name for joint, name in pairs if not columns.isdisjoint(skeleton.columns(joint))]
 
 
 def _recording(clip: Clip, unread: list[str]) -> dict[str, Any] | None:

@@ -49,6 +49,11 @@ class SignalInfo:
         return by_id(self.codec_id, self.codec_version)
 
     @property
+    def exact(self) -> tuple[int, ...]:
+        """The groups of ordinals of a codec of values."""
+        return self.codec.exact(self.header, self.layout) if self.codec.exact else ()
+
+    @property
     def is_integer(self) -> bool:
         # GRID-10
         return bool(self.grids) and all(grid.kind == GridKind.INTEGER for grid in self.grids)

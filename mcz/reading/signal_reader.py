@@ -128,11 +128,35 @@ class SignalReader:
             yield start, stop
 
     def _decode(self, spans: Sequence[Span], start: int, stop: int) -> NDArray[Any]:
+        """What the codec decodes; of groups of ordinals beside values their values."""
+        of_ordinals = self.info.exact
+        exact = tuple(group for group in self.groups if group in of_ordinals)
+        if not exact:
+            return self._decode_groups(self.groups, spans, start, stop)
+        lossy = tuple(group for group in self.groups if group not in exact)
+        layout = self.info.layout
+        columns = [c for group in self.groups for c in layout.groups[group]]
+        is_exact = np.isin(columns, [c for group in exact for c in layout.groups[group]])
+        values = np.empty(self._shape(start, stop))
+        if lossy:
+            values[:, ~is_exact] = self._decode_groups(lossy, spans, start, stop)
+        number = {int(column): n for n, column in enumerate(np.flatnonzero(is_exact))}
+        changes = self.exceptions(start, stop, columns)[1]
+        values[:, is_exact] = _values_of(  # CODEC-06
+            self._decode_groups(exact, spans, start, stop),
+            [layout.grids[columns[column]] for column in number],
+            [(row, number[column], grid) for row, column, grid in changes if column in number],
+        )
+        return values
+
+    def _decode_groups(
+        self, groups: tuple[int, ...], spans: Sequence[Span], start: int, stop: int
+    ) -> NDArray[Any]:
         return self.info.codec.decode(
             self.info.header,
             self.info.layout,
             spans,
-            Request(start, stop, self.groups, self.resolution),
+            Request(start, stop, groups, self.resolution),
             self.fetch,
         )
 

@@ -18,7 +18,7 @@ REFINEMENT = "refinement"
 MOST_OCTAVES = 7
 MOST_ROUNDS = 10  # with one step
 MOST_STEPS = 6
-FINER = 0.7  # from one step to the next
+FINER = 0.85  # from one step to the next
 MARGIN = 0.3  # octaves that are added to what a frame misses
 
 

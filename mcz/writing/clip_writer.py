@@ -24,7 +24,7 @@ from mcz.container.value_hash import value_hash
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
-from mcz.motion import Motion, Signal, Skeleton, Source
+from mcz.motion import Motion, Skeleton, Source
 from mcz.schema import MAX_COUNT, build
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource, as_stored, settle
@@ -151,7 +151,7 @@ def _coded(
         raise MotionError(f"codec {codec.name}: signal {signal.name!r} has channels of its own")
     if codec.domain == "values" and signal.values.dtype == np.int64:
         raise MotionError(f"codec {codec.name}: signal {signal.name!r} is one of integers")
-    source = MemorySource(motion, index, codec, segment_bytes)
+    source = MemorySource(motion, index, codec, segment_bytes, options)
     if codec.domain == "values" and source.signal.values.dtype == np.int64:
         raise MotionError(f"signal {source.signal.name!r}: codec {codec.name} holds no integers")
     return _Coded(source, codec, codec.encode(source, options))
@@ -198,7 +198,7 @@ def _clip_fields(writer: Writer, motion: Motion, coded: Sequence[_Coded]) -> dic
         "rate_denominator": rate.denominator if rate else 1,
         "metadata": [{"key": k, "value": metadata[k]} for k in sorted(metadata)],
         "source": [_source_fields(writer, motion.source)] if motion.source else [],
-        "signals": [_signal_fields(part.source.signal, part.codec, part.encoded) for part in coded],
+        "signals": [_signal_fields(part.source, part.codec, part.encoded) for part in coded],
         "extension": b"",
     }
 
@@ -216,7 +216,8 @@ def _source_fields(writer: Writer, source: Source) -> dict[str, Any]:
     }
 
 
-def _signal_fields(signal: Signal, codec: Codec, part: Encoded) -> dict[str, Any]:
+def _signal_fields(source: MemorySource, codec: Codec, part: Encoded) -> dict[str, Any]:
+    signal = source.signal
     runs: list[dict[str, Any]] = []
     for grid in signal.grids:
         if runs and runs[-1]["grid"] == grid:
@@ -228,6 +229,8 @@ def _signal_fields(signal: Signal, codec: Codec, part: Encoded) -> dict[str, Any
     kind = kinds.get(codec.grouping, payloads.GROUP_CHANNEL)
     if own and codec.grouping == "joint":
         kind = payloads.GROUP_CHANNEL
+    kind = payloads.GROUP_LISTED if source.is_listed else kind
+    sizes = [len(group) for group in source.layout.groups] if source.is_listed else None
     return {
         "name": signal.name,
         "flags": payloads.OWN_CHANNELS if own else 0,
@@ -239,7 +242,7 @@ def _signal_fields(signal: Signal, codec: Codec, part: Encoded) -> dict[str, Any
         "codec": codec.id,
         "codec_version": codec.version,
         "header": part.header,
-        "groups": {"kind": kind, "sizes": None},
+        "groups": {"kind": kind, "sizes": sizes},
         "n_resolutions": part.n_resolutions,
         "extension": b"",
     }
@@ -274,6 +277,7 @@ def _write_segment(
 
 
 def _decoded(coded: _Coded, segments: Sequence[Segment]) -> NDArray[np.float64]:
+    """What a reader will have: of exact channels what was given, of others what is decoded."""
     encoded = coded.encoded
     layout = replace(
         coded.source.layout,
@@ -282,11 +286,14 @@ def _decoded(coded: _Coded, segments: Sequence[Segment]) -> NDArray[np.float64]:
     )
     spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in segments]
     n_groups = len(layout.groups)
-    request = Request(0, layout.n_frames, tuple(range(n_groups)))
-    return coded.codec.decode(
+    exact = coded.codec.exact(encoded.header, layout) if coded.codec.exact else ()
+    lossy = tuple(group for group in range(n_groups) if group not in exact)
+    values = np.array(coded.source.signal.values, np.float64)
+    values[:, [c for group in lossy for c in layout.groups[group]]] = coded.codec.decode(
         coded.encoded.header,
         layout,
         spans,
-        request,
+        Request(0, layout.n_frames, lossy),
         lambda segment, resolution, group: segments[segment].streams[resolution * n_groups + group],
     )
+    return values

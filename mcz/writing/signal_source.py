@@ -6,9 +6,10 @@ values themselves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from mcz.container.masks import build_mask
 from mcz.errors import MotionError
 from mcz.formats import recording_of
 from mcz.motion import Exceptions, Motion, Signal, Skeleton
-from mcz.numbers import Grid, values_of_texts
+from mcz.numbers import Grid, GridKind, values_of_texts
 from mcz.schema import build
 
 MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
@@ -33,13 +34,25 @@ class MemorySource:
     Values that lie on no point of their text grid join the exceptions, so that nothing is lost.
     """
 
-    def __init__(self, motion: Motion, index: int, codec: Codec, segment_bytes: int) -> None:
+    def __init__(
+        self,
+        motion: Motion,
+        index: int,
+        codec: Codec,
+        segment_bytes: int,
+        options: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
+        """``options``: all of the codec's, where it has groups of ordinals beside values."""
         signal = motion.signals[index]
+        found = codec.partition(motion.skeleton, options) if codec.partition and options else None
+        self.is_listed = found is not None
+        groups, exact = found or (make_groups(motion.skeleton, signal, codec.grouping), ())
+        self.exact = [channel for group in exact for channel in groups[group]]
         # What a lossy codec returns is no longer the number that an exception spells.
-        self.signal = signal if codec.lossless else replace(signal, exceptions=Exceptions())
+        self.signal = signal if codec.lossless else _with_exceptions_of(signal, self.exact)
         self.layout = Layout(
             n_frames=motion.n_frames,
-            groups=make_groups(motion.skeleton, signal, codec.grouping),
+            groups=groups,
             samples_per_frame=signal.samples_per_frame,
             skeleton=motion.skeleton,
             frame_rate=motion.frame_rate,
@@ -63,9 +76,15 @@ class MemorySource:
         return self._block(start, stop)[0]
 
     def _block(self, start: int, stop: int) -> Block:
-        """Ordinals of a block, exceptions repeating the row before, and its signal with strays."""
+        """Ordinals of a block, exceptions repeating the row before, and its signal with strays.
+
+        Of a lossy codec those of its exact channels; others have no strays.
+        """
         if (start, stop) not in self._settled:
-            self._settled = {(start, stop): settle(self.signal.cut(start, stop))}
+            signal = self.signal.cut(start, stop)
+            ordinals, settled = settle(_freed(signal, self.exact) if self.exact else signal)
+            signal = replace(signal, exceptions=settled.exceptions)
+            self._settled = {(start, stop): (ordinals, signal)}
         return self._settled[start, stop]
 
     def group_notes(self, start: int, stop: int) -> list[bytes]:
@@ -103,6 +122,24 @@ class MemorySource:
             return []
         blocks = (mask[:, list(group)] for group in self.layout.groups)
         return [b"" if block.all() else build_mask(block) for block in blocks]
+
+
+def _with_exceptions_of(signal: Signal, channels: Sequence[int]) -> Signal:
+    """``signal`` with the exceptions of these channels alone."""
+    old = signal.exceptions
+    kept = np.flatnonzero(np.isin(old.channels, channels))
+    texts = tuple(old.texts[i] for i in kept)
+    return replace(signal, exceptions=Exceptions(old.rows[kept], old.channels[kept], texts))
+
+
+def _freed(signal: Signal, channels: Sequence[int]) -> Signal:
+    """``signal`` with the grids of these channels alone: others may have any value."""
+    free = Grid(GridKind.BINARY64)
+    return replace(
+        signal,
+        grids=tuple(grid if c in channels else free for c, grid in enumerate(signal.grids)),
+        grid_changes=tuple(change for change in signal.grid_changes if change[1] in channels),
+    )
 
 
 def as_stored(motion: Motion) -> Motion:

@@ -6,18 +6,15 @@ and one ``weights``, what each joint counts for in its metric.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import among
 from mcz.codecs.parameters import Dial
 from mcz.errors import OptionError
-from mcz.kinematics.feet import feet_of
-from mcz.motion import Skeleton
+from mcz.kinematics.words import joints_of
 from mcz.writing.trials import Trials
 
 Floats = NDArray[np.float64]
@@ -27,30 +24,6 @@ QUALITY, WEIGHTS = "quality", "weights"
 MOST_ROUNDS = 8
 OVER = 1.15  # by how much more a weight grows than the square of what is missed
 MOST_WEIGHT = 2.0**24
-GROUPS = {
-    "hands": r"hand|wrist|finger|thumb|index|middle|ring|pinky",
-    "head": r"head|neck|eye|jaw",
-    "arms": r"clavicle|collar|shoulder|humerus|arm|radius|elbow|hand|wrist|finger|thumb",
-    "legs": r"hip|thigh|femur|upleg|leg|knee|shin|tibia|foot|toe|ankle",
-    "spine": r"spine|back|chest|thorax|abdomen",
-}
-
-
-def joints_of(skeleton: Skeleton, name: str) -> list[int]:
-    """The joints that ``name`` means: a group, or else a joint of that name; raises OptionError."""
-    addresses = skeleton.addresses()
-    if name in addresses:
-        return [addresses.index(name)]
-    found = []
-    if name == "feet":
-        found = feet_of(skeleton)
-    elif name in GROUPS:
-        pattern = re.compile(GROUPS[name], re.IGNORECASE)
-        found = [i for i, joint in enumerate(skeleton.joints) if pattern.search(joint.name)]
-    if not found:
-        known = ["feet", *GROUPS, *addresses]
-        raise OptionError(f"quality: no joint and no group is called {name!r}{among(name, known)}")
-    return found
 
 
 def weighted(
@@ -61,7 +34,7 @@ def weighted(
     Also returns what the quality record says of it. Raises OptionError where they cannot be kept.
     """
     skeleton = trial.motion.skeleton
-    groups = [(name, joints_of(skeleton, name), limit) for name, limit in limits]
+    groups = [(name, joints_of(skeleton, name, QUALITY), limit) for name, limit in limits]
     given = found.get(WEIGHTS)
     weights = np.ones(skeleton.n_joints) if given is None else np.array(given)
     for _ in range(MOST_ROUNDS):

@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless import lossless
-from mcz.codecs.lossless.units import find_unit, of_multiples
 from mcz.coding.logistic import NODES, squash_table, stretch_table
+from mcz.coding.ordinals import heads, streams
+from mcz.coding.ordinals.units import find_unit, of_multiples
 from mcz.errors import FormatError
 from mcz.formats import FORMATS
 from mcz.motion import Signal
@@ -42,7 +43,7 @@ GRIDS = (
 
 def coded(columns: np.ndarray, grid: Grid, clip_grid: Grid | None = None) -> bytes:
     own = [(grid, clip_grid or grid)] * columns.shape[1]
-    return lossless._build(columns, own, 0, {})
+    return streams.build_stream(columns, own, 0, {})
 
 
 def decoded(stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> np.ndarray:
@@ -125,7 +126,7 @@ def test_copies_of_another_group() -> None:
 
 def test_copy_of_a_copy_is_refused() -> None:
     layout = Layout(3, ((0,), (1,)), grids=(GRIDS[0],) * 2)
-    streams = {0: bytes((lossless.COPY, 1, 0)), 1: bytes((lossless.COPY, 0, 0))}
+    streams = {0: bytes((heads.COPY, 1, 0)), 1: bytes((lossless.COPY, 0, 0))}
     with pytest.raises(FormatError, match="copy of a copy"):
         lossless.decode(b"", layout, [Span(0, 3)], Request(0, 3, (0,)), lambda s, r, g: streams[g])
 
@@ -133,7 +134,7 @@ def test_copy_of_a_copy_is_refused() -> None:
 @pytest.mark.parametrize("copy", [(5, 0), (0, 9), (1, 1)])
 def test_copy_of_nothing_is_refused(copy: tuple[int, int]) -> None:
     layout = Layout(3, ((0,), (1,)), grids=(GRIDS[0],) * 2)
-    stream = bytes((lossless.COPY, *copy))
+    stream = bytes((heads.COPY, *copy))
     with pytest.raises(FormatError):
         lossless.decode(b"", layout, [Span(0, 3)], Request(0, 3, (0,)), lambda s, r, g: stream)
 
@@ -168,7 +169,7 @@ def test_bytes_after_the_end_are_refused() -> None:
         with pytest.raises(FormatError):
             decoded(stream + more, 20, 2, GRIDS[0])
     with pytest.raises(FormatError):
-        decoded(bytes((lossless.CONSTANT,)) + b"\0", 3, 1, GRIDS[0])
+        decoded(bytes((heads.CONSTANT,)) + b"\0", 3, 1, GRIDS[0])
 
 
 def test_rows_of_a_cut_equal_those_of_the_whole() -> None:

@@ -263,9 +263,9 @@ def test_bad_headers(orders: list[int], message: str) -> None:
     source = source_of(skeleton, values)
     data = choose(source, PARAMETERS).header
     fields = parse_header(data, source.layout)
-    rest = data[: -1 - len(fields.orders)]  # they are last
+    rest = data[: -3 - len(fields.orders)]  # behind them: nothing is exact, no contacts
     with pytest.raises(FormatError, match=message):
-        parse_header(rest + bytes([len(orders), *orders]), source.layout)
+        parse_header(rest + bytes([len(orders), *orders, 0, 0]), source.layout)
 
 
 @given(SEQUENCE, CODES, st.integers(0, 100))

@@ -243,7 +243,7 @@ def test_axis_orders_of_posewave(
     codes: tuple[int, ...], other: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Joints whose angles are coded in other orders of axes than those of the source."""
-    monkeypatch.setattr(choices, "choose_orders", lambda source: [*codes, 0, 0])
+    monkeypatch.setattr(choices, "choose_orders", lambda source, exact: [*codes, 0, 0])
     for step in (0.01, 1.0):
         check(saved("posewave", smooth(90), step=step, segment_frames=50), other, step)
 

@@ -68,6 +68,11 @@ export function decodeSignal(clip, signal, { from, to, dropped, room }) {
   const rows = decoded
     ? wantedRows(decoded, segments, wanted, layout)
     : new (isOrdinals ? BigInt64Array : Float64Array)(0);
+  if (decoder.exactColumns?.length > 0 && decoded) {
+    const ordinals = decoder.ordinals(segments, { dropped });
+    const exact = wantedRows(ordinals, segments, wanted, layout);
+    setColumns(rows, exact, decoder.exactColumns, parts, layout.channels.length);
+  }
   const out = {
     signal,
     grids: layout.grids,
@@ -197,6 +202,15 @@ function valuesOf(ordinals, parts, layout) {
     }
   }
   return withExceptions(values, parts, layout);
+}
+
+/** Sets the values of the exact channels of a codec of values: those of their ordinals. */
+function setColumns(values, ordinals, columns, parts, nChannels) {
+  for (const { firstRow, nRows, grids } of parts) {
+    for (const column of columns) {
+      columnValues(grids[column], ordinals, values, firstRow * nChannels + column, nChannels, nRows);
+    }
+  }
 }
 
 /** Sets the values of exceptions, which are those of their tokens. */

@@ -65,8 +65,8 @@ class Chain:
         if fresh:
             head = choose_head(self.header, values, np.ones(values.shape[1], np.bool_), values)
             coder = fresh_coder(self.header.start)
-            coding = Stream(coder, room_of(Pyramid(n_frames, 0, 0), 0, head), None)
-            code_head(coding, self._kinds, head.kept.astype(np.int64), head.numbers.copy(), NAME)
+            coding = Stream(coder, room_of(Pyramid(n_frames, 0, 0), 0, head.moving), None)
+            code_head(coding, self._kinds, head.moving.astype(np.int64), head.numbers.copy(), NAME)
             walk, rows = self._begin(head, n_frames, coding)
         else:
             walk, rows = self._so_far(NAME)
@@ -89,8 +89,8 @@ class Chain:
     def _begin(self, head: Head, n_frames: int, coding: Stream) -> tuple[Walk, RowCoder]:
         header = self.header
         pyramid = Pyramid(n_frames, 0, 0)
-        walk = Walk(header, self.skeleton, pyramid, head.kept, head.values(header))
-        classes = self._classes[head.kept]
+        walk = Walk(header, self.skeleton, pyramid, head.moving, head.values(header))
+        classes = self._classes[head.moving]
         rows = RowCoder(classes, header.start, coding.coder, NAME, refining=header.refining)
         rows.begin(0, pyramid.kind(0), n_frames, coding)
         return walk, rows

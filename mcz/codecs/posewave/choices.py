@@ -17,6 +17,7 @@ from mcz.codecs.contract import SignalSource
 from mcz.codecs.gaps import FrameReader
 from mcz.codecs.posewave.contact_choice import choose_contacts, runs_of
 from mcz.codecs.posewave.contact_keeper import Keeper
+from mcz.codecs.posewave.exact import partition
 from mcz.codecs.posewave.header import MAX_FINE, NAME, Header, build_header, parse_header
 from mcz.codecs.posewave.order_choices import choose_orders
 from mcz.codecs.posewave.orders import N_NOTES, Orders
@@ -75,7 +76,10 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
     fields |= _plain_steps(skeleton, _spreads(sample(source, SAMPLED_FRAMES)), step_cm)
     octaves = params.get("refinement")
     fields["refining"] = int(octaves is not None and bool(np.any(octaves)))
-    fields["orders"] = choose_orders(source)
+    groups = partition(skeleton, params)
+    fields["exact"] = groups[1] if groups else ()
+    exact = {channel for group in fields["exact"] for channel in source.layout.groups[group]}
+    fields["orders"] = choose_orders(source, exact)
     if params.get("weights") is not None:
         fields["weights"] = [code_of(float(weight)) for weight in params["weights"]]
     fields["levels"] = params["levels"]
@@ -92,6 +96,8 @@ def _contacts(
     """The header's field, and what is to be kept; ``in_cm``: length units a centimeter."""
     if not params.get("contacts") or not source.layout.n_frames:
         return [], None
+    if params.get("lossless"):
+        raise OptionError(f"{NAME}: contacts and lossless exclude each other")
     skeleton, rate = skeleton_of(NAME, source.layout), source.layout.frame_rate
     if skeleton.unit_cm is None:
         raise OptionError(
@@ -163,6 +169,7 @@ def _fields(skeleton: Skeleton, step: float, step_cm: float) -> dict[str, Any]:
         "plain": [],
         "weights": [],
         "orders": [],
+        "exact": [],
     }
 
 
@@ -212,7 +219,7 @@ def best_levels(
     """How many levels make the beginning of the clip smallest for what they get wrong."""
     layout = source.layout
     n_frames = min(TRIAL_FRAMES, layout.n_frames, layout.most_frames)
-    if not layout.n_channels or n_frames < 1 << min(LEVELS):
+    if len(fields["exact"]) == len(layout.groups) or n_frames < 1 << min(LEVELS):
         return min(LEVELS)
     values = FrameReader(NAME, source).next(n_frames)
     orders = Orders(fields["orders"], skeleton)
@@ -225,6 +232,7 @@ def best_levels(
         )
         streams, found = encode_coded(header, skeleton, coded, weights)
         found = orders.values(found[::SAMPLED], no_notes)
+        found[:, header.exact] = values[::SAMPLED, header.exact]
         error = distortion(header, skeleton, values[::SAMPLED], found)
         return math.log(sum(map(len, streams))) + EXCHANGE * math.log(max(error, 1e-300))
 

@@ -5,7 +5,9 @@ SPEC.md, "Codec 13: posewave", is normative; the names below are its field names
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,7 @@ from mcz.codecs.posewave.orders import N_ORDERS, check_orders
 from mcz.codecs.steps import code_of, ratio_of
 from mcz.errors import FormatError
 from mcz.motion import POSITION_KINDS, ROTATION_KINDS
-from mcz.schema import build, counted, parse
+from mcz.schema import UVARINT, build, counted, parse
 
 Floats = NDArray[np.float64]
 
@@ -63,6 +65,7 @@ POSEWAVE_HEADER = Struct(
     "orders"
     / counted(ExprValidator(Int8ul, lambda n, ctx: n < N_ORDERS), 2**14)
     * "of each joint the code of its axis order, 0 to 6; none: all 0",
+    "exact" / counted(UVARINT, 2**14) * "numbers of the groups whose channels are exact, ascending",
     "contacts" / counted(CONTACTS, 1) * "none, or what the contacts of segments rest on",
 )
 
@@ -73,7 +76,8 @@ class Header:
 
     Arrays are by channel, but for ``weights`` (n_joints,): ``greatest`` steps and the step of the
     ``first`` value of a segment and of a ``constant``, in source units. ``orders``: a code of each
-    joint, or none.
+    joint, or none. ``exact`` (n_channels,): whether a channel is; ``exact_groups`` are their
+    groups.
     """
 
     levels: int
@@ -88,12 +92,15 @@ class Header:
     constant: Floats
     weights: Floats
     orders: tuple[int, ...]
+    exact: NDArray[np.bool_]
+    exact_groups: tuple[int, ...]
     contacts: Contacts | None = None
 
     @property
     def may_go_on(self) -> bool:
         """Whether a segment may go on where the one before it ended."""
-        return self.levels == 0 and not any(self.orders) and not self.contacts  # PWAVE-28
+        rest = any(self.orders) or self.exact_groups or self.contacts
+        return self.levels == 0 and not rest  # PWAVE-28
 
 
 def build_header(**fields: Any) -> bytes:
@@ -104,8 +111,9 @@ def parse_header(header: bytes, layout: Layout) -> Header:
     """Raises FormatError where ``header`` does not fit the skeleton of ``layout``."""
     fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
     skeleton = layout.skeleton
+    many = len(layout.groups) > 1 and not fields.exact
     # PWAVE-01, PWAVE-02, PWAVE-04
-    if skeleton is None or layout.samples_per_frame != 1 or len(layout.groups) > 1:
+    if skeleton is None or layout.samples_per_frame != 1 or many:
         raise FormatError(
             f"{NAME}: {layout.samples_per_frame} samples a frame, {len(layout.groups)} groups"
         )
@@ -124,6 +132,9 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         if len(fields[name]) not in (0, due):  # PWAVE-13, PWAVE-14, PWAVE-15
             raise FormatError(f"{NAME}: {len(fields[name])} of {name}, {due} are due")
     check_orders(fields.orders, skeleton, NAME)
+    exact = _exact(fields.exact, layout)
+    if fields.exact and fields.contacts:  # PWAVE-39
+        raise FormatError(f"{NAME}: contacts beside exact channels")
     plain = iter(fields.plain or [code_of(1.0)] * n_plain)
     rotation, position = ratio_of(fields.rotation), ratio_of(fields.position)
     greatest = np.array(
@@ -151,5 +162,19 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         constant=first * 2.0**-fields.constant,
         weights=np.array([ratio_of(s) for s in fields.weights] or [1.0] * skeleton.n_joints),
         orders=tuple(fields.orders),
+        exact=exact,
+        exact_groups=tuple(fields.exact),
         contacts=parse_contacts(fields.contacts, skeleton, NAME),
     )
+
+
+def _exact(groups: Sequence[int], layout: Layout) -> NDArray[np.bool_]:
+    """Of each channel whether it is exact."""
+    found = np.zeros(layout.n_channels, np.bool_)
+    for before, group in pairwise([-1, *groups]):
+        if group <= before:  # PWAVE-32
+            raise FormatError(f"{NAME}: group {group} is exact, named behind {before}")
+        if group >= len(layout.groups):  # PWAVE-33
+            raise FormatError(f"{NAME}: group {group} of {len(layout.groups)} is exact")
+        found[list(layout.groups[group])] = True
+    return found

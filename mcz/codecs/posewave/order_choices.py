@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,10 @@ STILL = 1e-4  # of a turn: a joint whose steps change by less keeps its order
 GREATEST = 2.0**20  # of an angle, whose sine is exact enough in any unit
 
 
-def choose_orders(source: SignalSource) -> list[int]:
+def choose_orders(source: SignalSource, exact: Container[int] = ()) -> list[int]:
     """Of each joint the code of its order; empty where all have that of the source.
+
+    Joints with ``exact`` channels have that of the source.
 
     Angles that jump or turn fast cost bytes: bits by the logarithms of their second differences,
     of which roots are near enough.
@@ -32,6 +34,7 @@ def choose_orders(source: SignalSource) -> list[int]:
         index
         for index, joint in enumerate(skeleton.joints)
         if own_sequence(joint, skeleton) is not None
+        and not any(channel in exact for channel in skeleton.columns(index))
     ]
     if not joints:
         return []

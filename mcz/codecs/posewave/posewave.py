@@ -13,6 +13,7 @@ states). A stream holds one resolution of one segment; a segment decodes by itse
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -34,6 +35,7 @@ from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
 from mcz.codecs.posewave.chain import Chain
 from mcz.codecs.posewave.choices import PRESETS, Choice, choose, guess
 from mcz.codecs.posewave.contact_choice import parse_runs
+from mcz.codecs.posewave.exact import build_exact, cut, decode_exact, joint_words, partition
 from mcz.codecs.posewave.header import NAME, Header, parse_header
 from mcz.codecs.posewave.limits import joint_limits
 from mcz.codecs.posewave.live import LiveDecoder, LiveEncoder
@@ -84,49 +86,76 @@ def _segments(
     length = min(wanted or MOST_FRAMES, layout.most_frames)
     lengths = Lengths(length, bool(wanted), least=LEAST_FRAMES)
     reader = SegmentReader(NAME, source)
-
-    octaves, keeper = params["refinement"], choice.keeper
+    octaves, keeper, lossy = params["refinement"], choice.keeper, _lossy(header, layout)
 
     def code(first: int, stop: int) -> tuple[bytes, ...]:
         own = None if octaves is None else octaves[first:stop]
-        if keeper:
-            keeper.first = first
+        streams = {
+            (0, group): stream
+            for group, stream in zip(
+                header.exact_groups,
+                build_exact(source, header.exact_groups, first, stop),
+                strict=True,
+            )
+        }
         values = reader(first, stop)
-        return encode_segment(header, skeleton, values, choice.weights, own, keeper)[0]
+        if lossy:
+            if keeper:
+                keeper.first = first
+            levels = encode_segment(header, skeleton, values, choice.weights, own, keeper)[0]
+            streams |= {(level, lossy[0]): stream for level, stream in enumerate(levels)}
+        places = itertools.product(range(header.levels + 1), range(len(layout.groups)))
+        return tuple(streams.get(place, b"") for place in places)
 
-    for first, stop, streams in halving(layout.n_frames, lengths, code):
+    breaks = source.breaks if header.exact_groups else ()
+    for first, stop, streams in halving(layout.n_frames, lengths, code, breaks):
         yield Segment(first, stop - first, streams)
     if keeper and header.contacts:
         keeper.warn(skeleton, header.contacts)
 
 
+def _lossy(header: Header, layout: Layout) -> list[int]:
+    """The groups of lossy channels, the first of which has the streams."""
+    return [group for group in range(len(layout.groups)) if group not in header.exact_groups]
+
+
+def exact_groups(header: bytes, layout: Layout) -> tuple[int, ...]:
+    """The groups of ordinals; raises FormatError on bad bytes."""
+    return parse_header(header, layout).exact_groups
+
+
 def decode(
     header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
-) -> Floats:
-    """Return the values, (frames, channels of the groups); raise FormatError on bad bytes."""
+) -> NDArray[Any]:
+    """The values, (frames, channels of the groups), ordinals of exact groups.
+
+    Raises FormatError on bad bytes.
+    """
     fields = parse_header(header, layout)
     for span in spans:
         if span.lead or span.tail:  # PWAVE-03
             raise FormatError(f"{NAME}: the segment at {span.first} bears upon others")
         if not (span.fresh or fields.may_go_on):  # PWAVE-28
             raise FormatError(f"{NAME}: the segment at {span.first} goes on from the one before")
-    n_channels = layout.n_channels if request.groups else 0
-    out = np.zeros((request.stop - request.start, n_channels))
-    if not n_channels:
+    if request.groups and set(request.groups) <= set(fields.exact_groups):
+        return decode_exact(layout, spans, request, fetch, NAME)
+    columns = [column for group in request.groups for column in layout.groups[group]]
+    out = np.zeros((request.stop - request.start, len(columns)))
+    if not columns:
         return out
     assert layout.skeleton is not None  # the header was checked against it
-    decode_one = _decoder(fields, layout.skeleton)
+    lossy, decode_one = _lossy(fields, layout), _decoder(fields, layout.skeleton)
     for index in _needed(spans, request):
         span = spans[index]
-        streams = [
-            fetch(index, resolution, 0)
-            for resolution in range(layout.n_resolutions - request.resolution)
-        ]
-        values = decode_one(streams, span)
+        stored = range(layout.n_resolutions - request.resolution)
+        for group in set(lossy[1:]) & set(request.groups):
+            if any(fetch(index, resolution, group) for resolution in stored):  # PWAVE-34
+                raise FormatError(f"{NAME}: segment at {span.first}: a stream of group {group}")
+        values = decode_one([fetch(index, resolution, lossy[0]) for resolution in stored], span)
         start, stop = max(span.first, request.start), min(span.stop, request.stop)
         if start < stop:
             out[start - request.start : stop - request.start] = values[
-                start - span.first : stop - span.first
+                start - span.first : stop - span.first, columns
             ]
     return out
 
@@ -139,7 +168,10 @@ def _needed(spans: Sequence[Span], request: Request) -> range:
 
 
 def _decoder(header: Header, skeleton: Skeleton) -> Callable[[Sequence[bytes], Span], Floats]:
-    """What decodes one segment after the other, (n_frames, n_channels) of each."""
+    """What decodes one segment after the other, (n_frames, n_channels) of each.
+
+    Of exact channels it gives something that is of no account.
+    """
     chain = Chain(header, skeleton)
 
     def decode_one(streams: Sequence[bytes], span: Span) -> Floats:
@@ -162,6 +194,9 @@ CODEC = Codec(
     grouping="all",
     dial=Dial("step", 2.0**-30, 2.0**30, guess=guess),
     promise=promise,
+    cut=cut,
+    partition=partition,
+    exact=exact_groups,
     live=LiveEncoder,
     follow=LiveDecoder,
     live_options={"levels": 0},
@@ -201,6 +236,12 @@ CODEC = Codec(
             None,
             "mean errors of joints or groups of them, such as feet=0.5mm,head=1mm",
             joint_limits,
+        ),
+        Parameter(
+            "lossless",
+            None,
+            "joints or groups of them that are coded exactly, such as lfoot,ltoes or feet",
+            joint_words,
         ),
         Parameter("weights", None, "weight of each joint", np.asarray, inner=True),
         Parameter("refinement", None, "octaves of each frame", np.asarray, inner=True),

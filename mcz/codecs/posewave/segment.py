@@ -45,12 +45,16 @@ class Weights:
 class Head:
     """Which channels change in a segment, and the first value of every channel, in steps."""
 
-    kept: NDArray[np.bool_]
+    moving: NDArray[np.bool_]
     numbers: Ints
+
+    def kept(self, header: Header) -> NDArray[np.bool_]:
+        """The channels that are coded in rows."""
+        return self.moving & ~header.exact  # PWAVE-38
 
     def values(self, header: Header) -> Floats:
         """The pose that the numbers stand for, (n_channels,)."""
-        steps = np.where(self.kept, header.first, header.constant)
+        steps = np.where(self.moving, header.first, header.constant)
         return np.multiply(self.numbers, steps, dtype=np.float64)
 
 
@@ -65,8 +69,8 @@ def encode_segment(
     """The streams of a segment of unwrapped ``values``, and what a decoder will have of them.
 
     Both are (n_frames, n_channels). ``refinement`` (n_frames,) asks for steps of 2^-r of the
-    usual ones where rows bear on these frames, ``contacts`` has what is to keep its place. Raises
-    MotionError for values that are too large.
+    usual ones where rows bear on these frames, ``contacts`` has what is to keep its place. Exact
+    channels are of no account in what is found. Raises MotionError for values that are too large.
     """
     orders = Orders(header.orders, skeleton)
     coded = orders.coded(values)
@@ -95,16 +99,15 @@ def encode_coded(
     bands = [approx, *reversed(details)]
     head = choose_head(header, values, kept, approx)
     classes, coder = classes_of(skeleton), fresh_coder(header.start)
-    rows = RowCoder(classes[head.kept], header.start, coder, NAME, refining=header.refining)
-    walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
+    rows = RowCoder(classes[kept], header.start, coder, NAME, refining=header.refining)
+    walk = Walk(header, skeleton, pyramid, kept, head.values(header))
     streams = []
     for level, band in enumerate(bands):
-        room = room_of(pyramid, level, head) + room_of_contacts(header.contacts, len(values))
+        room = room_of(pyramid, level, kept) + room_of_contacts(header.contacts, len(values))
         stream = Stream(coder, room, None)
         if level == 0:
-            code_head(
-                stream, kinds_of(skeleton), head.kept.astype(np.int64), head.numbers.copy(), NAME
-            )
+            moving = head.moving.astype(np.int64)
+            code_head(stream, kinds_of(skeleton), moving, head.numbers.copy(), NAME)
         rows.begin(level, pyramid.kind(level), len(band), stream)
         rows.exponents[:] = pyramid.exponents(level, refinement)
         code = partial(rows.encode, weights.of(level))
@@ -112,7 +115,7 @@ def encode_coded(
         if level < pyramid.n_details:
             streams.append(stream.finish())
     found = walk.values()
-    if header.contacts and head.kept.any():
+    if header.contacts and kept.any():
         held = walk.held(header.contacts)
         (contacts or Keeper()).encode(
             header.contacts, walk.metric.plan, held, stream, values, found
@@ -122,15 +125,18 @@ def encode_coded(
     return (streams[0], *empty, *streams[1:]), found
 
 
-def room_of(pyramid: Pyramid, level: int, head: Head) -> int:
+def room_of(pyramid: Pyramid, level: int, kept: NDArray[np.bool_]) -> int:
     """As many bytes as the stream of a level may take."""
-    return 8 * len(head.kept) + pyramid.rows(level) * (8 * int(head.kept.sum()) + 1) + 1024
+    return 8 * len(kept) + pyramid.rows(level) * (8 * int(kept.sum()) + 1) + 1024
 
 
 def decode_segment(
     header: Header, skeleton: Skeleton, streams: Sequence[bytes], n_frames: int, where: str
 ) -> Floats:
-    """The values, (n_frames, n_channels); details of which there is no stream are zero."""
+    """The values, (n_frames, n_channels); details of which there is no stream are zero.
+
+    Those of exact channels are of no account.
+    """
     pyramid = Pyramid(n_frames, header.levels, header.borrowing)
     n_empty = header.levels - pyramid.n_details
     if any(streams[1 : 1 + n_empty]):  # PWAVE-17
@@ -141,12 +147,13 @@ def decode_segment(
     classes = classes_of(skeleton)
     coder = fresh_coder(header.start)
     stream = Stream(coder, 0, streams[0])
-    kept, numbers = np.zeros((2, len(classes)), np.int64)
-    code_head(stream, kinds_of(skeleton), kept, numbers, where)
-    head = Head(kept == 1, numbers)
-    walk = Walk(header, skeleton, pyramid, head.kept, head.values(header))
-    held = walk.held(header.contacts) if header.contacts and head.kept.any() else None  # HOLD-07
-    rows = RowCoder(classes[head.kept], header.start, coder, where, refining=header.refining)
+    moving, numbers = np.zeros((2, len(classes)), np.int64)
+    code_head(stream, kinds_of(skeleton), moving, numbers, where)
+    head = Head(moving == 1, numbers)
+    kept = head.kept(header)
+    walk = Walk(header, skeleton, pyramid, kept, head.values(header))
+    held = walk.held(header.contacts) if header.contacts and kept.any() else None  # HOLD-07
+    rows = RowCoder(classes[kept], header.start, coder, where, refining=header.refining)
     for level in range(pyramid.n_details + 1):
         if level >= len(streams):
             walk.skip(level)
@@ -185,16 +192,20 @@ def classes_of(skeleton: Skeleton) -> Ints:
 
 
 def choose_kept(header: Header, values: Floats) -> NDArray[np.bool_]:
-    """All channels but those that hardly leave their middle."""
+    """All channels but exact ones and those that hardly leave their middle."""
     moved: NDArray[np.bool_] = np.ptp(values, axis=0) > MOST_STILL * header.constant
-    return moved
+    return moved & ~header.exact
 
 
 def choose_head(header: Header, values: Floats, kept: NDArray[np.bool_], approx: Floats) -> Head:
-    """Kept channels begin near their first approximation, others stay in their middle."""
+    """Kept channels begin near their first approximation, others stay in their middle.
+
+    Exact ones, which the pose alone needs, do so in coarse steps.
+    """
     first = 0.5 * (values.min(axis=0) + values.max(axis=0))
     first[kept] = approx[0]
-    numbers = first / np.where(kept, header.first, header.constant)
+    moving = kept | header.exact
+    numbers = first / np.where(moving, header.first, header.constant)
     if not (np.abs(numbers) < MAX_NUMBER).all():
         raise MotionError(f"{NAME}: a value exceeds 2^40 steps of {header.first.max():g}")
-    return Head(kept, np.rint(numbers).astype(np.int64))
+    return Head(moving, np.rint(numbers).astype(np.int64))

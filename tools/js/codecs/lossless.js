@@ -79,11 +79,26 @@ export function open(header, layout) {
   };
 }
 
-/** Decodes a run of segments. */
+/**
+ * The ordinals of some groups of another codec, which has no copies in them.
+ *
+ * @param {object} layout as of {@link open}
+ * @param {object[]} segments with their streams
+ * @param {number[]} groups numbers of groups
+ * @returns {BigInt64Array} row after row; 0 in the columns of other groups
+ * @throws {Refused}
+ */
+export function decodeGroups(layout, segments, groups) {
+  return new SignalDecoder(layout, segments, groups).decode();
+}
+
+/** Decodes a run of segments: all groups, or those of these numbers, without copies. */
 class SignalDecoder {
-  constructor(layout, segments) {
+  constructor(layout, segments, numbers = null) {
     this.layout = layout;
     this.segments = segments;
+    this.copying = numbers === null;
+    this.numbers = numbers ?? [...layout.groups.keys()];
     this.nChannels = layout.channels.length;
     const nRows = segments.reduce((sum, segment) => sum + segment.nRows, 0);
     this.ordinals = new BigInt64Array(nRows * this.nChannels);
@@ -102,13 +117,15 @@ class SignalDecoder {
 
   decodeSegment({ streams, nRows }, firstRow) {
     const { grids } = this.layout;
-    const groups = this.layout.groups.map((columns, g) => {
+    const groups = this.numbers.map((g) => {
+      const columns = this.layout.groups[g];
       const reader = new ByteReader(streams[0][g], `lossless stream of group ${g}`);
       const heads = columns.map((column) => readHead(reader, grids[column], column));
       return { columns, heads, reader };
     });
     const heads = groups.flatMap((group) => group.heads);
     const copies = heads.filter(({ kind }) => kind === COPY);
+    if (copies.length > 0 && !this.copying) throw new Refused("lossless: a copy in an exact group");
     const sources = copies.map((copy) => sourceOf(copy, groups));
     for (const { column, ordinal } of heads.filter(({ kind }) => kind === CONSTANT)) {
       this.eachRow(firstRow, nRows, column, () => ordinal);

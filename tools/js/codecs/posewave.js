@@ -11,6 +11,7 @@ import { Pyramid, Walk } from "../pose-levels.js";
 import { RowDecoder } from "../pose-rows.js";
 import { HEAD, startTable } from "../pose-start.js";
 import { stepOf } from "../scales.js";
+import { decodeGroups } from "./lossless.js";
 
 export const id = 13;
 export const name = "posewave";
@@ -46,17 +47,19 @@ const PLAIN = 2;
  */
 export function open(header, layout) {
   const { skeleton, groups, nResolutions, samplesPerFrame } = layout;
-  if (groups.length > 1) throw new Refused(`${name}: ${groups.length} groups`);
   if (samplesPerFrame !== 1) throw new Refused(`${name}: ${samplesPerFrame} rows a frame`);
   if (skeleton === null) throw new Refused(`${name}: channels that are not those of the skeleton`);
-  const fields = readHeader(header, skeleton);
+  const fields = readHeader(header, skeleton, groups);
+  if (groups.length > 1 && fields.exactGroups.length === 0) {
+    throw new Refused(`${name}: ${groups.length} groups`);
+  }
   if (nResolutions > fields.levels + 1) {
     throw new Refused(`${name}: ${nResolutions} resolutions of ${fields.levels} levels`);
   }
-  return new PoseDecoder(fields, skeleton, nResolutions);
+  return new PoseDecoder(fields, layout);
 }
 
-function readHeader(bytes, skeleton) {
+function readHeader(bytes, skeleton, groups) {
   const { channels, joints } = skeleton;
   const reader = new ByteReader(bytes, "POSEWAVE_HEADER");
   const levels = upTo(reader, MAX_LEVELS, "levels");
@@ -78,8 +81,10 @@ function readHeader(bytes, skeleton) {
   if (orders.length !== 0 && orders.length !== joints.length) {
     reader.refuse(`${orders.length} axis orders of ${joints.length} joints`);
   }
+  const exactGroups = readExact(reader, groups.length);
   const contacts = reader.counted(() => readContacts(reader, skeleton));
   if (contacts.length > 1) reader.refuse(`${contacts.length} times contacts`);
+  if (contacts.length > 0 && exactGroups.length > 0) reader.refuse("contacts and exact groups");
   reader.end();
   let at = 0;
   const greatest = Float64Array.from(kinds, (kind) => steps[kind] ?? plain[at++]);
@@ -88,8 +93,9 @@ function readHeader(bytes, skeleton) {
   return {
     ...{ levels, borrowing, start, refining, step, radius, kappa, weights, orders },
     axisOrders: new AxisOrders(skeleton, orders),
+    ...{ kinds, greatest, firstStep, constantStep, exactGroups },
+    exactColumns: new Set(exactGroups.flatMap((g) => groups[g])),
     contacts: contacts[0] ?? null,
-    ...{ kinds, greatest, firstStep, constantStep },
     classes: classesOf(joints),
   };
 }
@@ -105,6 +111,16 @@ function readSteps(reader, due) {
   const codes = reader.take(reader.varint());
   if (codes.length !== 0 && codes.length !== due) reader.refuse(`${codes.length} codes of ${due}`);
   return codes.length > 0 ? Array.from(codes, stepOf) : new Array(due).fill(1);
+}
+
+/** The numbers of exact groups, of so many. */
+function readExact(reader, nGroups) {
+  const numbers = reader.counted(() => reader.varint());
+  numbers.forEach((number, i) => {
+    if (i > 0 && number <= numbers[i - 1]) reader.refuse("exact groups that do not ascend");
+    if (number >= nGroups) reader.refuse(`exact group ${number} of ${nGroups}`);
+  });
+  return numbers;
 }
 
 function kindOf({ kind }) {
@@ -135,13 +151,19 @@ function classesOf(joints) {
 
 /** The decoder of one signal. */
 class PoseDecoder {
-  constructor(header, skeleton, nResolutions) {
+  constructor(header, layout) {
     this.decodes = "values";
+    const { groups, skeleton, nResolutions } = layout;
+    const { exactGroups, exactColumns } = header;
     /** Whether a segment may go on where the one before it ended. */
-    this.mayGoOn =
-      header.levels === 0 && header.contacts === null && header.orders.every((code) => code === 0);
+    this.mayGoOn = header.levels === 0 && header.orders.every((code) => code === 0);
+    if (header.contacts !== null || exactGroups.length > 0) this.mayGoOn = false;
     this.alone = !this.mayGoOn;
     this.header = header;
+    this.layout = layout;
+    /** The columns of exact channels, of which `ordinals` are decoded, and no values. */
+    this.exactColumns = [...exactColumns];
+    this.lossyGroups = [...groups.keys()].filter((g) => !exactGroups.includes(g));
     this.skeleton = skeleton;
     this.nResolutions = nResolutions;
   }
@@ -161,23 +183,47 @@ class PoseDecoder {
   }
 
   /**
+   * The ordinals of exact channels.
+   *
+   * @param {object[]} segments with their streams
+   * @param {{dropped: number}} options how many of the finest resolutions are left out
+   * @returns {BigInt64Array} the rows of all these segments; 0 in the columns of others
+   * @throws {Refused}
+   */
+  ordinals(segments, { dropped }) {
+    const { exactGroups } = this.header;
+    for (const { firstFrame, streams } of segments) {
+      const details = streams.slice(1, this.nResolutions - dropped);
+      if (details.some((own) => exactGroups.some((g) => own[g].length > 0))) {
+        throw new Refused(`${name}: segment at frame ${firstFrame}: details of an exact group`);
+      }
+    }
+    return decodeGroups(this.layout, segments, exactGroups);
+  }
+
+  /**
    * Decodes segments, of which the first one starts fresh.
    *
    * @param {object[]} segments with their streams
    * @param {{dropped: number}} options how many of the finest resolutions are left out
-   * @returns {Float64Array} the rows of all these segments
+   * @returns {Float64Array} the rows of all these segments; in exact columns anything
    * @throws {Refused}
    */
   decode(segments, { dropped }) {
     const nChannels = this.skeleton.channels.length;
     const nRows = segments.reduce((sum, { nFrames }) => sum + nFrames, 0);
     const out = new Float64Array(nRows * nChannels);
-    if (nChannels === 0) return out;
+    const [lossy, ...others] = this.lossyGroups;
+    if (lossy === undefined) return out;
     let at = 0;
     let before = null;
     for (const { firstFrame, nFrames, streams, fresh } of segments) {
-      const given = streams.slice(0, this.nResolutions - dropped).map(([stream]) => stream);
+      const stored = streams.slice(0, this.nResolutions - dropped);
+      const given = stored.map((own) => own[lossy]);
       const what = `${name}: segment at frame ${firstFrame}`;
+      if (stored.some((own) => others.some((g) => own[g].length > 0))) {
+        throw new Refused(`${what}: a stream of a lossy group that is not the first`);
+      }
       const values = out.subarray(at, at + nFrames * nChannels);
       if (fresh) before = this.segment(given, nFrames, values, what);
       else this.goOn(before, given[0], nFrames, values, what);
@@ -272,10 +318,12 @@ class PoseDecoder {
 
   /** The first pose, and the columns of the kept channels. */
   head(coder, model, what) {
-    const { kinds, firstStep, constantStep } = this.header;
+    const { kinds, firstStep, constantStep, exactColumns } = this.header;
     const { kept, numbers } = readHead(coder, model, HEAD, kinds, what);
     const first = numbers.map((x, c) => x * (kept[c] ? firstStep[c] : constantStep[c]));
-    const columns = Int32Array.from(kept.keys()).filter((c) => kept[c] === 1);
+    const columns = Int32Array.from(kept.keys()).filter(
+      (c) => kept[c] === 1 && !exactColumns.has(c),
+    );
     return { first, kept: columns };
   }
 }

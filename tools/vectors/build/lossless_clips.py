@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Encoded, Segment
-from mcz.codecs.lossless import heads as lossless_heads
 from mcz.codecs.lossless import lossless
-from mcz.codecs.lossless.choices import Lattice
+from mcz.coding.ordinals import heads as lossless_heads
+from mcz.coding.ordinals import streams as ordinal_streams
+from mcz.coding.ordinals.choices import Lattice
 from mcz.coding.start import start_states
 from mcz.motion import Motion
 from mcz.numbers import Grid, GridKind
@@ -106,13 +107,13 @@ def build_stream(
     """
     table = np.array(ordinals, np.int64)
     data, plans, coded = b"", [], []
-    code = _code_to_the_fault if faulty else lossless._code
+    code = _code_to_the_fault if faulty else ordinal_streams.code
     for place, head in enumerate(heads):
         column = table[:, place]
         if isinstance(head, Copy):
             data += b"\2" + varint(head.group) + varint(head.channel)
         elif isinstance(head, Constant):
-            data += lossless._constant_head(int(column[0]))
+            data += ordinal_streams.constant_head(int(column[0]))
         else:
             shape = _shape(head, grids[place], column.tolist())
             data += _coded_head(head, shape)
@@ -126,7 +127,7 @@ def build_stream(
 
 
 def _shape(head: Coded, grid: Grid, column: Sequence[int]) -> Lattice:
-    form = lossless.form_of_grid(grid) if head.form is None else head.form
+    form = lossless_heads.form_of_grid(grid) if head.form is None else head.form
     if form in (PLAIN, MULTIPLES):
         return Lattice(0, 0, head.drop)
     base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)
@@ -138,7 +139,7 @@ def _shape(head: Coded, grid: Grid, column: Sequence[int]) -> Lattice:
 
 def _coded_head(head: Coded, shape: Lattice) -> bytes:
     own = head.form is not None
-    kind = head.from_last << 2 | len(head.taps) << 3 | lossless.OWN_FORM * own
+    kind = head.from_last << 2 | len(head.taps) << 3 | lossless_heads.OWN_FORM * own
     data = bytes((kind, *((head.form, head.drop) if head.form is not None else ())))
     data += struct.pack("<d", head.unit) if head.unit is not None else b""
     data += varint(shape.top) if shape.base else b""
@@ -148,11 +149,11 @@ def _coded_head(head: Coded, shape: Lattice) -> bytes:
 
 def _code_to_the_fault(ordinals: Ints, plans: Sequence[Ints]) -> bytes:
     """The bits up to what cannot be coded."""
-    loops, coding = lossless._kernels()
+    loops, coding = ordinal_streams.loops()
     data, state = np.zeros(UNEXAMINED, np.uint8), start_states("lossless")[0].copy()
     coding.start(state, data, 1)
     rows = np.ascontiguousarray(ordinals).copy()
-    fault = loops.code_rows(state, data, rows, np.stack(plans), lossless._powers())
+    fault = loops.code_rows(state, data, rows, np.stack(plans), ordinal_streams.powers())
     assert fault >= 0
     return data[: coding.finish(state, data)].tobytes()
 

@@ -6,8 +6,9 @@ depend on a machine's arithmetic. Values are those of the decoder.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from types import MappingProxyType
 from typing import Any
 
@@ -15,13 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs import raw
-from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, Span
+from mcz.codecs.contract import Codec, Encoded, Layout, Request, Segment, SignalSource, Span
 from mcz.codecs.posewave import posewave
 from mcz.codecs.posewave.chain import Chain
 from mcz.codecs.posewave.contact_keeper import Keeper, Piece
+from mcz.codecs.posewave.exact import build_exact, groups_of
 from mcz.codecs.posewave.header import Header, build_header, parse_header
 from mcz.codecs.posewave.segment import Weights, encode_segment
 from mcz.motion import Joint, Motion, Signal, Skeleton
+from mcz.numbers import Grid
 from tools.vectors.build.files import Whole, file_of, partial
 from tools.vectors.build.motions import channels, wave
 
@@ -43,6 +46,7 @@ PLAIN_FIELDS: dict[str, Any] = {
     "plain": [],
     "weights": [],
     "orders": [],
+    "exact": [],
 }
 
 
@@ -52,8 +56,9 @@ class Plan:
 
     ``fields`` are those of the header that are not the plain ones; ``cut``: finest resolutions that
     are not stored; ``price`` of a bit in squared steps; ``streams``: those of a segment in the
-    place of its own; ``on``: segments that go on where the one before ended. ``pieces`` of contacts
-    are to keep their places to ``tolerance``.
+    place of its own; ``on``: segments that go on where the one before ended; ``exact`` joints have
+    groups of their own, and values on ``grids``, all BINARY64 where there are none. ``pieces`` of
+    contacts are to keep their places to ``tolerance``.
     """
 
     skeleton: Skeleton
@@ -67,6 +72,21 @@ class Plan:
     on: Collection[int] = ()
     pieces: tuple[Piece, ...] = ()
     tolerance: float = 0.01
+    exact: Collection[int] = ()
+    grids: tuple[Grid, ...] = ()
+
+    @property
+    def groups(self) -> tuple[tuple[tuple[int, ...], ...], tuple[int, ...]]:
+        """All groups, and the numbers of the exact ones."""
+        if self.exact:
+            return groups_of(self.skeleton, self.exact)
+        return ((tuple(range(self.skeleton.n_channels)),) if self.skeleton.n_channels else ()), ()
+
+    @property
+    def lossy(self) -> tuple[int, ...]:
+        """The numbers of the other groups."""
+        groups, exact = self.groups
+        return tuple(number for number in range(len(groups)) if number not in exact)
 
     @property
     def n_frames(self) -> int:
@@ -82,14 +102,16 @@ class Plan:
 
 
 def header_of(plan: Plan, **changes: Any) -> bytes:
-    fields = PLAIN_FIELDS | plan.fields | changes
+    fields = PLAIN_FIELDS | {"exact": plan.groups[1]} | plan.fields | changes
     fields["borrowing"] = min(fields["borrowing"], fields["levels"])
     return build_header(**fields)
 
 
 def layout_of(plan: Plan) -> Layout:
-    groups = (tuple(range(plan.skeleton.n_channels)),) if plan.skeleton.n_channels else ()
-    return Layout(plan.n_frames, groups, skeleton=plan.skeleton, n_resolutions=plan.n_resolutions)
+    groups, grids = plan.groups[0], plan.grids
+    return Layout(
+        plan.n_frames, groups, grids=grids, skeleton=plan.skeleton, n_resolutions=plan.n_resolutions
+    )
 
 
 def parsed(plan: Plan) -> Header:
@@ -122,15 +144,31 @@ def _streams(
     if plan.on:
         octave = 0 if octaves is None else int(octaves[0])
         return chain.encode(source, plan.price, octave, fresh=index not in plan.on)[:1]
+    if not plan.lossy:
+        return (b"",) * plan.n_resolutions
     streams, _ = encode_segment(chain.header, plan.skeleton, source, weights, octaves, keeper)
     return streams[: plan.n_resolutions]
+
+
+def with_exact(plan: Plan, source: SignalSource) -> Iterator[Segment]:
+    """The segments of ``plan``, with the streams of all groups; ``source`` has what is exact."""
+    groups, exact = plan.groups
+    for segment in segments_of(plan):
+        last = segment.first + segment.n_frames
+        own = zip(exact, build_exact(source, exact, segment.first, last), strict=True)
+        streams = {(0, group): stream for group, stream in own}
+        if plan.lossy:
+            streams |= {(r, plan.lossy[0]): s for r, s in enumerate(segment.streams)}
+        places = product(range(plan.n_resolutions), range(len(groups)))
+        yield replace(segment, streams=tuple(streams.get(place, b"") for place in places))
 
 
 def codec_of(plan: Plan) -> Codec:
     """Codec 13 with this content, whatever the values of the motion."""
 
     def encode(source: Any, params: Any) -> Encoded:
-        return Encoded(header_of(plan), iter(segments_of(plan)), plan.n_resolutions)
+        made = with_exact(plan, source) if plan.exact else iter(segments_of(plan))
+        return Encoded(header_of(plan), made, plan.n_resolutions)
 
     return replace(
         posewave.CODEC,
@@ -138,24 +176,32 @@ def codec_of(plan: Plan) -> Codec:
         parameters=raw.CODEC.parameters,
         dial=None,
         promise=None,
+        partition=lambda skeleton, options: plan.groups if plan.exact else None,
     )
 
 
 def values_of(plan: Plan, resolution: int = 0) -> Floats:
     made, layout = segments_of(plan), layout_of(plan)
-    request = Request(0, plan.n_frames, (0,) if layout.groups else (), resolution)
-    return posewave.CODEC.decode(
+    request = Request(0, plan.n_frames, plan.lossy, resolution)
+    values = plan.source.copy()
+    values[:, [c for g in plan.lossy for c in layout.groups[g]]] = posewave.CODEC.decode(
         header_of(plan),
         layout,
         [Span(s.first, s.n_frames, fresh=s.fresh) for s in made],
         request,
-        lambda segment, stream, _: made[segment].streams[stream],
+        lambda segment, stream, group: (
+            made[segment].streams[stream] if group in plan.lossy[:1] else b""
+        ),
     )
+    return values
 
 
 def motion_of(plan: Plan, resolution: int = 0, **more: Any) -> Motion:
     """The clip as it is decoded."""
-    fields: dict[str, Any] = {"name": "pose", "signals": (Signal(values_of(plan, resolution)),)}
+    fields: dict[str, Any] = {
+        "name": "pose",
+        "signals": (Signal(values_of(plan, resolution), plan.grids),),
+    }
     return Motion(plan.skeleton, **(fields | more))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs import by_name, raw
 from mcz.codecs.contract import Encoded, Segment
-from mcz.codecs.lossless import lossless
+from mcz.coding.ordinals.heads import form_of_grid
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.numbers import Grid, GridFlag, GridKind
 from tools.vectors.build import (
@@ -243,8 +243,8 @@ def _lossless_streams(
         elif (column == column[0]).all() and chance.random() < 0.7:
             heads.append(lossless_clips.Constant())
         else:
-            form = lossless.form_of_grid(grids[c])
-            own = form != lossless.form_of_grid(layout.grids[c]) or chance.random() < 0.1
+            form = form_of_grid(grids[c])
+            own = form != form_of_grid(layout.grids[c]) or chance.random() < 0.1
             heads.append(_coded(chance, form if own else None))
     return lossless_clips._streams(layout, block, heads)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs.lossless import lossless
+from mcz.coding.ordinals.streams import constant_head
 from mcz.container import payloads
 from mcz.motion import Motion
 from mcz.numbers import Grid, GridKind
@@ -300,12 +300,12 @@ def _ordinals(shelf: Broken) -> None:
         values = np.array([[0], [value]], motion.signals[0].values.dtype)
         purpose = f"An ordinal beyond a {grid.kind.name} grid, coded: {what}."
         shelf.add(f"ordinal-of-{name}", spec, purpose, _with(motion, data, CEND=rehash(values)))
-    data = lossless._constant_head(-1 - 2**51)
+    data = constant_head(-1 - 2**51)
     values = np.full((2, 1), -beyond)
     purpose = "A constant ordinal beyond a FIXED grid."
     data = _with(column([0.0, 0.0], HUNDREDTHS), data, CEND=rehash(values))
     shelf.add("ordinal-of-constant", spec, purpose, data)
-    minus = _with(column([0, 0], WHOLE), lossless._constant_head(-(2**53) - 1), CEND=_integers())
+    minus = _with(column([0, 0], WHOLE), constant_head(-(2**53) - 1), CEND=_integers())
     purpose = "A constant ordinal below an INTEGER grid."
     shelf.add("ordinal-of-constant-minus", spec, purpose, minus)
 

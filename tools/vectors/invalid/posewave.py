@@ -45,6 +45,7 @@ from tools.vectors.invalid.common import every_codec
 
 ORDERS = f"{HEADING}; Axis orders"
 CHAINS = f"{HEADING}; Segments that go on"
+EXACT = f"{HEADING}; Exact channels"
 ROWS = f"{HEADING}; Rows in the metric"
 ROOM = 2**16  # bytes, more than any crafted stream has
 
@@ -58,6 +59,7 @@ def vectors() -> Iterable[Vector]:
     _nothing(shelf)
     _segments(shelf)
     _chains(shelf)
+    _exact(shelf)
     _streams(shelf)
     _numbers(shelf)
     _notes(shelf)
@@ -228,6 +230,40 @@ def _chains(shelf: Broken) -> None:
     data = file_with(still, segments=stream(0, plus(b"\0"), segment=1))
     purpose = "A byte for nothing in a segment that goes on, where no channel is kept."
     shelf.add("on-none-kept-byte-for-nothing", CHAINS, purpose, data)
+
+
+def _exact(shelf: Broken) -> None:
+    skeleton = acclaim()
+    plan = Plan(skeleton, waves(10, skeleton), exact=(1, 3))  # groups 0 and 2 are lossy
+    motion, good = motion_of(plan), parsed(plan)
+    assert good.exact_groups == (1, 3)
+    for name, purpose, numbers in (
+        ("descending", "Exact groups 3 and 1, in this order.", b"\2\3\1"),
+        ("twice", "Exact group 1 twice.", b"\2\1\1"),
+        ("none", "Four groups, none of which is exact.", b"\0"),
+    ):
+        header = put(POSEWAVE_HEADER, "exact", numbers)(header_of(plan))
+        shelf.add(f"exact-{name}", EXACT, purpose, file_with(plan, motion, CLIP=says(header)))
+    one = replace(plan, exact=(1,))
+    for name, number in (("beyond", 3), ("far-beyond", 2**40)):
+        numbers = b"\2\1" + varint(number)
+        header = put(POSEWAVE_HEADER, "exact", numbers)(header_of(one))
+        purpose = f"Exact groups 1, which is, and {number} of 3 groups."
+        shelf.add(f"exact-{name}", EXACT, purpose, file_with(one, CLIP=says(header)))
+    copies = b"\1" + b"\2\1\0" * 2  # a constant 0, and two copies of it
+    still = replace(plan, source=np.where(np.isin(np.arange(12), [6, 7, 8]), 0, plan.source))
+    for name, purpose, own, place, edit in (
+        ("rows-elsewhere", "A stream of the second lossy group.", plan, 2, lambda _: b"\0"),
+        ("details-elsewhere", "Details of the second lossy group.", plan, 10, lambda _: b"\0"),
+        ("detail", "A detail of an exact group.", plan, 5, lambda _: b"\0"),
+        ("copies", "Copies in an exact group.", still, 1, lambda _: copies),
+        ("absent", "An exact group without a stream.", still, 1, lambda _: b""),
+    ):
+        data = file_with(own, motion_of(own), segments=stream(place, edit))
+        shelf.add(f"exact-{name}", EXACT, purpose, data)
+    on = replace(_still(skeleton, 10, levels=0), ends=(4,), exact=(1,))
+    data = file_with(on, segments=headed(1, flags=0))
+    shelf.add("on-exact", CHAINS, "A segment goes on, though a joint is exact.", data)
 
 
 def _streams(shelf: Broken) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -74,6 +75,11 @@ def _headers(shelf: Broken) -> None:
         header = put(POSEWAVE_HEADER, "contacts", new)(header_of(plan))
         data = file_with(plan, CLIP=says(header))
         shelf.add(f"contacts-{name}", CONTACTS, f"{purpose} Nothing is kept.", data)
+    exact = replace(plan, exact=(1,))
+    header = put(POSEWAVE_HEADER, "contacts", _contacts(_point()))(header_of(exact))
+    purpose = "Contacts beside an exact joint. Nothing is kept."
+    data = file_with(exact, CLIP=says(header))
+    shelf.add("exact-and-contacts", f"{HEADING}; Exact channels", purpose, data)
 
 
 class Script:

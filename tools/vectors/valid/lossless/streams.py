@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mcz.codecs.lossless import lossless
+from mcz.coding.ordinals.heads import MAX_SCALE
+from mcz.coding.ordinals.streams import parse_stream
 from mcz.numbers import Grid, GridKind
 from tools.vectors.build.edits import Made, stream
 from tools.vectors.build.files import file_of, partial
@@ -216,7 +217,7 @@ def _classes(shelf: Streams) -> None:
 def _residuals(shelf: Streams) -> None:
     lengths = [*range(45), *range(43, -1, -1), *[44, 0, 43, 1, 30, 2, 20, 10, 0, 0, 0, 44] * 2]
     values = [(2**n * 2 // 3 + n % 3) * (-1) ** (n // 2) if n else 0 for n in lengths]
-    for name, scale in (("small", 0), ("middle", 80), ("large", lossless.MAX_SCALE)):
+    for name, scale in (("small", 0), ("middle", 80), ("large", MAX_SCALE)):
         purpose = f"Residuals of all lengths to 44 bits, up, down and in leaps; scale {scale}."
         head = Coded(scale=scale, from_last=0)
         shelf.code(f"residuals-{name}", purpose, column(values, WHOLE), [head])
@@ -251,7 +252,7 @@ def _ends(shelf: Streams) -> None:
 def _another_end(made: Made) -> Made:
     """The first stream with another last byte that decodes to the same."""
     ((_, (data,)),) = made
-    rows = lossless._parse(data, (HUNDREDTHS,), 12)[0]
+    rows = parse_stream(data, (HUNDREDTHS,), 12)[0]
     other = data[:-1] + bytes((data[-1] + 1,))
-    assert np.array_equal(lossless._parse(other, (HUNDREDTHS,), 12)[0], rows), "other motion!"
+    assert np.array_equal(parse_stream(other, (HUNDREDTHS,), 12)[0], rows), "other motion!"
     return list(stream(0, lambda _: other)(made))

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from tools.vectors.build.files import Vector
 from tools.vectors.build.pose_clips import Poses
 from tools.vectors.valid.common import every_codec
-from tools.vectors.valid.posewave import chains, clips, contacts
+from tools.vectors.valid.posewave import chains, clips, contacts, exact
 
 
 def vectors() -> Iterable[Vector]:
@@ -15,5 +15,6 @@ def vectors() -> Iterable[Vector]:
     clips.add(shelf)
     chains.add(shelf)
     contacts.add(shelf)
+    exact.add(shelf)
     every_codec.add(shelf, "posewave")
     return shelf.vectors

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.lossless.choices import MAX_TAP, Lattice, base_and_digits, max_top
+from mcz.coding.ordinals.choices import MAX_TAP, Lattice, base_and_digits, max_top
 from mcz.errors import FormatError
 from mcz.numbers import Grid
 from mcz.schema import read_varint

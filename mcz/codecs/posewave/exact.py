@@ -1,0 +1,120 @@
+"""Exact channels of ``posewave``: groups of ordinals beside the rows, as those of codec 1.
+
+SPEC.md, "Exact channels", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Layout, Request, SignalSource, Span
+from mcz.codecs.posewave.header import NAME, POSEWAVE_HEADER, build_header
+from mcz.codecs.segments import gather
+from mcz.coding.ordinals.heads import COPY, read_heads
+from mcz.coding.ordinals.streams import build_stream, parse_stream
+from mcz.errors import FormatError, OptionError
+from mcz.kinematics.words import joints_of
+from mcz.motion import Skeleton
+from mcz.schema import parse
+
+Ints = NDArray[np.int64]
+Groups = tuple[tuple[int, ...], ...]
+Stream = Callable[[int, int, int], bytes]  # (segment, resolution, group)
+
+OPTION = "lossless"
+
+
+def joint_words(text: Any) -> tuple[str, ...]:
+    """Names of joints or groups of joints; raises OptionError.
+
+    >>> joint_words("lfoot, hands")
+    ('lfoot', 'hands')
+    """
+    words = text.split(",") if isinstance(text, str) else text
+    if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
+        raise OptionError(f"{OPTION} is {text!r}, not names of joints")
+    found = tuple(word.strip() for word in words)
+    if not all(found):
+        raise OptionError(f"{OPTION} is {text!r}: a name is missing")
+    return found
+
+
+def partition(
+    skeleton: Skeleton, options: Mapping[str, Any]
+) -> tuple[Groups, tuple[int, ...]] | None:
+    """The groups of a clip and the numbers of the exact ones; None where no joint is exact."""
+    words = options.get(OPTION)
+    if words is None:
+        return None
+    joints = {joint for word in words for joint in joints_of(skeleton, word, OPTION)}
+    groups, exact = groups_of(skeleton, joints)
+    if not exact:
+        raise OptionError(f"{OPTION}: {', '.join(words)} have no channels")
+    return groups, exact
+
+
+def groups_of(skeleton: Skeleton, joints: Collection[int]) -> tuple[Groups, tuple[int, ...]]:
+    """Each of these joints is a group, and so are the channels of others from one to the next.
+
+    Also returns the numbers of the groups of these joints.
+    """
+    owners = [joint for joint in range(skeleton.n_joints) for _ in skeleton.columns(joint)]
+    keys = [owner if owner in joints else -1 for owner in owners]
+    runs = [(key, list(run)) for key, run in groupby(range(len(keys)), key=keys.__getitem__)]
+    exact = tuple(number for number, (key, _) in enumerate(runs) if key >= 0)
+    return tuple(tuple(run) for _, run in runs), exact
+
+
+def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int, ...]) -> bytes:
+    """Exact groups can be left alone; rows, of which all lossy joints have a part, cannot be cut.
+
+    Raises OptionError for other groups.
+    """
+    fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
+    if len(groups) == len(layout.groups):
+        return header
+    if not set(groups) <= set(fields.exact):
+        raise OptionError(
+            f"{NAME}: joints that are not coded exactly cannot be cut out or left out; all of them "
+            f"are coded in one"
+        )
+    left = {"plain": [], "orders": [], "exact": range(len(groups))}
+    return build_header(**{**fields, **left})
+
+
+def build_exact(source: SignalSource, groups: Sequence[int], first: int, stop: int) -> list[bytes]:
+    """The stream of each of these groups in the segment first <= f < stop."""
+    layout, grids = source.layout, source.grids(first)
+    ordinals = source.ordinals(first, stop)
+    return [
+        build_stream(
+            ordinals[:, list(layout.groups[group])],
+            [(grids[c], layout.grids[c]) for c in layout.groups[group]],
+            group,
+            None,
+        )
+        for group in groups
+    ]
+
+
+def decode_exact(
+    layout: Layout, spans: Sequence[Span], request: Request, stream: Stream, where: str
+) -> Ints:
+    """The ordinals of the groups of ``request``, all exact, whatever its resolution."""
+
+    def rows(index: int, group: int) -> Ints:
+        for resolution in range(1, layout.n_resolutions - request.resolution):
+            if stream(index, resolution, group):  # PWAVE-35
+                raise FormatError(f"{where}: a detail of the exact group {group}")
+        grids = [layout.grids[channel] for channel in layout.groups[group]]
+        data = stream(index, 0, group)
+        if any(kind == COPY for kind, _, _ in read_heads(data, grids)[0]):  # PWAVE-37
+            raise FormatError(f"{where}: a copy in the exact group {group}")
+        return parse_stream(data, grids, spans[index].n_frames)[0]  # PWAVE-36
+
+    return gather(layout, spans, request, rows)

@@ -1,0 +1,251 @@
+"""Codec 13, ``posewave``: joints that are coded exactly beside the others."""
+
+from __future__ import annotations
+
+import io
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
+from mcz.codecs import by_name
+from mcz.codecs.contract import Encoded, Request, Span
+from mcz.codecs.posewave.header import POSEWAVE_HEADER
+from mcz.coding.ordinals.streams import build_stream
+from mcz.editing.extraction import extract
+from mcz.motion import Exceptions, Motion, Signal
+from mcz.numbers import Grid, GridKind
+from mcz.schema import build, parse
+from mcz.writing.signal_source import MemorySource
+from tests.codecs.lossy import Array, amc, bytes_of, gapped, saved
+from tests.motions import smooth
+
+NAME = "posewave"
+SPINE = [6, 7, 8]  # columns of ``smooth``; its joints are hips 0 to 5, spine, knee 9
+SIX, FOUR = Grid(GridKind.FIXED, 6), Grid(GridKind.FIXED, 4)
+
+
+def same_bits(one: Array, other: Array) -> bool:
+    return bool(
+        np.array_equal(*(np.ascontiguousarray(a, "<f8").view(np.int64) for a in (one, other)))
+    )
+
+
+def read(data: bytes, **request: Any) -> Array:
+    with mcz.open(data) as file:
+        return file.only_clip().read(**request)
+
+
+class Coded:
+    """A clip coded by the codec alone, with groups of both sorts."""
+
+    def __init__(self, motion: Motion, **params: object) -> None:
+        self.codec = by_name(NAME)
+        options = self.codec.options(params)
+        source = MemorySource(motion, 0, self.codec, 2**26, options)
+        coded: Encoded = self.codec.encode(source, options)
+        self.header, self.segments = coded.header, list(coded.segments)
+        self.layout = replace(source.layout, n_resolutions=coded.n_resolutions)
+        self.spans = [Span(s.first, s.n_frames) for s in self.segments]
+        self.fetched: list[tuple[int, int, int]] = []
+        self.changed: dict[tuple[int, int, int], bytes] = {}
+
+    def stream(self, segment: int, resolution: int, group: int) -> bytes:
+        place = segment, resolution, group
+        self.fetched.append(place)
+        stored = self.segments[segment].streams
+        return self.changed.get(place, stored[resolution * len(self.layout.groups) + group])
+
+    def read(self, *groups: int, resolution: int = 0, header: bytes | None = None) -> Array:
+        request = Request(0, self.layout.n_frames, groups, resolution)
+        given = self.header if header is None else header
+        return self.codec.decode(given, self.layout, self.spans, request, self.stream)
+
+    def with_header(self, **fields: Any) -> bytes:
+        return build(
+            POSEWAVE_HEADER, {**parse(POSEWAVE_HEADER, self.header, "header"), **fields}, "header"
+        )
+
+
+@pytest.fixture(scope="module")
+def coded() -> Coded:
+    return Coded(smooth(100), step=0.05, levels=2, segment_frames=60, lossless="spine")
+
+
+@pytest.mark.parametrize("words", ["spine", "knee,hips", "hips,spine,knee", ("spine", "knee")])
+def test_exact_joints_come_back_at_every_resolution(words: str) -> None:
+    motion = smooth(90)
+    data = saved(NAME, motion, step=0.5, levels=2, lossless=words)
+    names = words.split(",") if isinstance(words, str) else words
+    columns = [c for name in names for c in motion.skeleton.columns(motion.skeleton.find(name))]
+    for resolution in range(3):
+        found = read(data, resolution=resolution)
+        assert same_bits(found[:, columns], motion.values[:, columns])
+        others = np.delete(found, columns, 1)
+        assert not others.size or not same_bits(others, np.delete(motion.values, columns, 1))
+
+
+def test_exact_joints_of_a_file_print_as_they_did(data: Path) -> None:
+    motion = amc(data, "16_02")
+    coded = saved(NAME, motion, step=0.05, lossless="lfoot,hands")
+    with mcz.open(coded) as file:
+        text = file.only_clip().source_bytes()
+    source = (data / "cmu/amc/16_02.amc").read_bytes()
+    lines = [
+        [line.strip() for line in file.split(b"\n") if line.startswith((b"lfoot", b"rhand"))]
+        for file in (source, text)
+    ]
+    assert lines[0] == lines[1] and len(lines[0]) == 2 * motion.n_frames
+    assert bytes_of(coded) < 0.5 * bytes_of(saved("lossless", motion))
+
+
+def test_grids_exceptions_and_gaps_of_exact_channels() -> None:
+    """The grid of a channel changes, values are off theirs, a token is odd, some are invalid."""
+    motion = smooth(80)
+    values, mask = np.array(motion.values), np.ones((80, 10), bool)
+    values[40:, 7] = np.round(values[40:, 7] / 3, 6)
+    values[10, 6], values[11, 6], values[12, 8] = 1e-9, -0.0, 2.5
+    values[:, 2] += 1e-7  # off the grid, but not exact
+    mask[20:30, 8] = mask[5:9, 3] = False
+    signal = Signal(
+        values,
+        (FOUR,) * 10,
+        mask=mask,
+        grid_changes=((40, 7, SIX),),
+        exceptions=Exceptions(np.array([12]), np.array([8]), (b"2.50000000001e0"[:5],)),
+    )
+    motion = replace(motion, signals=(signal,))
+    with mcz.open(saved(NAME, motion, step=0.5, lossless="spine")) as file:
+        clip = file.only_clip()
+        found = clip.motion().signals[0]
+        assert [row.header.first for row in clip.signals[0].rows] == [0, 40]
+        alone = clip.read(joints=["spine"])
+    assert same_bits(found.values[:, SPINE], values[:, SPINE])
+    assert same_bits(alone[mask[:, SPINE]], values[:, SPINE][mask[:, SPINE]])
+    assert np.array_equal(found.mask, mask)
+    assert set(found.exceptions.channels.tolist()) == {6, 8}
+    assert found.grid_changes == ((40, 7, SIX),)
+
+
+def test_markers_with_gaps() -> None:
+    motion = gapped()
+    values = motion.values.copy()
+    values[50, 4] = 3.0
+    motion = replace(motion, signals=(replace(motion.signals[0], values=values),))
+    mask = motion.signals[0].mask
+    assert mask is not None
+    found = read(saved(NAME, motion, step=0.1, lossless="RASI"))
+    assert same_bits(found[:, 3:][mask[:, 3:]], values[:, 3:][mask[:, 3:]])
+
+
+def test_an_exact_joint_needs_its_stream_alone(coded: Coded) -> None:
+    coded.fetched.clear()
+    assert coded.read(1).dtype == np.int64
+    assert {group for _, _, group in coded.fetched} == {1}
+    assert {place for place in tuple(coded.fetched) if coded.stream(*place)} == {
+        (0, 0, 1),
+        (1, 0, 1),
+    }
+    coded.fetched.clear()
+    knee = coded.read(2)
+    assert {group for _, _, group in coded.fetched} == {0, 2}
+    np.testing.assert_array_equal(knee, coded.read(0, 2)[:, 6:])
+
+
+@pytest.mark.parametrize("exact", [[3], [1, 1], [1, 0], []])
+def test_headers_that_do_not_fit(coded: Coded, exact: list[int]) -> None:
+    with pytest.raises(mcz.FormatError, match="group"):
+        coded.read(0, header=coded.with_header(exact=exact))
+
+
+@pytest.mark.parametrize(
+    ("place", "groups", "stream"),
+    [
+        ((0, 1, 1), (1,), b"\0"),  # a detail of what is exact
+        ((0, 0, 2), (0, 2), b"\0"),  # rows of another group
+        ((1, 2, 2), (0, 2), b"\0"),
+        ((0, 0, 1), (1,), bytes((1, 2, 1, 0, 1))),  # a copy
+    ],
+)
+def test_streams_that_cannot_be(
+    coded: Coded, place: tuple[int, int, int], groups: tuple[int, ...], stream: bytes
+) -> None:
+    coded.changed = {place: stream}
+    with pytest.raises(mcz.FormatError, match="group"):
+        coded.read(*groups)
+    coded.changed = {}
+
+
+@given(data=st.data())
+def test_any_change_of_an_exact_stream_decodes_or_is_refused(data: st.DataObject) -> None:
+    coded = Coded(smooth(30), step=0.2, levels=1, lossless="spine")
+    stream = bytearray(coded.stream(0, 0, 1))
+    stream[data.draw(st.integers(0, len(stream) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    coded.changed = {(0, 0, 1): bytes(stream[: data.draw(st.integers(0, len(stream)))])}
+    with suppress(mcz.MczError):
+        assert coded.read(1).shape == (30, 3)
+
+
+def test_streams_are_those_of_codec_1(coded: Coded) -> None:
+    ordinals = FOUR.ordinals(np.ascontiguousarray(smooth(100).values[:60, SPINE]))[0]
+    assert coded.stream(0, 0, 1) == build_stream(ordinals, [(FOUR, FOUR)] * 3, 1, None)
+
+
+def test_extract_takes_out_exact_joints_alone() -> None:
+    motion, out = smooth(90), io.BytesIO()
+    data = saved(NAME, motion, step=0.5, levels=2, lossless="spine,knee")
+    extract(data, out, joints=["spine"])
+    assert same_bits(read(out.getvalue()), motion.values[:, SPINE])
+    for joints in (["hips"], ["hips", "knee"]):
+        with pytest.raises(mcz.OptionError, match="not coded exactly"):
+            extract(data, io.BytesIO(), joints=joints)
+    out = io.BytesIO()
+    extract(data, out, frames=(10, 60), resolution=1)
+    assert same_bits(read(out.getvalue()), read(data, resolution=1)[10:60])
+
+
+@pytest.mark.parametrize(
+    "target", [{"max_error_cm": 0.3}, {"mean_error_cm": 0.1}, {"target_bytes": 1500}]
+)
+def test_targets_and_quality(target: dict[str, Any]) -> None:
+    motion = smooth(200)
+    with mcz.open(saved(NAME, motion, lossless="knee", quality="spine=2mm", **target)) as file:
+        clip = file.only_clip()
+        found, quality = clip.motion(), clip.quality
+    assert same_bits(found.values[:, 9], motion.values[:, 9])
+    assert quality["param.lossless"] == "knee" and "target_reached" in quality
+
+
+@pytest.mark.parametrize("words", ["", "lfoot", "spine,", "fixed", 3])
+def test_words_that_mean_nothing(words: object) -> None:
+    with pytest.raises(mcz.OptionError, match="lossless"):
+        saved(NAME, smooth(20), step=0.1, lossless=words)
+
+
+def test_a_live_encoder_has_none() -> None:
+    codec = by_name(NAME)
+    layout = replace(Coded(smooth(5), step=0.1).layout, n_frames=0)
+    assert codec.live is not None
+    with pytest.raises(mcz.OptionError, match="lossless"):
+        codec.live(layout, codec.options({"lossless": "spine", "levels": 0}))
+
+
+def test_commands_name_exact_joints(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "clip.mcz"
+    path.write_bytes(saved(NAME, amc(data, "16_02"), step=0.5, lossless="rfoot,rtoes"))
+    assert run(cli, "mcz", ["info", str(path)]) == 0
+    assert "  exact      rfoot, rtoes\n" in capsys.readouterr().out
+    assert run(cli, "mcz", ["diff", str(data / "cmu/amc/16_02.amc"), str(path)]) == 0
+    said = capsys.readouterr().out
+    (line,) = [line for line in said.split("\n") if "equal in every bit" in line]
+    assert "rfoot, rtoes" in line and "lfoot" not in line
