@@ -117,7 +117,7 @@ def _manifest(listed: Sequence[dict[str, Any]]) -> str:
         "licence": "CC0-1.0",
         "zlib": zlib.ZLIB_RUNTIME_VERSION,
     }
-    lines = [json.dumps(fields, ensure_ascii=False) for fields in listed]
+    lines = [json.dumps(fields, ensure_ascii=False, separators=(",", ":")) for fields in listed]
     start = json.dumps(head)[:-1]
     return f'{start}, "vectors": [\n' + ",\n".join(lines) + "\n]}\n"
 

@@ -106,8 +106,8 @@ def _headers(shelf: Poses) -> None:
         "alone": ("Points that follow none", held(*two, follows=0)),
         "step-fine": ("A fine step: large residuals", held(*two, step=2.0**-18)),
         "step-coarse": ("A coarse step", held(*two, step=2.0)),
-        "step-least": ("The least step", held(*two, step=2.0**-60)),
-        "step-greatest": ("The greatest step", held(*two, step=2.0**60)),
+        "step-least": ("Displacements in the least step", held(*two, step=2.0**-60)),
+        "step-greatest": ("Displacements in the greatest step", held(*two, step=2.0**60)),
     }
     for name, (purpose, fields) in cases.items():
         step = fields["contacts"][0]["points"][0]["step"]
