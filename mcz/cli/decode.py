@@ -342,7 +342,7 @@ def _export(clip: Clip, target: str, part: Part, wanted: _Wanted) -> Output:
         units = channel_units(clip.skeleton, channels)
         table = part.of_signal(signal, wanted.stored, names, units)
         return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
-    if chosen is not None:
+    if chosen is not None and channels is None:  # else the table says why there are no joints
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
     return target, f"{_stem(clip)}.{target}", EXPORTS[target](part.table(chosen, names))
