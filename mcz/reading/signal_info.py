@@ -91,6 +91,9 @@ def read_signal(
     channels = None
     if own.flags & payloads.OWN_CHANNELS:
         channels = parse_channels(own.channels, where)
+    coded: Skeleton | None = skeleton
+    if channels is not None:  # PWAVE-04
+        coded = None
     n_channels = skeleton.n_channels if channels is None else len(channels)
     check(f"{where}: channels", n_channels, container.profile.channels)
     layout = Layout(
@@ -98,7 +101,7 @@ def read_signal(
         # CLIP-09
         parse_groups(own.groups, skeleton if channels is None else None, n_channels, where),
         own.samples_per_frame,
-        skeleton,
+        coded,
         frame_rate,
         parse_grids(own.grids, n_channels, where),
         own.n_resolutions,

@@ -25,6 +25,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "PWAVE-01": ("invalid/posewave/groups*", "invalid/posewave/exact-none"),
     "PWAVE-02": ("invalid/posewave/samples",),
     "PWAVE-03": ("invalid/posewave/segment-lead", "invalid/posewave/segment-tail"),
+    "PWAVE-04": ("invalid/posewave/own-channels",),
     "PWAVE-05": ("invalid/posewave/levels-9",),
     "PWAVE-06": ("invalid/posewave/borrowing-*", "valid/posewave/borrowing-*"),
     "PWAVE-07": ("invalid/posewave/start-*",),
@@ -94,5 +95,4 @@ VECTORS: dict[str, tuple[str, ...]] = {
 ARGUED: dict[str, str] = {
     "PWAVE-31": "A rule for who goes on after a loss; shown by tests/codecs/test_posewave_live.py::"
     "test_what_is_decoded_after_a_loss_is_right",
-    "PWAVE-04": "no writer gives a lossy codec a signal with channels of its own",
 }

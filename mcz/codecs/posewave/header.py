@@ -111,9 +111,10 @@ def parse_header(header: bytes, layout: Layout) -> Header:
     """Raises FormatError where ``header`` does not fit the skeleton of ``layout``."""
     fields = parse(POSEWAVE_HEADER, header, f"{NAME} header")
     skeleton = layout.skeleton
+    if skeleton is None:  # PWAVE-04
+        raise FormatError(f"{NAME}: a signal with channels of its own, not those of its skeleton")
     many = len(layout.groups) > 1 and not fields.exact
-    # PWAVE-01, PWAVE-02, PWAVE-04
-    if skeleton is None or layout.samples_per_frame != 1 or many:
+    if layout.samples_per_frame != 1 or many:  # PWAVE-01, PWAVE-02
         raise FormatError(
             f"{NAME}: {layout.samples_per_frame} samples a frame, {len(layout.groups)} groups"
         )

@@ -166,6 +166,7 @@ def _signal(shelf: Broken) -> None:
         ("samples", "Two rows a frame.", {"CLIP": twice, "CEND": hashed, "row": two_rows}),
         ("groups", "Two groups.", {"CLIP": grouped, "segments": _more(1)}),
         ("groups-joint", "A group for each joint.", {"CLIP": by_joint, "segments": _more(3)}),
+        ("own-channels", "As many channels, of its own.", {"CLIP": _own_channels(n)}),
         ("resolutions", "Two resolutions, no levels.", {"CLIP": resolved, "segments": _more(1)}),
         (
             "integers",
@@ -175,6 +176,12 @@ def _signal(shelf: Broken) -> None:
     )
     for name, purpose, edits in cases:
         shelf.add(name, spec, purpose, file_with(plan, **edits))
+
+
+def _own_channels(count: int) -> Callable[[bytes], bytes]:
+    """As many rotations in the place of the skeleton's channels."""
+    flags = bytes([payloads.OWN_CHANNELS])
+    return put(payloads.CLIP, "signals.0.flags", flags + varint(count) + b"\4\0\0" * count)
 
 
 def _nothing(shelf: Broken) -> None:
