@@ -300,14 +300,18 @@ class Codec:
         """Whether it has a parameter of that name."""
         return any(parameter.name == name for parameter in self.parameters)
 
-    def options(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """All parameters, those given checked; raises OptionError for an unknown or bad one."""
+    def options(self, given: Mapping[str, Any], *, inner: bool = False) -> dict[str, Any]:
+        """All parameters, those given checked; raises OptionError for an unknown or bad one.
+
+        Parameters that only a search finds may be given where ``inner`` is true.
+        """
         known = {p.name: p for p in (*self.parameters, *(TARGETS if self.dial else ()))}
-        unknown = sorted(set(given) - set(known))
+        told = [name for name, parameter in known.items() if inner or not parameter.inner]
+        unknown = sorted(set(given) - set(told))
         if unknown:
             raise OptionError(
                 f"codec {self.name} has no parameter {unknown[0]!r}; it has "
-                f"{', '.join(known) or 'none'}"
+                f"{', '.join(told) or 'none'}"
             )
         return {
             name: parameter.parse(given[name]) if name in given else parameter.default

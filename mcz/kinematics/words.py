@@ -34,5 +34,5 @@ def joints_of(skeleton: Skeleton, name: str, option: str) -> list[int]:
         found = [i for i, joint in enumerate(skeleton.joints) if pattern.search(joint.name)]
     if not found:
         known = ["feet", *GROUPS, *addresses]
-        raise OptionError(f"{option}: no joint and no group is called {name!r}{among(name, known)}")
+        raise OptionError(f"{option}: no joint or group {name!r} among {among(known, name)}")
     return found

@@ -28,6 +28,7 @@ def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[dict[str, Any], 
     Raises OptionError where none that was tried does.
     """
     step = (dial.guess and dial.guess(target.name, target.limit)) or 1.0
+    step = min(max(step, dial.low), dial.high)
     for _ in range(MOST_STEPS):
         octaves = np.zeros(trial.motion.n_frames, np.int64)
         for _ in range(MOST_ROUNDS):
@@ -37,11 +38,9 @@ def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[dict[str, Any], 
                 reached = float(errors.max(initial=0.0))
                 return found, {"target_reached": repr(reached)}
             octaves = _refined(octaves, errors / target.limit)
+        missed = f"{dial.parameter} {step:g} gives {errors.max():g}"
         step = max(step * FINER, dial.low)
-    raise OptionError(
-        f"{target.name} {target.limit:g} cannot be met: {dial.parameter} {step:g} gives "
-        f"{errors.max():g}"
-    )
+    raise OptionError(f"{target.name} {target.limit:g} cannot be met: {missed}")
 
 
 def _refined(octaves: Any, ratios: Floats) -> Any:

@@ -77,7 +77,7 @@ def write_clip(
     quality record. Raises OptionError for a bad parameter or a target that nobody has met yet (see
     ``tuning.py``), MotionError for values that the codec cannot hold.
     """
-    options = codec.options(params)
+    options = codec.options(params, inner=True)
     if codec.dial and asked(options) and options[codec.dial.parameter] is None:
         raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
     motion = _with_source_hash(as_stored(motion))

@@ -47,6 +47,7 @@ class MemorySource:
         found = codec.partition(motion.skeleton, options) if codec.partition and options else None
         self.is_listed = found is not None
         groups, exact = found or (make_groups(motion.skeleton, signal, codec.grouping), ())
+        self.is_lossless = codec.lossless
         self.exact = [channel for group in exact for channel in groups[group]]
         # What a lossy codec returns is no longer the number that an exception spells.
         self.signal = signal if codec.lossless else _with_exceptions_of(signal, self.exact)
@@ -82,7 +83,7 @@ class MemorySource:
         """
         if (start, stop) not in self._settled:
             signal = self.signal.cut(start, stop)
-            ordinals, settled = settle(_freed(signal, self.exact) if self.exact else signal)
+            ordinals, settled = settle(signal if self.is_lossless else _freed(signal, self.exact))
             signal = replace(signal, exceptions=settled.exceptions)
             self._settled = {(start, stop): (ordinals, signal)}
         return self._settled[start, stop]

@@ -50,6 +50,11 @@ def write_tuned(
     targets = asked(options)
     if not targets and codec.promise and codec.dial and options[codec.dial.parameter] is None:
         targets = codec.promise(options)
+        if motion.skeleton.unit_cm is None:
+            raise OptionError(
+                f"{codec.name}: a preset promises an error in cm, and the length unit is unknown; "
+                f"--unit says it, or give {codec.dial.parameter}"
+            )
     limits = options.get(QUALITY)
     if codec.dial is None or not (targets or limits):
         return write_clip(writer, motion, codec, params, progress)

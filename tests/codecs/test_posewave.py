@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs.posewave.header import POSEWAVE_HEADER
 from mcz.motion import Motion, Signal
+from mcz.numbers import Grid, GridKind
 from mcz.schema import build, parse
 from tests.codecs.lossy import (
     Array,
@@ -225,6 +226,36 @@ def test_unknown_units_have_steps_in_their_own() -> None:
     assert np.isfinite(decoded(NAME, motion, step=0.05)).all()
     with pytest.raises(mcz.OptionError, match="--unit"):
         saved(NAME, motion, mean_error_cm=0.1)
+    with pytest.raises(mcz.OptionError, match="preset promises .*--unit says it, or give step"):
+        saved(NAME, motion)
+
+
+@pytest.mark.parametrize(
+    ("params", "words"),
+    [
+        ({"max_error_cm": 1e-9}, "exceeds 2.29 quantizer steps"),
+        ({"target_bytes": 10}, r"target_bytes 10 cannot be met: step 1e\+09 gives"),
+        ({"step": 1, "weights": 1}, "has no parameter 'weights'; it has preset, step, levels, con"),
+        ({"step": 1, "refinement": 1}, "has no parameter 'refinement'"),
+        ({"step": 1, "quality": "nobdy=1mm"}, "no joint or group 'nobdy' among feet, hands"),
+        ({"step": 1, "lossless": "spne"}, "among feet, hands, .*; did you mean 'spine'"),
+    ],
+)
+def test_options_out_of_reach(params: dict[str, Any], words: str) -> None:
+    with pytest.raises(mcz.MczError, match=words):
+        saved(NAME, smooth(20), **params)
+
+
+def test_text_of_many_grids() -> None:
+    """Numbers off the grid of their channel are as lossy as the others: nothing of them is kept."""
+    values = np.random.default_rng(3).uniform(-180, 180, (40, 4))
+    values[7], values[9, 2] = 1e-9, -0.0
+    motion = clip_of(values)
+    motion = replace(motion, signals=(Signal(values, (Grid(GridKind.FIXED, 3),) * 4),))
+    with mcz.open(saved(NAME, motion, step=0.05)) as file:
+        found = file.only_clip().motion()
+    assert not len(found.signals[0].exceptions)
+    assert not np.isin([1e-9], found.values).any()
 
 
 def test_a_skeleton_of_no_extent() -> None:

@@ -89,6 +89,8 @@ def cut(header: bytes, layout: Layout, first: int, stop: int, groups: tuple[int,
 
 def build_exact(source: SignalSource, groups: Sequence[int], first: int, stop: int) -> list[bytes]:
     """The stream of each of these groups in the segment first <= f < stop."""
+    if not groups:
+        return []
     layout, grids = source.layout, source.grids(first)
     ordinals = source.ordinals(first, stop)
     return [

@@ -27,7 +27,7 @@ from mcz.kinematics.single import FramePositions
 Floats = NDArray[np.float64]
 
 JOINING = 480  # frames from one that starts fresh to the next, where the caller leaves it open
-NEEDS_ALL = ("quality", "lossless", "contacts", "weights", "refinement")
+NEEDS_ALL = ("quality", "lossless", "contacts")
 
 
 class LiveEncoder:

@@ -192,7 +192,7 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     grouping="all",
-    dial=Dial("step", 2.0**-30, 2.0**30, guess=guess),
+    dial=Dial("step", 1e-9, 1e9, guess=guess),
     promise=promise,
     cut=cut,
     partition=partition,
