@@ -171,11 +171,11 @@ def parse_header(header: bytes, layout: Layout) -> Header:
 
 def _exact(groups: Sequence[int], layout: Layout) -> NDArray[np.bool_]:
     """Of each channel whether it is exact."""
-    found = np.zeros(layout.n_channels, np.bool_)
+    found, last = np.zeros(layout.n_channels, np.bool_), len(layout.groups) - 1
     for before, group in pairwise([-1, *groups]):
         if group <= before:  # PWAVE-32
             raise FormatError(f"{NAME}: group {group} is exact, named behind {before}")
-        if group >= len(layout.groups):  # PWAVE-33
-            raise FormatError(f"{NAME}: group {group} of {len(layout.groups)} is exact")
+        if group > last:  # PWAVE-33
+            raise FormatError(f"{NAME}: group {group} is exact, the last is {last}")
         found[list(layout.groups[group])] = True
     return found

@@ -194,6 +194,10 @@ def _nothing(shelf: Broken) -> None:
     header = put(POSEWAVE_HEADER, "orders", b"\2\0\1")(header_of(still))
     purpose = "An order of a joint with two rotations, no frames."
     shelf.add("frames-0-order", ORDERS, purpose, file_with(still, CLIP=says(header)))
+    exact = replace(_still(n_frames=0), exact=(1,))
+    header = put(POSEWAVE_HEADER, "exact", b"\2\1\3")(header_of(exact))
+    purpose = "Exact groups 1, which is, and 3 of 3 groups, no frames."
+    shelf.add("frames-0-exact-beyond", EXACT, purpose, file_with(exact, CLIP=says(header)))
 
 
 def _more(count: int) -> Callable[[Any], Any]:
