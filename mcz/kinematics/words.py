@@ -32,6 +32,10 @@ def joints_of(skeleton: Skeleton, name: str, option: str) -> list[int]:
     elif name in GROUPS:
         pattern = re.compile(GROUPS[name], re.IGNORECASE)
         found = [i for i, joint in enumerate(skeleton.joints) if pattern.search(joint.name)]
+    if not found and (name == "feet" or name in GROUPS):
+        raise OptionError(
+            f"{option}: no joint is one of the {name} by its name; name those that are"
+        )
     if not found:
         known = ["feet", *GROUPS, *addresses]
         raise OptionError(f"{option}: no joint or group {name!r} among {among(known, name)}")

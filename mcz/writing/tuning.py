@@ -11,10 +11,13 @@ from collections.abc import Callable, Mapping
 from operator import itemgetter
 from typing import Any
 
+import numpy as np
+
 from mcz.codecs.contract import Codec
 from mcz.codecs.parameters import Dial
 from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
+from mcz.kinematics import positions_of
 from mcz.motion import Motion
 from mcz.writing.bounding import REFINEMENT, bounded
 from mcz.writing.clip_writer import Progress, asked, write_clip
@@ -94,6 +97,7 @@ def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
     if target is None:
         return {}, {}
     if target.name == "max_error_cm" and codec.has(REFINEMENT):
+        _check_places(trial.motion, codec.dial, target)
         return bounded(codec.dial, target, trial)
     return _searched(codec.dial, target, trial)
 
@@ -101,6 +105,16 @@ def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
 def _check_unit(motion: Motion, name: str) -> None:
     if motion.skeleton.unit_cm is None:
         raise OptionError(f"{name} has no meaning: the length unit is unknown; --unit says it")
+
+
+def _check_places(motion: Motion, dial: Dial, target: Target) -> None:
+    skeleton = motion.skeleton
+    try:
+        positions_of(skeleton, np.zeros((0, skeleton.n_channels)))
+    except MotionError as error:
+        raise OptionError(
+            f"{target.name} {target.limit:g} has no meaning: {error}; give {dial.parameter}"
+        ) from error
 
 
 def _searched(dial: Dial, target: Target, trial: Trials) -> Found:

@@ -276,7 +276,10 @@ def test_csv_of_a_motion_with_channels_of_its_own(
 ) -> None:
     channels = (mcz.Channel("", "knee", "deg"), mcz.Channel("", ""))
     signal_ = Signal(np.array([[1.5, 2.5]]), channels=channels)
-    mcz.write(mcz.Motion(mcz.Skeleton(()), (signal_,)), folder / "own.mcz")
+    skeleton = mcz.Skeleton((mcz.Joint("a", channels=tuple(map(mcz.Channel, ("rx", "ry", "rz")))),))
+    mcz.write(mcz.Motion(skeleton, (signal_,)), folder / "own.mcz")
+    code, _, errors = call(capsys, "decode", folder / "own.mcz", "--to", "csv", "--joints", "a")
+    assert code == 2 and "channels of its own, no joints" in errors
     assert call(capsys, "decode", folder / "own.mcz", "--to", "csv")[0] == 0
     rows = list(csv.reader((folder / "motion.csv").read_text().splitlines()))
     assert rows == [["frame", "knee", "channel-1"], ["1", "1.5", "2.5"]]

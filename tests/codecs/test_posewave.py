@@ -246,6 +246,16 @@ def test_options_out_of_reach(params: dict[str, Any], words: str) -> None:
         saved(NAME, smooth(20), **params)
 
 
+def test_errors_where_nothing_is_placed() -> None:
+    motion = wandering(20, ["rx", "ry"])
+    motion = replace(motion, skeleton=replace(motion.skeleton, angle_unit=""))
+    with pytest.raises(mcz.OptionError, match="max_error_cm 0.5 has no meaning: .*; give step"):
+        saved(NAME, motion)
+    with pytest.raises(mcz.OptionError, match="no joint is one of the feet by its name"):
+        saved(NAME, motion, step=0.1, lossless="feet")
+    assert np.isfinite(decoded(NAME, motion, step=0.1)).all()
+
+
 def test_text_of_many_grids() -> None:
     """Numbers off the grid of their channel are as lossy as the others: nothing of them is kept."""
     values = np.random.default_rng(3).uniform(-180, 180, (40, 4))
