@@ -27,8 +27,10 @@ from conformance.server import Server
 from mcz.cli import conformance
 from mcz.codecs import by_name
 from mcz.codecs.posewave import choices
+from mcz.container.writer import Writer
 from mcz.errors import OptionError
 from mcz.motion import Motion
+from mcz.writing.clip_writer import write_clip
 from tests.codecs.lossy import gapped, markers, rough, saved, wandering
 from tests.codecs.test_posewave_contacts import RUNS, walking
 from tests.motions import smooth
@@ -234,8 +236,12 @@ def test_finer_steps_of_posewave(seed: int, other: Server) -> None:
     """Rows that have steps of their own."""
     wanted = np.random.default_rng(seed).integers(0, 8, 90)
     for refinement in (wanted, np.where(wanted == 7, 7, 0), np.sort(wanted)):
-        data = saved("posewave", smooth(90), step=0.5, refinement=refinement, segment_frames=50)
-        check(data, other, refinement)
+        out = io.BytesIO()
+        writer = Writer(out)
+        params = {"step": 0.5, "refinement": refinement, "segment_frames": 50}
+        write_clip(writer, smooth(90), by_name("posewave"), params)
+        writer.finish()
+        check(out.getvalue(), other, refinement)
 
 
 @pytest.mark.parametrize("codes", [(2, 0), (1, 6), (5, 3), (0, 4)], ids=str)
