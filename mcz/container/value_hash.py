@@ -17,7 +17,10 @@ def canonical(values: NDArray[Any]) -> bytes:
     """The bytes that hashes and conformance compare: little-endian, row after row, one NaN."""
     if values.dtype == np.int64:
         return values.astype("<i8").tobytes()  # CEND-03
-    return np.where(np.isnan(values), math.nan, values).astype("<f8").tobytes()  # CEND-03
+    missing = np.isnan(values)
+    if missing.any():
+        values = np.where(missing, math.nan, values)
+    return values.astype("<f8", copy=False).tobytes()  # CEND-03
 
 
 def value_hash(values: NDArray[Any], mask: NDArray[np.bool_] | None) -> bytes:

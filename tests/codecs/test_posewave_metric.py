@@ -14,14 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs.posewave.metric_kernels import (
-    LANES,
-    factor,
-    factor_one,
-    from_metric,
-    inverse_root,
-    to_metric,
-)
+from mcz.codecs.posewave.apply_kernels import into_metric, out_of_metric
+from mcz.codecs.posewave.metric_kernels import factor, inverse_root
 from mcz.codecs.posewave.skeleton_plan import MAX_PATH, PLAIN, Plan, make_plan
 from mcz.codecs.posewave.turns import RULES, sine_cosine
 from mcz.kinematics.chain import chain_of
@@ -42,10 +36,18 @@ def plan_of(skeleton: Skeleton, added: float = 1e-3, **options: object) -> Plan:
     return make_plan(skeleton, np.ones(n, np.bool_), np.full(n, added), **given)  # type: ignore[arg-type]
 
 
-def dense(plan: Plan, packed: np.ndarray, pose: int = 0) -> np.ndarray:
+def into(plan: Plan, factors: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Each row by the factor of its own number."""
+    return into_metric(plan, factors, rows, np.arange(len(rows)))
+
+
+def out_of(plan: Plan, factors: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    return out_of_metric(plan, factors, rows, np.arange(len(rows)))
+
+
+def dense(plan: Plan, factors: np.ndarray, pose: int = 0) -> np.ndarray:
     """R of a pose, (n_kept, n_kept)."""
-    width = packed.shape[2]
-    entries = packed[pose // width, :, pose % width]
+    entries = factors[pose]
     result = np.zeros((plan.n_kept, plan.n_kept))
     for number, (start, stop) in enumerate(zip(plan.starts, plan.starts[1:], strict=False)):
         root = 1.0 / entries[stop - 1]
@@ -136,12 +138,12 @@ def test_kept_channels_alone(skeleton: Skeleton, seed: int) -> None:
 @given(skeletons(), st.integers(1, 20), st.integers(0, 1000))
 def test_rows_come_back(skeleton: Skeleton, n_poses: int, seed: int) -> None:
     plan = plan_of(skeleton, 1e-4)
-    packed = factor(plan, values_for(skeleton, n_poses, seed))
+    factors = factor(plan, values_for(skeleton, n_poses, seed))
     rows = np.random.default_rng(seed).normal(size=(n_poses, plan.n_kept))
-    inside = to_metric(plan, packed, rows)
-    expected = [dense(plan, packed, pose) @ row for pose, row in enumerate(rows)]
+    inside = into(plan, factors, rows)
+    expected = [dense(plan, factors, pose) @ row for pose, row in enumerate(rows)]
     assert_near(inside, np.array(expected), 1e-12)
-    assert_near(from_metric(plan, packed, inside), rows, 1e-9)
+    assert_near(out_of(plan, factors, inside), rows, 1e-9)
 
 
 @given(skeletons(), st.integers(2, 20), st.integers(1, 3), st.integers(0, 1000))
@@ -149,39 +151,24 @@ def test_batches_are_singles_to_the_bit(
     skeleton: Skeleton, n_poses: int, repeat: int, seed: int
 ) -> None:
     plan, values = plan_of(skeleton), values_for(skeleton, n_poses, seed)
-    packed = factor(plan, values)
-    singles = np.empty((n_poses, plan.n_entries, 1))
-    factor_one(plan, values, singles)
-    flat = packed.transpose(0, 2, 1).reshape(-1, plan.n_entries)[:n_poses]
-    assert np.array_equal(flat, singles[:, :, 0])
-    alone = [factor(plan, pose[None]) for pose in values]
-    assert np.array_equal(np.concatenate(alone), singles)
-    n_rows = n_poses * repeat - (repeat - 1)
-    rows = np.random.default_rng(seed).normal(size=(n_rows, plan.n_kept))
-    for action in (to_metric, from_metric):
-        whole = action(plan, packed, rows, repeat)
-        assert np.array_equal(whole, action(plan, singles, rows, repeat))
-        for n, row in enumerate(rows):
-            assert np.array_equal(whole[n], action(plan, alone[n // repeat], row[None])[0])
-
-
-def test_poses_go_on_to_the_number_asked_for() -> None:
-    skeleton = chain(3)
-    plan, values = plan_of(skeleton), values_for(skeleton, 2)
-    longer = factor(plan, values, 19)
-    repeated = factor(plan, values[[0, *[1] * 18]])
-    assert len(longer) == -(-19 // LANES)
-    assert np.array_equal(longer, repeated)
+    factors = factor(plan, values)
+    assert np.array_equal(factors, np.concatenate([factor(plan, pose[None]) for pose in values]))
+    which = np.arange(n_poses * repeat) // repeat
+    rows = np.random.default_rng(seed).normal(size=(len(which), plan.n_kept))
+    for action in (into_metric, out_of_metric):
+        alone = [
+            action(plan, factors, row[None], n) for row, n in zip(rows, which[:, None], strict=True)
+        ]
+        assert np.array_equal(action(plan, factors, rows, which), np.concatenate(alone))
 
 
 def test_shapes_that_do_not_fit() -> None:
     skeleton = chain(3)
     plan = plan_of(skeleton)
-    packed = factor(plan, values_for(skeleton, 19))
-    with pytest.raises(ValueError, match="25 rows for 3 batches"):
-        to_metric(plan, packed, np.zeros((25, 9)))
-    with pytest.raises(ValueError, match="rows of 8 values for 9 channels"):
-        from_metric(plan, packed, np.zeros((19, 8)))
+    factors = factor(plan, values_for(skeleton, 19))
+    for action in (into, out_of):
+        with pytest.raises(ValueError, match="rows of 8 values for 9 channels"):
+            action(plan, factors, np.zeros((19, 8)))
     with pytest.raises(ValueError, match=r"poses of shape \(2, 8\) for 9 channels"):
         factor(plan, np.zeros((2, 8)))
     with pytest.raises(ValueError, match="8 of 9 channels are kept"):
@@ -195,9 +182,9 @@ def test_worked_example() -> None:
     knee = replace(knee, channels=tuple(Channel(kind) for kind in "ry rx".split()))
     kept = np.array([1, 1, 0, 1, 1, 1, 1], np.bool_)
     plan = make_plan(Skeleton((hip, knee)), kept, np.full(6, 0.001), radius=3.0, kappa=0.5)
-    packed = factor(plan, np.array([[1.0, 90.0, 2.0, 30.0, -40.0, 10.0, 100.0]]))
-    assert packed[0, :, 0].tolist() == EXAMPLE
-    row = from_metric(plan, packed, np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]))
+    factors = factor(plan, np.array([[1.0, 90.0, 2.0, 30.0, -40.0, 10.0, 100.0]]))
+    assert factors[0].tolist() == EXAMPLE
+    row = out_of(plan, factors, np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]))
     assert row[0].tolist() == EXAMPLE_ROW
 
 
@@ -240,13 +227,13 @@ def test_cost_is_linear() -> None:
 def test_nothing_to_do() -> None:
     empty = Skeleton(())
     plan = plan_of(empty)
-    packed = factor(plan, np.zeros((3, 0)))
-    assert packed.shape == (1, 0, LANES)
-    assert to_metric(plan, packed, np.zeros((3, 0))).shape == (3, 0)
+    factors = factor(plan, np.zeros((3, 0)))
+    assert factors.shape == (3, 0)
+    assert into(plan, factors, np.zeros((3, 0))).shape == (3, 0)
     skeleton = chain(2)
     plan = make_plan(skeleton, np.zeros(6, np.bool_), np.zeros(0), radius=1.0)
     assert plan.n_entries == 0
-    assert from_metric(plan, factor(plan, np.zeros((1, 6))), np.zeros((1, 0))).shape == (1, 0)
+    assert out_of(plan, factor(plan, np.zeros((1, 6))), np.zeros((1, 0))).shape == (1, 0)
 
 
 def test_plain_channels_stand_alone() -> None:
@@ -277,8 +264,8 @@ def test_an_unknown_angle_unit_makes_all_plain() -> None:
 def test_a_singular_metric_is_held_by_its_regularization() -> None:
     joints = [Joint(f"{n}", n - 1, channels=TURNING) for n in range(4)]
     plan = plan_of(Skeleton(tuple(joints)), 0.01, radius=0.0)
-    packed = factor(plan, np.zeros((1, 12)))
-    assert np.allclose(dense(plan, packed), 0.1 * np.eye(12))
+    factors = factor(plan, np.zeros((1, 12)))
+    assert np.allclose(dense(plan, factors), 0.1 * np.eye(12))
 
 
 LARGE = st.sampled_from([0.0, 1.0, -3e11, 1e12, -1.1e12, 5e15, 1e300, -1e308, 1e-300])
@@ -308,12 +295,12 @@ def test_huge_numbers_give_numbers(data: st.DataObject) -> None:
     wild = st.sampled_from([0.0, 7.0, 1e5, 1e11, -2e11, 1e300, np.inf, -np.inf, np.nan])
     n = skeleton.n_channels
     values = np.array(data.draw(st.lists(wild, min_size=n, max_size=n)), np.float64)
-    packed = factor(plan, values[None])
-    assert np.isfinite(packed).all()
-    assert (packed[0, plan.starts[1:] - 1] > 0).all()
+    factors = factor(plan, values[None])
+    assert np.isfinite(factors).all()
+    assert (factors[0, plan.starts[1:] - 1] > 0).all()
     rows = np.array([[1e150, -1e150][k % 2] for k in range(n)], np.float64)[None]
-    assert np.isfinite(from_metric(plan, packed, rows)).all()
-    assert np.isfinite(to_metric(plan, packed, 1e-140 * rows)).all()
+    assert np.isfinite(out_of(plan, factors, rows)).all()
+    assert np.isfinite(into(plan, factors, 1e-140 * rows)).all()
 
 
 @given(
@@ -353,10 +340,10 @@ def bits_of_factor() -> str:
     skeleton = Skeleton(joints, intrinsic=False)
     plan, values = plan_of(skeleton), values_for(skeleton, 3)
     found = []
-    for packed in (factor(plan, values), factor(plan, values[:1])):
-        rows = np.cos(np.arange(packed.shape[2] * plan.n_kept, dtype=np.float64))
-        rows = rows.reshape(-1, plan.n_kept)[:3]
-        found += [packed, to_metric(plan, packed, rows), from_metric(plan, packed, rows)]
+    for factors in (factor(plan, values), factor(plan, values[:1])):
+        rows = np.cos(np.arange(len(factors) * plan.n_kept, dtype=np.float64))
+        rows = rows.reshape(-1, plan.n_kept)
+        found += [factors, into(plan, factors, rows), out_of(plan, factors, rows)]
     return b"".join(array.tobytes() for array in found).hex()
 
 
@@ -428,5 +415,5 @@ def test_real_clips(name: str, data: Path) -> None:
     assert_near(metric_of(plan, pose), expected)
     assert np.abs(expected).max() > 0
     rows = np.random.default_rng(0).normal(size=(1, plan.n_kept))
-    packed = factor(plan, pose[None])
-    assert_near(from_metric(plan, packed, to_metric(plan, packed, rows)), rows, 1e-9)
+    factors = factor(plan, pose[None])
+    assert_near(out_of(plan, factors, into(plan, factors, rows)), rows, 1e-9)

@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs.posewave.metric_kernels import factor, from_metric
+from mcz.codecs.posewave.apply_kernels import out_of_metric
+from mcz.codecs.posewave.metric_kernels import factor
 from mcz.codecs.posewave.orders import own_sequence
 from mcz.codecs.posewave.skeleton_plan import make_plan
 from mcz.motion import CHANNEL_KINDS, Skeleton
@@ -79,11 +80,9 @@ def case(skeleton: Skeleton, values: np.ndarray, seed: int) -> Case:
     plan = make_plan(
         skeleton, kept, reg, radius=0.7, kappa=0.3, joint_weights=weights, orders=orders
     )
-    packed = factor(plan, values)
-    by_pose = packed.transpose(0, 2, 1).reshape(len(packed) * packed.shape[2], plan.n_entries)
-    flat = by_pose[: len(values)]
-    back = from_metric(plan, packed, rows)
-    return [[row.tobytes().hex() for row in array] for array in (flat, back)], {
+    factors = factor(plan, values)
+    back = out_of_metric(plan, factors, rows, np.arange(len(rows)))
+    return [[row.tobytes().hex() for row in array] for array in (factors, back)], {
         "skeleton": as_javascript(skeleton),
         "kept": np.flatnonzero(kept).tolist(),
         "reg": reg.tolist(),

@@ -5,10 +5,32 @@ SPEC.md, "Pose metric", is normative. Imported on first use only.
 
 from __future__ import annotations
 
+import numpy as np
+
 from mcz.codecs.posewave.skeleton_plan import Floats, Ints, Plan
 from mcz.jit import inner, kernel
 
 GREATEST_VALUE = 2.0**100  # of what comes back
+
+
+def into_metric(plan: Plan, factors: Floats, rows: Floats, which: Ints) -> Floats:
+    """Rows of values, (n_rows, n_kept), in the metric: row n by the factor ``which[n]``."""
+    result = _room(plan, factors, rows)
+    rows_into(plan, factors, np.ascontiguousarray(rows), result, which)
+    return result
+
+
+def out_of_metric(plan: Plan, factors: Floats, rows: Floats, which: Ints) -> Floats:
+    """The inverse of ``into_metric``, which never comes to more than 2^100."""
+    result = _room(plan, factors, rows)
+    rows_out_of(plan, factors, np.ascontiguousarray(rows), result, which)
+    return result
+
+
+def _room(plan: Plan, factors: Floats, rows: Floats) -> Floats:
+    if rows.shape[1] != plan.n_kept or factors.shape[1] != plan.n_entries:
+        raise ValueError(f"rows of {rows.shape[1]} values for {plan.n_kept} channels")
+    return np.empty(rows.shape)
 
 
 @kernel

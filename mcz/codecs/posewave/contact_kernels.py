@@ -98,7 +98,7 @@ def correct(
         np.empty((len(plan.parents) + 1, 3, 1)),
         np.zeros((n_kept, 6, 1)),
     )
-    pose, packed = np.empty((1, values.shape[1])), np.empty((1, len(plan.path), 1))
+    pose, factors = np.empty((1, values.shape[1])), np.empty((1, len(plan.path)))
     points, goals = np.empty((n_points, 3)), np.empty((n_points, 3))
     pulls, square = np.zeros((3 * n_points, n_kept)), np.zeros((3 * n_points, 3 * n_points))
     wanted, pivots = np.zeros(3 * n_points), np.zeros(3 * n_points)
@@ -112,8 +112,8 @@ def correct(
             pose[0, c] = values[n, c]
         for c in range(n_kept):
             total[c] = 0.0
-        factor_rows(plan, pose, packed, 1, 1)
-        factor = packed[0, :, 0]
+        factor_rows(plan, pose, factors, 1, 1)
+        factor = factors[0]
         n_next = 0
         for turn in range(rounds):
             place_joints(plan, pose, 0, batch, 1)

@@ -74,18 +74,16 @@ def go_on(course: Course, difference: Floats) -> None:
 
 
 @kernel
-def next_factor(plan: Plan, course: Course, packed: Floats) -> None:
-    """Fill ``packed`` (1, n_entries) at the last pose."""
-    lane = np.empty((1, len(plan.path), 1))
-    factor_rows(plan, course.pose, lane, 1, 1)
-    packed[0] = lane[0, :, 0]
+def next_factor(plan: Plan, course: Course, factor: Floats) -> None:
+    """Fill ``factor`` (1, n_entries) at the last pose."""
+    factor_rows(plan, course.pose, factor, 1, 1)
 
 
 @kernel
-def take_row(plan: Plan, course: Course, packed: Floats, row: Floats) -> None:
+def take_row(plan: Plan, course: Course, factor: Floats, row: Floats) -> None:
     """Go on by a row (1, n_kept) that is in the metric."""
     difference = np.empty(len(course.kept))
-    row_out_of(plan, packed[0], row[0], difference)
+    row_out_of(plan, factor[0], row[0], difference)
     go_on(course, difference)
 
 
@@ -93,10 +91,10 @@ def take_row(plan: Plan, course: Course, packed: Floats, row: Floats) -> None:
 def take_rows(plan: Plan, course: Course, rows: Floats, approx: Floats) -> None:
     """The approximations, (n_rows, n_kept), of rows in the metric."""
     n_kept = len(course.kept)
-    packed, difference = np.empty((1, len(plan.path), 1)), np.empty(n_kept)
+    factor, difference = np.empty((1, len(plan.path))), np.empty(n_kept)
     for m in range(len(rows)):
-        factor_rows(plan, course.pose, packed, 1, 1)
-        row_out_of(plan, packed[0, :, 0], rows[m], difference)
+        factor_rows(plan, course.pose, factor, 1, 1)
+        row_out_of(plan, factor[0], rows[m], difference)
         go_on(course, difference)
         for k in range(n_kept):
             approx[m, k] = course.pose[0, course.kept[k]]

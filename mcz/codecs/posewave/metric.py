@@ -58,14 +58,11 @@ class Metric:
         )
 
     def factors(self, poses: Floats) -> Floats:
-        """What the kernels need of ``poses``, (n_poses, n_kept)."""
+        """Those of ``poses``, (n_poses, n_kept): (n_poses, n_entries)."""
         values = np.repeat(self.still[None], len(poses), axis=0)
         values[:, self.kept] = poses
-        if not len(poses):
-            return np.zeros((0, self.plan.n_entries))
-        packed: Floats = kernels().factor(self.plan, values)
-        by_pose = packed.transpose(0, 2, 1).reshape(len(packed) * packed.shape[2], packed.shape[1])
-        return np.ascontiguousarray(by_pose[: len(poses)])
+        found: Floats = kernels().factor(self.plan, values)
+        return found
 
     def empty(self) -> Floats:
         """Room for the factor of a single pose."""
@@ -73,12 +70,10 @@ class Metric:
 
     def into(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
         """Differences of values, (n_rows, n_kept), in the metric, each at the pose ``which``."""
-        result = np.empty_like(rows)
-        apply_kernels().rows_into(self.plan, factors, np.ascontiguousarray(rows), result, which)
-        return result
+        found: Floats = apply_kernels().into_metric(self.plan, factors, rows, which)
+        return found
 
     def out_of(self, factors: Floats, rows: Floats, which: Ints = ALONE) -> Floats:
         """The inverse of ``into``."""
-        result = np.empty_like(rows)
-        apply_kernels().rows_out_of(self.plan, factors, np.ascontiguousarray(rows), result, which)
-        return result
+        found: Floats = apply_kernels().out_of_metric(self.plan, factors, rows, which)
+        return found

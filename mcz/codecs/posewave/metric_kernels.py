@@ -1,11 +1,11 @@
-"""Compiled: the metric of a pose, its factor, and what the factor does to rows of values.
+"""Compiled: the metric of a pose, and its factor.
 
 SPEC.md, "Pose metric", is normative. A factor holds for each kept channel c the entries L of the
 channels above it in its block, and last 1 / root(D): G + regularization = L' D L. So a row x of
 values becomes y = root(D) L x, of which one step is one step of the points' mean squared error.
 
-Poses and rows go through in batches of ``LANES``, see ``pose_kernels``. A batch of one has kernels
-of its own; both give the same bits.
+Poses go through in batches of ``LANES``, see ``pose_kernels``. A single pose has a kernel of its
+own; both give the same bits. What a factor does to rows of values: ``apply_kernels``.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ Row = tuple[Floats, Floats]  # (MAX_PATH, width): entries of G, last 1 / D; and 
 
 LANES = 8
 GREATEST = 2.0**120  # of entries of the metric, whose products then stay finite
-GREATEST_VALUE = 2.0**100  # of what comes back
 
 # A power of 4, that of which 1 / root is taken off, and the root itself.
 OCTAVES = tuple((2.0 ** (2 * n), 2.0 ** (-2 * n), 2.0**-n) for n in (64, 32, 16, 8, 4, 2, 1))
@@ -28,95 +27,33 @@ LIFT, LIFT_ROOT = 2.0**102, 2.0**51
 HALF_ROOT = 0.7071067811865476
 
 
-def factor(plan: Plan, values: Floats, n_poses: int | None = None) -> Floats:
-    """The factors at poses ``values`` (at least 1, n_channels), packed for batches.
-
-    (n_batches, n_entries, LANES), pose n in batch n // LANES; (n_poses, n_entries, 1) where there
-    is a single pose. With ``n_poses`` the last of the poses goes on up to that number.
-    """
-    if values.shape[1] != plan.n_channels or not len(values):
+def factor(plan: Plan, values: Floats) -> Floats:
+    """The factors at poses ``values`` (n_poses, n_channels): (n_poses, n_entries)."""
+    if values.shape[1] != plan.n_channels:
         raise ValueError(f"poses of shape {values.shape} for {plan.n_channels} channels")
-    n_poses = n_poses or len(values)
-    width = 1 if n_poses == 1 else LANES
-    packed = np.empty((-(-n_poses // width), plan.n_entries, width))
-    if width == 1:
-        factor_one(plan, values, packed)
+    found = np.empty((len(values), plan.n_entries))
+    if len(values) == 1:
+        factor_one(plan, values, found)
     else:
-        factor_batches(plan, values, packed)
-    return packed
-
-
-def to_metric(plan: Plan, packed: Floats, rows: Floats, repeat: int = 1) -> Floats:
-    """Rows of values, (n_rows, n_kept), in the metric: row n by the pose n // ``repeat``.
-
-    There must be a pose for each row.
-    """
-    _check(plan, packed, rows, repeat)
-    result = np.empty_like(rows)
-    if packed.shape[2] == 1:
-        into_one(plan, packed, rows, result, repeat)
-    else:
-        into_batches(plan, packed, rows, result, repeat)
-    return result
-
-
-def from_metric(plan: Plan, packed: Floats, rows: Floats, repeat: int = 1) -> Floats:
-    """The inverse of ``to_metric``, which never comes to more than 2^100."""
-    _check(plan, packed, rows, repeat)
-    result = np.empty_like(rows)
-    if packed.shape[2] == 1:
-        out_of_one(plan, packed, rows, result, repeat)
-    else:
-        out_of_batches(plan, packed, rows, result, repeat)
-    return result
-
-
-def _check(plan: Plan, packed: Floats, rows: Floats, repeat: int) -> None:
-    n_batches, n_entries, width = packed.shape
-    if rows.shape[1] != plan.n_kept or n_entries != plan.n_entries:
-        raise ValueError(f"rows of {rows.shape[1]} values for {plan.n_kept} channels")
-    if len(rows) > n_batches * width * repeat:
-        raise ValueError(f"{len(rows)} rows for {n_batches} batches of poses")
+        factor_batches(plan, values, found, LANES)
+    return found
 
 
 @kernel
-def factor_batches(plan: Plan, values: Floats, packed: Floats) -> None:
-    """Fill ``packed`` (n_batches, n_entries, LANES)."""
-    factor_rows(plan, values, packed, LANES, packed.shape[2])
+def factor_batches(plan: Plan, values: Floats, factors: Floats, lanes: int) -> None:
+    """Fill ``factors`` (n_poses, n_entries); ``lanes`` is ``LANES``."""
+    factor_rows(plan, values, factors, LANES, lanes)
 
 
 @kernel
-def factor_one(plan: Plan, values: Floats, packed: Floats) -> None:
-    """The same of poses one by one: ``packed`` (n_poses, n_entries, 1)."""
-    factor_rows(plan, values, packed, 1, 1)
-
-
-@kernel
-def into_batches(plan: Plan, packed: Floats, rows: Floats, result: Floats, repeat: int) -> None:
-    """Fill ``result`` (n_rows, n_kept) with ``rows`` in the metric."""
-    _into_metric(plan, packed, rows, result, repeat, LANES, packed.shape[2])
-
-
-@kernel
-def into_one(plan: Plan, packed: Floats, rows: Floats, result: Floats, repeat: int) -> None:
-    """The same where poses are one by one."""
-    _into_metric(plan, packed, rows, result, repeat, 1, 1)
-
-
-@kernel
-def out_of_batches(plan: Plan, packed: Floats, rows: Floats, result: Floats, repeat: int) -> None:
-    """Fill ``result`` (n_rows, n_kept) with what ``rows`` are in the metric."""
-    _out_of_metric(plan, packed, rows, result, repeat, LANES, packed.shape[2])
-
-
-@kernel
-def out_of_one(plan: Plan, packed: Floats, rows: Floats, result: Floats, repeat: int) -> None:
-    """The same where poses are one by one."""
-    _out_of_metric(plan, packed, rows, result, repeat, 1, 1)
+def factor_one(plan: Plan, values: Floats, factors: Floats) -> None:
+    """The same of poses one by one."""
+    factor_rows(plan, values, factors, 1, 1)
 
 
 @inner
-def factor_rows(plan: Plan, values: Floats, packed: Floats, width: int, lanes: int) -> None:
+def factor_rows(plan: Plan, values: Floats, factors: Floats, width: int, lanes: int) -> None:
+    n_poses, n_entries = factors.shape
     n_joints, n_turns, n_kept = len(plan.parents), len(plan.turns), len(plan.joints)
     angles, cosines = np.empty((n_turns, width)), np.empty((n_turns, width))
     axes, origins = np.empty((n_joints + 1, 9, width)), np.empty((n_joints + 1, 3, width))
@@ -125,18 +62,22 @@ def factor_rows(plan: Plan, values: Floats, packed: Floats, width: int, lanes: i
     lanes_of = angles, cosines, scratch, axes, origins, motions
     one = np.empty((MAX_PATH, width)), np.empty((MAX_PATH, width))
     other = np.empty((MAX_PATH, width)), np.empty((MAX_PATH, width))
-    pivots = np.empty(n_kept * width)
-    for batch in range(len(packed)):
-        place_joints(plan, values, batch * width, lanes_of, lanes)
+    entries, pivots = np.empty((n_entries, width)), np.empty(n_kept * width)
+    for batch in range((n_poses + width - 1) // width):
+        first = batch * width
+        place_joints(plan, values, first, lanes_of, lanes)
         gather_inertia(plan, axes, origins, inertia, lanes)
-        _measure(plan, motions, inertia, force, packed[batch], lanes)
-        _eliminate(plan, packed[batch], one, other, pivots, width, lanes)
+        _measure(plan, motions, inertia, force, entries, lanes)
+        _eliminate(plan, entries, one, other, pivots, width, lanes)
         for at in range(n_kept * width):
             pivots[at] = inverse_root(pivots[at])
         for number in range(n_kept):
             last = plan.starts[number + 1] - 1
             for p in range(lanes):
-                packed[batch, last, p] = pivots[number * width + p]
+                entries[last, p] = pivots[number * width + p]
+        for p in range(min(lanes, n_poses - first)):
+            for at in range(n_entries):
+                factors[first + p, at] = entries[at, p]
 
 
 @inner
@@ -263,71 +204,3 @@ def inverse_root(value: float) -> float:
     for _ in (0, 1, 2, 3):
         found = found * (1.5 - 0.5 * value * found * found)
     return found * scale
-
-
-@inner
-def _into_metric(
-    plan: Plan,
-    packed: Floats,
-    rows: Floats,
-    result: Floats,
-    repeat: int,
-    width: int,
-    lanes: int,
-) -> None:
-    n_rows, n_kept = rows.shape
-    taken, total = np.empty((n_kept, width)), np.empty(width)
-    for turn in range(len(packed) * repeat):
-        batch, first = turn // repeat, turn // repeat * width * repeat + turn % repeat
-        _load(rows, first, repeat, taken, lanes)
-        for number in range(n_kept):
-            start, last = plan.starts[number], plan.starts[number + 1] - 1
-            for p in range(lanes):
-                total[p] = taken[number, p]
-            for at in range(start, last):
-                other = plan.path[at]
-                for p in range(lanes):
-                    total[p] += packed[batch, at, p] * taken[other, p]
-            for p in range(lanes):
-                if first + p * repeat < n_rows:
-                    result[first + p * repeat, number] = total[p] / packed[batch, last, p]
-
-
-@inner
-def _out_of_metric(
-    plan: Plan,
-    packed: Floats,
-    rows: Floats,
-    result: Floats,
-    repeat: int,
-    width: int,
-    lanes: int,
-) -> None:
-    n_rows, n_kept = rows.shape
-    taken, total = np.empty((n_kept, width)), np.empty(width)
-    for turn in range(len(packed) * repeat):
-        batch, first = turn // repeat, turn // repeat * width * repeat + turn % repeat
-        _load(rows, first, repeat, taken, lanes)
-        for number in range(n_kept):
-            start, last = plan.starts[number], plan.starts[number + 1] - 1
-            for p in range(lanes):
-                total[p] = taken[number, p] * packed[batch, last, p]
-            for at in range(start, last):
-                other = plan.path[at]
-                for p in range(lanes):
-                    total[p] -= packed[batch, at, p] * taken[other, p]
-            for p in range(lanes):
-                taken[number, p] = min(max(total[p], -GREATEST_VALUE), GREATEST_VALUE)
-        for p in range(lanes):
-            if first + p * repeat < n_rows:
-                for number in range(n_kept):
-                    result[first + p * repeat, number] = taken[number, p]
-
-
-@inner
-def _load(rows: Floats, first: int, repeat: int, taken: Floats, lanes: int) -> None:
-    """Rows of values to lanes; after the last row, the last again."""
-    for p in range(lanes):
-        row = min(first + p * repeat, len(rows) - 1)
-        for number in range(len(taken)):
-            taken[number, p] = rows[row, number]

@@ -140,6 +140,7 @@ def decode(
     if request.groups and set(request.groups) <= set(fields.exact_groups):
         return decode_exact(layout, spans, request, fetch, NAME)
     columns = [column for group in request.groups for column in layout.groups[group]]
+    whole = columns == list(range(layout.n_channels))
     out = np.zeros((request.stop - request.start, len(columns)))
     if not columns:
         return out
@@ -154,9 +155,8 @@ def decode(
         values = decode_one([fetch(index, resolution, lossy[0]) for resolution in stored], span)
         start, stop = max(span.first, request.start), min(span.stop, request.stop)
         if start < stop:
-            out[start - request.start : stop - request.start] = values[
-                start - span.first : stop - span.first, columns
-            ]
+            rows = values[start - span.first : stop - span.first]
+            out[start - request.start : stop - request.start] = rows if whole else rows[:, columns]
     return out
 
 

@@ -71,7 +71,7 @@ class Plan(NamedTuple):
 
     @property
     def n_entries(self) -> int:
-        """Numbers of a packed factor."""
+        """Numbers of a factor."""
         return len(self.path)
 
 

@@ -85,12 +85,12 @@ class Walk:
     def code_coarsest(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
         """Level 0, a row at a time: ``code`` gives what a decoder will have of it."""
         course, steps = self.course, self.steps(level, exponents)
-        packed = self.metric.empty()
+        factor = self.metric.empty()
         self.approx = np.empty((len(rows), len(self.kept)))
         for m, row in enumerate(rows):
-            kernels().next_factor(self.metric.plan, course, packed)
-            wanted = self.metric.into(packed, (row - course.expected)[None]) / steps[m]
-            kernels().take_row(self.metric.plan, course, packed, code(m, wanted) * steps[m])
+            kernels().next_factor(self.metric.plan, course, factor)
+            wanted = self.metric.into(factor, (row - course.expected)[None]) / steps[m]
+            kernels().take_row(self.metric.plan, course, factor, code(m, wanted) * steps[m])
             self.approx[m] = course.pose[0, self.kept]
 
     def take_coarsest(self, level: int, rows: Floats, exponents: Ints) -> None:
