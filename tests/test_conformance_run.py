@@ -246,7 +246,7 @@ WRONG = {
 @pytest.mark.parametrize("fault", WRONG)
 def test_a_fault_has_a_name(tmp_path: Path, fault: str, serve: list[str]) -> None:
     edit, kind = WRONG[fault]
-    limits = ["--timeout", "10" if fault == "hangs" else "60", "--memory", "200", "--jobs", "2"]
+    limits = ["--timeout", "5" if fault == "hangs" else "60", "--memory", "200", "--jobs", "2"]
     command = decoder(tmp_path, edit)
     code, document = result("--decoder", command, "--only", "raw", *limits, *serve)
     assert code == 1

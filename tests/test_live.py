@@ -582,9 +582,9 @@ def test_the_index_must_say_what_the_packet_says() -> None:
 # Long and cut off --------------------------------------------------------------
 
 
-def test_a_hundred_thousand_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("n", [20_000, pytest.param(100_000, marks=pytest.mark.long)])
+def test_many_frames(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is decoded twice, or kept for each frame beside its row in the index."""
-    n = 100_000
     values = np.random.default_rng(3).integers(-9, 9, (n, 10)).cumsum(axis=0) / 8
     data = live(values, every=240)
     pushes = 0

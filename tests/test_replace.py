@@ -530,14 +530,9 @@ def test_a_stranger_among_copies() -> None:
     assert lossless.CODEC.regroup is not None
 
 
-def test_edited_quality_adds_the_codec(tmp_path: Path) -> None:
-    from mcz.editing.recoding import recode
-
-    data = written(smooth(30), "qbc")
-    with mcz.open(data) as file:
-        recoded = recode(only(file), "knee", np.zeros(30), False)
-    record = edited_quality({}, recoded)
-    assert record["codec"] == "qbc" and record["edit-joints"] == "knee"
+def test_edited_quality_adds_the_codec() -> None:
+    record = edited_quality({"edit-joints": "hip"}, "qbc", "knee", {"mse": "1"})
+    assert record == {"codec": "qbc", "edit-joints": "hip,knee", "edit_mse": "1"}
 
 
 def run(*arguments: Any) -> int:

@@ -311,6 +311,20 @@ def test_a_setting_that_is_refused_as_too_fine_is_no_answer() -> None:
     assert reached == 1 / found <= 100 and found >= 0.01
     with pytest.raises(mcz.MotionError):
         searched(lambda t: figure(t / 1e5), 1000.0, falls=True)
+    with pytest.raises(mcz.OptionError, match="figure 1e-05 cannot be met: a coefficient exceeds"):
+        searched(lambda t: 1 / figure(t), 1e-5, falls=False)
+
+
+def test_a_figure_that_stays_is_not_followed_to_the_end() -> None:
+    asked = []
+
+    def figure(t: float) -> float:
+        asked.append(t)
+        return 100.0
+
+    with pytest.raises(mcz.OptionError, match="cannot be met: T_g .* gives 100"):
+        searched(figure, 10.0, falls=True)
+    assert len(asked) <= 5
 
 
 def test_errors_of_the_codec_come_through() -> None:

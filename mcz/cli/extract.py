@@ -50,6 +50,12 @@ if TYPE_CHECKING:
 @click.option(
     "--frames", metavar="A:B", callback=to_frames, help="Keep frames A <= f < B, counted from 0."
 )
+@click.option(
+    "--recode",
+    is_flag=True,
+    help="Decode joints that are coded together with others, and code them anew, with another "
+    "small error. Default: such joints are refused.",
+)
 @clips_option
 @salvage_option
 @copies_option("where IN.mcz has some")
@@ -62,6 +68,7 @@ def command(
     resolution: int,
     joints: str | None,
     frames: tuple[int, int | None] | None,
+    recode: bool,
     clips: tuple[str, ...],
     salvage: bool,
     copies: bool | None,
@@ -72,8 +79,9 @@ def command(
     """Cut frames, joints or the finest resolutions out of IN.mcz, without re-encoding.
 
     Streams are copied byte for byte, so the values of OUT.mcz are those that IN.mcz gives for the
-    same frames, joints and resolution. Its quality record says what was cut. With --salvage IN.mcz
-    may be damaged, if not in what is cut out; mcz repair takes out all that is whole.
+    same frames, joints and resolution; some codecs code all joints in one, see --recode. Its
+    quality record says what was cut. With --salvage IN.mcz may be damaged, if not in what is cut
+    out; mcz repair takes out all that is whole.
     """
     import mcz
 
@@ -92,6 +100,7 @@ def command(
             force=force,
             max_decoded=max_decoded,
             copies=copies,
+            recode=recode,
             progress=progress,
         )
     if as_json:
@@ -118,4 +127,6 @@ def _parts(clip: ExtractedClip) -> Iterator[str]:
         yield f"joints {' '.join(clip.joints)}"
     if clip.resolution:
         yield f"resolution {clip.resolution}"
+    if clip.recoded:
+        yield "coded anew"
     yield f"data {clip.data_bytes:,} of {clip.data_bytes_before:,} bytes"

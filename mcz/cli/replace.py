@@ -47,6 +47,12 @@ if TYPE_CHECKING:
 @click.option(
     "--on-grid", is_flag=True, help="Round to what the source prints. Default: every digit is kept."
 )
+@click.option(
+    "--recode",
+    is_flag=True,
+    help="Where all joints are coded in one, decode the clip and code it anew, so that others "
+    "change a little. Default: such a clip is refused.",
+)
 @copies_option("where IN.mcz has some")
 @force_option
 @json_option
@@ -58,6 +64,7 @@ def command(
     name: str | None,
     in_place: bool,
     on_grid: bool,
+    recode: bool,
     copies: bool | None,
     force: bool,
     as_json: bool,
@@ -92,14 +99,19 @@ def command(
                 output,
                 on_grid=on_grid,
                 copies=copies,
+                recode=recode,
                 force=force,
                 progress=progress,
             )
     if as_json:
         print_json({"output": shown, **asdict(found)})
         return Exit.FINE
-    line = f"{shown}: {found.size:,} bytes; {found.joint} of {found.clip}: {found.joint_bytes:,}"
+    coded = f"{found.joint} of {found.clip}" + (", coded anew" if found.anew else "")
+    line = f"{shown}: {found.size:,} bytes; {coded}: {found.joint_bytes:,}"
     echo(f"{line} of {found.joint_bytes_before:,} bytes, {found.codec}")
+    if found.anew:
+        off = f"{found.max_error:.3g}, others by {found.others_error:.3g}"
+        echo(f"  off by at most, in units of the source: {found.joint} by {off}")
     if found.n_exceptions or found.n_exceptions_before:
         before = f"{found.n_exceptions_before:,} before"
         line = f"  {plural(found.n_exceptions, 'number')} of the joint off the grid, {before}"

@@ -300,6 +300,12 @@ class Codec:
         """Whether it has a parameter of that name."""
         return any(parameter.name == name for parameter in self.parameters)
 
+    def settings(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """``options`` as a quality record has them, without inner ones."""
+        known = {parameter.name: parameter for parameter in (*self.parameters, *TARGETS)}
+        shown = {name: known[name].shown(value) for name, value in options.items()}
+        return {name: value for name, value in shown.items() if not known[name].inner}
+
     def options(self, given: Mapping[str, Any], *, inner: bool = False) -> dict[str, Any]:
         """All parameters, those given checked; raises OptionError for an unknown or bad one.
 

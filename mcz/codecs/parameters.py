@@ -20,6 +20,8 @@ class Parameter:
     """One parameter of a codec, as ``--param name=value`` gives it.
 
     ``inner``: it is found by a search for a target; nobody is told of it, and no record names it.
+    ``show`` gives the text from which ``parse`` makes a value (None: numbers or words as they are,
+    with commas between several).
     """
 
     name: str
@@ -27,6 +29,11 @@ class Parameter:
     help: str
     parse: Callable[[Any], Any]
     inner: bool = False
+    show: Callable[[Any], str] | None = None
+
+    def shown(self, value: Any) -> Any:
+        """A value as a record is given it."""
+        return value if self.show is None or value is None else self.show(value)
 
     @property
     def range(self) -> str:

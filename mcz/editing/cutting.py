@@ -21,6 +21,7 @@ from mcz.reading.joints import Chosen, Joints, joint_list
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build, parse
 
+ANEW = "recode (--recode) codes them anew, with another small error"
 WITHOUT_SOURCE = "the source file was left out when joints were cut"
 WITHOUT_CHANNELS = "the channels of other joints were cut"
 
@@ -51,7 +52,10 @@ class SignalCut:
 
 @dataclass(frozen=True, slots=True)
 class ClipCut:
-    """What is left of one clip: frames start <= f < stop, these joints (None: all)."""
+    """What is left of one clip: frames start <= f < stop, these joints (None: all).
+
+    ``signals`` are empty where it is coded ``anew``.
+    """
 
     clip: Clip
     start: int
@@ -59,6 +63,7 @@ class ClipCut:
     joints: frozenset[int] | None
     resolution: int
     signals: tuple[SignalCut, ...]
+    anew: bool = False  # what is left is decoded and coded again
 
     @property
     def n_frames(self) -> int:
@@ -87,8 +92,12 @@ def plan_cut(
     frames: tuple[int, int | None] | None,
     joints: Joints,
     resolution: int,
+    anew: bool = False,
 ) -> ClipCut:
-    """What is left of ``clip``; raises OptionError or MotionError where it cannot be cut so."""
+    """What is left of ``clip``; raises OptionError or MotionError where it cannot be cut so.
+
+    With ``anew`` joints may be chosen that are coded in one group with others.
+    """
     start, stop = frames if frames is not None else (0, None)
     stop = clip.n_frames if stop is None else stop
     if not 0 <= start <= stop <= clip.n_frames:
@@ -101,6 +110,8 @@ def plan_cut(
         )
     kept = None if joints is None else _kept_joints(clip, joints)
     cut = ClipCut(clip, start, stop, kept, resolution, ())
+    if kept is not None and anew and not _is_of_groups(clip, kept):
+        return replace(cut, anew=True)
     signals = []
     for info in clip.signals:
         groups = tuple(range(info.counts.n_groups))
@@ -128,6 +139,13 @@ def joint_of_column(skeleton: Skeleton) -> list[int]:
     return [index for index, joint in enumerate(skeleton.joints) for _ in joint.channels]
 
 
+def _is_of_groups(clip: Clip, joints: frozenset[int]) -> bool:
+    """Whether no group has channels of these joints and of others."""
+    owners = joint_of_column(clip.skeleton)
+    groups = [{owners[c] in joints for c in group} for group in clip.signals[0].layout.groups]
+    return all(len(group) < 2 for group in groups)
+
+
 def _kept_groups(clip: Clip, info: SignalInfo, joints: frozenset[int]) -> tuple[int, ...]:
     owners, groups = joint_of_column(clip.skeleton), []
     for number, columns in enumerate(info.layout.groups):
@@ -137,7 +155,7 @@ def _kept_groups(clip: Clip, info: SignalInfo, joints: frozenset[int]) -> tuple[
             names = clip.skeleton.addresses()
             raise OptionError(
                 f"clip {clip.name!r}: joint {names[min(inside)]} cannot be cut out, its channels "
-                f"are coded in one group with those of {names[min(outside)]}"
+                f"are coded in one group with those of {names[min(outside)]}; {ANEW}"
             )
         if inside:
             groups.append(number)

@@ -1,15 +1,15 @@
 """``extract``: frames, joints and coarser resolutions cut out of the stored bytes of a file.
 
-Streams are copied byte for byte, never encoded anew. SPEC.md, "Cutting without re-encoding", is
-normative.
+Streams are copied byte for byte, SPEC.md, "Cutting without re-encoding"; only where a caller allows
+it is what cannot be cut coded anew (``anew.py``).
 """
 
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, BinaryIO
 
 from mcz.brief import brief
@@ -28,6 +28,14 @@ from mcz.container.reader import Container
 from mcz.container.value_hash import ValueDigest, value_hash
 from mcz.container.writer import Writer, payload_id
 from mcz.editing.ancillary import inside
+from mcz.editing.anew import (
+    OF_JOINTS,
+    check_anew,
+    joints_alone,
+    settings_of_joints,
+    write_anew,
+)
+from mcz.editing.cut_quality import cut_quality, recoded_quality
 from mcz.editing.cutting import (
     WITHOUT_SOURCE,
     ClipCut,
@@ -53,6 +61,7 @@ class ExtractedClip:
     """What was cut: frames a <= f < b of a clip, joints (None: all), finest resolutions.
 
     ``stored_frames`` are those whose bytes were copied; the two sizes are of whole DATA payloads.
+    ``recoded``: it was decoded and coded anew.
     """
 
     name: str
@@ -62,6 +71,7 @@ class ExtractedClip:
     stored_frames: int
     data_bytes: int
     data_bytes_before: int
+    recoded: bool = False
 
     __repr__ = brief
 
@@ -89,6 +99,7 @@ def extract(
     force: bool = False,
     max_decoded: int | None = None,
     copies: bool | None = None,
+    recode: bool = False,
     progress: Progress | None = None,
 ) -> Extraction:
     """Write what is left of the MCZ file ``source`` when all else is cut, without re-encoding.
@@ -99,6 +110,8 @@ def extract(
     ``salvage``: the file may be damaged, but not in what is taken out.
     ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
     ``copies``: as ``mcz.write`` has it; None: where ``source`` has some.
+    ``recode``: joints that a codec codes in one group with others are decoded and coded anew, as
+    the clip was; by default they are refused.
     Raises OptionError or MotionError for what cannot be cut so, and where the target is the source;
     FormatError for bad bytes; nothing is left under the target's name then.
     """
@@ -110,7 +123,10 @@ def extract(
         clips = list(file.clips.values()) if names is None else file.clips_called(names)
         if not clips:
             raise OptionError(f"{file.name} has no clip to extract from")
-        cuts = [plan_cut(one, frames, joints, resolution) for one in clips]
+        cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]
+        for cut in cuts:
+            if cut.anew:
+                check_anew(cut.clip)
         with replacing(target, force=force, inputs=(source,)) as stream:
             copier = Copier(file, stream, progress, copies)
             return copier.run(cuts, alone=names is not None)
@@ -214,6 +230,9 @@ class Copier:
 
     def clip(self, cut: ClipCut) -> None:
         """Write one clip."""
+        if cut.anew:
+            self._anew(cut)
+            return
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
         fields = self.container.clip(row)
         payload = self.skeleton(clip.skeleton_id)
@@ -236,6 +255,32 @@ class Copier:
         extension = b"" if cend is None else bytes(cend.extension)
         self.writer.end_clip(cut.n_frames, source, hashes, extension)
         self._quality(cut, row)
+        self._note(cut)
+
+    def _anew(self, cut: ClipCut) -> None:
+        """Write what is left of a clip, decoded and coded anew."""
+        clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
+        self.skeleton(clip.skeleton_id)
+        old = clip.quality or {}
+        motion = replace(joints_alone(cut), name=self.name_of(cut))
+        record = write_anew(
+            self.writer,
+            motion,
+            clip,
+            settings_of_joints(clip),
+            partial(recoded_quality, cut, old),
+            self.progress,
+        )
+        for name in OF_JOINTS:
+            if f"param.{name}" in old and f"param.{name}" not in record:
+                said = f"its {name}, which other joints have a part in"
+                self.found.left_out.append(f"clip {clip.name}: {said}")
+        if clip.source is not None:
+            self.found.left_out.append(f"clip {clip.name}: its source file, as joints were cut")
+        self.inside(row)
+        for chunk in row.ancillary:
+            if chunk.type != b"QUAL":
+                self.ancillary(read_chunk(self.container.source, chunk.offset))
         self._note(cut)
 
     def name_of(self, cut: ClipCut) -> str:
@@ -335,19 +380,22 @@ class Copier:
 
     def _note(self, cut: ClipCut) -> None:
         written = self.writer.directory.clips[self.name_of(cut)].segments
-        rows = [row for part in cut.signals for row in part.rows]
-        before = [row for part in cut.signals for row in part.info.rows]
-        part = cut.signals[0]
-        assert sum(row.header.n_frames for row in rows) == sum(r.header.n_frames for r in written)
+        before = [row for info in cut.clip.signals for row in info.rows]
+        stored = cut.n_frames
+        if not cut.anew:
+            stored += cut.signals[0].skip + cut.signals[0].spare
+            n_frames = sum(row.header.n_frames for part in cut.signals for row in part.rows)
+            assert n_frames == sum(row.header.n_frames for row in written)
         self.found.clips.append(
             ExtractedClip(
                 cut.clip.name,
                 (cut.start, cut.stop),
                 cut.names,
                 cut.resolution,
-                part.skip + cut.n_frames + part.spare,
+                stored,
                 sum(row.size for row in written),
                 sum(row.size for row in before),
+                cut.anew,
             )
         )
 
@@ -368,32 +416,3 @@ class Copier:
             elif alone:
                 continue
             self.writer.alias(name, of, target)
-
-
-def cut_quality(cut: ClipCut, old: dict[str, str]) -> list[dict[str, str]]:
-    """The entries of the quality record of a cut clip; ``old`` are those of the clip it came from.
-
-    Where these say of a former cut what cannot be, it is taken for none.
-    """
-    now = {key: value for key, value in old.items() if key.startswith("cut-")}
-    if cut.resolution:
-        before = _first_number(old.get("cut-resolution", ""), 1)
-        now["cut-resolution"] = str(before + cut.resolution)
-    if not cut.has_all_frames:
-        start = _first_number(old.get("cut-frames", ""), 2)
-        now["cut-frames"] = f"{start + cut.start}:{start + cut.stop}"
-    if cut.names is not None:
-        now["cut-joints"] = ",".join(cut.names)
-    for key, value in old.items():
-        if key.startswith(("param.", "uncut_")) or key in ("codec", "edit-joints"):
-            now[key] = value
-        elif not key.startswith("cut-"):
-            now[f"uncut_{key}"] = value
-    return [{"key": key, "value": value} for key, value in now.items()]
-
-
-def _first_number(text: str, count: int) -> int:
-    """The first of ``count`` numbers with colons between them, 0 where the text is another."""
-    words = text.split(":")
-    good = len(words) == count and all(re.fullmatch("[0-9]{1,16}", word) for word in words)
-    return int(words[0]) if good else 0

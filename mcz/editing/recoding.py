@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Request
 from mcz.codecs.parameters import TARGETS
-from mcz.editing.cutting import joint_of_column
+from mcz.editing.cutting import ANEW, joint_of_column
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
@@ -55,17 +55,16 @@ class Recoded:
         return notes, masks
 
 
-def recode(clip: Clip, joint: int | str, values: Any, on_grid: bool) -> Recoded:
+def recode_joint(clip: Clip, joint: int | str, values: Any, on_grid: bool) -> Recoded:
     """Code the joint anew, and decode it again.
 
     Raises OptionError for what cannot be edited, MotionError for values that do not suit.
     """
     info = clip.signals[0]
-    index, groups = _groups_of(clip, info, joint)
-    columns = list(clip.skeleton.columns(index))
-    before = clip.motion()
-    given = _checked(clip, columns, values)
-    signal = _edited(clip, before, columns, given, on_grid)
+    groups = _groups_of(clip, info, joint)
+    edited = edit(clip, joint, values, on_grid)
+    columns, motion = list(clip.skeleton.columns(edited.joint)), edited.motion
+    signal = motion.signals[0]
     source = _source_of(clip, info, signal)
     reader = SignalReader(clip.container, info, tuple(range(len(info.layout.groups))), 0, clip.name)
     dependents = _dependents(info, groups, reader)
@@ -76,10 +75,10 @@ def recode(clip: Clip, joint: int | str, values: Any, on_grid: bool) -> Recoded:
     n_segments = range(len(info.rows))
     n_resolutions = range(info.counts.n_resolutions)
     with np.errstate(invalid="ignore"):  # infinities
-        difference = np.abs(decoded.masked()[:, columns] - given)
+        difference = np.abs(decoded.masked()[:, columns] - edited.given)
     return Recoded(
         info=info,
-        joint=index,
+        joint=edited.joint,
         groups=groups,
         others=_joints_of(clip, info, dependents),
         streams=streams,
@@ -88,19 +87,54 @@ def recode(clip: Clip, joint: int | str, values: Any, on_grid: bool) -> Recoded:
             len(reader.fetch(i, r, g)) for i in n_segments for r in n_resolutions for g in groups
         ),
         max_error=float(np.nanmax(difference, initial=0.0)),
-        given=replace(before, signals=(with_values(signal, signal.values), *before.signals[1:])),
-        decoded=replace(before, signals=(decoded, *before.signals[1:])),
+        given=replace(motion, signals=(with_values(signal, signal.values), *motion.signals[1:])),
+        decoded=replace(motion, signals=(decoded, *motion.signals[1:])),
         source=source,
     )
 
 
-def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, tuple[int, ...]]:
-    """The joint's index and its groups, which hold no channel of another joint."""
+@dataclass(frozen=True, slots=True)
+class Edited:
+    """A decoded clip, one joint of which has other values; ``given`` are these as they came."""
+
+    joint: int
+    motion: Motion
+    given: NDArray[np.float64]
+
+
+def edit(clip: Clip, joint: int | str, values: Any, on_grid: bool) -> Edited:
+    """A clip with other values for one joint; raises as ``recode_joint`` does."""
+    index = _editable(clip, joint)
+    columns = list(clip.skeleton.columns(index))
+    before = clip.motion()
+    given = _checked(clip, columns, values)
+    signal = _edited(clip, before, columns, given, on_grid)
+    return Edited(index, replace(before, signals=(signal, *before.signals[1:])), given)
+
+
+def _editable(clip: Clip, joint: int | str) -> int:
+    """The joint's index, of a clip that may be edited."""
     if clip.container.salvage:
         raise OptionError(f"clip {clip.name!r}: a file that is salvaged cannot be edited")
-    if info.channels is not None:
+    if clip.signals[0].channels is not None:
         raise OptionError(f"clip {clip.name!r}: its motion has channels of its own, no joints")
     index = clip.skeleton.find(joint)
+    if not clip.skeleton.joints[index].channels:
+        name = clip.skeleton.addresses()[index]
+        raise OptionError(f"clip {clip.name!r}: joint {name} has no channels")
+    return index
+
+
+def is_coded_with_others(clip: Clip, joint: int | str) -> bool:
+    """Whether a group of the joint's channels has channels of another one."""
+    index, owners = _editable(clip, joint), joint_of_column(clip.skeleton)
+    groups = [{owners[c] for c in group} for group in clip.signals[0].layout.groups]
+    return any(index in group and len(group) > 1 for group in groups)
+
+
+def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...]:
+    """The joint's groups, which hold no channel of another joint."""
+    index = _editable(clip, joint)
     names, owners = clip.skeleton.addresses(), joint_of_column(clip.skeleton)
     groups = []
     for number, group in enumerate(info.layout.groups):
@@ -109,15 +143,14 @@ def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, tup
             other = next(name for name in joints if name != index)
             raise OptionError(
                 f"clip {clip.name!r}: joint {names[index]} cannot be replaced alone, codec "
-                f"{info.codec.name} codes its channels in one group with those of {names[other]}"
+                f"{info.codec.name} codes its channels in one group with those of {names[other]}; "
+                f"{ANEW}"
             )
         if index in joints:
             groups.append(number)
-    if not groups:
-        raise OptionError(f"clip {clip.name!r}: joint {names[index]} has no channels")
     if info.codec.recode is None:
         raise OptionError(f"codec {info.codec.name} cannot code one joint anew")
-    return index, tuple(groups)
+    return tuple(groups)
 
 
 def _joints_of(clip: Clip, info: SignalInfo, groups: Mapping[int, Any]) -> tuple[int, ...]:

@@ -1,7 +1,7 @@
 """``replace``: one joint of a clip gets other values; no other stream of the file is touched.
 
 SPEC.md, "Replacing a joint", is normative. ``recoding.py`` codes the joint, this file writes what
-it has coded.
+it has coded. Where all joints are coded in one and a caller allows it, the clip is coded anew.
 """
 
 from __future__ import annotations
@@ -10,10 +10,14 @@ import builtins
 import dataclasses
 import hashlib
 import os
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mcz.brief import brief
 from mcz.container import payloads
@@ -22,9 +26,10 @@ from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.locks import lock
 from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
+from mcz.editing.anew import check_anew, settings_of, write_anew
 from mcz.editing.cutting import ClipCut, add_note, cut_segment, plan_cut
 from mcz.editing.extraction import Copier
-from mcz.editing.recoding import Recoded, recode
+from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
 from mcz.errors import AccessError, MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion
@@ -36,6 +41,8 @@ from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.quality import CHUNK, figures, texts_of
 
+RECODED = "edit-recoded"
+
 
 @dataclass(frozen=True, slots=True)
 class Replacement:
@@ -45,6 +52,9 @@ class Replacement:
     values as before. The two numbers of bytes are those of the joint's streams, its masks and its
     exceptions: numbers off the grid, which are counted, too. ``max_error``: how far a decoded value
     is from the one that was given, at most, in source units.
+
+    ``anew``: the whole clip was coded anew, and other joints are off by at most ``others_error``;
+    the numbers of bytes are those of the clip then.
     """
 
     clip: str
@@ -58,6 +68,8 @@ class Replacement:
     max_error: float
     left_out: tuple[str, ...]
     size: int
+    anew: bool = False
+    others_error: float = 0.0
 
     __repr__ = brief
 
@@ -72,6 +84,7 @@ def replace(
     on_grid: bool = False,
     force: bool = False,
     copies: bool | None = None,
+    recode: bool = False,
     progress: Progress | None = None,
 ) -> Replacement:
     """Give one joint of a clip other values; write the file to ``target``, by default in place.
@@ -82,6 +95,8 @@ def replace(
     The joint is coded anew with the clip's own codec and settings, all other streams are copied
     byte for byte. A lossless clip takes every number exactly, or, ``on_grid``, the nearest that its
     source would print. ``copies``: as ``mcz.write`` has it; None: where the file has some.
+    ``recode``: a clip whose codec codes all joints in one is decoded and coded anew, so that other
+    joints change a little, too; by default it is refused.
 
     Raises OptionError where the codec cannot code a joint alone, or where ``target`` is the source,
     MotionError for values that it cannot hold; the file is as it was then.
@@ -93,7 +108,11 @@ def replace(
         stream = stack.enter_context(replacing(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
         chosen = file.only_clip(clip)
-        recoded = recode(chosen, joint, values, on_grid)
+        if recode and is_coded_with_others(chosen, joint):
+            check_anew(chosen)
+            edited = edit(chosen, joint, values, on_grid)
+            return _write_anew(chosen, _AnewEditor(file, stream, chosen, edited, progress, copies))
+        recoded = recode_joint(chosen, joint, values, on_grid)
         writer = _Editor(file, stream, chosen.name, recoded, progress, copies)
         return _write(file, chosen, recoded, writer)
 
@@ -261,12 +280,104 @@ class _Editor(Copier):
                 payload = self.container.payload(records[0])
                 fields = dict(parse(payloads.QUAL, payload, records[0].label))
             old = {entry.key: entry.value for entry in fields["entries"]}
-            entries = edited_quality(old, self.recoded).items()
+            entries = self._entries(old).items()
             fields["entries"] = [{"key": key, "value": value} for key, value in entries]
             self.writer.ancillary(CHUNK, build(payloads.QUAL, fields, "quality record"))
         for chunk in row.ancillary:
             if chunk.type != CHUNK:
                 self.ancillary(read_chunk(self.container.source, chunk.offset))
+
+    def _entries(self, old: dict[str, str]) -> dict[str, str]:
+        edit, codec = self.recoded, self.recoded.info.codec
+        found = {} if codec.lossless else texts_of(figures(edit.given, edit.decoded))
+        address = edit.given.skeleton.addresses()[edit.joint]
+        return edited_quality(old, codec.name, address, found)
+
+
+class _AnewEditor(Copier):
+    """Copies a file, one clip of it decoded and, after its edit, coded anew."""
+
+    def __init__(
+        self,
+        file: File,
+        stream: BinaryIO,
+        clip: Clip,
+        edited: Edited,
+        progress: Progress | None,
+        copies: bool | None,
+    ) -> None:
+        super().__init__(file, stream, progress, copies)
+        self.edited_clip, self.edited = clip, edited
+        self.address = clip.skeleton.addresses()[edited.joint]
+        self.max_error = self.others_error = 0.0
+
+    def is_same(self, cut: ClipCut) -> bool:
+        return cut.clip.name != self.edited_clip.name
+
+    def clip(self, cut: ClipCut) -> None:
+        if self.is_same(cut):
+            super().clip(cut)
+            return
+        row = self.container.directory.clips[cut.clip.name]
+        self.skeleton(cut.clip.skeleton_id)
+        motion = self._sourced(self.edited.motion)
+        settings = settings_of(cut.clip)
+        write_anew(self.writer, motion, cut.clip, settings, self._record, self.progress)
+        self.inside(row)
+        for chunk in row.ancillary:
+            if chunk.type != CHUNK:
+                self.ancillary(read_chunk(self.container.source, chunk.offset))
+
+    def _sourced(self, motion: Motion) -> Motion:
+        """The motion with a source of its own values, or none where there can be none."""
+        if motion.source is None:
+            return motion
+        try:
+            _source_file(motion)
+        except MotionError as error:
+            metadata = dict(motion.metadata)
+            add_note(metadata, "source-note", f"the source file was left out: {error}")
+            self.found.left_out.append(f"clip {motion.name}: its source file, as {error}")
+            return dataclasses.replace(motion, source=None, metadata=metadata)
+        return dataclasses.replace(motion, source=of_no_file(motion.source))
+
+    def _record(self, now: dict[str, str], decoded: Sequence[NDArray[Any]]) -> dict[str, str]:
+        wanted = self.edited.motion.signals[0].masked()
+        with np.errstate(invalid="ignore"):  # infinities
+            difference = np.abs(decoded[0] - wanted)
+        own = np.zeros(difference.shape[1], np.bool_)
+        own[list(self.edited_clip.skeleton.columns(self.edited.joint))] = True
+        self.max_error = float(np.nanmax(difference[:, own], initial=0.0))
+        self.others_error = float(np.nanmax(difference[:, ~own], initial=0.0))
+        settings = {key: value for key, value in now.items() if key.startswith("param.")}
+        found = {k: v for k, v in now.items() if k != "codec" and k not in settings}
+        old = self.edited_clip.quality or {}
+        record = edited_quality(old, now["codec"], self.address, found)
+        record = {k: v for k, v in record.items() if not k.startswith("param.")}
+        return record | settings | {RECODED: "yes"}
+
+
+def _write_anew(clip: Clip, writer: _AnewEditor) -> Replacement:
+    before = sum(row.size for info in clip.signals for row in info.rows)
+    found = writer.run(
+        [plan_cut(one, None, None, 0) for one in writer.file.clips.values()], alone=False
+    )
+    segments = writer.writer.directory.clips[clip.name].segments
+    return Replacement(
+        clip=clip.name,
+        joint=writer.address,
+        codec=clip.codec,
+        recoded=(),
+        joint_bytes=sum(row.size for row in segments),
+        joint_bytes_before=before,
+        n_exceptions=0,
+        n_exceptions_before=0,
+        max_error=writer.max_error,
+        left_out=tuple(found.left_out),
+        size=found.size,
+        anew=True,
+        others_error=writer.others_error,
+    )
 
 
 def _source_file(motion: Motion) -> bytes:
@@ -277,18 +388,21 @@ def _source_file(motion: Motion) -> bytes:
     return data
 
 
-def edited_quality(old: dict[str, str], recoded: Recoded) -> dict[str, str]:
-    """The entries of the quality record of an edited clip; ``old`` are those of before."""
-    address = recoded.given.skeleton.addresses()[recoded.joint]
-    now = {"codec": recoded.info.codec.name}
+def edited_quality(
+    old: Mapping[str, str], codec: str, address: str, found: Mapping[str, str]
+) -> dict[str, str]:
+    """The entries of the quality record of a clip in which the joint ``address`` was edited.
+
+    ``old`` are those of before, ``found`` the figures of this edit.
+    """
+    now = {"codec": codec}
     for key, value in old.items():
         if key == "codec" or key.startswith(("param.", "cut-", "uncut_", "unedited_")):
             now[key] = value
-        elif key != "edit-joints" and not key.startswith("edit_"):
+        elif not key.startswith(("edit-", "edit_")):
             now[f"unedited_{key}"] = value
     edited = [name for name in old.get("edit-joints", "").split(",") if name]
     now["edit-joints"] = ",".join(dict.fromkeys([*edited, address]))
-    if not recoded.info.codec.lossless:
-        found = texts_of(figures(recoded.given, recoded.decoded))
-        now |= {f"edit_{key}": value for key, value in found.items()}
-    return now
+    if RECODED in old:
+        now[RECODED] = old[RECODED]
+    return now | {f"edit_{key}": value for key, value in found.items()}

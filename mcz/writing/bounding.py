@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mcz.codecs.parameters import Dial
-from mcz.errors import OptionError
+from mcz.errors import MotionError, OptionError
 from mcz.writing.trials import Floats, Target, Trials
 
 REFINEMENT = "refinement"
@@ -33,7 +33,7 @@ def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[dict[str, Any], 
         octaves = np.zeros(trial.motion.n_frames, np.int64)
         for _ in range(MOST_ROUNDS):
             found = {dial.parameter: step, REFINEMENT: octaves}
-            errors = trial.frame_errors(found)
+            errors = _errors(trial, found, target)
             if not (errors > target.limit).any():
                 reached = float(errors.max(initial=0.0))
                 return found, {"target_reached": repr(reached)}
@@ -41,6 +41,13 @@ def bounded(dial: Dial, target: Target, trial: Trials) -> tuple[dict[str, Any], 
         missed = f"{dial.parameter} {step:g} gives {errors.max():g}"
         step = max(step * FINER, dial.low)
     raise OptionError(f"{target.name} {target.limit:g} cannot be met: {missed}")
+
+
+def _errors(trial: Trials, found: dict[str, Any], target: Target) -> Floats:
+    try:
+        return trial.frame_errors(found)
+    except MotionError as error:
+        raise OptionError(f"{target.name} {target.limit:g} cannot be met: {error}") from error
 
 
 def _refined(octaves: Any, ratios: Floats) -> Any:

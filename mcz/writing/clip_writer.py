@@ -30,6 +30,8 @@ from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource, as_stored, settle
 
 Progress = Callable[[int, int, str], None]
+# (entries of a quality record, decoded values of each signal) -> its entries
+Amend = Callable[[dict[str, str], Sequence[NDArray[Any]]], dict[str, str]]
 
 
 def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
@@ -68,14 +70,16 @@ def write_clip(
     *,
     quality: bool = True,
     remarks: Mapping[str, str] = MappingProxyType({}),
+    amend: Amend | None = None,
 ) -> dict[str, str] | None:
     """Write one clip: its skeleton and template if new, CLIP, segments, CEND, quality if lossy.
 
     Returns what the quality record says, None where there is none.
 
     A lossy codec takes the motion alone; further signals stay lossless. ``remarks`` join the
-    quality record. Raises OptionError for a bad parameter or a target that nobody has met yet (see
-    ``tuning.py``), MotionError for values that the codec cannot hold.
+    quality record, ``amend`` has the last word on it. Raises OptionError for a bad parameter or a
+    target that nobody has met yet (see ``tuning.py``), MotionError for values that the codec cannot
+    hold.
     """
     options = codec.options(params, inner=True)
     if codec.dial and asked(options) and options[codec.dial.parameter] is None:
@@ -101,9 +105,9 @@ def write_clip(
     sha256 = motion.source.sha256 if motion.source else b""
     writer.end_clip(motion.n_frames, sha256, hashes)
     if quality and not codec.lossless:
-        inner = {parameter.name for parameter in codec.parameters if parameter.inner}
-        settings = {name: value for name, value in options.items() if name not in inner}
+        settings = codec.settings(options)
         record = quality_record(motion, decoded, codec.name, settings, remarks)
+        record = amend(record, decoded) if amend else record
         writer.ancillary(CHUNK, quality_payload(record))
         return record
     return None

@@ -20,17 +20,19 @@ from mcz.errors import MotionError, OptionError
 from mcz.kinematics import positions_of
 from mcz.motion import Motion
 from mcz.writing.bounding import REFINEMENT, bounded
-from mcz.writing.clip_writer import Progress, asked, write_clip
+from mcz.writing.clip_writer import Amend, Progress, asked, write_clip
 from mcz.writing.positions import as_codec_wants
 from mcz.writing.trials import Target, Trials
 from mcz.writing.weighing import QUALITY, Limits, weighted
 
+PRESET = "preset"
 GOAL = 0.985  # of a target: near enough to stop
 PROMISED = 0.97  # of a target: what is less is remarked upon
 MOST_TRIALS = 60
 MOST_TURNS = 4  # of weights and a target, each found for the other
 CLOSE = 1.00002  # between a setting that meets the target and one that does not
 GUESSED = 1.25  # from a setting that was guessed to the next
+SAME = 3  # figures in a row that do not differ: the next setting is the last of the range
 NEAR, NEIGHBORS = 1.01, 24  # where figures jump: settings tried beside the one that was found
 
 Point = tuple[float, float]  # a setting and its figure
@@ -42,6 +44,8 @@ def write_tuned(
     codec: Codec,
     params: Mapping[str, Any],
     progress: Progress | None = None,
+    *,
+    amend: Amend | None = None,
 ) -> dict[str, str] | None:
     """``write_clip``, a size or an error among ``params`` met first.
 
@@ -51,6 +55,7 @@ def write_tuned(
     options = codec.options(params)
     motion = as_codec_wants(writer, motion, codec, options)
     targets = asked(options)
+    _check_preset(codec, params, options, targets)
     if not targets and codec.promise and codec.dial and options[codec.dial.parameter] is None:
         targets = codec.promise(options)
         if motion.skeleton.unit_cm is None:
@@ -60,14 +65,26 @@ def write_tuned(
             )
     limits = options.get(QUALITY)
     if codec.dial is None or not (targets or limits):
-        return write_clip(writer, motion, codec, params, progress)
+        return write_clip(writer, motion, codec, params, progress, amend=amend)
     target = _target(motion, codec.dial, options, targets) if targets else None
     trial = Trials(motion, codec, params, writer)
     if limits:
         found, remarks = _with_quality(codec, target, trial, limits)
     else:
         found, remarks = _meet(codec, target, trial)
-    return write_clip(writer, motion, codec, {**params, **found}, progress, remarks=remarks)
+    params = {**params, **found}
+    return write_clip(writer, motion, codec, params, progress, remarks=remarks, amend=amend)
+
+
+def _check_preset(
+    codec: Codec, params: Mapping[str, Any], options: Mapping[str, Any], targets: Mapping[str, Any]
+) -> None:
+    """A preset that promises an error stands beside nothing that says another."""
+    if not (codec.promise and codec.dial) or params.get(PRESET) is None:
+        return
+    others = [*targets, *([codec.dial.parameter] if options[codec.dial.parameter] else [])]
+    if others:
+        raise OptionError(f"{PRESET} and {others[0]} are given, only one can be")
 
 
 Found = tuple[dict[str, Any], dict[str, str]]  # parameters, and what the quality record says
@@ -205,7 +222,7 @@ def _bracket(
     first_meets = found[1] <= target.limit
     falls = target.falls != dial.rises  # as the dial goes up
     upwards = first_meets != falls  # where the other side of the target lies
-    factor = GUESSED if guessed else 2.0
+    factor, same = GUESSED if guessed else 2.0, 1
     while True:
         end = dial.high if upwards else dial.low
         if setting == end:
@@ -216,11 +233,12 @@ def _bracket(
                 f"gives {found[1]:g}"
             )
         moved = setting * factor if upwards else setting / factor
-        setting = _fitting(dial, moved)
+        setting = end if same == SAME else _fitting(dial, moved)
         factor = min(factor * 2, 2.0**8)
         other = setting, _figure(dial, measure, target, setting)
         if (other[1] <= target.limit) != first_meets:
             return (found, other, False) if first_meets else (other, found, False)
+        same = same + 1 if other[1] == found[1] else 1
         found = other
 
 
@@ -230,9 +248,11 @@ def _figure(
     """The figure of a setting; one that the codec refuses as too fine has no bound on its size."""
     try:
         return measure(target, int(setting) if dial.whole else setting)
-    except MotionError:
-        if target.falls and (setting > 1 if dial.rises else setting < 1):
-            return math.inf
+    except MotionError as error:
+        if setting > 1 if dial.rises else setting < 1:
+            if target.falls:
+                return math.inf
+            raise OptionError(f"{target.name} {target.limit:g} cannot be met: {error}") from error
         raise
 
 

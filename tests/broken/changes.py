@@ -11,7 +11,7 @@ import ast
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 
-from tests.broken.marks import Slot, modules, parsed, slots
+from tests.broken.marks import Slot, modules, parsed, slots, source
 
 Changed = Iterator[ast.AST]
 _RELAXED: dict[type[ast.cmpop], type[ast.cmpop]] = {
@@ -207,7 +207,7 @@ def word(node: ast.AST) -> Changed:
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute):
         for i, arg in enumerate(node.args):
             if isinstance(arg, ast.Constant) and isinstance(arg.value, str):
-                for other in words().get((_name(node.func), i), {}):
+                for other in words(_name(node.func)).get(i, {}):
                     if other == arg.value:
                         continue
                     args = [*node.args]
@@ -216,15 +216,17 @@ def word(node: ast.AST) -> Changed:
 
 
 @cache
-def words() -> dict[tuple[str, int], dict[str, None]]:
-    """The words that each function is given anywhere, by its name and the argument."""
-    found: dict[tuple[str, int], dict[str, None]] = {}
+def words(function: str) -> dict[int, dict[str, None]]:
+    """The words that functions of this name are given anywhere, by the number of the argument."""
+    found: dict[int, dict[str, None]] = {}
     for module in modules():
+        if function not in source(module):
+            continue
         for node in ast.walk(parsed(module)):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name | ast.Attribute):
-                for i, arg in enumerate(node.args):
+                for i, arg in enumerate(node.args if _name(node.func) == function else ()):
                     if isinstance(arg, ast.Constant) and isinstance(arg.value, str):
-                        found.setdefault((_name(node.func), i), {})[arg.value] = None
+                        found.setdefault(i, {})[arg.value] = None
     return found
 
 

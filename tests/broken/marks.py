@@ -73,6 +73,8 @@ def parsed(module: str) -> ast.Module:
 
 def marks(text: str) -> Iterator[tuple[int, tuple[str, ...]]]:
     """(line of the code that is meant, ids) of each mark of a source."""
+    if not MARK.search(text):
+        return
     waiting: list[str] = []
     code = 0  # the last line with code
     for token in tokenize.generate_tokens(io.StringIO(text).readline):

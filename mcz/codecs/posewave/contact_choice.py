@@ -70,6 +70,16 @@ def parse_runs(given: Any) -> Runs:
     return runs
 
 
+def run_words(runs: Runs) -> str:
+    """
+    >>> run_words((("lfoot", 0, 0), ("rfoot", 160, 52)))
+    'lfoot,rfoot:160+52'
+    """
+    if isinstance(runs, str):
+        return runs
+    return ",".join(f"{name}:{first}+{n}" if n else name for name, first, n in runs)
+
+
 in_range("auto, or joints, each with frames (joint:first+count) or without", parse_runs)
 
 

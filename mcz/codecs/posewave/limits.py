@@ -33,3 +33,11 @@ def joint_limits(text: Any) -> tuple[tuple[str, float], ...]:
             raise OptionError(f"quality is {entry!r}: a limit must be more than 0")
         found.append((match["name"], limit))
     return tuple(found)
+
+
+def limit_words(limits: tuple[tuple[str, float], ...]) -> str:
+    """
+    >>> limit_words((("feet", 0.05), ("lhand", 2.0)))
+    'feet=0.05cm,lhand=2.0cm'
+    """
+    return ",".join(f"{name}={limit!r}cm" for name, limit in limits)

@@ -34,10 +34,10 @@ from mcz.codecs.gaps import SegmentReader
 from mcz.codecs.parameters import Dial, Parameter, choice, integer, number
 from mcz.codecs.posewave.chain import Chain
 from mcz.codecs.posewave.choices import PRESETS, Choice, choose, guess
-from mcz.codecs.posewave.contact_choice import parse_runs
+from mcz.codecs.posewave.contact_choice import parse_runs, run_words
 from mcz.codecs.posewave.exact import build_exact, cut, decode_exact, joint_words, partition
 from mcz.codecs.posewave.header import NAME, Header, parse_header
-from mcz.codecs.posewave.limits import joint_limits
+from mcz.codecs.posewave.limits import joint_limits, limit_words
 from mcz.codecs.posewave.live import LiveDecoder, LiveEncoder
 from mcz.codecs.posewave.segment import decode_segment, encode_segment
 from mcz.codecs.segments import (
@@ -224,6 +224,7 @@ CODEC = Codec(
             None,
             "feet that stand keep their place: auto, joints (lfoot,rfoot) or frames (lfoot:120+45)",
             parse_runs,
+            show=run_words,
         ),
         Parameter(
             "contact_tolerance",
@@ -236,6 +237,7 @@ CODEC = Codec(
             None,
             "mean errors of joints or groups of them, such as feet=0.5mm,head=1mm",
             joint_limits,
+            show=limit_words,
         ),
         Parameter(
             "lossless",

@@ -1,0 +1,106 @@
+"""Clips of which no joint can be taken alone, decoded and coded anew where a caller allows it.
+
+``extraction.py`` and ``replacing.py`` ask for it; SPEC.md, "Cutting without re-encoding" and
+"Replacing a joint", says what they note of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mcz.container.writer import Writer
+from mcz.editing.cutting import WITHOUT_CHANNELS, ClipCut, add_note, joint_of_column
+from mcz.editing.recoding import recorded_options
+from mcz.errors import OptionError
+from mcz.motion import Motion, Signal
+from mcz.reading.clip import Clip
+from mcz.writing.clip_writer import Amend, Progress
+from mcz.writing.tuning import write_tuned
+
+OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may not be there
+
+
+def check_anew(clip: Clip) -> None:
+    """Raise OptionError for a clip that cannot be coded anew as it was."""
+    info = clip.signals[0]
+    if info.exact:
+        raise OptionError(
+            f"clip {clip.name!r}: some of its joints are coded exactly, and would not be any more"
+        )
+    if info.codec.lossless:
+        raise OptionError(f"clip {clip.name!r}: codec {info.codec.name} cannot code a clip anew")
+    if (clip.quality or {}).get("codec") != info.codec.name:
+        raise OptionError(
+            f"clip {clip.name!r}: no quality record says how it was coded; decode it and encode it "
+            "anew"
+        )
+
+
+def settings_of(clip: Clip) -> dict[str, Any]:
+    """The settings that a clip was coded with and that are not what they are by default."""
+    codec = clip.signals[0].codec
+    usual = codec.options({})
+    found = recorded_options(codec, clip.quality or {})
+    if codec.promise:
+        found.pop("preset", None)  # the setting of the dial is what came of it
+    return {name: value for name, value in found.items() if value != usual[name]}
+
+
+def joints_alone(cut: ClipCut) -> Motion:
+    """What is left of a clip, decoded: its other joints have no channels, its source is gone."""
+    motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
+    if cut.joints is None:
+        return motion
+    owners = np.array(joint_of_column(motion.skeleton))
+    columns = np.flatnonzero(np.isin(owners, sorted(cut.joints)))
+    joints = tuple(
+        joint if index in cut.joints else replace(joint, channels=())
+        for index, joint in enumerate(motion.skeleton.joints)
+    )
+    skeleton = replace(motion.skeleton, joints=joints, base=cut.clip.skeleton_id, source=None)
+    whole = motion.signals[0]
+    signal = Signal(
+        whole.values[:, columns],
+        grids=tuple(whole.grids[column] for column in columns),
+        name=whole.name,
+        mask=None if whole.mask is None else whole.mask[:, columns],
+    )
+    metadata = dict(motion.metadata)
+    add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
+    return replace(
+        motion,
+        skeleton=skeleton,
+        signals=(signal, *motion.signals[1:]),
+        source=None,
+        metadata=metadata,
+    )
+
+
+def settings_of_joints(clip: Clip) -> dict[str, Any]:
+    """The settings of a clip that suit some of its joints alone."""
+    codec = clip.signals[0].codec
+    found = {k: v for k, v in settings_of(clip).items() if k not in OF_JOINTS}
+    # Positions of points stay what they are: with fewer of them, positions were found again.
+    return found | {"domain": "channels"} if codec.has("domain") else found
+
+
+def write_anew(
+    writer: Writer,
+    motion: Motion,
+    clip: Clip,
+    settings: Mapping[str, Any],
+    amend: Amend,
+    progress: Progress | None,
+) -> dict[str, str]:
+    """Write ``motion`` with the codec of ``clip``.
+
+    ``amend`` makes the quality record from that of this coding, which is returned.
+    """
+    codec = clip.signals[0].codec
+    record = write_tuned(writer, motion, codec, settings, progress, amend=amend)
+    assert record is not None  # the codec is lossy
+    return record

@@ -1,0 +1,53 @@
+"""What the quality record of a clip says after a cut. SPEC.md, "Cutting without re-encoding"."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mcz.editing.cutting import ClipCut
+
+
+def cut_quality(cut: ClipCut, old: Mapping[str, str]) -> list[dict[str, str]]:
+    """The entries of the quality record of a cut clip; ``old`` are those of the clip it came from.
+
+    Where these say of a former cut what cannot be, it is taken for none.
+    """
+    now = _keys(cut, old)
+    for key, value in old.items():
+        if key.startswith(("param.", "uncut_")) or key in ("codec", "edit-joints"):
+            now[key] = value
+        elif not key.startswith("cut-"):
+            now[f"uncut_{key}"] = value
+    return [{"key": key, "value": value} for key, value in now.items()]
+
+
+def recoded_quality(
+    cut: ClipCut, old: Mapping[str, str], now: dict[str, str], _: Sequence[Any]
+) -> dict[str, str]:
+    """The entries for a clip that was cut and coded anew; ``now`` are those of this coding."""
+    before = {entry["key"]: entry["value"] for entry in cut_quality(cut, old)}
+    before = {key: value for key, value in before.items() if not key.startswith("param.")}
+    return before | {"cut-recoded": "yes"} | now
+
+
+def _keys(cut: ClipCut, old: Mapping[str, str]) -> dict[str, str]:
+    """What a quality record says of a cut, of which ``old`` tells of earlier ones."""
+    now = {key: value for key, value in old.items() if key.startswith("cut-")}
+    if cut.resolution:
+        before = _first_number(old.get("cut-resolution", ""), 1)
+        now["cut-resolution"] = str(before + cut.resolution)
+    if not cut.has_all_frames:
+        start = _first_number(old.get("cut-frames", ""), 2)
+        now["cut-frames"] = f"{start + cut.start}:{start + cut.stop}"
+    if cut.names is not None:
+        now["cut-joints"] = ",".join(cut.names)
+    return now
+
+
+def _first_number(text: str, count: int) -> int:
+    """The first of ``count`` numbers with colons between them, 0 where the text is another."""
+    words = text.split(":")
+    good = len(words) == count and all(re.fullmatch("[0-9]{1,16}", word) for word in words)
+    return int(words[0]) if good else 0
