@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import io
 import os
+import signal
 import subprocess
 import sys
 import tracemalloc
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -672,3 +675,68 @@ def test_a_frame_that_is_refused_leaves_no_trace(at: int) -> None:
         values = file.clips["live"].read()
     np.testing.assert_allclose(values[:, 0], 10.0 * np.arange(6) + 5, atol=0.1)
     assert mcz.verify(data) == []
+
+
+class Interrupts:
+    """Signals an interrupt before the n-th line that is traced in the block; says if it came."""
+
+    def __init__(self, n: int) -> None:
+        self.n, self.came = n, False
+
+    def __enter__(self) -> Interrupts:
+        sys.settrace(self._call)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        sys.settrace(None)
+
+    def _call(self, frame: FrameType, *_: object) -> Any:
+        file = frame.f_code.co_filename
+        return self._line if file.endswith(("live/writer.py", "container/writer.py")) else None
+
+    def _line(self, _: FrameType, event: str, __: object) -> Any:
+        self.n -= event == "line"
+        if self.n == 0 and not self.came:
+            self.came = True
+            signal.raise_signal(signal.SIGINT)
+        return self._line
+
+
+def test_an_interrupt_before_any_line_leaves_a_whole_clip() -> None:
+    rows = frames(6)
+    n, came = 0, True
+    while came:
+        n += 1
+        out = io.BytesIO()
+        try:
+            with LiveWriter(out, skeleton(), "stairs") as live:
+                live.push(rows[0])
+                with Interrupts(n) as interrupts:
+                    for row in rows[1:3]:
+                        live.push(row)
+                    live.close()
+        except KeyboardInterrupt:
+            pass
+        came = interrupts.came
+        assert mcz.verify(out.getvalue()) == []
+        with mcz.open(out.getvalue()) as file:
+            values = file.clips["live"].read()
+            np.testing.assert_array_equal(values, rows[: len(values)])
+    assert n > 100
+    assert len(values) == 3
+
+
+def test_a_second_interrupt_does_not_wait() -> None:
+    class Stuck(io.BytesIO):
+        def write(self, data: Any, /) -> int:
+            if self.tell() > 0:
+                signal.raise_signal(signal.SIGINT)
+                signal.raise_signal(signal.SIGINT)
+            return super().write(data)
+
+    out = Stuck()
+    with pytest.raises(KeyboardInterrupt), LiveWriter(out, skeleton(), "stairs") as live:
+        live.push(frames(1)[0])
+    with pytest.raises(mcz.TruncatedError):
+        mcz.open(out.getvalue())
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -23,6 +23,7 @@ from mcz.container.segments import FRESH, MASKS, SegmentHeader
 from mcz.container.value_hash import ValueDigest
 from mcz.container.writer import Sink, Writer
 from mcz.errors import LimitError, MotionError, OptionError
+from mcz.interrupts import held
 from mcz.kinematics import point_names, point_set
 from mcz.kinematics.marker_motion import NOTE, SEPARATOR, marker_skeleton
 from mcz.kinematics.single import FramePositions
@@ -54,6 +55,7 @@ class LiveWriter:
     those of the beginning or finds them repeated there; None where that is nowhere.
 
     As a context manager it closes the clip where the block fails, too: what was written is whole.
+    An interrupt amid a frame waits until that is written; a second one leaves the clip cut off.
     """
 
     def __init__(
@@ -82,8 +84,6 @@ class LiveWriter:
         self._writer = Writer(self._outlet)
         self._is_open = self._has_data = self._is_stuck = False
         check_metadata(metadata, name)
-        self._written: tuple[bytes, bool, Mask | None, Floats] | None = None
-        self._decoded: Floats | None = None
         if base is not None:
             name_skeleton(self._writer, base)
             if skeleton.base is not None or skeleton.up_axis != base.up_axis:
@@ -148,6 +148,14 @@ class LiveWriter:
                 f"frame {self.n_frames}: values of shape {row.shape}, "
                 f"the skeleton has {self._n_channels} channels"
             )
+        with held():
+            try:
+                return self._push(row)
+            except KeyboardInterrupt:  # a second one: what was sent ends amid a frame
+                self._is_open = False
+                raise
+
+    def _push(self, row: Floats) -> Floats:
         if self._positions:
             row = self._placed(row).reshape(-1)
         known = ~np.isnan(row)
@@ -159,10 +167,12 @@ class LiveWriter:
         except LimitError:
             self._is_stuck = True
             raise
-        self._written = stream, fresh, valid, row
-        self._decoded = None
         self._outlet.send()
-        return self._settle()
+        decoded = self._decoder.push(stream, fresh)
+        self._digest.update(decoded[None], None if valid is None else valid[None])
+        self.n_frames += 1
+        self._figures.add(row, decoded)
+        return decoded if valid is None else np.where(valid, decoded, np.nan)
 
     def change(self, /, **params: Any) -> None:
         """Let parameters of the codec have other values from the next group of frames on.
@@ -174,21 +184,6 @@ class LiveWriter:
         options = self.codec.options(params)
         self._encoder.change({name: options[name] for name in params})
         self._changed |= set(params)
-
-    def _settle(self) -> Floats:
-        """Count the frame that was written, and take it into the hash and the figures.
-
-        An interrupt amid this leaves it to ``close``.
-        """
-        assert self._written is not None
-        stream, fresh, valid, row = self._written
-        if self._decoded is None:
-            self._decoded = self._decoder.push(stream, fresh)
-        decoded = self._decoded
-        self._digest.update(decoded[None], None if valid is None else valid[None])
-        self.n_frames, self._written = self.n_frames + 1, None
-        self._figures.add(row, decoded)
-        return decoded if valid is None else np.where(valid, decoded, np.nan)
 
     def _write(self, stream: bytes, fresh: bool, valid: Mask | None) -> None:
         """Write one frame, each fresh one as the first of a DATA of its own."""
@@ -217,11 +212,12 @@ class LiveWriter:
 
     def close(self) -> None:
         """Write what comes behind the frames: hash, quality record, index."""
-        if not self._is_open:
-            return
-        self._is_open = False
-        if self._written is not None:  # an interrupt came after a frame, before it was counted
-            self._settle()
+        with held():
+            if self._is_open:
+                self._is_open = False
+                self._end()
+
+    def _end(self) -> None:
         if self._has_data:
             self._writer.close_data()
         self.entry = self._outlet.size
@@ -253,15 +249,11 @@ def _coders(
 
 
 class _Outlet:
-    """Collects what is written and sends it in one call.
-
-    An interrupt may come between any two steps; what the sink took by then is not sent again.
-    """
+    """Collects what is written and sends it in one call."""
 
     def __init__(self, sink: Sink) -> None:
         self._sink = sink
         self._parts: list[bytes] = []
-        self._taken: list[int | None] = []  # bytes of them at a time; None: all there were
 
     def write(self, data: bytes, /) -> None:
         self._parts.append(data)
@@ -269,19 +261,18 @@ class _Outlet:
     @property
     def size(self) -> int:
         """The bytes that were collected and not sent."""
-        size = sum(map(len, self._parts))
-        return 0 if None in self._taken else size - sum(filter(None, self._taken))
+        return sum(map(len, self._parts))
 
     def chunks(self, kinds: Sequence[bytes]) -> bytes:
         """Those of the chunks that were collected that are of these types, in order."""
         return b"".join(part for part in self._parts if part[:4] in kinds)
 
     def send(self) -> None:
-        while self.size:  # a raw stream may take a part alone
-            left = memoryview(b"".join(self._parts))[-self.size :]
-            # One step: no interrupt comes between what the sink takes and the note of it.
-            self._taken.extend(map(self._sink.write, (left,)))  # type: ignore[arg-type]  # any buffer
-        self._parts, self._taken = [], []
+        while self._parts:
+            data = b"".join(self._parts)
+            taken = self._sink.write(data)  # a raw stream may take a part alone
+            left = b"" if taken is None else data[taken:]
+            self._parts = [left] if left else []
         flush = getattr(self._sink, "flush", None)
         if flush is not None:
             flush()
