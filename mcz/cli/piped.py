@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from io import FileIO
+from contextlib import ExitStack, contextmanager, suppress
+from io import BufferedReader, FileIO, RawIOBase
 from pathlib import Path
+from select import select
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
@@ -22,6 +23,7 @@ from mcz.cli.common import (
 )
 
 NAME = "standard input"
+PATIENCE = 0.3  # seconds of waiting for input between two looks whether there was an interrupt
 
 
 def standard_input() -> BinaryIO:
@@ -29,6 +31,31 @@ def standard_input() -> BinaryIO:
     if sys.stdin is None:
         raise Failure(f"{NAME} is closed")
     return sys.stdin.buffer
+
+
+def live_input() -> BinaryIO:
+    """Standard input of which lines are read as they come, and an interrupt is never missed."""
+    stream = standard_input()
+    raw = getattr(stream, "raw", None)
+    if raw is None or sys.platform == "win32":  # which cannot wait for a pipe
+        return stream
+    return BufferedReader(_Awaited(raw))
+
+
+class _Awaited(RawIOBase):
+    """Waits for bytes without reading: a read does not see an interrupt that came just before."""
+
+    def __init__(self, raw: FileIO) -> None:
+        self._raw = raw
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any, /) -> int | None:
+        with suppress(OSError, ValueError):  # a descriptor that cannot be waited for
+            while not select([self._raw], [], [], PATIENCE)[0]:
+                pass
+        return self._raw.readinto(buffer)
 
 
 @contextmanager
@@ -56,7 +83,7 @@ def encode_lines(
     for name in ("verbatim", "archive", "copies"):
         if options.pop(name):
             raise Failure(f"--{name} has no meaning for what is coded frame by frame", Exit.USAGE)
-    stream = standard_input()
+    stream = live_input()
     name = format_name or ("bvh" if skeleton is None else "amc")
     others = () if target in (None, "-") else (str(target),)
     with about(NAME, *others), live_output(target, force) as sink:

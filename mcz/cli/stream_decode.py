@@ -27,7 +27,7 @@ from mcz.cli.common import (
     to_rate,
 )
 from mcz.cli.options import token_option
-from mcz.cli.piped import NAME, standard_input
+from mcz.cli.piped import NAME, live_input
 from mcz.cli.rows import NUMBER, STATE
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def _stream(file: str, connect: str | None, token: str | None) -> Iterator[Binar
         with connected(connect, token) as stream:
             yield stream
     elif file == "-":
-        yield standard_input()
+        yield live_input()
     else:
         existing(file)
         with builtins.open(file, "rb") as stream:

@@ -22,7 +22,7 @@ from mcz.cli.common import (
     to_rate,
 )
 from mcz.cli.options import UNITS, force_option, param_option, token_option, up_option
-from mcz.cli.piped import NAME, live_output, standard_input
+from mcz.cli.piped import NAME, live_input, live_output
 from mcz.cli.rows import Rows, skeleton_in
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def _encode(
 
     known = None if skeleton is None else skeleton_in(skeleton)
     n_channels = None if known is None else known.n_channels
-    rows = Rows(standard_input(), binary=binary, n_channels=n_channels)
+    rows = Rows(live_input(), binary=binary, n_channels=n_channels)
     if known is None:
         known = markers(rows.names or [])
     rows.expect(known.n_channels)
