@@ -26,6 +26,7 @@ JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "fo
 DOORS = {"reading", "writing", "editing", "live", "conversion"}
 ALLOWED = {
     "jit": set(),
+    "interrupts": set(),
     "brief": set(),
     "errors": set(),
     "schema": {"errors"},
@@ -50,7 +51,7 @@ ALLOWED = {
     "writing": JOINT | {"metrics", "reading"},
     "conversion": MODEL | {"kinematics", "formats", "reading"},
     "editing": JOINT | {"metrics", "reading", "writing"},
-    "live": JOINT | {"reading", "writing"},
+    "live": JOINT | {"interrupts", "reading", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL | {"units", "kinematics", "metrics", "joint_errors", "sample", "training"} | DOORS,
     # On top of all: it measures every part by itself.

@@ -87,7 +87,8 @@ def test_groups_and_resolutions_of_codecs() -> None:
     levels = f"1 to {MAX_LEVELS + 1}"
     for row in rows_under("Codecs"):
         codec = CODECS[int(row[0])]
-        assert row[4] == ("any" if codec.domain == "ordinals" else codec.grouping)
+        groups = "any" if codec.domain == "ordinals" else codec.grouping
+        assert row[4] == groups + ("; any with exact groups" if codec.exact else "")
         by_codec = {"mrdwt": levels, "dwt": levels, "awt": levels, "qbc": "1 to 2"}
         by_codec["posewave"] = f"1 to {posewave.MAX_LEVELS + 1}"
         assert row[5] == by_codec.get(codec.name, "1")
