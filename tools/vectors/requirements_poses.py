@@ -88,7 +88,11 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "HOLD-11": ("invalid/posewave/contacts-start-*",),
     "HOLD-12": ("valid/posewave/contacts-*",),
     "HOLD-13": ("invalid/posewave/contacts-displacement-*",),
-    "HOLD-14": ("valid/posewave/contacts-ramp-*", "valid/posewave/contacts-segments"),
+    "HOLD-14": (
+        "valid/posewave/contacts-ramp-*",
+        "valid/posewave/contacts-leaning",
+        "valid/posewave/contacts-segments",
+    ),
     "HOLD-15": ("valid/posewave/contacts-*",),
 }
 

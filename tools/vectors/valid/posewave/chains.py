@@ -46,6 +46,9 @@ def _segments(shelf: Poses) -> None:
     shelf.plan("on-refining", purpose, refined, CHAINS, requests)
     coarse = replace(plan, fields={"levels": 0, "step": 2.0, "start": 1}, price=0.5)
     shelf.plan("on-zeros", "Most rows are zeros.", coarse, CHAINS, requests)
+    long = replace(plan, source=waves(64, skeleton), ends=(50,), on={1})
+    purpose = "What goes on knows more than 40 rows, and is not made to forget."
+    shelf.plan("on-after-50", purpose, long, CHAINS, [(0, (48, 56), (2,))])
     bones = biovision()
     plan = Plan(bones, waves(24, bones), {"levels": 0, "orders": [0] * 5}, (7, 9), on={1, 2})
     purpose = "Orders that are all those of the source let segments go on."

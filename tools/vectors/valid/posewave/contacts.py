@@ -89,6 +89,10 @@ def _segments(shelf: Poses) -> None:
     cut = replace(plan, cut=1, ends=(1,))
     purpose = "The finest details are not stored: contacts are in a segment of a frame alone."
     shelf.plan("contacts-cut", purpose, cut, CONTACTS)
+    short = pieces((0, 3, 20), (1, 10, 1))
+    near = Plan(skeleton, source[:30], held((2, 1), (3, 2)), price=0.5, pieces=short)
+    purpose = "A point stands for a frame where it is; then it leans by nothing, and counts."
+    shelf.plan("contacts-leaning", purpose, near, CONTACTS)
     none = replace(plan, pieces=(), ends=())
     shelf.plan("contacts-none", "Points that never stand.", none, CONTACTS)
 
