@@ -100,7 +100,7 @@ def _run(given: argparse.Namespace, other: Other, found: Comparison) -> None:
 def _hashed(data: bytes) -> bytes:
     try:
         return with_hashes(data)
-    except (MczError, AssertionError, StopIteration):
+    except (MczError, AssertionError):
         return data
 
 

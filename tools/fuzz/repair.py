@@ -255,13 +255,13 @@ def with_hashes(data: bytes, max_decoded: int | None = None) -> bytes:
     """The file with hashes of what its clips decode to and restore; raises MczError."""
     pieces = pieces_of(data)
     with mcz.open(data, max_decoded=max_decoded) as file:
-        found = iter([_hashes(clip) for clip in file.clips.values()])
+        found = {name: _hashes(clip) for name, clip in file.clips.items()}
     pending: tuple[list[bytes], bytes | None] | None = None
     for n, piece in enumerate(pieces):
         if piece.type == b"CLIP":
-            pending = next(found)
-            if pending[1] is not None:
-                fields = parse(payloads.CLIP, piece.payload, "CLIP")
+            fields = parse(payloads.CLIP, piece.payload, "CLIP")
+            pending = found.get(fields.name)  # the index may list other clips, or in another order
+            if pending is not None and pending[1] is not None and fields.source:
                 fields.source[0].size = len(pending[1])
                 pieces[n] = replace(piece, payload=build(payloads.CLIP, fields, "CLIP"))
         elif piece.type == b"CEND" and pending is not None:
