@@ -23,6 +23,7 @@ HOMES = {
     9: "spatial.mdtt",
     10: "spatial.pca_rdo",
     11: "online.online",
+    12: "lossless.best",
     13: "posewave.posewave",
 }
 

@@ -29,7 +29,7 @@ from mcz.codecs.contract import (
 from mcz.codecs.parameters import Parameter, integer
 from mcz.codecs.segments import TARGET_BYTES, Sizing, gather, guessing
 from mcz.coding.ordinals.heads import COPY, read_heads
-from mcz.coding.ordinals.streams import build_stream, parse_stream
+from mcz.coding.ordinals.streams import Own, Seen, build_stream, parse_stream
 from mcz.errors import FormatError
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
@@ -41,23 +41,40 @@ MAX_ROWS = 2**16
 SIZING = Sizing(target=TARGET_BYTES, value_bytes=2, aim=95, most_rows=MAX_ROWS, spare=1)
 
 PLAIN = Grid(GridKind.INTEGER)
+PARAMETERS = (
+    Parameter(
+        "segment_frames",
+        0,
+        "frames a segment; 0: as many as make about 62,000 bytes",
+        integer("segment_frames", 0, MAX_ROWS),
+    ),
+)
+
+# (stream, grids, rows) -> the ordinals of a group, and which of its channels copy which.
+Parse = Callable[[bytes, Sequence[Grid], int], tuple[Ints, dict[int, tuple[int, int]]]]
+Build = Callable[[Ints, Sequence[Own], int, Seen | None], bytes]  # as ``build_stream``
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
-    code = partial(_build_segment, source)
+    return encode_streams(source, params, build_stream)
+
+
+def encode_streams(source: SignalSource, params: Mapping[str, Any], build: Build) -> Encoded:
+    """The same with streams that ``build`` makes."""
+    code = partial(_build_segment, source, build)
     return Encoded(header=b"", segments=guessing(source, params["segment_frames"], SIZING, code))
 
 
-def _build_segment(source: SignalSource, start: int, stop: int) -> tuple[bytes, ...]:
+def _build_segment(source: SignalSource, build: Build, start: int, stop: int) -> tuple[bytes, ...]:
     ordinals = source.ordinals(start, stop)
     grids = source.grids(start)
-    seen: dict[bytes, tuple[int, int]] = {}
+    seen: Seen = {}
     streams = []
     for index, group in enumerate(source.layout.groups):
         columns = ordinals[:, list(group)]
         own = [(grids[c], source.layout.grids[c]) for c in group]
-        streams.append(build_stream(columns, own, index, seen))
+        streams.append(build(columns, own, index, seen))
     return tuple(streams)
 
 
@@ -73,11 +90,18 @@ def recode(
 
     What such a stream repeated, or who repeated it, need not be looked at then.
     """
+    return recode_streams(source, groups, spans, build_stream)
+
+
+def recode_streams(
+    source: SignalSource, groups: tuple[int, ...], spans: Sequence[Span], build: Build
+) -> Iterator[tuple[bytes, ...]]:
+    """The same with streams that ``build`` makes."""
     layout = source.layout
     for span in spans:
         ordinals, grids = source.ordinals(span.first, span.stop), source.grids(span.first)
         yield tuple(
-            build_stream(
+            build(
                 ordinals[:, list(layout.groups[group])],
                 [(grids[c], layout.grids[c]) for c in layout.groups[group]],
                 group,
@@ -92,8 +116,16 @@ def decode(
 ) -> Ints:
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     refuse_extras("lossless", header, layout)
+    return decode_streams(layout, spans, request, fetch, parse_stream)
+
+
+def decode_streams(
+    layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch, parse: Parse
+) -> Ints:
+    """The same of streams that ``parse`` turns into ordinals and copies."""
+    per_frame = layout.samples_per_frame
     readers = {
-        index: _Segment(layout, span.n_frames * layout.samples_per_frame, partial(fetch, index, 0))
+        index: _Segment(layout, span.n_frames * per_frame, partial(fetch, index, 0), parse)
         for index, span in enumerate(spans)
         if span.first < request.stop and request.start < span.stop
     }
@@ -103,8 +135,10 @@ def decode(
 class _Segment:
     """The groups of one segment, decoded as they are asked for."""
 
-    def __init__(self, layout: Layout, n_rows: int, stream: Callable[[int], bytes]) -> None:
-        self.layout, self.n_rows, self.stream = layout, n_rows, stream
+    def __init__(
+        self, layout: Layout, n_rows: int, stream: Callable[[int], bytes], parse: Parse
+    ) -> None:
+        self.layout, self.n_rows, self.stream, self.parse = layout, n_rows, stream, parse
         self._done: dict[int, tuple[Ints, dict[int, tuple[int, int]]]] = {}
 
     def group(self, group: int) -> Ints:
@@ -122,7 +156,7 @@ class _Segment:
         """The columns of a group that are no copies, and which are."""
         if group not in self._done:
             grids = [self.layout.grids[c] for c in self.layout.groups[group]]
-            self._done[group] = parse_stream(self.stream(group), grids, self.n_rows)
+            self._done[group] = self.parse(self.stream(group), grids, self.n_rows)
         return self._done[group]
 
 
@@ -153,12 +187,5 @@ CODEC = Codec(
     decode=decode,
     regroup=regroup,
     recode=recode,
-    parameters=(
-        Parameter(
-            "segment_frames",
-            0,
-            "frames a segment; 0: as many as make about 62,000 bytes",
-            integer("segment_frames", 0, MAX_ROWS),
-        ),
-    ),
+    parameters=PARAMETERS,
 )

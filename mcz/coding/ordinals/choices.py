@@ -87,14 +87,19 @@ def fixed_point(ordinals: Ints, shape: Lattice) -> Floats:
     return np.where(magnitudes == 0, 0.0, np.where(ordinals < 0, -sizes, sizes))
 
 
-def choose_predictor(values: Floats) -> tuple[int, tuple[int, ...], int]:
-    """(from_last, taps, scale) that predict ``values`` best; scale is the mean error there."""
+def choose_predictor(
+    values: Floats, *, fitted: bool = True
+) -> tuple[int, tuple[int, ...], int]:
+    """(from_last, taps, scale) that predict ``values`` best; scale is the mean error there.
+
+    ``fitted``: taps may be fitted to the values, too.
+    """
     before = np.concatenate([[0.0], values[:-1]])
     differences = np.clip(values - before, -(2.0**40), 2.0**40)
     lagged = np.zeros((len(values), _FITTED))
     for tap in range(_FITTED):
         lagged[tap + 1 :, tap] = differences[: max(0, len(values) - tap - 1)]
-    candidates = [*FIXED_ORDERS, *_fitted(differences, lagged)]
+    candidates = [*FIXED_ORDERS, *(_fitted(differences, lagged) if fitted else ())]
     costs, scales = [], []
     for from_last, taps in candidates:
         guess = np.floor((lagged[:, : len(taps)] @ np.array(taps, float) + 16) / 32)

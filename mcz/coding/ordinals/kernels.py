@@ -135,9 +135,11 @@ def code_steps(state: Ints, data: Bytes, steps: int, greater: int, rf: int, rs: 
 
 
 @inner
-def code_plain(state: Ints, data: Bytes, ordinal: int, plan: Ints, track: Ints, flow: Ints) -> int:
+def code_plain(
+    state: Ints, data: Bytes, ordinal: int, predicted: int, plan: Ints, track: Ints, flow: Ints
+) -> int:
     """Code an ordinal as an integer and return it; set BAD where there is no such code."""
-    predicted = clamp(predict(plan, track), -MAX_PLAIN, MAX_PLAIN)  # LOSS-25
+    predicted = clamp(predicted, -MAX_PLAIN, MAX_PLAIN)  # LOSS-25
     value = ordinal >> plan[DROP]
     scales = track[FAST], track[SLOW]
     residual = code_error(state, data, value - predicted, 0, scales, track, flow)
@@ -151,7 +153,14 @@ def code_plain(state: Ints, data: Bytes, ordinal: int, plan: Ints, track: Ints, 
 
 @inner
 def code_scaled(
-    state: Ints, data: Bytes, ordinal: int, plan: Ints, track: Ints, flow: Ints, powers: Ints
+    state: Ints,
+    data: Bytes,
+    ordinal: int,
+    predicted: int,
+    plan: Ints,
+    track: Ints,
+    flow: Ints,
+    powers: Ints,
 ) -> int:
     """Code an ordinal as class, sign and mantissa; return it, or set BAD."""
     width = DECIMAL_WIDTH if plan[BASE] == 10 else BINARY_WIDTH
@@ -162,7 +171,7 @@ def code_scaled(
     magnitude = (ordinal ^ (ordinal >> 63)) >> plan[DROP]
     shift = width - plan[TOP]
     own = (magnitude - first) // per_class + shift
-    predicted = clamp(predict(plan, track), 1 - powers[width], powers[width] - 1)
+    predicted = clamp(predicted, 1 - powers[width], powers[width] - 1)
     zero = 1 if magnitude == 0 else 0
     found = code_class(state, data, own, zero, abs(predicted), track[FAST], track[SLOW], powers)
     if found == FAULT or (found != ZERO_CLASS and not 0 <= found - shift <= plan[TOP]):  # LOSS-29
@@ -190,6 +199,27 @@ def code_scaled(
     remember(track, flow, -value if negative else value, predicted)
     magnitude = int((found - shift) * per_class + first + mantissa - low << plan[DROP])
     return -1 - magnitude if negative else magnitude
+
+
+@inner
+def code_ordinal(
+    state: Ints,
+    data: Bytes,
+    ordinal: int,
+    predicted: int,
+    plan: Ints,
+    track: Ints,
+    flow: Ints,
+    powers: Ints,
+) -> int:
+    """Code an ordinal against what is ``predicted``; return it, or set BAD."""
+    if plan[BASE] == 0:
+        found = code_plain(state, data, ordinal, predicted, plan, track, flow)
+    else:
+        base = powers[1 if plan[BASE] == 10 else 0]
+        found = code_scaled(state, data, ordinal, predicted, plan, track, flow, base)
+    flow[OTHER] = track[SIDE_1]  # LOSS-24
+    return found
 
 
 @inner
@@ -252,13 +282,9 @@ def code_rows(state: Ints, data: Bytes, ordinals: Ints, plans: Ints, powers: Int
         flow[NEAR], flow[OTHER] = 0, 3
         for channel in range(n_channels):
             plan, track, given = plans[channel], tracks[channel], ordinals[row, channel]
-            if plan[BASE] == 0:
-                found = code_plain(state, data, given, plan, track, flow)
-            else:
-                base = powers[1 if plan[BASE] == 10 else 0]
-                found = code_scaled(state, data, given, plan, track, flow, base)
+            predicted = predict(plan, track)
+            found = code_ordinal(state, data, given, predicted, plan, track, flow, powers)
             if flow[BAD]:
                 return row
             ordinals[row, channel] = found
-            flow[OTHER] = track[SIDE_1]  # LOSS-24
     return -1

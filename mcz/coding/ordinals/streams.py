@@ -6,7 +6,7 @@ SPEC.md, "Codec 1: lossless", is normative; the names below are its field names.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -38,15 +38,30 @@ Ints = NDArray[np.int64]
 PLAIN = Grid(GridKind.INTEGER)
 
 
-def build_stream(
-    ordinals: Ints,
-    grids: Sequence[tuple[Grid, Grid]],
-    group: int,
-    seen: dict[bytes, tuple[int, int]] | None,
-) -> bytes:
+Own = tuple[Grid, Grid]  # the grid in force and that of the clip
+Seen = dict[bytes, tuple[int, int]]  # the ordinals of a channel -> its group and place
+
+
+def build_stream(ordinals: Ints, grids: Sequence[Own], group: int, seen: Seen | None) -> bytes:
     """One stream: ``ordinals`` of one group, (rows, channels); grids in force and of the clip.
 
     ``seen``: where a channel was coded that a later one may repeat; None: there shall be no copies.
+    """
+    heads, plans, coded = plan_stream(ordinals, grids, group, seen)
+    return heads + (code(coded, plans) if plans else b"")
+
+
+def plan_stream(
+    ordinals: Ints,
+    grids: Sequence[Own],
+    group: int,
+    seen: Seen | None,
+    *,
+    fitted: bool = True,
+) -> tuple[bytes, list[Ints], Ints]:
+    """The heads of a stream, the plans of its coded channels and what is coded of them.
+
+    ``fitted``: predictors may have taps that are fitted to the channel.
     """
     heads, plans, coded = [], [], []
     for channel, column in enumerate(ordinals.T):
@@ -59,11 +74,12 @@ def build_stream(
         else:
             if seen is not None:
                 seen[key] = group, channel
-            head, plan, numbers = _coded_head(column, *grids[channel])
+            head, plan, numbers = _coded_head(column, *grids[channel], fitted=fitted)
             heads.append(head)
             plans.append(plan)
             coded.append(numbers)
-    return b"".join(heads) + (code(np.stack(coded, axis=1), plans) if plans else b"")
+    columns = np.stack(coded, axis=1) if coded else np.empty((len(ordinals), 0), np.int64)
+    return b"".join(heads), plans, columns
 
 
 def constant_head(ordinal: int) -> bytes:
@@ -72,14 +88,16 @@ def constant_head(ordinal: int) -> bytes:
     return bytes((CONSTANT | size << 2,)) + folded.to_bytes(size, "little")
 
 
-def _coded_head(column: Ints, grid: Grid, clip_grid: Grid) -> tuple[bytes, Ints, Ints]:
+def _coded_head(
+    column: Ints, grid: Grid, clip_grid: Grid, *, fitted: bool
+) -> tuple[bytes, Ints, Ints]:
     """The head of a coded channel, its plan for the compiled loop, and the integers to code."""
     found = find_unit(column) if grid.kind == GridKind.BINARY32 else None
     unit, column = found if found is not None else (0.0, column)
     shape = lattice(grid if found is None else PLAIN, column)
     if shape.base and shape.top > max_top(shape):
         shape = lattice(PLAIN, column)
-    from_last, taps, error = choose_predictor(fixed_point(column, shape))
+    from_last, taps, error = choose_predictor(fixed_point(column, shape), fitted=fitted)
     scale = next((q for q in range(MAX_SCALE) if scale_of(q) >= error), MAX_SCALE)
     form = form_of(shape) if found is None else MULTIPLES
     own_form = shape.drop > 0 or form != form_of_grid(clip_grid)
@@ -124,13 +142,21 @@ def code(ordinals: Ints, plans: Sequence[Ints]) -> bytes:
         size = used + 1024
 
 
+Uncode = Callable[[bytes, Sequence[Ints], int], Ints]  # bits, plans, rows -> what is coded
+
+
 def parse_stream(
-    stream: bytes, grids: Sequence[Grid], n_rows: int
+    stream: bytes, grids: Sequence[Grid], n_rows: int, uncode: Uncode | None = None
 ) -> tuple[Ints, dict[int, tuple[int, int]]]:
+    """The ordinals of a group, (n_rows, channels), and which channels are copies of which.
+
+    ``uncode``: how what follows the heads is decoded, if not as codec 1 does.
+    """
     columns = np.zeros((n_rows, len(grids)), np.int64)
     heads, end = read_heads(stream, grids)
     coded = [channel for channel, (kind, _, _) in enumerate(heads) if kind == CODED]
-    columns[:, coded] = _uncode(stream[end:], [heads[c][1][0] for c in coded], n_rows)
+    plans = [heads[channel][1][0] for channel in coded]
+    columns[:, coded] = (uncode or _uncode)(stream[end:], plans, n_rows)
     copies = {}
     for channel, (kind, found, _) in enumerate(heads):
         if kind == COPY:

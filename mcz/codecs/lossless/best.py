@@ -1,0 +1,72 @@
+"""Codec 12, ``best``: ordinals predicted by regressions that are learned while they are used.
+
+SPEC.md, "Codec 12: best", is normative; the names below are its field names.
+
+Exactness: lossless and bit-exact. Predictions are binary64 in one stated order, of ``+ - * /`` and
+rounding down alone; all else is in integers. A stream holds all channels of a segment, so that each
+can look at those before it, and needs no other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from mcz.codecs.contract import (
+    Codec,
+    Encoded,
+    Fetch,
+    Layout,
+    Request,
+    SignalSource,
+    Span,
+    refuse_extras,
+)
+from mcz.codecs.lossless import lossless
+from mcz.codecs.lossless.best_streams import build_stream, parse_stream
+from mcz.codecs.lossless.lossless import Ints
+
+
+def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
+    """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
+    return lossless.encode_streams(source, params, build_stream)
+
+
+def decode(
+    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+) -> Ints:
+    """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
+    refuse_extras("best", header, layout)  # BEST-01
+    return lossless.decode_streams(layout, spans, request, fetch, parse_stream)
+
+
+def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int]) -> bytes:
+    """``stream`` of ``group`` with its copies referring to the groups' new ``numbers``."""
+    return stream[:1] + lossless.regroup(stream[1:], layout, group, numbers)
+
+
+def recode(
+    header: bytes,
+    source: SignalSource,
+    groups: tuple[int, ...],
+    spans: Sequence[Span],
+    options: Mapping[str, Any],
+    fetch: Fetch,
+) -> Iterator[tuple[bytes, ...]]:
+    """The streams of some groups with new values, without copies."""
+    return lossless.recode_streams(source, groups, spans, build_stream)
+
+
+CODEC = Codec(
+    id=12,
+    name="best",
+    version=0,
+    domain="ordinals",
+    lossless=True,
+    grouping="all",
+    encode=encode,
+    decode=decode,
+    regroup=regroup,
+    recode=recode,
+    parameters=lossless.PARAMETERS,
+)

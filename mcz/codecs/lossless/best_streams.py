@@ -1,0 +1,147 @@
+"""The stream of a group of codec 12: heads as codec 1 has them, links, then bits.
+
+SPEC.md, "Codec 12: best", is normative; the names below are its field names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.lossless.best_choices import choose_links
+from mcz.coding.ordinals import streams
+from mcz.coding.ordinals.streams import Own, Seen, plan_stream, powers
+from mcz.coding.start import start_states
+from mcz.errors import FormatError
+from mcz.numbers import Grid
+from mcz.schema import read_varint, varint
+
+Ints = NDArray[np.int64]
+
+AS_CODEC_1, LINKED = 0, 1  # method
+MAX_UNIT = 44
+MAX_SEEN = 8
+MAX_LINKS = 4096  # in a stream, so that what is learned takes little memory
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """What a coded channel is counted in, and which coded channels before it it looks at."""
+
+    unit: int
+    reach: int
+    seen: tuple[int, ...]
+
+    def head(self) -> bytes:
+        first = bytes((self.unit, len(self.seen) | self.reach - self.unit << 4))
+        return first + b"".join(map(varint, self.seen))
+
+
+def build_stream(ordinals: Ints, grids: Sequence[Own], group: int, seen: Seen | None) -> bytes:
+    """One stream, as ``mcz.coding.ordinals.streams.build_stream``: the shorter of both methods."""
+    seen_before = None if seen is None else dict(seen)
+    heads, plans, coded = plan_stream(ordinals, grids, group, seen, fitted=False)
+    simple = streams.build_stream(ordinals, grids, group, seen_before)
+    if not plans:
+        return bytes((AS_CODEC_1,)) + simple
+    links = [Link(*link) for link in choose_links(coded, plans, MAX_LINKS)]
+    bits = code(coded, plans, links)
+    linked = heads + b"".join(link.head() for link in links) + bits
+    return min(bytes((AS_CODEC_1,)) + simple, bytes((LINKED,)) + linked, key=len)
+
+
+def parse_stream(
+    stream: bytes, grids: Sequence[Grid], n_rows: int
+) -> tuple[Ints, dict[int, tuple[int, int]]]:
+    """The ordinals of a group, (n_rows, channels), and which channels are copies of which."""
+    if not stream or stream[0] > LINKED:  # BEST-02
+        raise FormatError(f"best: method {stream[:1].hex() or 'missing'}")
+    uncode = None if stream[0] == AS_CODEC_1 else _uncode
+    return streams.parse_stream(stream[1:], grids, n_rows, uncode)
+
+
+def _uncode(data: bytes, plans: Sequence[Ints], n_rows: int) -> Ints:
+    """The numbers of the coded channels, (n_rows, len(plans))."""
+    if not plans:  # BEST-03
+        raise FormatError("best: no channel is coded, and yet the method is 1")
+    links, end = read_links(data, len(plans))
+    bits = np.frombuffer(data[end:], np.uint8).copy()
+    _, coding = loops()
+    state = start_states("best")[0].copy()  # BEST-08
+    rows = np.zeros((n_rows, len(plans)), np.int64)
+    coding.start(state, bits, 0)
+    fault = run(state, bits, rows, plans, links)
+    if fault >= 0:
+        raise FormatError(f"best: row {fault} cannot be decoded")
+    if coding.coded_size(state) != len(bits):  # BEST-09, RANGE-04
+        raise FormatError(f"best: {len(bits)} bytes, of which {coding.coded_size(state)} belong")
+    return rows
+
+
+def read_links(data: bytes, n_coded: int) -> tuple[list[Link], int]:
+    """The links of the coded channels and the offset after them."""
+    links, at, total = [], 0, 0
+    for channel in range(n_coded):
+        if at + 2 > len(data):
+            raise FormatError(f"best: the stream ends in the links, channel {channel}")
+        unit, n_seen, reach = data[at], data[at + 1] & 15, data[at + 1] >> 4
+        at += 2
+        if unit > MAX_UNIT or n_seen > MAX_SEEN:  # BEST-04, BEST-05
+            raise FormatError(f"best: a unit of 2^{unit}, {n_seen} links")
+        seen = []
+        for _ in range(n_seen):
+            other, at = read_varint(data, at)
+            seen.append(other)
+        if any(other >= channel for other in seen):  # BEST-06
+            raise FormatError(f"best: coded channel {channel} looks at {seen}")
+        total += n_seen
+        links.append(Link(unit, unit + reach, tuple(seen)))
+    if total > MAX_LINKS:  # BEST-07
+        raise FormatError(f"best: {total} links, more than {MAX_LINKS}")
+    return links, at
+
+
+@cache
+def loops() -> tuple[Any, Any]:
+    from mcz.codecs.lossless import best_kernels
+    from mcz.coding import mixing
+
+    return best_kernels, mixing
+
+
+def code(coded: Ints, plans: Sequence[Ints], links: Sequence[Link]) -> bytes:
+    """The bits of the coded channels, at least one."""
+    _, coding = loops()
+    size = 4 * coded.size + 1024
+    while True:
+        data = np.zeros(size, np.uint8)
+        state = start_states("best")[0].copy()
+        coding.start(state, data, 1)
+        fault = run(state, data, coded.copy(), plans, links)
+        used = coding.finish(state, data)
+        if fault >= 0:
+            raise AssertionError(f"best: row {fault} has no code")
+        if used <= size:
+            return data[:used].tobytes()
+        size = used + 1024
+
+
+def run(
+    state: Ints, data: NDArray[np.uint8], rows: Ints, plans: Sequence[Ints], links: Sequence[Link]
+) -> int:
+    """Code ``rows`` in place; return the row of a fault or -1."""
+    own, _ = loops()
+    table = np.zeros((len(links), own.LINKS_SIZE), np.int64)
+    end = 0
+    for row, link in zip(table, links, strict=True):
+        near, bent = own.sizes_of(len(link.seen))
+        row[: own.SEEN] = link.unit, link.reach, end, end + near, len(link.seen)
+        row[own.SEEN : own.SEEN + len(link.seen)] = link.seen
+        end += near + bent
+    with np.errstate(all="ignore"):  # what is no number is no estimate
+        return int(own.code_rows(state, data, rows, np.stack(plans), powers(), table, end))
