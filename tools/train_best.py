@@ -41,7 +41,5 @@ def train(paths: list[Path]) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    result = table(
-        train([Path(name) for name in sys.argv[2:]]), best_numbers.N_MIXERS, MAX_COUNT
-    )
+    result = table(train([Path(name) for name in sys.argv[2:]]), best_numbers.N_MIXERS, MAX_COUNT)
     Path(sys.argv[1]).write_text(json.dumps(result, indent=1) + "\n")

@@ -1,6 +1,7 @@
 // SPEC.md, "Codecs": the codecs by id and version.
 
 import * as awt from "./codecs/awt.js";
+import * as best from "./codecs/best.js";
 import * as dwt from "./codecs/dwt.js";
 import * as lossless from "./codecs/lossless.js";
 import * as lsdtClip from "./codecs/lsdt-clip.js";
@@ -18,6 +19,7 @@ import { Unsupported } from "./errors.js";
 const CODECS = new Map(
   [
     ...[raw, lossless, mrdwt, qbc, pca, dwt, awt, lsdtFrame, lsdtClip, mdtt, pcaRdo, online],
+    best,
     posewave,
   ].map((codec) => [codec.id, codec]),
 );

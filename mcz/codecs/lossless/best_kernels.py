@@ -102,7 +102,9 @@ def look_bent(
         features[BENT_LAGS + i] = steps[one, 0]
         for j in range(i, n_seen):
             other = link[SEEN + j]
-            step = levels[one, NOW] * levels[other, NOW] - levels[one, BEFORE] * levels[other, BEFORE]
+            step = (
+                levels[one, NOW] * levels[other, NOW] - levels[one, BEFORE] * levels[other, BEFORE]
+            )
             features[at] = step * ratio
             at += 1
 

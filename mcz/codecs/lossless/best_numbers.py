@@ -74,9 +74,7 @@ def code_plain(
 
 
 @inner
-def code_error(
-    state: Ints, data: Bytes, error: int, unit: int, track: Ints, flow: Ints
-) -> int:
+def code_error(state: Ints, data: Bytes, error: int, unit: int, track: Ints, flow: Ints) -> int:
     """Code what the prediction missed, counted in ``unit``, or return FAULT."""
     scales = track[FAST] // unit, track[SLOW] // unit
     near = clamp(flow[NEAR] + 3, 0, 7)

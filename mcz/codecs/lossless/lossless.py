@@ -57,13 +57,15 @@ Build = Callable[[Ints, Sequence[Own], int, Seen | None], bytes]  # as ``build_s
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
-    return encode_streams(source, params, build_stream)
+    return encode_streams(source, params, SIZING, build_stream)
 
 
-def encode_streams(source: SignalSource, params: Mapping[str, Any], build: Build) -> Encoded:
+def encode_streams(
+    source: SignalSource, params: Mapping[str, Any], sizing: Sizing, build: Build
+) -> Encoded:
     """The same with streams that ``build`` makes."""
     code = partial(_build_segment, source, build)
-    return Encoded(header=b"", segments=guessing(source, params["segment_frames"], SIZING, code))
+    return Encoded(header=b"", segments=guessing(source, params["segment_frames"], sizing, code))
 
 
 def _build_segment(source: SignalSource, build: Build, start: int, stop: int) -> tuple[bytes, ...]:

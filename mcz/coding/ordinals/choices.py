@@ -87,9 +87,7 @@ def fixed_point(ordinals: Ints, shape: Lattice) -> Floats:
     return np.where(magnitudes == 0, 0.0, np.where(ordinals < 0, -sizes, sizes))
 
 
-def choose_predictor(
-    values: Floats, *, fitted: bool = True
-) -> tuple[int, tuple[int, ...], int]:
+def choose_predictor(values: Floats, *, fitted: bool = True) -> tuple[int, tuple[int, ...], int]:
     """(from_last, taps, scale) that predict ``values`` best; scale is the mean error there.
 
     ``fitted``: taps may be fitted to the values, too.

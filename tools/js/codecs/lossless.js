@@ -20,7 +20,7 @@ export const id = 1;
 export const name = "lossless";
 export const version = 0;
 
-const CODED = 0;
+export const CODED = 0;
 const CONSTANT = 1;
 const COPY = 2;
 
@@ -93,7 +93,7 @@ export function decodeGroups(layout, segments, groups) {
 }
 
 /** Decodes a run of segments: all groups, or those of these numbers, without copies. */
-class SignalDecoder {
+export class SignalDecoder {
   constructor(layout, segments, numbers = null) {
     this.layout = layout;
     this.segments = segments;
@@ -120,8 +120,9 @@ class SignalDecoder {
     const groups = this.numbers.map((g) => {
       const columns = this.layout.groups[g];
       const reader = new ByteReader(streams[0][g], `lossless stream of group ${g}`);
+      const method = this.readMethod(reader);
       const heads = columns.map((column) => readHead(reader, grids[column], column));
-      return { columns, heads, reader };
+      return { columns, heads, reader, method };
     });
     const heads = groups.flatMap((group) => group.heads);
     const copies = heads.filter(({ kind }) => kind === COPY);
@@ -135,6 +136,11 @@ class SignalDecoder {
       const from = sources[i] - column;
       this.eachRow(firstRow, nRows, column, (at) => this.ordinals[at + from]);
     });
+  }
+
+  /** What a stream begins with: nothing, but in another codec that has such heads. */
+  readMethod() {
+    return 0;
   }
 
   /** Sets a column to what `ordinalAt` says, which is given the index in `ordinals`. */
@@ -255,10 +261,11 @@ function greatestTop(form) {
 // Bits
 
 /** A coded channel: its head, what it remembers, and the numbers of its form. */
-class CodedChannel {
+export class CodedChannel {
   constructor(head) {
     this.column = head.column;
     this.form = head.form;
+    this.isPlain = head.form === PLAIN || head.form === MULTIPLES;
     this.drop = head.drop;
     this.unit = head.unit;
     this.fromLast = head.fromLast;
@@ -300,14 +307,18 @@ function beside(value, scale) {
 }
 
 /** Decodes the coded channels of a group in a segment, one group after the other. */
-class BitDecoder {
-  /** @param {BigInt64Array} ordinals where they go */
-  constructor(ordinals) {
+export class BitDecoder {
+  /**
+   * @param {BigInt64Array} ordinals where they go
+   * @param {string} annex the file of the start table
+   * @param {[number, number]} first the first context and mixer of residuals
+   */
+  constructor(ordinals, annex = "lossless_start.json", first = [RESIDUALS, RESIDUALS_MIXER]) {
     this.ordinals = ordinals;
     this.halves = halvesOf(ordinals);
-    [this.startModel] = startModels("lossless_start.json");
+    [this.startModel] = startModels(annex);
     this.model = this.startModel.copy();
-    this.residuals = new Residuals(this.model, RESIDUALS, RESIDUALS_MIXER);
+    this.residuals = new Residuals(this.model, ...first);
     this.coder = null;
     this.near = 0;
     this.other = 3;
@@ -327,11 +338,8 @@ class BitDecoder {
       const first = firstIndex + row * nChannels;
       for (let i = 0; i < channels.length; i++) {
         const channel = channels[i];
-        if (channel.form === PLAIN || channel.form === MULTIPLES) {
-          this.plain(channel, first + channel.column);
-        } else {
-          this.classes(channel, first + channel.column);
-        }
+        if (channel.isPlain) this.plain(channel, first + channel.column);
+        else this.classes(channel, first + channel.column);
         this.other = channel.side1;
       }
     }
@@ -358,7 +366,11 @@ class BitDecoder {
 
   /** Forms 0 and 32. */
   plain(channel, index) {
-    const predicted = clamp(channel.predict(), -TWO_44, TWO_44);
+    this.plainOf(channel, index, clamp(channel.predict(), -TWO_44, TWO_44));
+  }
+
+  /** Such a number against what is predicted. */
+  plainOf(channel, index, predicted) {
     const value = predicted + this.residual(channel, false, channel.fast, channel.slow);
     if (!(value >= -TWO_44 && value < TWO_44)) {
       throw new Refused(`lossless: the value ${value} is beyond 2^44`);
@@ -423,6 +435,13 @@ class BitDecoder {
     if (!(m >= least && m <= greatest)) {
       throw new Refused(`lossless: mantissa ${m} of ${least} to ${greatest}`);
     }
+    this.take(channel, index, minus, k, m, predicted);
+  }
+
+  /** Remembers a number of class k and mantissa m, and sets its ordinal. */
+  take(channel, index, minus, k, m, predicted) {
+    const j = Math.max(k + channel.width - channel.top - channel.nDigits, -63);
+    const power = channel.powers[Math.abs(j)];
     let v;
     if (j >= 0) v = m * power;
     else if (power > 2 * m) v = 0;
@@ -477,7 +496,7 @@ class BitDecoder {
 const ZERO_CLASS = -Infinity;
 
 /** The least g >= 0 with B^g > s. */
-function guessed(channel, s) {
+export function guessed(channel, s) {
   if (!channel.decimal) return bits(s);
   let g = 0;
   while (POWERS_OF_10[g] <= s) g++;
