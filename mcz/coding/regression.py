@@ -33,7 +33,7 @@ def width_of(n: int) -> int:
 @inner
 def bounded(value: float) -> float:
     """``value``, or 0 for one that is too large or no number."""
-    return value if -LIMIT < value and value < LIMIT else 0.0
+    return value if abs(value) < LIMIT else 0.0
 
 
 @inner

@@ -49,8 +49,8 @@ BENT_LAGS = 3
 MOST_NEARBY = NEARBY_LAGS + 2 * NEARBY_SEEN
 MOST_BENT = BENT_LAGS + MAX_SEEN + MAX_SEEN * (MAX_SEEN + 1) // 2
 N_FINAL = 3
-KEEP_NEARBY, KEEP_BENT, KEEP_FINAL = 0.95, 0.998, 0.98
-RIDGE_NEARBY, RIDGE_BENT, RIDGE_FINAL = 0.01, 0.001, 0.01
+KEEP = 0.95, 0.998, 0.98
+RIDGE = 0.01, 0.001, 0.01
 FIRST_ROWS = 8  # in which the final regression is not asked
 OFTEN_ROWS = 64  # in which the bent one is solved every other row, later every fourth
 
@@ -125,24 +125,24 @@ def foresee(opinions: Floats, weights: Floats, row: int) -> float:
 
 @inner
 def learn(
-    sums: Floats,
-    weights: Floats,
-    features: Floats,
+    one: tuple[Floats, Floats, Floats],
+    which: int,
     n: int,
     target: float,
     guess: float,
-    typical: float,
+    typical: Floats,
     row: int,
-    figures: tuple[float, float],
     due: bool,
     desk: Desk,
-) -> float:
-    """Teach a regression what the step was that it guessed; return its typical error."""
-    error = target - guess
-    take_in(sums, features, n, target, weight_of(error, typical), figures[0], desk)
+) -> None:
+    """Teach a regression, its sums, weights and features, what the step was that it guessed."""
+    sums, weights, features = one
+    keep, ridge = KEEP[which], RIDGE[which]
+    error = target - guess  # BEST-11
+    take_in(sums, features, n, target, weight_of(error, typical[which]), keep, desk)
     if due:
-        solve(sums, weights, n, figures[1], desk)
-    return follow(typical, error, row)
+        solve(sums, weights, n, ridge, desk)
+    typical[which] = follow(typical[which], error, row)
 
 
 @inner
@@ -191,7 +191,7 @@ def code_rows(
             plan, track, link = plans[channel], tracks[channel], links[channel]
             unit, reach = float(powers[0, link[UNIT]]), float(powers[0, link[REACH]])
             n_near, n_bend = n_nearby(link[N_SEEN]), n_bent(link[N_SEEN])
-            last = float(track[LAST])
+            last = float(track[LAST])  # BEST-10
             look_nearby(near, link, channel, steps)
             look_bent(bent, link, channel, steps, levels, reach / unit)
             opinions[NEARBY] = estimate(near_weights[channel], near, n_near)
@@ -213,45 +213,12 @@ def code_rows(
             step = min(max((value - last) / unit, -LIMIT), LIMIT)
             steps[channel, 0] = step
             levels[channel, NOW] = (value - levels[channel, FIRST]) / reach
-            at, size = link[NEAR_SUMS], n_near * width_of(n_near)
-            typical[channel, NEARBY] = learn(
-                sums[at : at + size],
-                near_weights[channel],
-                near,
-                n_near,
-                step,
-                opinions[NEARBY],
-                typical[channel, NEARBY],
-                row,
-                (KEEP_NEARBY, RIDGE_NEARBY),
-                True,
-                desk,
-            )
-            at, size = link[BENT_SUMS], n_bend * width_of(n_bend)
-            typical[channel, BENT] = learn(
-                sums[at : at + size],
-                bent_weights[channel],
-                bent,
-                n_bend,
-                step,
-                opinions[BENT],
-                typical[channel, BENT],
-                row,
-                (KEEP_BENT, RIDGE_BENT),
-                is_due(row, channel),
-                desk,
-            )
-            typical[channel, FINAL] = learn(
-                final_sums[channel],
-                final_weights[channel],
-                opinions,
-                N_FINAL,
-                step,
-                guess,
-                typical[channel, FINAL],
-                row,
-                (KEEP_FINAL, RIDGE_FINAL),
-                True,
-                desk,
-            )
+            at, end = link[NEAR_SUMS], link[BENT_SUMS]
+            one = sums[at:end], near_weights[channel], near
+            learn(one, NEARBY, n_near, step, opinions[NEARBY], typical[channel], row, True, desk)
+            one = sums[end : end + n_bend * width_of(n_bend)], bent_weights[channel], bent
+            due = is_due(row, channel)
+            learn(one, BENT, n_bend, step, opinions[BENT], typical[channel], row, due, desk)
+            one = final_sums[channel], final_weights[channel], opinions
+            learn(one, FINAL, N_FINAL, step, guess, typical[channel], row, True, desk)
     return -1

@@ -51,7 +51,7 @@ def code_number(
     flow: Ints,
     powers: Ints,
 ) -> int:
-    """Code an ordinal against what is ``predicted``; return it, or set BAD."""
+    """Code an ordinal against what is ``predicted``; return it, or set BAD."""  # BEST-12
     if plan[BASE] == 0:
         return code_plain(state, data, ordinal, predicted, plan, track, flow)
     base = powers[1 if plan[BASE] == 10 else 0]
@@ -65,7 +65,7 @@ def code_plain(
     """Code an integer and return it; set BAD where there is no such code."""
     value = ordinal >> plan[DROP]
     residual = code_error(state, data, value - predicted, 1, track, flow)
-    if residual == FAULT or not -MAX_PLAIN <= predicted + residual < MAX_PLAIN:
+    if residual == FAULT or not -MAX_PLAIN <= predicted + residual < MAX_PLAIN:  # BEST-13
         flow[BAD] = 1
         return 0
     value = predicted + residual
@@ -125,7 +125,7 @@ def code_digits(
     if own == ZERO:
         remember(track, flow, 0, predicted)
         return -1 if negative else 0
-    if mantissa < low or not least <= own <= width:
+    if mantissa < low or not least <= own <= width:  # BEST-15, BEST-16, BEST-17
         flow[BAD] = 1
         return 0
     value = from_mantissa(mantissa, max(own - n_digits, -LAST_POWER), powers)
@@ -152,19 +152,20 @@ def class_of(size: int, base: int, powers: Ints) -> int:
 def in_units(mantissa: int, shift: int, powers: Ints) -> int:
     """mantissa * base^shift, rounded down."""
     if shift >= 0:
-        return mantissa * powers[min(shift, LAST_POWER)]
-    return mantissa // powers[min(-shift, LAST_POWER)]
+        return int(mantissa * powers[min(shift, LAST_POWER)])
+    return int(mantissa // powers[min(-shift, LAST_POWER)])
 
 
 @inner
 def code_rest(
     state: Ints, data: Bytes, mantissa: int, count: int, shift: int, plan: Ints, powers: Ints
 ) -> int:
-    """The mantissa of a number of ``count`` units: code the digits below; -1 where there is none."""
+    """Code the digits below ``count`` units and return the mantissa; -1 where there is none."""
     if shift < 0:
-        return count * powers[-shift] + code_below(state, data, mantissa, -shift, plan[BASE])
+        rest = code_below(state, data, mantissa, -shift, plan[BASE])
+        return int(count * powers[-shift]) + rest
     unit = powers[min(shift, LAST_POWER)]
-    return count // unit if count % unit == 0 else -1
+    return int(count // unit) if count % unit == 0 else -1
 
 
 @inner
@@ -203,7 +204,7 @@ def code_down(state: Ints, data: Bytes, steps: int) -> int:
         if not adaptive(state, data, 1 if length > at else 0, C_DOWN + at):
             break
         at += 1
-    if at > MAX_DOWN_LENGTH:
+    if at > MAX_DOWN_LENGTH:  # BEST-14
         return -1
     return at if at < 2 else 1 << (at - 1) | number(state, data, steps, at - 1)
 

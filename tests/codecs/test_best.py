@@ -1,0 +1,235 @@
+"""Codec 12, ``best``: every grid, degenerate channels, hostile streams, the same bits everywhere."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mcz
+from mcz.codecs.contract import Layout, Request, Span
+from mcz.codecs.lossless import best, best_streams
+from mcz.codecs.lossless.best_choices import choose_links
+from mcz.codecs.lossless.best_streams import LINKED, MAX_LINKS, MAX_SEEN, Link
+from mcz.coding.ordinals.streams import plan_stream
+from mcz.errors import FormatError
+from mcz.motion import Signal
+from mcz.numbers import Grid, GridKind
+from tests.codecs.lossy import saved
+from tests.codecs.test_interpreted import canonical_sha256
+from tests.codecs.test_lossless import GRIDS, columns
+from tests.motions import motions, smooth
+
+FIXED, SIX = GRIDS[0], GRIDS[3]
+
+
+def linked(ordinals: np.ndarray, grid: Grid, links: list[Link] | None = None) -> bytes:
+    """A stream of method 1, whether it is the shorter one or not; b"" where nothing is coded."""
+    heads, plans, coded = plan_stream(ordinals, [(grid, grid)] * ordinals.shape[1], 0, {})
+    if not plans:
+        return b""
+    links = links or [Link(*link) for link in choose_links(coded, plans, MAX_LINKS)]
+    links = links[: len(plans)]
+    bits = best_streams.code(coded, plans, links)
+    return bytes((LINKED,)) + heads + b"".join(link.head() for link in links) + bits
+
+
+def decoded(stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> np.ndarray:
+    layout = Layout(n_rows, (tuple(range(n_channels)),), grids=(grid,) * n_channels)
+    request = Request(0, n_rows, (0,))
+    return best.decode(b"", layout, [Span(0, n_rows)], request, lambda s, r, g: stream)
+
+
+@st.composite
+def some_links(draw: st.DrawFn) -> list[Link]:
+    """Of four channels."""
+    made = []
+    for channel in range(4):
+        unit = draw(st.integers(0, best_streams.MAX_UNIT))
+        seen = st.lists(st.integers(0, max(0, channel - 1)), max_size=MAX_SEEN * (channel > 0))
+        made.append(Link(unit, unit + draw(st.integers(0, 15)), tuple(draw(seen))))
+    return made
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=lambda g: f"{g.kind.name}-{g.digits}")
+@given(data=st.data())
+@settings(max_examples=40)
+def test_any_ordinals_come_back(grid: Grid, data: st.DataObject) -> None:
+    wanted = data.draw(columns(grid))
+    stream = linked(wanted, grid, data.draw(st.one_of(st.none(), some_links())))
+    if stream:
+        np.testing.assert_array_equal(decoded(stream, *wanted.shape, grid), wanted)
+
+
+@pytest.mark.parametrize("extreme", [-(2**63), 2**63 - 1, 0, -1])
+def test_extreme_ordinals_of_any_form(extreme: int) -> None:
+    wanted = np.array([[extreme], [5], [extreme], [-9]], np.int64)
+    for grid in GRIDS:
+        np.testing.assert_array_equal(decoded(linked(wanted, grid), 4, 1, grid), wanted)
+
+
+@given(motions())
+@settings(max_examples=40)
+def test_any_motion_comes_back(motion: mcz.Motion) -> None:
+    out = io.BytesIO()
+    mcz.write(motion, out, codec="best", segment_frames=5)
+    with mcz.open(out.getvalue()) as file:
+        back = file.clips[motion.name].motion()
+    for one, other in zip(motion.signals, back.signals, strict=True):
+        np.testing.assert_array_equal(one.values, other.values)
+
+
+def test_channels_that_say_the_same() -> None:
+    """Sums of products of which most are singular, and what jumps far out of them."""
+    rng = np.random.default_rng(3)
+    walk = rng.integers(-50, 50, 300).cumsum()
+    wanted = np.stack([walk, walk + 1, walk * 2, -walk, walk // 3 + walk], axis=1)
+    wanted[150:152, 2] += 2**40
+    stream = linked(wanted, FIXED)
+    np.testing.assert_array_equal(decoded(stream, 300, 5, FIXED), wanted)
+    alone = [Link(0, 4, ())] * 5
+    assert len(stream) < 0.8 * len(linked(wanted, FIXED, alone))
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-3, 9.5, 9.99999e5, 1e30])
+def test_numbers_that_cross_their_classes(size: float) -> None:
+    """The unit is that of the class or of the one above, also where signs and zeros are mixed."""
+    rng = np.random.default_rng(7)
+    values = size * (1 + 0.4 * np.sin(np.arange(400) / 9) + 0.01 * rng.normal(size=400))
+    values[200:300] -= size
+    values[250:255] = 0
+    wanted = SIX.ordinals(np.array([float(f"{v:.6g}") for v in values]))[0][:, None]
+    wanted[253] = -1  # -0
+    np.testing.assert_array_equal(decoded(linked(wanted, SIX), 400, 1, SIX), wanted)
+
+
+def test_it_is_smaller_than_codec_1_and_never_much_larger() -> None:
+    sizes = {name: len(saved(name, smooth(600))) for name in ("lossless", "best")}
+    assert sizes["best"] < 0.97 * sizes["lossless"]
+    rng = np.random.default_rng(1)
+    noise = rng.integers(-(10**6), 10**6, (40, 30))
+    own = [(FIXED, FIXED)] * 30
+    simple = best_streams.streams.build_stream(noise, own, 0, {})
+    assert len(best_streams.build_stream(noise, own, 0, {})) <= len(simple) + 1
+
+
+def test_part_equals_whole() -> None:
+    data = saved("best", smooth(200), segment_frames=32)
+    with mcz.open(data) as file:
+        clip = file.clips["smooth"]
+        whole = clip.read()
+        np.testing.assert_array_equal(whole, smooth(200).values)
+        for frames in [(0, 1), (31, 33), (64, 96), (199, 200), (5, 190)]:
+            np.testing.assert_array_equal(clip.read(frames), whole[slice(*frames)])
+        np.testing.assert_array_equal(clip.read((30, 40), ["knee"]), whole[30:40, 9:])
+
+
+@given(st.binary(max_size=60), st.sampled_from(GRIDS), st.booleans())
+def test_any_bytes_decode_or_are_refused(stream: bytes, grid: Grid, method: bool) -> None:
+    try:
+        out = decoded(bytes((method,)) + stream, 30, 2, grid)
+    except FormatError:
+        return
+    assert out.shape == (30, 2)
+
+
+@given(st.data())
+@settings(max_examples=60)
+def test_flipped_bits_decode_or_are_refused(data: st.DataObject) -> None:
+    grid = data.draw(st.sampled_from(GRIDS))
+    wanted = data.draw(columns(grid))
+    stream = bytearray(linked(wanted, grid))
+    if not stream:
+        return
+    bit = data.draw(st.integers(0, 8 * len(stream) - 1))
+    stream[bit // 8] ^= 1 << bit % 8
+    try:
+        out = decoded(bytes(stream), *wanted.shape, grid)
+    except FormatError:
+        return
+    assert out.shape == wanted.shape
+
+
+def test_prefixes_and_longer_streams_are_refused() -> None:
+    wanted = np.random.default_rng(2).integers(-900, 900, (30, 3)).cumsum(axis=0)
+    stream = linked(wanted, FIXED)
+    refused = 0
+    for size in range(len(stream)):
+        try:
+            out = decoded(stream[:size], 30, 3, FIXED)
+        except FormatError:
+            refused += 1
+        else:  # zeros stand in for the last ones, SPEC.md, "Entropy coding"
+            assert size >= len(stream) - 4 and out.shape == wanted.shape
+    assert refused >= len(stream) - 4
+    for more in (b"\0", b"\1", bytes(5)):
+        with pytest.raises(FormatError, match="bytes"):
+            decoded(stream + more, 30, 3, FIXED)
+
+
+@pytest.mark.parametrize(
+    ("link", "message"),
+    [
+        (b"\x2d\0", "unit"),
+        (b"\0\x09" + bytes(9), "links"),
+        (b"\0\x01\0", "looks at"),
+        (b"\0", "ends in the links"),
+    ],
+)
+def test_bad_links_are_refused(link: bytes, message: str) -> None:
+    with pytest.raises(FormatError, match=message):
+        best_streams.read_links(link, 1)
+
+
+def test_too_many_links_are_refused() -> None:
+    n_coded = MAX_LINKS // MAX_SEEN + 2
+    data = b"\0\0" + (b"\0\x08" + bytes(8)) * (n_coded - 2)
+    assert len(best_streams.read_links(data, n_coded - 1)[0]) == n_coded - 1
+    with pytest.raises(FormatError, match="4104 links"):
+        best_streams.read_links(data + b"\0\x08" + bytes(8), n_coded)
+
+
+def test_a_replaced_joint_comes_back() -> None:
+    motion = smooth(90)
+    values = motion.values.copy()
+    values[:, 4] = np.round(values[::-1, 4], 4)
+    out = io.BytesIO()
+    mcz.write(motion, out, codec="best", segment_frames=40)
+    source = motion.with_values(values)
+    assert isinstance(source.signals[0], Signal)
+    again = saved("best", source, segment_frames=40)
+    with mcz.open(again) as file:
+        np.testing.assert_array_equal(file.only_clip().read(), values)
+
+
+def test_interpreted(tmp_path: Path) -> None:
+    """Plain Python gives the bits that machine code gives, of numbers near the ends of floats."""
+    rng = np.random.default_rng(11)
+    values = np.round(rng.normal(size=(40, 4)).cumsum(axis=0), 4)
+    values[20:22, 1] = 2.0**51 // 10**4
+    values[:, 3] = np.round(values[:, 0] * 2, 4)
+    bones = mcz.Skeleton((mcz.Joint("m", channels=tuple(mcz.Channel("", c) for c in "abcd")),))
+    grids = (Grid(GridKind.FIXED, 4),) * 3 + (Grid(GridKind.BINARY64),)
+    path = tmp_path / "clip.mcz"
+    path.write_bytes(saved("best", mcz.Motion(bones, (Signal(values, grids),))))
+    program = (
+        "import sys; from pathlib import Path\n"
+        "from tests.codecs.test_interpreted import canonical_sha256\n"
+        "print(canonical_sha256(Path(sys.argv[1])))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(path)],
+        cwd=Path(__file__).parents[2],
+        env={**os.environ, "MCZ_LOOPS": "interpreted"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.strip() == canonical_sha256(path)
