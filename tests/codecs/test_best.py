@@ -1,4 +1,4 @@
-"""Codec 12, ``best``: every grid, degenerate channels, hostile streams, the same bits everywhere."""
+"""Codec 12, ``best``: every grid, degenerate channels, hostile streams, the same bits."""
 
 from __future__ import annotations
 
