@@ -24,6 +24,7 @@ HOMES = {
     10: "spatial.pca_rdo",
     11: "online.online",
     13: "posewave.posewave",
+    14: "lossless.fast",
 }
 
 

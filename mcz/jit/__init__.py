@@ -41,3 +41,8 @@ def inner(function: Loop) -> Loop:
     """``function``, to be called by other loops: compiled with each kernel that needs it."""
     function.__is_loop__ = True  # type: ignore[attr-defined]
     return function
+
+
+def bit_length(value: int) -> int:
+    """Bits of ``value`` >= 0 without leading zeros, also in loops."""
+    return int(value).bit_length()

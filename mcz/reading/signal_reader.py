@@ -16,8 +16,8 @@ from mcz.container.packets import SHORT
 from mcz.container.reader import Container
 from mcz.container.segments import FRESH, StreamTable
 from mcz.errors import FormatError
-from mcz.motion import Exceptions, Signal, grid_blocks
-from mcz.numbers import Grid, GridKind
+from mcz.motion import Exceptions, Signal
+from mcz.numbers import Grid, GridKind, values_of
 from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values_of_exceptions
 from mcz.reading.salvage import salvage
 from mcz.reading.signal_info import SignalInfo
@@ -142,7 +142,7 @@ class SignalReader:
             values[:, ~is_exact] = self._decode_groups(lossy, spans, start, stop)
         number = {int(column): n for n, column in enumerate(np.flatnonzero(is_exact))}
         changes = self.exceptions(start, stop, columns)[1]
-        values[:, is_exact] = _values_of(  # CODEC-06
+        values[:, is_exact] = values_of(  # CODEC-06
             self._decode_groups(exact, spans, start, stop),
             [layout.grids[columns[column]] for column in number],
             [(row, number[column], grid) for row, column, grid in changes if column in number],
@@ -258,7 +258,7 @@ class SignalReader:
                 )
             Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
         if self.info.codec.domain == "ordinals" and not self.info.is_integer:
-            values = _values_of(coded, [layout.grids[c] for c in columns], changes)  # NOTES-09
+            values = values_of(coded, [layout.grids[c] for c in columns], changes)  # NOTES-09
         if len(exceptions):  # NOTES-10
             values[exceptions.rows, exceptions.channels] = values_of_exceptions(
                 exceptions.texts, self.name
@@ -325,12 +325,3 @@ class SignalReader:
                     mask[rows, at : at + n] = bits[cut]
                 at += n
         return mask
-
-
-def _values_of(
-    ordinals: NDArray[np.int64], grids: Sequence[Grid], changes: Sequence[tuple[int, int, Grid]]
-) -> NDArray[np.float64]:
-    values = np.empty(ordinals.shape)
-    for rows, columns, grid in grid_blocks(len(ordinals), grids, changes):
-        values[rows, columns] = grid.values(ordinals[rows][:, columns])
-    return values
