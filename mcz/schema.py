@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from typing import Any
 
 from construct import (
@@ -36,7 +37,11 @@ class Varint(Construct):
     """Unsigned, up to ``MAX_COUNT``: 7 bits a byte, least significant first, shortest form."""
 
     def _parse(self, stream: Any, context: Any, path: str) -> int:
-        return take_varint(iter(lambda: stream_read(stream, 1, path)[0], None), path)
+        first: int = stream_read(stream, 1, path)[0]
+        if first < 0x80:
+            return first
+        more = iter(lambda: stream_read(stream, 1, path)[0], None)
+        return take_varint(chain((first,), more), path)
 
     def _build(self, obj: Any, stream: Any, context: Any, path: str) -> Any:
         _write(stream, varint(obj), path)

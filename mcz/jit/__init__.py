@@ -43,6 +43,12 @@ def inner(function: Loop) -> Loop:
     return function
 
 
+def inlined(function: Loop) -> Loop:
+    """``inner``, compiled into its callers whatever its size: for what is done once a value."""
+    function.__is_inlined__ = True  # type: ignore[attr-defined]
+    return inner(function)
+
+
 def bit_length(value: int) -> int:
     """Bits of ``value`` >= 0 without leading zeros, also in loops."""
     return int(value).bit_length()

@@ -14,7 +14,7 @@ from mcz.container.limits import check_decoded
 from mcz.container.masks import parse_mask
 from mcz.container.packets import SHORT
 from mcz.container.reader import Container
-from mcz.container.segments import FRESH, StreamTable
+from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable
 from mcz.errors import FormatError
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind, values_of
@@ -277,9 +277,10 @@ class SignalReader:
         column = {channel: number for number, channel in enumerate(of_signal)}
         noted = Noted([layout.grids[channel] for channel in column], (stop - start) * per_frame)
         for index in self.info.covering(start, stop):
-            shift = (self.info.rows[index].header.first - start) * per_frame
+            row = self.info.rows[index]
+            shift = (row.header.first - start) * per_frame
             noted.begin(shift)
-            if self.info.rows[index].packet in SHORT:
+            if row.packet in SHORT or not row.header.flags & GROUP_NOTES:
                 continue  # it has no notes, and the grids of the clip
             for group in self.groups:
                 notes = self._group_notes(index, group)
@@ -305,12 +306,10 @@ class SignalReader:
         layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
         mask: NDArray[np.bool_] | None = None
         for index in self.info.covering(start, stop):
-            if self.info.rows[index].packet in SHORT:
-                continue  # all of it is valid
             header = self.info.rows[index].header
+            if self.info.rows[index].packet in SHORT or not header.flags & MASKS:
+                continue  # all of it is valid
             table, streams = self._streams(index)
-            if table.mask(0) is None:
-                continue
             a, b = max(start, header.first), min(stop, header.stop)
             rows = slice((a - start) * per_frame, (b - start) * per_frame)
             cut = slice((a - header.first) * per_frame, (b - header.first) * per_frame)

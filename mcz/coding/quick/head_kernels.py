@@ -1,4 +1,4 @@
-"""Compiled: the heads of channels, and with them all groups of a segment.
+"""Compiled: the heads of channels.
 
 SPEC.md, "Codec 14: fast", is normative. Imported on first use only.
 """
@@ -25,8 +25,6 @@ from mcz.coding.quick.kernels import (
     UNIT,
     Bytes,
     Ints,
-    Tables,
-    read_columns,
 )
 from mcz.jit import inner, kernel
 
@@ -178,39 +176,3 @@ def read_ends(
             return fault
         ends[n] = at
     return -1
-
-
-@kernel
-def read_groups(
-    data: Bytes,
-    words: Ints,
-    at: int,
-    ends: Ints,
-    firsts: Ints,
-    forms: Ints,
-    heads: Ints,
-    out: Ints,
-    tables: Tables,
-) -> tuple[int, int, int]:
-    """Decode the streams of groups, which lie one behind the other in ``data``.
-
-    The first begins ``at``; ``ends`` and ``firsts``: where each stream ends, and its first channel, from that of the next on
-    those of the next; of ``forms``, ``heads`` and the columns of ``out``. ``data`` has 16 bytes
-    more. Returns group, channel and fault, or -1 -1 -1. Copies are left to the caller.
-    """
-    for group in range(len(ends)):
-        a, b = firsts[group], firsts[group + 1]
-        own = heads[a:b]
-        for n in range(a, b):
-            at, fault = read_head(data, at, ends[group], forms[n], heads[n], tables.powers)
-            if at < 0:
-                return group, n - a, fault
-        wrong = read_columns(data, words, at, ends[group], own, a, out, tables)
-        if wrong >= 0:
-            return group, wrong, BAD_BITS
-        for n in range(a, b):
-            if heads[n, KIND] == CONSTANT:
-                for t in range(len(out)):
-                    out[t, n] = heads[n, ORDINAL]
-        at = ends[group]
-    return -1, -1, -1

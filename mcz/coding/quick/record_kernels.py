@@ -7,15 +7,21 @@ from __future__ import annotations
 
 from mcz.coding.quick.kernels import (
     BASE,
+    DIGITS,
     DIRECT,
     DROP,
     FAR,
+    FIRST,
     FROM_LAST,
     LENGTH_BITS,
+    HIGH,
+    LEAST,
+    LEAST_STATE,
+    LIMIT,
     LOW,
     MAX_DIFFERENCE,
-    MAX_MISS,
-    MAX_PLAIN,
+    PER_CLASS,
+    ROW,
     SCALE,
     TABLE,
     TABLE_BITS,
@@ -25,27 +31,37 @@ from mcz.coding.quick.kernels import (
     Tables,
     clamp,
     class_of,
-    expected_of,
-    first_of,
     from_mantissa,
-    lattice_of,
-    quarters_of_step,
     quotient,
+    settle,
 )
 from mcz.jit import bit_length, inner, kernel
 
 # Columns of ``records``, one row a value.
-CONTEXT, SYMBOL, N_RAW, RAW, N_LEAST, LEAST = range(6)  # of FAR and more the length is added
+CONTEXT, SYMBOL, N_RAW, RAW, N_DROPPED, DROPPED = range(6)  # of FAR and more the length is added
 RECORD_SIZE = 6
-FIRST = -1  # context of a first value, whose symbol is its length
+NEW = -1  # context of a first value, whose symbol is its length
 
 
-@kernel
+@inner
+def expected_of(size: int, own: int, plan: Ints, powers: Ints) -> int:
+    """The magnitude of the reduced ordinal that is nearest to ``size``, whose class is ``own``."""
+    row, shift = plan[ROW], own - plan[DIGITS]
+    if size < powers[row, own - 1]:
+        return 0
+    if shift >= 0:
+        unit = powers[row, shift]
+        mantissa = min(quotient(size + (unit >> 1), unit), plan[HIGH] - 1)
+    else:
+        mantissa = size * powers[row, -shift]
+    return 1 + (own - plan[LEAST]) * plan[PER_CLASS] + mantissa - plan[LOW]
+
+
+@inner
 def spread_column(ordinals: Ints, plan: Ints, powers: Ints, spread: Ints) -> None:
     """Fill ``spread`` (2, n_rows) with the reduced ordinals and the values in fixed point."""
-    lattice = lattice_of(plan, powers)
-    row, digits, low, per_class, least, _ = lattice
-    first, drop = first_of(plan, per_class), plan[DROP]
+    settle(plan, powers)
+    drop, per_class = plan[DROP], plan[PER_CLASS]
     for t in range(len(ordinals)):
         ordinal = ordinals[t]
         if plan[BASE] == 0:
@@ -54,15 +70,15 @@ def spread_column(ordinals: Ints, plan: Ints, powers: Ints, spread: Ints) -> Non
         magnitude = (ordinal ^ (ordinal >> 63)) >> drop
         value = 0
         if magnitude:
-            magnitude -= first
+            magnitude -= plan[FIRST]
             k = quotient(magnitude - 1, per_class)
-            mantissa = magnitude - 1 - k * per_class + low
-            value = from_mantissa(mantissa, least + k - digits, row, powers)
+            mantissa = magnitude - 1 - k * per_class + plan[LOW]
+            value = from_mantissa(mantissa, plan[LEAST] + k - plan[DIGITS], plan[ROW], powers)
         spread[0, t] = -1 - magnitude if ordinal < 0 else magnitude
         spread[1, t] = -value if ordinal < 0 else value
 
 
-@kernel
+@inner
 def record_column(
     ordinals: Ints, spread: Ints, plan: Ints, powers: Ints, costs: Ints, records: Ints
 ) -> int:
@@ -71,28 +87,27 @@ def record_column(
     ``costs`` are those of symbols, by context.
     """
     base, drop, from_last, f = plan[BASE], plan[DROP], plan[FROM_LAST], plan[SCALE] << 4
-    lattice = lattice_of(plan, powers)
-    row, digits, _, _, least, width = lattice
-    limit = powers[row, width] - 1 if base else MAX_PLAIN
-    own = last = d0 = d1 = d2 = d3 = total = step = 0
+    limit, own = plan[LIMIT], 0
+    last = d0 = d1 = d2 = d3 = total = quarters = 0
     for t in range(len(ordinals)):
         p = plan[TAPS] * d0 + plan[TAPS + 1] * d1 + plan[TAPS + 2] * d2 + plan[TAPS + 3] * d3
         p = (p + 16) >> 5
         p = clamp(p + last if from_last else p, -limit, limit)
         expected = p
         if base:
-            own = class_of(abs(p), own, least, width, row, powers)
-            step = quarters_of_step(base, own - digits)
-            expected = expected_of(abs(p), own, lattice, powers)
+            own = class_of(abs(p), own, plan, powers)
+            shift = own - plan[DIGITS]
+            quarters = 4 * shift if base == 2 else (425 * shift + 16) >> 5
+            expected = expected_of(abs(p), own, plan, powers)
             expected = -1 - expected if p < 0 else expected
         miss, value = spread[0, t] - expected, spread[1, t]
         size = abs(miss)
         if t == 0:
             far = bit_length(size)
-            context, symbol, n_raw, kept = FIRST, far, far, size - (1 << far >> 1)
+            context, symbol, n_raw, kept = NEW, far, far, size - (1 << far >> 1)
         else:
             length = bit_length(f + 1) - 1
-            scale = max(4 * length + ((f + 1 << 2) >> length & 3) - step, 0)
+            scale = max(4 * length + ((f + 1 << 2) >> length & 3) - quarters, 0)
             context = scale if scale < 28 else 28 + (scale & 3)
             k = clamp((scale >> 2) - 7, 0, 44)
             part = size >> k
@@ -110,13 +125,13 @@ def record_column(
                 n_raw += 1
             d3, d2, d1 = d2, d1, d0
             d0 = clamp(value - last, -MAX_DIFFERENCE, MAX_DIFFERENCE)
-            f += (min(abs(value - p) << 4, MAX_MISS) - f) >> 2
+            f += ((abs(value - p) << 4) - f) >> 2
         last = value
         total += n_raw << 8
         records[t, CONTEXT], records[t, SYMBOL], records[t, N_RAW] = context, symbol, n_raw
         records[t, RAW] = kept << 1 | (1 if miss < 0 else 0)
-        records[t, N_LEAST] = drop if base == 0 else 0
-        records[t, LEAST] = ordinals[t] & ((1 << drop) - 1)
+        records[t, N_DROPPED] = drop if base == 0 else 0
+        records[t, DROPPED] = ordinals[t] & ((1 << drop) - 1)
     return total
 
 
@@ -141,18 +156,18 @@ def write_records(records: Ints, tables: Tables, words: Ints, data: Bytes) -> tu
     i = 0
     for t in range(len(records)):
         context, symbol = records[t, CONTEXT], records[t, SYMBOL]
-        if context == FIRST:
+        if context == NEW:
             i = put(data, i, symbol, LENGTH_BITS)
         elif symbol >= FAR:
             i = put(data, i, symbol - FAR, LENGTH_BITS)
         if records[t, N_RAW]:
             i = put(data, i, records[t, RAW], records[t, N_RAW])
-        if records[t, N_LEAST]:
-            i = put(data, i, records[t, LEAST], records[t, N_LEAST])
-    x, at = LOW, 0
+        if records[t, N_DROPPED]:
+            i = put(data, i, records[t, DROPPED], records[t, N_DROPPED])
+    x, at = LEAST_STATE, 0
     for t in range(len(records) - 1, -1, -1):
         context = records[t, CONTEXT]
-        if context != FIRST:
+        if context != NEW:
             frequency = tables.frequencies[context, min(records[t, SYMBOL], FAR)]
             count = frequency >> TABLE_BITS
             if x >= count << 20:

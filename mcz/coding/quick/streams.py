@@ -38,9 +38,9 @@ FAULTS = (
 
 @cache
 def loops() -> tuple[Any, Any, Any]:
-    from mcz.coding.quick import choice_kernels, head_kernels, kernels
+    from mcz.coding.quick import choice_kernels, kernels, stream_kernels
 
-    return kernels, head_kernels, choice_kernels
+    return kernels, stream_kernels, choice_kernels
 
 
 def build_stream(
@@ -79,7 +79,7 @@ def _code_column(column: Ints, grid: Grid, clip_grid: Grid) -> tuple[bytes, Ints
     depth = _depth(column, shape)
     if shape.base and (shape.top > max_top(shape) or _too_wide(shape, depth)):
         shape, depth = lattice(PLAIN, column), 0
-    plan = np.zeros(own.HEAD_SIZE, np.int64)
+    plan = np.zeros(own.PLAN_SIZE, np.int64)
     plan[[own.BASE, own.DIGITS, own.DROP]] = shape.base, shape.digits, shape.drop
     plan[[own.TOP, own.DEPTH]] = shape.top, depth
     records = np.empty((len(column), RECORD_SIZE), np.int64)
@@ -137,10 +137,12 @@ def parse_streams(
     words = np.ascontiguousarray(data[::-1]).view("<u4").astype(np.int64)
     ends = SPARE + np.cumsum([len(stream) for stream in streams])
     firsts = np.concatenate(([0], np.cumsum(sizes)))
-    heads = np.zeros((len(forms), own.HEAD_SIZE), np.int64)
-    group, channel, fault = read.read_groups(data, words, SPARE, ends, firsts, forms, heads, out, tables.tables())
+    heads = np.zeros((len(forms), own.PLAN_SIZE), np.int64)
+    channel, fault = read.read_streams(
+        data, words, SPARE, ends, firsts, forms, heads, out, tables.tables()
+    )
     if fault >= 0:
-        raise FormatError(f"fast: group {group} of those read, channel {channel}: {FAULTS[fault]}")
+        raise FormatError(f"fast: channel {channel} of those read: {FAULTS[fault]}")
     return {
         int(n): (int(heads[n, own.GROUP]), int(heads[n, own.COLUMN]))
         for n in np.flatnonzero(heads[:, own.KIND] == COPY)
@@ -152,7 +154,7 @@ def renumbered(stream: bytes, forms: Ints, number_of: Callable[[int, int], int])
     own, read, _ = loops()
     from mcz.coding.quick import tables
 
-    heads = np.zeros((len(forms), own.HEAD_SIZE), np.int64)
+    heads = np.zeros((len(forms), own.PLAN_SIZE), np.int64)
     ends = np.zeros(len(forms), np.int64)
     fault = read.read_ends(_spared([stream]), SPARE, SPARE + len(stream), forms, heads, ends, tables.tables().powers)
     if fault >= 0:
