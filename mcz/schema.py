@@ -81,6 +81,12 @@ def take_varint(source: Iterable[int], where: str) -> int:
 
 def read_varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
     """The varint at offset ``at`` of ``data`` and the offset after it."""
+    if at + 1 < len(data):  # most have one byte or two
+        low, high = data[at], data[at + 1]
+        if low < 0x80:
+            return low, at + 1
+        if 0 < high < 0x80:
+            return low & 0x7F | high << 7, at + 2
     value = take_varint(data[at : at + 9], f"offset {at}")
     return value, at + max(1, -(-value.bit_length() // 7))  # its form is the shortest
 

@@ -18,7 +18,7 @@ import numpy as np
 import mcz
 from mcz.coding.quick import kernels, record_kernels, streams, tables
 
-ROUNDS = 4
+ROUNDS = 3
 SMOOTH = 64.0  # of the distribution of the neighboring contexts, in symbols
 
 
@@ -44,10 +44,8 @@ def train(paths: list[Path]) -> np.ndarray:
     for number in range(ROUNDS):
         known = tables.tables_of(counts)
         tables.tables = lambda known=known: known
-        costs = tables.costs_of(counts)
-        tables.costs = lambda costs=costs: costs
         seen = np.zeros(counts.shape)
-        write = streams._write
+        write = streams.write
 
         def note(records: np.ndarray, seen: np.ndarray = seen) -> bytes:
             later = records[records[:, record_kernels.CONTEXT] >= 0]
@@ -55,13 +53,13 @@ def train(paths: list[Path]) -> np.ndarray:
             np.add.at(seen, (later[:, record_kernels.CONTEXT], symbols), 1)
             return write(records)
 
-        streams._write = note
+        streams.write = note
         before = after = 0
         for path in paths:
             out = io.BytesIO()
             mcz.write(mcz.read(path), out, codec="fast")
             before, after = before + path.stat().st_size, after + len(out.getvalue())
-        streams._write = write
+        streams.write = write
         print(f"round {number}: {before / after:.3f}", file=sys.stderr)
         shares = seen / np.maximum(seen.sum(axis=1, keepdims=True), 1)
         near = shares.sum(axis=0) / len(shares)

@@ -52,3 +52,8 @@ def inlined(function: Loop) -> Loop:
 def bit_length(value: int) -> int:
     """Bits of ``value`` >= 0 without leading zeros, also in loops."""
     return int(value).bit_length()
+
+
+def truncated(value: float) -> int:
+    """``int(value)``, in loops quicker than that, for values below 2^63 in size."""
+    return int(value)

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mcz.jit import bit_length
+from mcz.jit import bit_length, truncated
 from mcz.jit.expressions import Expressions
 from mcz.jit.types import (
     FLOAT,
@@ -122,6 +122,10 @@ class Calls(Expressions):
         zeros = self.op(f"call i64 @llvm.ctlz.i64(i64 {part}, i1 false)")
         return Value(INT, (self.op(f"sub i64 64, {zeros}"),))
 
+    def truncated(self, value: Value) -> Value:
+        part = self.convert(value, FLOAT).parts[0]
+        return Value(INT, (self.op(f"fptosi double {part} to i64"),))
+
     def length(self, value: Value) -> Value:
         """As ``len``."""
         if not isinstance(value.type, Array):
@@ -166,6 +170,7 @@ MAKERS: dict[Any, Maker] = {
     builtins.abs: _one(Calls.size),
     builtins.len: _one(Calls.length),
     bit_length: _one(Calls.bit_length),
+    truncated: _one(Calls.truncated),
     builtins.int: _one(Calls.whole),
     builtins.float: _one(lambda calls, value: calls.convert(value, FLOAT)),
     np.int64: _one(Calls.whole),

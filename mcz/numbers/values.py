@@ -16,13 +16,16 @@ from mcz.numbers.tokens import TENS, Floats, Ints
 
 
 def values_of(
-    ordinals: Ints, grids: Sequence[Grid], changes: Sequence[tuple[int, int, Grid]] = ()
+    ordinals: Ints,
+    grids: Sequence[Grid],
+    changes: Sequence[tuple[int, int, Grid]] = (),
+    out: Floats | None = None,
 ) -> Floats:
     """The binary64 of each ordinal, (rows, channels); see ``Signal.grid_changes``.
 
-    As ``Grid.values`` gives them, and refuses them.
+    As ``Grid.values`` gives them, and refuses them. They go to ``out`` where that is given.
     """
-    values = np.empty(ordinals.shape)
+    values = np.empty(ordinals.shape) if out is None else out
     if not changes and ordinals.flags.c_contiguous:
         left = np.zeros(len(grids), np.int64)
         _kernels().fill(ordinals, _rules(tuple(grids)), TENS, values, left)

@@ -22,7 +22,7 @@ from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values
 from mcz.reading.salvage import salvage
 from mcz.reading.signal_info import SignalInfo
 
-BLOCK_ROWS = 2048  # decoded at a time, at least
+BLOCK_ROWS = 512  # decoded at a time, at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +90,10 @@ class SignalReader:
             self._shape(start, stop), np.int64 if self.info.is_integer else np.float64
         )
         mask: NDArray[np.bool_] | None = None
-        for block in self.blocks(start, stop):
+        for block in self.blocks(start, stop, values):
             rows = slice((block.start - start) * per_frame, (block.stop - start) * per_frame)
-            values[rows] = block.values
+            if block.values.base is not values:
+                values[rows] = block.values
             if ordinals is not None:
                 ordinals[rows] = block.coded
             if block.mask is not None:
@@ -105,14 +106,19 @@ class SignalReader:
         n_columns = sum(len(layout.groups[group]) for group in self.groups)
         return (stop - start) * layout.samples_per_frame, n_columns
 
-    def blocks(self, start: int, stop: int) -> Iterator[Block]:
-        """The same block by block."""
+    def blocks(
+        self, start: int, stop: int, out: NDArray[Any] | None = None
+    ) -> Iterator[Block]:
+        """The same block by block; values may lie in ``out``, of all rows, already."""
         spans = self._prepare(start, stop)
         if start == stop:  # the header has to be right all the same (CODEC-05)
             self._decode(spans, start, stop)
         for a, b in self._ranges(start, stop):
             coded = self._decode(spans, a, b)
-            yield Block(a, b, coded, *self._finish(coded, a, b))
+            per_frame = self.info.layout.samples_per_frame
+            rows = slice((a - start) * per_frame, (b - start) * per_frame)
+            own = out[rows] if out is not None and not self.info.is_integer else None
+            yield Block(a, b, coded, *self._finish(coded, a, b, own))
 
     def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
         """The range in blocks of a few segments, which bound the memory beside the result."""
@@ -214,7 +220,7 @@ class SignalReader:
 
     def fetch(self, segment: int, resolution: int, group: int) -> bytes:
         """One stream of the codec."""
-        table, streams = self._streams(segment)
+        table, streams = self._cache.get(segment) or self._streams(segment)
         index = table.codec(resolution, group)
         if index not in streams:  # a group that another depends upon
             streams.update(
@@ -243,9 +249,9 @@ class SignalReader:
         return wanted
 
     def _finish(
-        self, coded: NDArray[Any], start: int, stop: int
+        self, coded: NDArray[Any], start: int, stop: int, out: NDArray[Any] | None = None
     ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-        """Ordinals to values, exceptions and masks put in."""
+        """Ordinals to values, in ``out`` where that is given, exceptions and masks put in."""
         layout = self.info.layout
         columns = [c for g in self.groups for c in layout.groups[g]]
         exceptions, changes = self.exceptions(start, stop, columns)
@@ -258,7 +264,7 @@ class SignalReader:
                 )
             Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
         if self.info.codec.domain == "ordinals" and not self.info.is_integer:
-            values = values_of(coded, [layout.grids[c] for c in columns], changes)  # NOTES-09
+            values = values_of(coded, [layout.grids[c] for c in columns], changes, out)  # NOTES-09
         if len(exceptions):  # NOTES-10
             values[exceptions.rows, exceptions.channels] = values_of_exceptions(
                 exceptions.texts, self.name

@@ -24,13 +24,13 @@ from mcz.codecs.lossless.segments import (
 )
 from mcz.codecs.segments import Sizing
 from mcz.coding.ordinals.heads import form_of_grid
-from mcz.coding.quick.streams import build_stream, parse_streams, renumbered
+from mcz.coding.quick.streams import build_streams, parse_streams, renumbered
 from mcz.errors import FormatError
 from mcz.numbers import Grid
 
 Ints = NDArray[np.int64]
 
-TARGET = 62_000
+TARGET = 44_000
 SIZING = Sizing(target=TARGET, value_bytes=2, aim=95, most_rows=MAX_ROWS, spare=1)
 
 
@@ -41,6 +41,7 @@ def decode(
     refuse_extras("fast", header, layout)
     per_frame = layout.samples_per_frame
     n_channels = sum(len(layout.groups[group]) for group in request.groups)
+    forms = _forms(layout.grids, tuple(layout.groups[group] for group in request.groups))
     out = np.empty(((request.stop - request.start) * per_frame, n_channels), np.int64)
     for index, span in enumerate(spans):
         start, stop = max(span.first, request.start), min(span.stop, request.stop)
@@ -49,7 +50,7 @@ def decode(
         target = out[(start - request.start) * per_frame : (stop - request.start) * per_frame]
         n_rows = span.n_frames * per_frame
         rows = target if len(target) == n_rows else np.empty((n_rows, n_channels), np.int64)
-        _read_segment(layout, request.groups, partial(fetch, index, 0), rows)
+        _read_segment(layout, request.groups, forms, partial(fetch, index, 0), rows)
         if rows is not target:
             first = (start - span.first) * per_frame
             target[:] = rows[first : first + len(target)]
@@ -57,13 +58,13 @@ def decode(
 
 
 def _read_segment(
-    layout: Layout, groups: tuple[int, ...], stream: partial[bytes], rows: Ints
+    layout: Layout, groups: tuple[int, ...], forms: Ints, stream: partial[bytes], rows: Ints
 ) -> None:
     """Fill ``rows``, those of one segment, with the channels of the groups."""
     copies = parse_streams(
         [stream(group) for group in groups],
         [len(layout.groups[group]) for group in groups],
-        _forms(layout.grids, tuple(layout.groups[group] for group in groups)),
+        forms,
         rows,
     )
     if not copies:
@@ -79,8 +80,8 @@ def _read_segment(
         if group not in columns:
             if group not in apart:
                 other = np.empty((len(rows), len(layout.groups[group])), np.int64)
-                forms = _forms(layout.grids, (layout.groups[group],))
-                apart[group] = other, parse_streams([stream(group)], [len(forms)], forms, other)
+                own = _forms(layout.grids, (layout.groups[group],))
+                apart[group] = other, parse_streams([stream(group)], [len(own)], own, other)
             source, known = apart[group]
         if at in known:  # LOSS-11
             raise FormatError(f"fast: a copy of a copy, channel {channel} of group {group}")
@@ -110,9 +111,9 @@ CODEC = Codec(
     version=0,
     domain="ordinals",
     lossless=True,
-    encode=partial(encode_groups, build_stream, SIZING),
+    encode=partial(encode_groups, build_streams, SIZING),
     decode=decode,
     regroup=regroup,
-    recode=partial(recode_groups, build_stream),
-    parameters=(segment_frames("62,000"),),
+    recode=partial(recode_groups, build_streams),
+    parameters=(segment_frames("44,000"),),
 )

@@ -19,10 +19,10 @@ Ints = NDArray[np.int64]
 
 MAX_ROWS = 2**16
 
-# (ordinals, grids in force and of the clip, group, seen) -> the stream of a group. ``seen``: where
-# a channel was coded that a later one may repeat; None: there shall be no copies.
+# (ordinals, grids in force and of the clip, the groups' channels, their numbers, copying) -> the
+# streams of groups. ``copying``: a channel may repeat one before it.
 Build = Callable[
-    [Ints, Sequence[tuple[Grid, Grid]], int, dict[bytes, tuple[int, int]] | None], bytes
+    [Ints, Sequence[tuple[Grid, Grid]], Sequence[Sequence[int]], Sequence[int], bool], list[bytes]
 ]
 
 
@@ -37,9 +37,7 @@ def encode_groups(
 def _build_segment(
     build: Build, source: SignalSource, start: int, stop: int
 ) -> tuple[bytes, ...]:
-    seen: dict[bytes, tuple[int, int]] = {}
-    groups = range(len(source.layout.groups))
-    return tuple(_streams(build, source, start, stop, groups, seen))
+    return _streams(build, source, start, stop, range(len(source.layout.groups)), True)
 
 
 def recode_groups(
@@ -56,7 +54,7 @@ def recode_groups(
     What such a stream repeated, or who repeated it, need not be looked at then.
     """
     for span in spans:
-        yield tuple(_streams(build, source, span.first, span.stop, groups, None))
+        yield _streams(build, source, span.first, span.stop, groups, False)
 
 
 def _streams(
@@ -65,14 +63,12 @@ def _streams(
     start: int,
     stop: int,
     groups: Sequence[int],
-    seen: dict[bytes, tuple[int, int]] | None,
-) -> Iterator[bytes]:
+    copying: bool,
+) -> tuple[bytes, ...]:
     layout = source.layout
-    ordinals, grids = source.ordinals(start, stop), source.grids(start)
-    for group in groups:
-        channels = list(layout.groups[group])
-        own = [(grids[c], layout.grids[c]) for c in channels]
-        yield build(ordinals[:, channels], own, group, seen)
+    grids = list(zip(source.grids(start), layout.grids, strict=True))
+    channels = [layout.groups[group] for group in groups]
+    return tuple(build(source.ordinals(start, stop), grids, channels, groups, copying))
 
 
 def check_copy(name: str, layout: Layout, group: int, column: int) -> None:

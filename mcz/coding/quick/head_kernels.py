@@ -32,7 +32,7 @@ OWN_FORM = 128  # in kind: form and drop are in the stream
 MULTIPLES = 32  # form: integers that are multiplied by a unit
 MAX_DROP, MAX_TAP, MAX_SCALE = 19, 511, 172
 MAX_TOP_10, MAX_TOP_24, MAX_TOP_53 = 614, 255, 2047
-MAX_REDUCED = 1 << 60
+MAX_RANK = 1 << 60
 UNIT_SIZE = 8
 MOST = 0x7FFFFFFFFFFFFFFF
 
@@ -117,7 +117,7 @@ def read_coded(
         if head[TOP] > most_classes(form) or head[DEPTH] > head[TOP]:
             return -1, BAD_TOP
         row = 1 if head[BASE] == 10 else 0
-        if (head[DEPTH] + 1) * (head[BASE] - 1) > MAX_REDUCED // powers[row, head[DIGITS] - 1]:
+        if (head[DEPTH] + 1) * (head[BASE] - 1) > MAX_RANK // powers[row, head[DIGITS] - 1]:
             return -1, BAD_TOP
     if at >= end:
         return -1, ENDS

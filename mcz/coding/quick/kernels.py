@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.jit import bit_length, inlined, inner
+from mcz.jit import bit_length, inlined, inner, truncated
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -24,14 +24,14 @@ UNIT = TAPS + MAX_TAPS  # where the unit lies in the data, or -1
 ORDINAL = 1  # of a constant
 GROUP, COLUMN = 1, 2  # of a copy
 # and what follows from that for numbers in classes of mantissas: which powers; the least mantissa
-# and one more than the greatest; how many make a class; by how much magnitudes exceed the reduced;
+# and one more than the greatest; how many make a class; by how much magnitudes exceed the rank;
 # the lowest and the highest class, by digits in fixed point; the greatest prediction.
 ROW, LOW, HIGH, PER_CLASS, FIRST, LEAST, WIDTH, LIMIT = range(UNIT + 1, UNIT + 9)
 PLAN_SIZE = UNIT + 9
 CODED, CONSTANT, COPY = range(3)
 
 N_CONTEXTS, N_SYMBOLS = 32, 49
-TABLE_BITS = 12
+TABLE_BITS, SYMBOL_BITS = 12, 6
 TABLE = 1 << TABLE_BITS
 LEAST_STATE = 1 << 16
 DIRECT, FAR = 16, 48  # symbols: of a size itself, of a length
@@ -53,23 +53,26 @@ TRACK_SIZE = 7
 
 
 class Tables(NamedTuple):
-    """``symbols``: by context and slot; ``frequencies``: count << TABLE_BITS | start of each."""
+    """``symbols``: by context and slot; ``frequencies``: count << TABLE_BITS | start of each, by
+    context and 64 symbols; ``scales``: of each scale its context << 8 | how many bits are raw.
+    """
 
     symbols: Bytes
     frequencies: Ints
+    scales: Ints
     powers: Ints  # of 2 in row 0, of 10 in row 1
 
 
 @inner
 def quotient(a: int, b: int) -> int:
     """``a // b`` of numbers that are not negative, quicker where floats are exact."""
-    return int(float(a) / float(b)) if a < EXACT else a // b
+    return truncated(float(a) / float(b)) if a < EXACT else a // b
 
 
 @inlined
 def divided(a: int, unit: int, inverse: float) -> int:
     """``a // unit`` of numbers that are not negative, ``inverse`` being 1 / unit."""
-    found = int(float(a) * inverse)
+    found = truncated(float(a) * inverse)
     rest = a - found * unit
     return found - 1 if rest < 0 else found + 1 if rest >= unit else found
 
@@ -142,10 +145,10 @@ def enter_class(size: int, plan: Ints, track: Ints, powers: Ints) -> None:
 
 
 @inner
-def of_reduced(reduced: int, plan: Ints, powers: Ints) -> tuple[int, int, bool]:
-    """Of a reduced ordinal: value in fixed point, ordinal, and whether there is such a one."""
-    minus = reduced >> 63
-    magnitude = reduced ^ minus
+def of_rank(rank: int, plan: Ints, powers: Ints) -> tuple[int, int, bool]:
+    """Of a rank ordinal: value in fixed point, ordinal, and whether there is such a one."""
+    minus = rank >> 63
+    magnitude = rank ^ minus
     if magnitude == 0:
         return 0, minus, True
     k = quotient(magnitude - 1, plan[PER_CLASS])
@@ -160,19 +163,19 @@ def first_value(words: Ints, i: int, plan: Ints, powers: Ints) -> tuple[int, int
     """Decode the first value of a channel: (next bit, value in fixed point, ordinal, all right)."""
     n = bits_at(words, i, LENGTH_BITS)
     i += LENGTH_BITS
-    reduced = 0
+    rank = 0
     if n > MAX_LENGTH:
         return i, 0, 0, False
     if n:
         raw = bits_at(words, i, n)
         i += n
-        reduced = 1 << (n - 1) | raw >> 1
-        reduced = -reduced if raw & 1 else reduced
+        rank = 1 << (n - 1) | raw >> 1
+        rank = -rank if raw & 1 else rank
     if plan[BASE]:
-        value, ordinal, good = of_reduced(reduced, plan, powers)
+        value, ordinal, good = of_rank(rank, plan, powers)
         return i, value, ordinal, good
-    ordinal = reduced << plan[DROP] | bits_at(words, i, plan[DROP])
-    return i + plan[DROP], reduced, ordinal, -MAX_PLAIN <= reduced < MAX_PLAIN
+    ordinal = rank << plan[DROP] | bits_at(words, i, plan[DROP])
+    return i + plan[DROP], rank, ordinal, -MAX_PLAIN <= rank < MAX_PLAIN
 
 
 @inlined
@@ -218,12 +221,11 @@ def next_value(
                 mantissa = size * step
     # what it misses, FAST-11
     length = bit_length(f + 1) - 1
-    scale = max(4 * length + ((f + 1 << 2) >> length & 3) - track[QUARTERS], 0)
-    context = scale if scale < 28 else 28 + (scale & 3)
-    k = clamp((scale >> 2) - 7, 0, 44)
+    scale = tables.scales[max(4 * length + ((f + 1 << 2) >> length & 3) - track[QUARTERS], 0)]
+    context, k = scale >> 8 & (N_CONTEXTS - 1), scale & 63
     slot = x & (TABLE - 1)
-    symbol = int(tables.symbols[context, slot])
-    frequency = tables.frequencies[context, symbol]
+    symbol = int(tables.symbols[context << TABLE_BITS | slot])
+    frequency = tables.frequencies[context << SYMBOL_BITS | symbol]
     x = (frequency >> TABLE_BITS) * (x >> TABLE_BITS) + slot - (frequency & (TABLE - 1))
     word = int(data[at & WORD]) | int(data[at + 1 & WORD]) << 8
     at = at + 2 if x < LEAST_STATE else at
@@ -256,7 +258,7 @@ def next_value(
         value = (value ^ minus) - minus
     elif plan[BASE]:  # another class or sign
         expected = mantissa + track[OFFSET] if size >= track[SINCE] else 0
-        value, ordinal, known = of_reduced((expected ^ minus) + miss, plan, tables.powers)
+        value, ordinal, known = of_rank((expected ^ minus) + miss, plan, tables.powers)
         good = good and known
     else:
         value = p + miss

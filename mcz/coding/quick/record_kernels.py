@@ -23,6 +23,7 @@ from mcz.coding.quick.kernels import (
     PER_CLASS,
     ROW,
     SCALE,
+    SYMBOL_BITS,
     TABLE,
     TABLE_BITS,
     TAPS,
@@ -33,7 +34,6 @@ from mcz.coding.quick.kernels import (
     class_of,
     from_mantissa,
     quotient,
-    settle,
 )
 from mcz.jit import bit_length, inner, kernel
 
@@ -45,7 +45,7 @@ NEW = -1  # context of a first value, whose symbol is its length
 
 @inner
 def expected_of(size: int, own: int, plan: Ints, powers: Ints) -> int:
-    """The magnitude of the reduced ordinal that is nearest to ``size``, whose class is ``own``."""
+    """The magnitude of the rank that is nearest to ``size``, whose class is ``own``."""
     row, shift = plan[ROW], own - plan[DIGITS]
     if size < powers[row, own - 1]:
         return 0
@@ -59,36 +59,34 @@ def expected_of(size: int, own: int, plan: Ints, powers: Ints) -> int:
 
 @inner
 def spread_column(ordinals: Ints, plan: Ints, powers: Ints, spread: Ints) -> None:
-    """Fill ``spread`` (2, n_rows) with the reduced ordinals and the values in fixed point."""
-    settle(plan, powers)
+    """Fill ``spread`` (3, n_rows): ranks, values in fixed point, and the size of a step there."""
     drop, per_class = plan[DROP], plan[PER_CLASS]
     for t in range(len(ordinals)):
         ordinal = ordinals[t]
         if plan[BASE] == 0:
             spread[0, t] = spread[1, t] = ordinal >> drop
+            spread[2, t] = 1
             continue
         magnitude = (ordinal ^ (ordinal >> 63)) >> drop
-        value = 0
+        value, step = 0, 1
         if magnitude:
             magnitude -= plan[FIRST]
             k = quotient(magnitude - 1, per_class)
             mantissa = magnitude - 1 - k * per_class + plan[LOW]
-            value = from_mantissa(mantissa, plan[LEAST] + k - plan[DIGITS], plan[ROW], powers)
+            shift = plan[LEAST] + k - plan[DIGITS]
+            value = from_mantissa(mantissa, shift, plan[ROW], powers)
+            step = powers[plan[ROW], max(shift, 0)]
         spread[0, t] = -1 - magnitude if ordinal < 0 else magnitude
         spread[1, t] = -value if ordinal < 0 else value
+        spread[2, t] = step
 
 
 @inner
-def record_column(
-    ordinals: Ints, spread: Ints, plan: Ints, powers: Ints, costs: Ints, records: Ints
-) -> int:
-    """Fill ``records`` with what is coded; return the cost of that in 256ths of a bit.
-
-    ``costs`` are those of symbols, by context.
-    """
+def record_column(ordinals: Ints, spread: Ints, plan: Ints, powers: Ints, records: Ints) -> None:
+    """Fill ``records`` with what is coded."""
     base, drop, from_last, f = plan[BASE], plan[DROP], plan[FROM_LAST], plan[SCALE] << 4
     limit, own = plan[LIMIT], 0
-    last = d0 = d1 = d2 = d3 = total = quarters = 0
+    last = d0 = d1 = d2 = d3 = quarters = 0
     for t in range(len(ordinals)):
         p = plan[TAPS] * d0 + plan[TAPS + 1] * d1 + plan[TAPS + 2] * d2 + plan[TAPS + 3] * d3
         p = (p + 16) >> 5
@@ -115,24 +113,20 @@ def record_column(
             symbol, n_raw = part, k
             if far > 12:
                 symbol, n_raw = FAR + far, k + far - 1
-                total += LENGTH_BITS << 8
             elif part >= DIRECT:
                 symbol = DIRECT + 4 * (far - 5) + (part >> (far - 3) & 3)
                 n_raw = k + far - 3
             kept = size & ((1 << n_raw) - 1)
-            total += costs[context, min(symbol, FAR)]
             if n_raw or size:
                 n_raw += 1
             d3, d2, d1 = d2, d1, d0
             d0 = clamp(value - last, -MAX_DIFFERENCE, MAX_DIFFERENCE)
             f += ((abs(value - p) << 4) - f) >> 2
         last = value
-        total += n_raw << 8
         records[t, CONTEXT], records[t, SYMBOL], records[t, N_RAW] = context, symbol, n_raw
         records[t, RAW] = kept << 1 | (1 if miss < 0 else 0)
         records[t, N_DROPPED] = drop if base == 0 else 0
         records[t, DROPPED] = ordinals[t] & ((1 << drop) - 1)
-    return total
 
 
 @inner
@@ -168,7 +162,7 @@ def write_records(records: Ints, tables: Tables, words: Ints, data: Bytes) -> tu
     for t in range(len(records) - 1, -1, -1):
         context = records[t, CONTEXT]
         if context != NEW:
-            frequency = tables.frequencies[context, min(records[t, SYMBOL], FAR)]
+            frequency = tables.frequencies[context << SYMBOL_BITS | min(records[t, SYMBOL], FAR)]
             count = frequency >> TABLE_BITS
             if x >= count << 20:
                 words[at] = x & 0xFFFF

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.annexes import annex_bytes
-from mcz.coding.quick.kernels import N_CONTEXTS, N_SYMBOLS, TABLE, TABLE_BITS, Tables
+from mcz.coding.quick.kernels import N_CONTEXTS, N_SYMBOLS, SYMBOL_BITS, TABLE, TABLE_BITS, Tables
 
 Ints = NDArray[np.int64]
 LAST_POWER = 63
+MAX_SCALES = 512
 
 
 @cache
@@ -30,14 +31,13 @@ def tables_of(counts: Ints) -> Tables:
     twos = [min(2**k, 2**62) for k in range(LAST_POWER + 1)]
     tens = [min(10**k, 10**18) for k in range(LAST_POWER + 1)]
     powers = np.array([twos, tens], np.int64)
-    return Tables(symbols.reshape(N_CONTEXTS, TABLE), counts << TABLE_BITS | starts, powers)
+    frequencies = np.zeros((N_CONTEXTS, 1 << SYMBOL_BITS), np.int64)
+    frequencies[:, :N_SYMBOLS] = counts << TABLE_BITS | starts
+    scales = np.array([_context(scale) for scale in range(MAX_SCALES)], np.int64)
+    return Tables(symbols, frequencies.ravel(), scales, powers)
 
 
-@cache
-def costs() -> Ints:
-    """What each symbol costs in each context, in 256ths of a bit."""
-    return costs_of(tables().frequencies >> TABLE_BITS)
-
-
-def costs_of(counts: Ints) -> Ints:
-    return np.rint(256 * (TABLE_BITS - np.log2(counts))).astype(np.int64)
+def _context(scale: int) -> int:
+    """The context of a scale, in quarters of octaves, << 8 | bits that are raw: FAST-11."""
+    context = scale if scale < N_CONTEXTS - 4 else N_CONTEXTS - 4 + scale % 4
+    return context << 8 | min(max(scale // 4 - 7, 0), 44)
