@@ -22,8 +22,8 @@ EXACT_POWER = 22
 def scaled(mantissa: int, power: int, tens: Floats) -> float:
     """``mantissa * 10^power``, rounded once: both factors are exact."""
     if power < 0:
-        return float(mantissa) / tens[-power]
-    return float(mantissa) * tens[power]
+        return float(mantissa / tens[-power])
+    return float(mantissa * tens[power])
 
 
 @inner

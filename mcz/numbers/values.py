@@ -29,8 +29,9 @@ def values_of(
     if not changes and ordinals.flags.c_contiguous:
         left = np.zeros(len(grids), np.int64)
         _kernels().fill(ordinals, _rules(tuple(grids)), TENS, values, left)
-        for grid in dict.fromkeys(grids[c] for c in np.flatnonzero(left)):
-            columns = [c for c in np.flatnonzero(left).tolist() if grids[c] == grid]
+        others = np.flatnonzero(left).tolist()
+        for grid in dict.fromkeys(grids[c] for c in others):
+            columns = [c for c in others if grids[c] == grid]
             values[:, columns] = grid.values(ordinals[:, columns])
         return values
     for rows, columns, grid in grid_blocks(len(ordinals), grids, changes):

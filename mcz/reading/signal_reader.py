@@ -106,9 +106,7 @@ class SignalReader:
         n_columns = sum(len(layout.groups[group]) for group in self.groups)
         return (stop - start) * layout.samples_per_frame, n_columns
 
-    def blocks(
-        self, start: int, stop: int, out: NDArray[Any] | None = None
-    ) -> Iterator[Block]:
+    def blocks(self, start: int, stop: int, out: NDArray[Any] | None = None) -> Iterator[Block]:
         """The same block by block; values may lie in ``out``, of all rows, already."""
         spans = self._prepare(start, stop)
         if start == stop:  # the header has to be right all the same (CODEC-05)

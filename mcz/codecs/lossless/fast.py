@@ -73,7 +73,7 @@ def _read_segment(
     for group in groups:
         columns[group] = first
         first += len(layout.groups[group])
-    apart: dict[int, tuple[Ints, Mapping[int, tuple[int, int]]]] = {}  # groups not asked for
+    apart: dict[int, tuple[Ints, dict[int, tuple[int, int]]]] = {}  # groups not asked for
     for column, (group, channel) in copies.items():
         check_copy("fast", layout, group, channel)
         source, known, at = rows, copies, columns.get(group, 0) + channel

@@ -34,9 +34,7 @@ def encode_groups(
     return Encoded(header=b"", segments=guessing(source, params["segment_frames"], sizing, code))
 
 
-def _build_segment(
-    build: Build, source: SignalSource, start: int, stop: int
-) -> tuple[bytes, ...]:
+def _build_segment(build: Build, source: SignalSource, start: int, stop: int) -> tuple[bytes, ...]:
     return _streams(build, source, start, stop, range(len(source.layout.groups)), True)
 
 

@@ -23,10 +23,9 @@ from mcz.coding.quick.kernels import (
     TOP,
     Ints,
     clamp,
-    quotient,
     settle,
 )
-from mcz.coding.quick.record_kernels import RECORD_SIZE, record_column, spread_column
+from mcz.coding.quick.record_kernels import record_column, spread_column
 from mcz.jit import bit_length, inner, kernel
 
 Floats = NDArray[np.float64]
@@ -84,40 +83,45 @@ def set_fixed(plan: Ints, order: int) -> None:
 
 @inner
 def quarters(value: int) -> int:
-    """About 4 log2 of a positive number."""
+    """About 4 log2 of a positive number: four times the bits of an error that is so large."""
     length = bit_length(value) - 1
     return 4 * length + (4 * value >> length & 3)
 
 
 @inner
 def choose(values: Ints, steps: Ints, plan: Ints, normal: Floats, taps: Floats) -> None:
-    """Note the predictor of ``values`` that misses them by the fewest ``steps``."""
-    last = d0 = d1 = d2 = d3 = 0
+    """Note the predictor of ``values`` whose errors, in ``steps``, take the fewest bits."""
     fitted = fit(values, plan, normal, taps)
     tap0, tap1, tap2, tap3 = plan[TAPS], plan[TAPS + 1], plan[TAPS + 2], plan[TAPS + 3]
-    first = second = third = none = fourth = 0  # costs
-    for t in range(len(values)):
-        value, step = values[t], steps[t]
-        if t:
-            d = value - last
-            first += quarters(abs(d) + step)
-            second += quarters(abs(d - d0) + step)
-            third += quarters(abs(d - 2 * d0 + d1) + step)
-            none += quarters(abs(value) + step)
-            if fitted:
-                p = (tap0 * d0 + tap1 * d1 + tap2 * d2 + tap3 * d3 + 16) >> 5
-                fourth += quarters(abs(d - p) + step)
-            d3, d2, d1, d0 = d2, d1, d0, clamp(d, -MAX_DIFFERENCE, MAX_DIFFERENCE)
-        last = value
-    best = first
-    order = 0
-    if second + TAP_COST < best:
-        best, order = second + TAP_COST, 1
-    if third + 2 * TAP_COST < best:
-        best, order = third + 2 * TAP_COST, 2
-    if none < best:
-        best, order = none, 3
-    if not fitted or best <= fourth + MAX_TAPS * TAP_COST:
+    last = values[0]
+    d0 = d1 = d2 = d3 = 0
+    near0 = near1 = near2 = near3 = near4 = 0  # errors, of late
+    cost0 = cost1 = cost2 = cost3 = cost4 = 0
+    for t in range(1, len(values)):
+        d, step = values[t] - last, steps[t]
+        e0, e1, e2, e3 = abs(d), abs(d - d0), abs(d - 2 * d0 + d1), abs(values[t])
+        cost0 += quarters(near0 + step + e0)
+        cost1 += quarters(near1 + step + e1)
+        cost2 += quarters(near2 + step + e2)
+        cost3 += quarters(near3 + step + e3)
+        near0 += (e0 - near0) >> 2
+        near1 += (e1 - near1) >> 2
+        near2 += (e2 - near2) >> 2
+        near3 += (e3 - near3) >> 2
+        if fitted:
+            e4 = abs(d - ((tap0 * d0 + tap1 * d1 + tap2 * d2 + tap3 * d3 + 16) >> 5))
+            cost4 += quarters(near4 + step + e4)
+            near4 += (e4 - near4) >> 2
+        d3, d2, d1, d0 = d2, d1, d0, clamp(d, -MAX_DIFFERENCE, MAX_DIFFERENCE)
+        last = values[t]
+    best, order = cost0, 0
+    if cost1 + TAP_COST < best:
+        best, order = cost1 + TAP_COST, 1
+    if cost2 + 2 * TAP_COST < best:
+        best, order = cost2 + 2 * TAP_COST, 2
+    if cost3 < best and plan[BASE] == 0:  # from 0 on, ranks of classes are far apart
+        best, order = cost3, 3
+    if not fitted or best <= cost4 + MAX_TAPS * TAP_COST:
         set_fixed(plan, order)
 
 

@@ -24,7 +24,7 @@ UNIT = TAPS + MAX_TAPS  # where the unit lies in the data, or -1
 ORDINAL = 1  # of a constant
 GROUP, COLUMN = 1, 2  # of a copy
 # and what follows from that for numbers in classes of mantissas: which powers; the least mantissa
-# and one more than the greatest; how many make a class; by how much magnitudes exceed the rank;
+# and one more than the greatest; how many make a class; by how much magnitudes exceed ranks;
 # the lowest and the highest class, by digits in fixed point; the greatest prediction.
 ROW, LOW, HIGH, PER_CLASS, FIRST, LEAST, WIDTH, LIMIT = range(UNIT + 1, UNIT + 9)
 PLAN_SIZE = UNIT + 9
@@ -86,15 +86,17 @@ def clamp(value: int, low: int, high: int) -> int:
 def window(words: Ints, i: int) -> int:
     """At least 32 bits from bit ``i`` on."""
     k = i >> 5 & WORD
-    return (words[k] | words[k + 1] << 32) >> (i & 31)
+    return int(words[k] | words[k + 1] << 32) >> (i & 31)
 
 
 @inlined
 def bits_at(words: Ints, i: int, n: int) -> int:
     """``n`` bits, at most 63, of ``words`` of 32 bits from bit ``i`` on."""
     if n > 32:
-        return window(words, i) & WORD | (window(words, i + 32) & ((1 << (n - 32)) - 1)) << 32
-    return window(words, i) & ((1 << n) - 1)
+        rest = window(words, i + 32) & ((1 << (n - 32)) - 1)
+        return window(words, i) & WORD | rest << 32
+    found: int = window(words, i) & ((1 << n) - 1)
+    return found
 
 
 @inner
@@ -146,14 +148,16 @@ def enter_class(size: int, plan: Ints, track: Ints, powers: Ints) -> None:
 
 @inner
 def of_rank(rank: int, plan: Ints, powers: Ints) -> tuple[int, int, bool]:
-    """Of a rank ordinal: value in fixed point, ordinal, and whether there is such a one."""
+    """Of a rank: value in fixed point, ordinal, and whether there is such a one."""
     minus = rank >> 63
     magnitude = rank ^ minus
     if magnitude == 0:
         return 0, minus, True
     k = quotient(magnitude - 1, plan[PER_CLASS])
     mantissa = magnitude - 1 - k * plan[PER_CLASS] + plan[LOW]
-    value = from_mantissa(mantissa, plan[LEAST] + min(k, plan[DEPTH]) - plan[DIGITS], plan[ROW], powers)
+    value = from_mantissa(
+        mantissa, plan[LEAST] + min(k, plan[DEPTH]) - plan[DIGITS], plan[ROW], powers
+    )
     ordinal = (plan[FIRST] + magnitude) << plan[DROP]
     return (value ^ minus) - minus, ordinal ^ minus, k <= plan[DEPTH]
 

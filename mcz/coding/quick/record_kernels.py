@@ -13,10 +13,10 @@ from mcz.coding.quick.kernels import (
     FAR,
     FIRST,
     FROM_LAST,
-    LENGTH_BITS,
     HIGH,
     LEAST,
     LEAST_STATE,
+    LENGTH_BITS,
     LIMIT,
     LOW,
     MAX_DIFFERENCE,
@@ -40,6 +40,7 @@ from mcz.jit import bit_length, inner, kernel
 # Columns of ``records``, one row a value.
 CONTEXT, SYMBOL, N_RAW, RAW, N_DROPPED, DROPPED = range(6)  # of FAR and more the length is added
 RECORD_SIZE = 6
+MAX_VALUE_SIZE = 12  # bytes of bits beside a symbol
 NEW = -1  # context of a first value, whose symbol is its length
 
 
@@ -54,7 +55,7 @@ def expected_of(size: int, own: int, plan: Ints, powers: Ints) -> int:
         mantissa = min(quotient(size + (unit >> 1), unit), plan[HIGH] - 1)
     else:
         mantissa = size * powers[row, -shift]
-    return 1 + (own - plan[LEAST]) * plan[PER_CLASS] + mantissa - plan[LOW]
+    return int(1 + (own - plan[LEAST]) * plan[PER_CLASS] + mantissa - plan[LOW])
 
 
 @inner
@@ -141,12 +142,9 @@ def put(data: Bytes, i: int, value: int, n: int) -> int:
     return end
 
 
-@kernel
-def write_records(records: Ints, tables: Tables, words: Ints, data: Bytes) -> tuple[int, int, int]:
-    """Code records: the state, how many ``words`` follow it, the last first, and bits of ``data``.
-
-    ``data`` shall be 0.
-    """
+@inner
+def write_bits(records: Ints, data: Bytes) -> int:
+    """Write all that is no symbol to ``data``, which is 0; how many bits there are."""
     i = 0
     for t in range(len(records)):
         context, symbol = records[t, CONTEXT], records[t, SYMBOL]
@@ -158,6 +156,12 @@ def write_records(records: Ints, tables: Tables, words: Ints, data: Bytes) -> tu
             i = put(data, i, records[t, RAW], records[t, N_RAW])
         if records[t, N_DROPPED]:
             i = put(data, i, records[t, DROPPED], records[t, N_DROPPED])
+    return i
+
+
+@inner
+def write_words(records: Ints, tables: Tables, words: Ints) -> tuple[int, int]:
+    """Code the symbols: the state, and how many ``words`` follow it, the last of them first."""
     x, at = LEAST_STATE, 0
     for t in range(len(records) - 1, -1, -1):
         context = records[t, CONTEXT]
@@ -169,4 +173,22 @@ def write_records(records: Ints, tables: Tables, words: Ints, data: Bytes) -> tu
                 x >>= 16
                 at += 1
             x = (quotient(x, count) << TABLE_BITS) + x % count + (frequency & (TABLE - 1))
-    return x, at, i
+    return x, at
+
+
+@kernel
+def write_records(
+    records: Ints, ends: Ints, tables: Tables, words: Ints, data: Bytes, sizes: Ints
+) -> None:
+    """Code the records of groups, which end at ``ends``.
+
+    Words and bits of a group begin where its records do, ``data`` having MAX_VALUE_SIZE bytes for
+    each. ``sizes`` (groups, 3) get its state, how many words follow it, and how many bits.
+    """
+    start = 0
+    for n in range(len(ends)):
+        own = records[start : ends[n]]
+        state, n_words = write_words(own, tables, words[start : ends[n]])
+        sizes[n, 0], sizes[n, 1] = state, n_words
+        sizes[n, 2] = write_bits(own, data[MAX_VALUE_SIZE * start : MAX_VALUE_SIZE * ends[n]])
+        start = ends[n]

@@ -32,7 +32,6 @@ from mcz.schema import varint
 
 Ints = NDArray[np.int64]
 
-MAX_VALUE_SIZE = 12  # bytes of bits beside a symbol
 SPARE = 32  # bytes at both ends of the streams that a reader of a hostile one may look at
 FAULTS = (
     "it ends in the head",
@@ -47,11 +46,11 @@ FAULTS = (
 
 
 @cache
-def loops() -> tuple[Any, Any, Any]:
-    """The compiled loops, imported on first use: for values, for streams, for an encoder."""
-    from mcz.coding.quick import choice_kernels, kernels, stream_kernels
+def loops() -> tuple[Any, Any, Any, Any]:
+    """The compiled loops, imported on first use: of values, of streams; of an encoder."""
+    from mcz.coding.quick import choice_kernels, kernels, record_kernels, stream_kernels
 
-    return kernels, stream_kernels, choice_kernels
+    return kernels, stream_kernels, choice_kernels, record_kernels
 
 
 @cache
@@ -99,18 +98,18 @@ def build_streams(
 ) -> list[bytes]:
     """The streams of some groups, whose channels ``groups`` are columns of ``ordinals``.
 
-    ``grids`` are those in force and of the clip, ``numbers`` the groups'. ``copying``: a channel may
-    repeat one before it.
+    ``grids`` are those in force and of the clip, ``numbers`` the groups'. ``copying``: a channel
+    may repeat one before it.
     """
     heads = _heads(np.ascontiguousarray(ordinals.T), grids, groups, numbers, copying)
     records = plan([head for group in heads for head in group if isinstance(head, Coded)])
-    streams, at = [], 0
-    for group in heads:
-        end = at + len(ordinals) * sum(isinstance(head, Coded) for head in group)
-        parts = [head.head() if isinstance(head, Coded) else head for head in group]
-        streams.append(b"".join(parts) + write(records[at:end]))
-        at = end
-    return streams
+    n_coded = [sum(isinstance(head, Coded) for head in group) for group in heads]
+    return [
+        b"".join(head.head() if isinstance(head, Coded) else head for head in group) + bits
+        for group, bits in zip(
+            heads, write(records, len(ordinals) * np.cumsum(n_coded)), strict=True
+        )
+    ]
 
 
 def _heads(
@@ -147,33 +146,37 @@ def _coded(column: Ints, grid: Grid, clip_grid: Grid) -> Coded:
 
 def plan(coded: Sequence[Coded]) -> Ints:
     """Choose how channels are coded; what is coded, one after the other, for ``write``."""
-    own, _, choice = loops()
+    own, _, choice, record = loops()
     if not coded:
-        return np.empty((0, 0), np.int64)
+        return np.empty((0, record.RECORD_SIZE), np.int64)
     columns = np.stack([head.numbers for head in coded])
     plans = np.zeros((len(coded), own.PLAN_SIZE), np.int64)
     plans[:, own.BASE] = [head.shape.base for head in coded]
     plans[:, own.DIGITS] = [head.shape.digits for head in coded]
     max_tops = np.array([max_top(head.shape) for head in coded], np.int64)
     scales = np.zeros(len(coded), np.int64)
-    records = np.empty((columns.size, choice.RECORD_SIZE), np.int64)
+    records = np.empty((columns.size, record.RECORD_SIZE), np.int64)
     choice.plan_columns(columns, max_tops, plans, tables().powers, scales, records)
     for head, found, scale in zip(coded, plans, scales.tolist(), strict=True):
         head.plan, head.scale = found, scale
     return records
 
 
-def write(records: Ints) -> bytes:
-    """State, words and bits of the coded channels of a group; nothing where there are none."""
-    if not len(records):
-        return b""
-    from mcz.coding.quick import record_kernels
-
+def write(records: Ints, ends: Ints) -> list[bytes]:
+    """State, words and bits of groups whose records end at ``ends``; b"" where there are none."""
+    own = loops()[3]
     words = np.empty(len(records), np.int64)
-    data = np.zeros(MAX_VALUE_SIZE * len(records), np.uint8)
-    state, n_words, n_bits = record_kernels.write_records(records, tables(), words, data)
-    bits = data[: (n_bits + 7) // 8][::-1].tobytes()
-    return int(state).to_bytes(4, "little") + words[:n_words][::-1].astype("<u2").tobytes() + bits
+    data = np.zeros(own.MAX_VALUE_SIZE * len(records), np.uint8)
+    sizes = np.empty((len(ends), 3), np.int64)
+    own.write_records(records, ends, tables(), words, data, sizes)
+    parts, start = [], 0
+    for end, (state, n_words, n_bits) in zip(ends.tolist(), sizes.tolist(), strict=True):
+        at = own.MAX_VALUE_SIZE * start
+        coded = words[start : start + n_words][::-1].astype("<u2").tobytes()
+        bits = data[at : at + (n_bits + 7) // 8][::-1].tobytes()
+        parts.append(state.to_bytes(4, "little") + coded + bits if end > start else b"")
+        start = end
+    return parts
 
 
 def parse_streams(
@@ -184,7 +187,7 @@ def parse_streams(
     ``forms`` are those that channels have where their heads name none. Returns the columns that are
     copies: of which group and which of its channels. Raises FormatError on bad bytes.
     """
-    own, read, _ = loops()
+    own, read, _, _ = loops()
     data = _spared(streams)
     words = np.ascontiguousarray(data[::-1]).view("<u4").astype(np.int64)
     ends = SPARE + np.cumsum([len(stream) for stream in streams], dtype=np.int64)
@@ -196,7 +199,7 @@ def parse_streams(
     if fault >= 0:
         raise FormatError(f"fast: channel {channel} of those read: {FAULTS[fault]}")
     for n in np.flatnonzero((plans[:, own.KIND] == CODED) & (plans[:, own.UNIT] > 0)):
-        (unit,) = struct.unpack_from("<d", data, plans[n, own.UNIT])
+        (unit,) = struct.unpack_from("<d", data.data, plans[n, own.UNIT])
         check_unit("fast", unit)
         out[:, n] = of_multiples(out[:, n], unit)  # FAST-12
     return {
@@ -207,7 +210,7 @@ def parse_streams(
 
 def renumbered(stream: bytes, forms: Ints, number_of: Callable[[int, int], int]) -> bytes:
     """``stream`` with the groups that its copies name numbered anew."""
-    own, read, _ = loops()
+    own, read, _, _ = loops()
     plans = np.zeros((len(forms), own.PLAN_SIZE), np.int64)
     ends = np.zeros(len(forms), np.int64)
     end = SPARE + len(stream)
