@@ -83,7 +83,7 @@ def _read_segment(
                 own = _forms(layout.grids, (layout.groups[group],))
                 apart[group] = other, parse_streams([stream(group)], [len(own)], own, other)
             source, known = apart[group]
-        if at in known:  # LOSS-11
+        if at in known:  # FAST-02, LOSS-11
             raise FormatError(f"fast: a copy of a copy, channel {channel} of group {group}")
         rows[:, column] = source[:, at]
 

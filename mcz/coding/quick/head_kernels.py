@@ -114,10 +114,14 @@ def read_coded(
         head[DEPTH], at = varint(data, at, end)
         if at < 0:
             return -1, ENDS
-        if head[TOP] > most_classes(form) or head[DEPTH] > head[TOP]:
+        if head[TOP] > most_classes(form):  # FAST-02, LOSS-18
+            return -1, BAD_TOP
+        if head[DEPTH] > head[TOP]:  # FAST-03
             return -1, BAD_TOP
         row = 1 if head[BASE] == 10 else 0
-        if (head[DEPTH] + 1) * (head[BASE] - 1) > MAX_RANK // powers[row, head[DIGITS] - 1]:
+        if (head[DEPTH] + 1) * (head[BASE] - 1) > MAX_RANK // powers[
+            row, head[DIGITS] - 1
+        ]:  # FAST-04
             return -1, BAD_TOP
     if at >= end:
         return -1, ENDS
@@ -127,7 +131,7 @@ def read_coded(
         return -1, BAD_SCALE
     head[SCALE] = (4 + (scale & 3) << (scale >> 2)) >> 2
     n_taps = kind >> 3 & 15
-    if n_taps > MAX_TAPS:
+    if n_taps > MAX_TAPS:  # FAST-05
         return -1, BAD_TAPS
     for tap in range(MAX_TAPS):
         head[TAPS + tap] = 0

@@ -142,7 +142,7 @@ def enter_class(size: int, plan: Ints, track: Ints, powers: Ints) -> None:
     track[OWN], track[SHIFT] = own, shift
     track[SINCE], track[UNTIL] = powers[row, own - 1], powers[row, own]
     track[STEP] = powers[row, abs(shift)]
-    track[QUARTERS] = 4 * shift if plan[BASE] == 2 else (425 * shift + 16) >> 5  # FAST-12
+    track[QUARTERS] = 4 * shift if plan[BASE] == 2 else (425 * shift + 16) >> 5  # FAST-14
     track[OFFSET] = 1 + (own - plan[LEAST]) * plan[PER_CLASS] - plan[LOW]
 
 
@@ -158,8 +158,8 @@ def of_rank(rank: int, plan: Ints, powers: Ints) -> tuple[int, int, bool]:
     value = from_mantissa(
         mantissa, plan[LEAST] + min(k, plan[DEPTH]) - plan[DIGITS], plan[ROW], powers
     )
-    ordinal = (plan[FIRST] + magnitude) << plan[DROP]
-    return (value ^ minus) - minus, ordinal ^ minus, k <= plan[DEPTH]
+    ordinal = (plan[FIRST] + magnitude) << plan[DROP]  # FAST-09
+    return (value ^ minus) - minus, ordinal ^ minus, k <= plan[DEPTH]  # FAST-10
 
 
 @inner
@@ -168,18 +168,18 @@ def first_value(words: Ints, i: int, plan: Ints, powers: Ints) -> tuple[int, int
     n = bits_at(words, i, LENGTH_BITS)
     i += LENGTH_BITS
     rank = 0
-    if n > MAX_LENGTH:
+    if n > MAX_LENGTH:  # there is no such rank
         return i, 0, 0, False
     if n:
         raw = bits_at(words, i, n)
         i += n
-        rank = 1 << (n - 1) | raw >> 1
+        rank = 1 << (n - 1) | raw >> 1  # FAST-13
         rank = -rank if raw & 1 else rank
     if plan[BASE]:
         value, ordinal, good = of_rank(rank, plan, powers)
         return i, value, ordinal, good
     ordinal = rank << plan[DROP] | bits_at(words, i, plan[DROP])
-    return i + plan[DROP], rank, ordinal, -MAX_PLAIN <= rank < MAX_PLAIN
+    return i + plan[DROP], rank, ordinal, -MAX_PLAIN <= rank < MAX_PLAIN  # FAST-11
 
 
 @inlined
@@ -206,10 +206,10 @@ def next_value(
     predictions were off, ``last`` and the others the values before and their differences. Returns
     the first four anew, the value in fixed point, its ordinal, and whether all is right.
     """
-    # what is expected, FAST-10
+    # what is expected
     p = plan[TAPS] * d0 + plan[TAPS + 1] * d1 + plan[TAPS + 2] * d2 + plan[TAPS + 3] * d3
     p = (p + 16) >> 5
-    p = clamp(p + last if plan[FROM_LAST] else p, -plan[LIMIT], plan[LIMIT])
+    p = clamp(p + last if plan[FROM_LAST] else p, -plan[LIMIT], plan[LIMIT])  # FAST-14
     minus = p >> 63
     size = (p ^ minus) - minus
     mantissa = FAR_OFF  # in the class of the prediction
@@ -223,13 +223,14 @@ def next_value(
                 mantissa = min(divided(size + (step >> 1), step, inverse[0]), plan[HIGH] - 1)
             else:
                 mantissa = size * step
-    # what it misses, FAST-11
+    # what that misses
     length = bit_length(f + 1) - 1
     scale = tables.scales[max(4 * length + ((f + 1 << 2) >> length & 3) - track[QUARTERS], 0)]
     context, k = scale >> 8 & (N_CONTEXTS - 1), scale & 63
     slot = x & (TABLE - 1)
     symbol = int(tables.symbols[context << TABLE_BITS | slot])
     frequency = tables.frequencies[context << SYMBOL_BITS | symbol]
+    # FAST-08
     x = (frequency >> TABLE_BITS) * (x >> TABLE_BITS) + slot - (frequency & (TABLE - 1))
     word = int(data[at & WORD]) | int(data[at + 1 & WORD]) << 8
     at = at + 2 if x < LEAST_STATE else at
@@ -240,7 +241,8 @@ def next_value(
         if symbol == FAR:
             far = bits_at(words, i, LENGTH_BITS)
             i += LENGTH_BITS
-            good = far > 0 and far + k <= MAX_LENGTH
+            good = far > 0  # FAST-15
+            good = good and far + k <= MAX_LENGTH  # there is no such rank
             k = clamp(far + k - 1, 0, MAX_LENGTH - 1)
             miss = 1 << k
         else:
@@ -251,7 +253,7 @@ def next_value(
         i += k + 1
         negative = -(raw & 1)
         miss = ((miss | raw >> 1) ^ negative) - negative
-    # the value in fixed point and its ordinal, FAST-13
+    # the number
     inside = mantissa + ((miss ^ minus) - minus)
     if plan[LOW] <= inside < plan[HIGH]:
         ordinal = ((track[OFFSET] + plan[FIRST] + inside) << plan[DROP]) ^ minus
@@ -266,9 +268,9 @@ def next_value(
         good = good and known
     else:
         value = p + miss
-        good = good and -MAX_PLAIN <= value < MAX_PLAIN
+        good = good and -MAX_PLAIN <= value < MAX_PLAIN  # FAST-11
         ordinal = value << plan[DROP] | bits_at(words, i, plan[DROP])
         i += plan[DROP]
-    # what is remembered, FAST-14
-    f += ((abs(value - p) << 4) - f) >> 2
+    # what is remembered
+    f += ((abs(value - p) << 4) - f) >> 2  # FAST-14
     return x, at, i, f, value, ordinal, good

@@ -54,18 +54,22 @@ def start_values(data: Bytes, flow: Ints) -> bool:
     x = int(data[at]) | int(data[at + 1]) << 8 | int(data[at + 2]) << 16 | int(data[at + 3]) << 24
     flow[X], flow[AT] = x, at + 4
     flow[BEGIN] = flow[BIT] = 8 * (len(data) - flow[END])
-    return x >= LEAST_STATE
+    return x >= LEAST_STATE  # FAST-07
 
 
 @inner
 def ends_well(flow: Ints, words: Ints) -> bool:
     """Whether a stream that is decoded has neither words nor bits left."""
     if flow[X] == 0:  # nor had it any
-        nothing: bool = flow[AT] == flow[END]
+        nothing: bool = flow[AT] == flow[END]  # FAST-06
         return nothing
     i = flow[BIT]
-    whole = flow[AT] + (i - flow[BEGIN] + 7 >> 3) == flow[END]
-    return flow[X] == LEAST_STATE and whole and bits_at(words, i, -i & 7) == 0
+    whole = flow[AT] + (i - flow[BEGIN] + 7 >> 3) == flow[END]  # FAST-17
+    spare = bits_at(words, i, -i & 7)
+    if spare != 0:  # FAST-17
+        return False
+    started: bool = flow[X] == LEAST_STATE  # FAST-16
+    return whole and started
 
 
 @inner

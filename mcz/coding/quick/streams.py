@@ -107,7 +107,7 @@ def build_streams(
     return [
         b"".join(head.head() if isinstance(head, Coded) else head for head in group) + bits
         for group, bits in zip(
-            heads, write(records, len(ordinals) * np.cumsum(n_coded)), strict=True
+            heads, write(records, len(ordinals) * np.cumsum(n_coded, dtype=np.int64)), strict=True
         )
     ]
 
