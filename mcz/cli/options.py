@@ -124,8 +124,3 @@ def encoding_options(function: Function) -> Function:
     for option in reversed(options):
         function = option(function)
     return function
-
-
-def chosen(codec: str | None, **others: Any) -> dict[str, Any]:
-    """The arguments of ``mcz.encode`` and its kin, ``codec`` only where it was given."""
-    return others if codec is None else {"codec": codec, **others}

@@ -47,6 +47,7 @@ from mcz.container.packets import (
     is_head,
 )
 from mcz.container.restoring import is_like, restored
+from mcz.container.runs import Runs
 from mcz.container.scan import scan
 from mcz.container.segments import (
     FRESH,
@@ -90,6 +91,7 @@ class Container:
         self.broken: list[tuple[int, Chunk | None]] = []
         self.feet: list[int] = []  # offsets of FOOTs, as far as salvage found them
         self.unverified = 0
+        self.runs = Runs()
         self.index: Foot | None = None
         self._skeletons: dict[bytes, tuple[Any, Skeleton]] = {}
         self.directory = self._salvage() if salvage else self._open()

@@ -14,6 +14,7 @@ from mcz.container.limits import check_decoded
 from mcz.container.masks import parse_mask
 from mcz.container.packets import SHORT
 from mcz.container.reader import Container
+from mcz.container.runs import MOST_OF_ONE, Run
 from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable
 from mcz.errors import FormatError
 from mcz.motion import Exceptions, Signal
@@ -90,7 +91,8 @@ class SignalReader:
             self._shape(start, stop), np.int64 if self.info.is_integer else np.float64
         )
         mask: NDArray[np.bool_] | None = None
-        for block in self.blocks(start, stop, values):
+        near = ordinals is None and not self.container.reads_parts
+        for block in (self._near if near else self.blocks)(start, stop, values):
             rows = slice((block.start - start) * per_frame, (block.stop - start) * per_frame)
             if block.values.base is not values:
                 values[rows] = block.values
@@ -117,6 +119,59 @@ class SignalReader:
             rows = slice((a - start) * per_frame, (b - start) * per_frame)
             own = out[rows] if out is not None and not self.info.is_integer else None
             yield Block(a, b, coded, *self._finish(coded, a, b, own))
+
+    def _near(self, start: int, stop: int, out: NDArray[Any]) -> Iterator[Block]:
+        """The same; a run of which the range has a part is decoded whole, and kept."""
+        per_frame = self.info.layout.samples_per_frame
+        at = start
+        if start < stop:
+            run = self._run(start)
+            if run is not None and (run[0] < start or stop < run[1]):
+                at = min(run[1], stop)
+                yield self._cut(run, start, at)
+        if at < stop:
+            run = self._run(stop - 1)
+            if run is not None and stop < run[1]:
+                yield from self.blocks(at, run[0], out[(at - start) * per_frame :])
+                at = stop
+                yield self._cut(run, run[0], stop)
+        if at < stop or start == stop:
+            yield from self.blocks(at, stop, out[(at - start) * per_frame :])
+
+    def _run(self, frame: int) -> tuple[int, int] | None:
+        """The shown frames that hang together with one; None where they are too many to keep."""
+        info, rows = self.info, self.info.rows
+        per_frame = self._shape(0, 1)[0] * self._shape(0, 1)[1] * 8
+        most = min(MOST_OF_ONE, self.container.max_decoded) // max(per_frame, 1)
+        first = last = info.covering(frame, frame + 1)[0]
+        while not rows[first].header.flags & FRESH and frame - rows[first].header.first < most:
+            first -= 1
+        while last + 1 < len(rows) and not rows[last + 1].header.flags & FRESH:
+            last += 1
+            if rows[last].header.stop - frame > most:
+                return None
+        start = max(rows[first].header.first, info.skip)
+        stop = min(rows[last].header.stop, info.layout.n_frames - info.spare)
+        return (start, stop) if stop - start <= most else None
+
+    def _cut(self, run: tuple[int, int], start: int, stop: int) -> Block:
+        """Frames of a run, which is decoded where it is not at hand."""
+        rows = self.info.covering(run[0], run[0] + 1)
+        key = self.info.rows[rows[0]].offset, self.groups, self.resolution
+        held = self.container.runs.get(key)
+        if held is None:
+            blocks = list(self.blocks(*run))
+            masks = [block.mask for block in blocks]
+            held = Run(
+                run[0],
+                np.concatenate([block.values for block in blocks]),
+                None if all(mask is None for mask in masks) else _joined(blocks),
+            )
+            self.container.runs.put(key, held)
+        per_frame = self.info.layout.samples_per_frame
+        wanted = slice((start - run[0]) * per_frame, (stop - run[0]) * per_frame)
+        mask = None if held.mask is None else held.mask[wanted]
+        return Block(start, stop, held.values[wanted], held.values[wanted], mask)
 
     def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
         """The range in blocks of a few segments, which bound the memory beside the result."""
@@ -328,3 +383,9 @@ class SignalReader:
                     mask[rows, at : at + n] = bits[cut]
                 at += n
         return mask
+
+
+def _joined(blocks: Sequence[Block]) -> NDArray[np.bool_]:
+    """The mask of blocks, some of which may be valid as a whole."""
+    masks = [np.ones(b.values.shape, np.bool_) if b.mask is None else b.mask for b in blocks]
+    return np.concatenate(masks)
