@@ -19,6 +19,9 @@ import os
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+from mcz.jit.functions import bit_length as bit_length
+from mcz.jit.functions import truncated as truncated
+
 Loop = TypeVar("Loop", bound=Callable[..., object])
 
 MODES = COMPILED, CHECKED, INTERPRETED = "compiled", "checked", "interpreted"
@@ -47,13 +50,3 @@ def inlined(function: Loop) -> Loop:
     """``inner``, compiled into its callers whatever its size: for what is done once a value."""
     function.__is_inlined__ = True  # type: ignore[attr-defined]
     return inner(function)
-
-
-def bit_length(value: int) -> int:
-    """Bits of ``value`` >= 0 without leading zeros, also in loops."""
-    return int(value).bit_length()
-
-
-def truncated(value: float) -> int:
-    """``int(value)``, in loops quicker than that, for values below 2^63 in size."""
-    return int(value)

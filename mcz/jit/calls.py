@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mcz.jit import bit_length, truncated
 from mcz.jit.expressions import Expressions
+from mcz.jit.functions import bit_length, truncated
 from mcz.jit.types import (
     FLOAT,
     INT,

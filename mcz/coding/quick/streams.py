@@ -210,7 +210,9 @@ def parse_streams(
 
 def renumbered(stream: bytes, forms: Ints, number_of: Callable[[int, int], int]) -> bytes:
     """``stream`` with the groups that its copies name numbered anew."""
-    own, read, _, _ = loops()
+    from mcz.coding.quick import head_kernels as read
+
+    own = loops()[0]
     plans = np.zeros((len(forms), own.PLAN_SIZE), np.int64)
     ends = np.zeros(len(forms), np.int64)
     end = SPARE + len(stream)
