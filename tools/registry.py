@@ -102,7 +102,7 @@ def _number(text: str) -> int:
 
 
 def _paragraph(text: str, start: str) -> str:
-    return text.split(f"\n{start}", 1)[1].split("\n\n", 1)[0]
+    return text.partition(f"\n{start}")[2].partition("\n\n")[0]
 
 
 def document() -> str:

@@ -25,6 +25,7 @@ HOMES = {
     11: "online.online",
     12: "lossless.best",
     13: "posewave.posewave",
+    14: "lossless.fast",
 }
 
 
@@ -63,7 +64,8 @@ class Codecs(MutableMapping[int, Codec]):
 
 
 CODECS = Codecs()
-DEFAULT = "lossless"  # the best lossless one there is
+DEFAULT = "fast"
+EFFORTS = {"fast": "fast", "normal": "lossless"}  # the lossless codecs, by what they cost
 ALIASES = {"lossy": "posewave"}  # the best lossy one there is
 
 
@@ -74,6 +76,15 @@ def by_name(name: str) -> Codec:
     if name not in names:
         raise OptionError(f"no codec is called {name!r}; there are: {', '.join(names)}")
     return CODECS[names[name]]
+
+
+def chosen(codec: str | None, effort: str | None) -> str:
+    """The codec of that name or of that effort, by default ``DEFAULT``; raises OptionError."""
+    if codec is not None and effort is not None:
+        raise OptionError(f"codec {codec!r} and effort {effort!r}: one of them, not both")
+    if effort is not None and effort not in EFFORTS:
+        raise OptionError(f"no effort is called {effort!r}; there are: {', '.join(EFFORTS)}")
+    return codec or EFFORTS.get(effort or "", DEFAULT)
 
 
 def by_id(id_: int, version: int) -> Codec:

@@ -1,10 +1,14 @@
 // SPEC.md, "Codec 12: best".
 
-import { clamp } from "../entropy.js";
+import { ByteReader } from "../bytes.js";
+import { RangeDecoder, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
+import { CODED } from "../heads.js";
 import { setHalves } from "../int64.js";
+import { SignalDecoder } from "../ordinal-streams.js";
 import { Learner, bounded } from "../regressions.js";
-import { BitDecoder, CODED, CodedChannel, SignalDecoder, guessed } from "./lossless.js";
+import { restart } from "../start-models.js";
+import { BitDecoder, CodedChannel, guessed } from "./lossless.js";
 
 export const id = 12;
 export const name = "best";
@@ -26,6 +30,12 @@ const LIMIT = 2 ** 20;
 const TWO_44 = 2 ** 44;
 const EIGHT_OR_NINE = 13107;
 
+const CODEC = {
+  name,
+  rules: { maxTaps: 8, hasDepth: false },
+  decoder: (ordinals) => new BitDecoder(ordinals),
+};
+
 /**
  * Opens a signal.
  *
@@ -46,28 +56,21 @@ export function open(header, layout) {
 
 class BestDecoder extends SignalDecoder {
   constructor(layout, segments) {
-    super(layout, segments);
+    super(CODEC, layout, segments);
     this.linked = new LinkedDecoder(this.ordinals);
   }
 
-  readMethod(reader) {
+  decoderOf(reader) {
     const method = reader.u8();
     if (method > LINKED) reader.refuse(`method ${method}`);
-    return method;
+    return method === AS_CODEC_1 ? this.bits : this.linked;
   }
 
   decodeBits(group, nRows, firstRow) {
-    if (group.method === AS_CODEC_1) {
-      super.decodeBits(group, nRows, firstRow);
-      return;
+    if (group.bits === this.linked && !group.heads.some(({ kind }) => kind === CODED)) {
+      group.reader.refuse("no channel is coded");
     }
-    const { heads, reader } = group;
-    const coded = heads.filter(({ kind }) => kind === CODED);
-    if (coded.length === 0) reader.refuse("no channel is coded");
-    const channels = readLinks(reader, coded);
-    this.linked.start(reader.rest());
-    this.linked.decode(channels, nRows, this.nChannels, firstRow * this.nChannels);
-    this.linked.coder.finish(reader.what);
+    super.decodeBits(group, nRows, firstRow);
   }
 }
 
@@ -175,6 +178,15 @@ class LinkedChannel extends CodedChannel {
 class LinkedDecoder extends BitDecoder {
   constructor(ordinals) {
     super(ordinals, "best_start.json", [RESIDUALS, 0]);
+  }
+
+  decodeGroup(heads, data, nRows, nChannels, firstIndex, what) {
+    const reader = new ByteReader(data, what);
+    const channels = readLinks(reader, heads);
+    restart(this.model, this.startModel);
+    this.coder = new RangeDecoder(reader.rest());
+    this.decode(channels, nRows, nChannels, firstIndex);
+    this.coder.finish(what);
   }
 
   decode(channels, nRows, nChannels, firstIndex) {
