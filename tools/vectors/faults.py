@@ -20,10 +20,11 @@ KIN = {
     "mdtt": "lsdt-clip",
     "pca-rdo": "lsdt-clip",
     "fast": "lossless",
+    "best": "lossless",
 }
 CODECS = tuple(
     "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online "
-    "posewave fast".split()
+    "best posewave fast".split()
 )
 
 

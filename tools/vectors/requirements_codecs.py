@@ -28,6 +28,12 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "RESID-01": ("valid/lossless/residuals-*", "valid/lossless/scale-*", "valid/*/sizes-*"),
     "RESID-02": ("invalid/*/*-61-bits", "invalid/lossless/length-61"),
     "RESID-03": ("invalid/*/*-54-bits", "invalid/lossless/length-54"),
+    "BEST-01": ("invalid/best/header", "invalid/best/resolutions"),
+    "BEST-02": ("invalid/best/method-*", "invalid/best/stream-missing"),
+    "BEST-04": ("invalid/best/cut-in-links-*",),
+    "BEST-09": ("invalid/best/*-missing", "invalid/best/another-value"),
+    "BEST-10": ("valid/best/*",),
+    "BEST-12": ("valid/best/class-*", "valid/best/grid-*", "valid/best/multiples"),
     "FAST-01": ("invalid/fast/header", "invalid/fast/resolutions"),
     "FAST-02": (
         "invalid/fast/c*",

@@ -105,9 +105,17 @@ def build_stream(
 
     ``faulty``: an ordinal has no code, and the bits end with the fault.
     """
+    code = _code_to_the_fault if faulty else ordinal_streams.code
+    data, plans, coded = heads_of(ordinals, grids, heads)
+    return data + code(coded, plans) if plans else data
+
+
+def heads_of(
+    ordinals: Any, grids: Sequence[Grid], heads: Sequence[Head]
+) -> tuple[bytes, list[Ints], Ints]:
+    """The heads of a stream, the plans of its coded channels and what is coded of them."""
     table = np.array(ordinals, np.int64)
     data, plans, coded = b"", [], []
-    code = _code_to_the_fault if faulty else ordinal_streams.code
     for place, head in enumerate(heads):
         column = table[:, place]
         if isinstance(head, Copy):
@@ -123,7 +131,7 @@ def build_stream(
                 )
             )
             coded.append(head.multiples or column.tolist())
-    return data + code(np.array(coded, np.int64).T, plans) if plans else data
+    return data, plans, np.array(coded, np.int64).T
 
 
 def _shape(head: Coded, grid: Grid, column: Sequence[int]) -> Lattice:

@@ -2,6 +2,7 @@
 
 from tools.vectors.invalid import (
     awt,
+    best,
     chunks,
     clip,
     copies,
@@ -50,6 +51,7 @@ MODULES = (
     pca,
     dwt,
     awt,
+    best,
     lsdt_frame,
     lsdt_clip,
     mdtt,

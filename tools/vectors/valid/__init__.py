@@ -2,6 +2,7 @@
 
 from tools.vectors.valid import (
     awt,
+    best,
     container,
     cut,
     dwt,
@@ -37,6 +38,7 @@ MODULES = (
     pca,
     dwt,
     awt,
+    best,
     lsdt_frame,
     lsdt_clip,
     mdtt,

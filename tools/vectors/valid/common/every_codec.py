@@ -18,6 +18,7 @@ from mcz.container import payloads
 from mcz.container.chunks import ANCILLARY
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from tools.vectors.build import (
+    best_clips,
     curve_clips,
     fast_clips,
     online_clips,
@@ -37,7 +38,7 @@ from tools.vectors.build.spatial_clips import CLIP, FRAME, MDTT, PCA_RDO
 
 NAMES = tuple(
     "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online "
-    "posewave fast".split()
+    "best posewave fast".split()
 )
 WAVES = ("mrdwt", "dwt", "awt")
 WINDOWS = (CLIP, MDTT, PCA_RDO)
@@ -86,6 +87,7 @@ _OF_ORDINALS: dict[str, Callable[[], Codec]] = {
     "raw": lambda: raw.CODEC,
     "lossless": codec_of,
     "fast": fast_clips.codec_of,
+    "best": best_clips.codec_of,
 }
 
 
@@ -272,7 +274,7 @@ def _cuts(shelf: Whole, spec: str, name: str) -> None:
 
 def _lengths(shelf: Whole, spec: str, name: str) -> None:
     """Clips of 1 and 2 frames and no channel, where the codec has none; long ones."""
-    taken = {"lossless", "fast", "mrdwt", "qbc", FRAME, CLIP, "online"}
+    taken = {"lossless", "fast", "best", "mrdwt", "qbc", FRAME, CLIP, "online"}
     for n_frames in (1, 2) if name not in taken | {"pca", MDTT, PCA_RDO} else ():
         made = sample(name, (n_frames,))
         purpose = f"A clip of {n_frames} frames, of 0-channel joints and one that has some."

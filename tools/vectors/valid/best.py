@@ -1,0 +1,174 @@
+"""Valid: codec 12, ``best``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from mcz.codecs.lossless.best_streams import AS_CODEC_1, LINKED, Link
+from mcz.motion import Motion
+from mcz.numbers import Grid, GridKind
+from tools.vectors.build.best_clips import HEADING, Streams
+from tools.vectors.build.files import Vector, partial
+from tools.vectors.build.lossless_clips import (
+    MULTIPLES,
+    PLAIN,
+    SINGLE,
+    SIX,
+    WHOLE,
+    Coded,
+    Constant,
+    Copy,
+)
+from tools.vectors.build.motions import (
+    HUNDREDTHS,
+    column,
+    dance,
+    grid_cases,
+    numbers,
+    panel,
+    wave,
+)
+from tools.vectors.valid.common import every_codec
+
+NO_MINUS = (GridKind.INTEGER, GridKind.SCALED, GridKind.VAX_F)  # grids without -0
+LONG = {"fixed", "fixed-integers", "fixed-22-digits", "integer", "scaled"}  # ordinals of 2^44
+
+
+def vectors() -> Iterable[Vector]:
+    shelf = Streams("valid/best")
+    _grids(shelf)
+    _methods(shelf)
+    _links(shelf)
+    _degenerate(shelf)
+    _classes(shelf)
+    _rows(shelf)
+    every_codec.no_channels(shelf, "best")
+    every_codec.add(shelf, "best")
+    return shelf.vectors
+
+
+def _grids(shelf: Streams) -> None:
+    for name, (grid, values) in grid_cases().items():
+        head = Coded(form=PLAIN, drop=10) if name in LONG else Coded()
+        turned = [v if np.isnan(v) or (v == 0 and grid.kind in NO_MINUS) else -v for v in values]
+        purpose = f"Ordinals of a {grid.kind.name} grid, jumping about: {name}."
+        spec = f"{HEADING}; Number grids"
+        motion = column([*values, *turned, *values], grid)
+        shelf.code(f"grid-{name}", purpose, motion, [head], spec=spec)
+    counts = tuple(round(50 * v) for v in wave(40))
+    motion = column([0.25 * count for count in counts], SINGLE)
+    head = Coded(MULTIPLES, unit=0.25, multiples=counts)
+    shelf.code("multiples", "Multiples of a unit, form 32.", motion, [head])
+
+
+def _panel(n_rows: int, n: int) -> Motion:
+    """Waves of which each is somewhat the sum of those before, on two grids."""
+    columns = [wave(n_rows, seed) for seed in range(n)]
+    for place in range(2, n):
+        mixed = [a / 2 + b / 4 for a, b in zip(columns[place - 1], columns[place - 2], strict=True)]
+        columns[place] = [round(v, 2) for v in mixed]
+    grids = tuple(HUNDREDTHS if place % 2 else SIX for place in range(n))
+    columns = [[float(f"{v:.2f}") for v in values] for values in columns]
+    return panel(columns, grids, (n,))
+
+
+def _methods(shelf: Streams) -> None:
+    motion = dance(9)
+    parts = (partial(motion, (1, 3), (1,)), partial(motion, (8, 9), (1, 0)))
+    for grouping in ("joint", "all", "channel"):
+        purpose = f"Groups by {grouping}: each has a coder of its own."
+        shelf.code(f"groups-{grouping}", purpose, motion, grouping=grouping, parts=parts)
+    purpose = "A stream of codec 1, and one with links; copies go from one to the other."
+    values = [wave(12, 1), wave(12, 2), wave(12, 1), wave(12, 2)]
+    motion = panel(values, (HUNDREDTHS,) * 4, (2, 2))
+    heads = [Coded(), Coded(taps=(32,)), Copy(0, 0), Coded(from_last=0)]
+    for name, methods in (("0-1", (AS_CODEC_1, LINKED)), ("1-0", (LINKED, AS_CODEC_1))):
+        given = {"grouping": "joint", "methods": methods}
+        shelf.code(f"methods-{name}", purpose, motion, heads, **given)
+    motion = panel([[0.5] * 9, wave(9), [0.25] * 9, wave(9)], (HUNDREDTHS,) * 4, (4,))
+    heads = [Constant(), Coded(), Constant(), Copy(0, 1)]
+    shelf.code("constants-between", "Constants and copies have no links.", motion, heads)
+    purpose = "Constants alone, in a stream of codec 1."
+    shelf.code("constants", purpose, panel([[0.5] * 4], (HUNDREDTHS,)), [Constant()])
+
+
+def _links(shelf: Streams) -> None:
+    motion = _panel(80, 10)
+    parts = (partial(motion, (70, 75)),)
+    purpose = "Ten channels, the last of which look at the eight before them."
+    shelf.code("links-8", purpose, motion, parts=parts)
+    for n in (0, 1, 6, 7):
+        links = [Link(5, 8, tuple(range(c))[:n]) for c in range(10)]
+        purpose = f"Channels that look at {n} others at most."
+        shelf.code(f"links-{n}", purpose, motion, links=links)
+    links = [Link(3, 7, (0,) * min(8, 8 * c)) for c in range(10)]
+    purpose = "Eight times the same other: sums of which nearly all are singular."
+    shelf.code("links-twice", purpose, motion, links=links)
+    links = [Link(3, 7, tuple(reversed(range(c)))[:8]) for c in range(10)]
+    shelf.code("links-backward", "Others in falling order.", motion, links=links)
+    cases = {"unit-0": (0, 0), "unit-44": (44, 44), "reach-0": (6, 6), "reach-15": (0, 15)}
+    for name, (unit, reach) in {**cases, "reach-59": (44, 59)}.items():
+        links = [Link(unit, reach, tuple(range(c))[:8]) for c in range(10)]
+        purpose = f"Steps in 2^{unit}, levels in 2^{reach}."
+        shelf.code(name, purpose, motion, links=links)
+    purpose = "Taps beside regressions: fitted ones, none of the last, most and least."
+    taps = ((41, -13, 5, -1), (511, -480), (-511,), (64, -32), ())
+    heads = [Coded(from_last=place % 2, taps=t) for place, t in enumerate(taps)]
+    shelf.code("taps", purpose, motion, heads)
+
+
+def _degenerate(shelf: Streams) -> None:
+    n = 90
+    base = wave(n)
+    twins = [base, base, [-v for v in base], [v + 1 for v in base], [2 * v for v in base]]
+    twins = [[round(v, 2) for v in values] for values in twins]
+    purpose = "Channels that are each other, but for sign and a constant: pivots at their floor."
+    shelf.code("twins", purpose, panel(twins, (HUNDREDTHS,) * 5, (5,)))
+    still = [[0.5] * n, [0.5] * 60 + [0.75] * 30, base]
+    purpose = "Channels that do not move, or once: sums of zeros."
+    shelf.code("still", purpose, panel(still, (HUNDREDTHS,) * 3, (3,)), [Coded()] * 3)
+    spikes = [[v + (10_000 if row in (5, 30, 31, 70) else 0) for row, v in enumerate(base)]]
+    spikes += [[round(v + s / 2, 2) for v, s in zip(wave(n, 1), spikes[0], strict=True)]]
+    shelf.code("spikes", "Jumps far out of waves.", panel(spikes, (HUNDREDTHS,) * 2, (2,)))
+    most = 2**44 - 1
+    swings = [most, -most - 1, most, most, 0, -most, 5, most, most - 7, -1, -most - 1, 3] * 3
+    links = [Link(0, 0, ()), Link(0, 0, (0,))]
+    purpose = "Steps beyond 2^20 units are cut, estimates that large are none."
+    motion = panel([swings, swings[::-1]], (WHOLE,) * 2, (2,))
+    shelf.code("beyond", purpose, motion, [Coded(taps=(511, -511)), Coded()], links)
+    eight = [numbers(160, 8)[:, c].tolist() for c in range(8)]
+    motion = panel(eight, (Grid(GridKind.FIXED, 2),) * 8, (8,))
+    heads = [Coded(taps=(32,) * (c % 3), scale=10 * c) for c in range(8)]
+    shelf.code("noise", "Eight channels of noise: weights reach far.", motion, heads)
+
+
+def _classes(shelf: Streams) -> None:
+    around = [9.98, 9.995, 10.01, 10.02, 9.9999, 9.99998, 10.0, 99.9999, 100.0, 9.99999, 0.001]
+    creep = [float(f"{v * 10.0**e:.6g}") for e in (0, -3, 4) for v in around]
+    purpose = "Numbers of six digits about powers of ten: units of their class and of others."
+    shelf.code("class-creep", purpose, column(creep, SIX), [Coded(scale=60)])
+    tiny = [5.0, 0.0, -0.0, 1e-7, -3e-9, 0.0, 4e-300, -2.5e-5, -0.0, 5.25, 1e-307, 9.99999e307]
+    purpose = "Numbers below the unit, zeros and minus zeros among large ones."
+    shelf.code("class-small", purpose, column(tiny * 3, SIX), [Coded(scale=90)])
+    purpose = "The same on a binary grid."
+    double = Grid(GridKind.BINARY64)
+    shelf.code("class-small-binary64", purpose, column(tiny * 3, double), [Coded(scale=90)])
+    single = [float(np.float32(v)) for v in tiny if abs(v) < 1e38]
+    purpose = "The same on a grid of 24 binary digits."
+    shelf.code("class-small-binary32", purpose, column(single * 3, SINGLE), [Coded(scale=90)])
+    jumps = [1.0, 123456.0, 1.5, 999999.0, -1.25, 1e9, 2.0, -1e12, 1.0]
+    purpose = "Numbers of far more units than were expected: multiples of powers of ten."
+    shelf.code("class-jumps", purpose, column(jumps, SIX), [Coded(scale=0, from_last=0)])
+
+
+def _rows(shelf: Streams) -> None:
+    for n_frames in (0, 1, 2, 8, 9):
+        shelf.code(f"frames-{n_frames}", f"A clip of {n_frames} frames.", dance(n_frames))
+    motion = _panel(150, 5)
+    parts = (partial(motion, (63, 67)), partial(motion, (149, 150)))
+    purpose = "150 rows: errors are followed slower from row 20 on, weights are solved less often."
+    shelf.code("rows-150", purpose, motion, parts=parts)
+    purpose = "Segments of 40 rows: all that was learned is forgotten."
+    shelf.code("segments", purpose, motion, segment_frames=40, parts=parts)
