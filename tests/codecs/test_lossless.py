@@ -126,7 +126,7 @@ def test_copies_of_another_group() -> None:
 
 def test_copy_of_a_copy_is_refused() -> None:
     layout = Layout(3, ((0,), (1,)), grids=(GRIDS[0],) * 2)
-    streams = {0: bytes((heads.COPY, 1, 0)), 1: bytes((lossless.COPY, 0, 0))}
+    streams = {0: bytes((heads.COPY, 1, 0)), 1: bytes((heads.COPY, 0, 0))}
     with pytest.raises(FormatError, match="copy of a copy"):
         lossless.decode(b"", layout, [Span(0, 3)], Request(0, 3, (0,)), lambda s, r, g: streams[g])
 

@@ -10,7 +10,6 @@ can look at those before it, and needs no other.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 from mcz.codecs.contract import (
@@ -23,17 +22,19 @@ from mcz.codecs.contract import (
     Span,
     refuse_extras,
 )
-from mcz.codecs.lossless import lossless
+from mcz.codecs.lossless import copying
 from mcz.codecs.lossless.best_streams import build_stream, parse_stream
-from mcz.codecs.lossless.lossless import Ints
+from mcz.codecs.lossless.copying import Ints
+from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
+from mcz.codecs.segments import TARGET_BYTES, Sizing
 
 # Longer segments than codec 1 guesses, and closer to the target: what is learned is lost with each.
-SIZING = replace(lossless.SIZING, value_bytes=1, aim=98)
+SIZING = Sizing(target=TARGET_BYTES, value_bytes=1, aim=98, most_rows=MAX_ROWS, spare=1)
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
-    return lossless.encode_streams(source, params, SIZING, build_stream)
+    return copying.encode_streams(source, params, SIZING, build_stream)
 
 
 def decode(
@@ -41,12 +42,12 @@ def decode(
 ) -> Ints:
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     refuse_extras("best", header, layout)  # BEST-01
-    return lossless.decode_streams(layout, spans, request, fetch, parse_stream)
+    return copying.decode_streams(layout, spans, request, fetch, parse_stream)
 
 
 def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int]) -> bytes:
     """``stream`` of ``group`` with its copies referring to the groups' new ``numbers``."""
-    return stream[:1] + lossless.regroup(stream[1:], layout, group, numbers)
+    return stream[:1] + copying.regroup(stream[1:], layout, group, numbers)
 
 
 def recode(
@@ -58,7 +59,7 @@ def recode(
     fetch: Fetch,
 ) -> Iterator[tuple[bytes, ...]]:
     """The streams of some groups with new values, without copies."""
-    return lossless.recode_streams(source, groups, spans, build_stream)
+    return copying.recode_streams(source, groups, spans, build_stream)
 
 
 CODEC = Codec(
@@ -72,5 +73,5 @@ CODEC = Codec(
     decode=decode,
     regroup=regroup,
     recode=recode,
-    parameters=lossless.PARAMETERS,
+    parameters=(segment_frames("62,000"),),
 )
