@@ -28,6 +28,7 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.parameters import Parameter, integer
 from mcz.codecs.segments import TARGET_BYTES, Sizing, gather, guessing
+from mcz.coding.ordinals.degrees import is_tiny
 from mcz.coding.ordinals.heads import COPY, read_heads
 from mcz.coding.ordinals.streams import build_stream, parse_stream
 from mcz.errors import FormatError
@@ -38,6 +39,7 @@ Ints = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
 MAX_ROWS = 2**16
+FIRST_FRAMES = 64  # that decide on the version
 SIZING = Sizing(target=TARGET_BYTES, value_bytes=2, aim=95, most_rows=MAX_ROWS, spare=1)
 
 PLAIN = Grid(GridKind.INTEGER)
@@ -45,11 +47,22 @@ PLAIN = Grid(GridKind.INTEGER)
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
-    code = partial(_build_segment, source)
-    return Encoded(header=b"", segments=guessing(source, params["segment_frames"], SIZING, code))
+    version = _least_version(source)
+    code = partial(_build_segment, source, version)
+    segments = guessing(source, params["segment_frames"], SIZING, code)
+    return Encoded(header=b"", segments=segments, version=version)
 
 
-def _build_segment(source: SignalSource, start: int, stop: int) -> tuple[bytes, ...]:
+def _least_version(source: SignalSource) -> int:
+    """1 where the first rows have a channel that its form may help, else 0."""
+    if not any(grid.kind == GridKind.GENERAL for grid in source.layout.grids):
+        return 0
+    columns = source.ordinals(0, min(FIRST_FRAMES, source.layout.n_frames)).T
+    pairs = zip(columns, source.layout.grids, strict=True)
+    return int(any(column.size > 0 and is_tiny(column, grid) for column, grid in pairs))
+
+
+def _build_segment(source: SignalSource, version: int, start: int, stop: int) -> tuple[bytes, ...]:
     ordinals = source.ordinals(start, stop)
     grids = source.grids(start)
     seen: dict[bytes, tuple[int, int]] = {}
@@ -57,7 +70,7 @@ def _build_segment(source: SignalSource, start: int, stop: int) -> tuple[bytes, 
     for index, group in enumerate(source.layout.groups):
         columns = ordinals[:, list(group)]
         own = [(grids[c], source.layout.grids[c]) for c in group]
-        streams.append(build_stream(columns, own, index, seen))
+        streams.append(build_stream(columns, own, index, seen, version))
     return tuple(streams)
 
 
@@ -88,12 +101,19 @@ def recode(
 
 
 def decode(
-    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+    header: bytes,
+    layout: Layout,
+    spans: Sequence[Span],
+    request: Request,
+    fetch: Fetch,
+    version: int = 1,
 ) -> Ints:
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     refuse_extras("lossless", header, layout)
     readers = {
-        index: _Segment(layout, span.n_frames * layout.samples_per_frame, partial(fetch, index, 0))
+        index: _Segment(
+            layout, span.n_frames * layout.samples_per_frame, partial(fetch, index, 0), version
+        )
         for index, span in enumerate(spans)
         if span.first < request.stop and request.start < span.stop
     }
@@ -103,8 +123,10 @@ def decode(
 class _Segment:
     """The groups of one segment, decoded as they are asked for."""
 
-    def __init__(self, layout: Layout, n_rows: int, stream: Callable[[int], bytes]) -> None:
-        self.layout, self.n_rows, self.stream = layout, n_rows, stream
+    def __init__(
+        self, layout: Layout, n_rows: int, stream: Callable[[int], bytes], version: int
+    ) -> None:
+        self.layout, self.n_rows, self.stream, self.version = layout, n_rows, stream, version
         self._done: dict[int, tuple[Ints, dict[int, tuple[int, int]]]] = {}
 
     def group(self, group: int) -> Ints:
@@ -122,7 +144,7 @@ class _Segment:
         """The columns of a group that are no copies, and which are."""
         if group not in self._done:
             grids = [self.layout.grids[c] for c in self.layout.groups[group]]
-            self._done[group] = parse_stream(self.stream(group), grids, self.n_rows)
+            self._done[group] = parse_stream(self.stream(group), grids, self.n_rows, self.version)
         return self._done[group]
 
 
@@ -133,7 +155,7 @@ def _check_copy(layout: Layout, group: int, column: int) -> None:
 
 def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int]) -> bytes:
     """``stream`` of ``group`` with its copies referring to the groups' new ``numbers``."""
-    heads, end = read_heads(stream, [layout.grids[c] for c in layout.groups[group]])
+    heads, end = read_heads(stream, [layout.grids[c] for c in layout.groups[group]], 1)
     parts = []
     for kind, found, head in heads:
         if kind == COPY:
@@ -146,7 +168,8 @@ def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int
 CODEC = Codec(
     id=1,
     name="lossless",
-    version=0,
+    version=1,
+    earlier={0: partial(decode, version=0)},
     domain="ordinals",
     lossless=True,
     encode=encode,

@@ -25,7 +25,13 @@ from mcz.schema import varint
 from tools.vectors.build.files import Whole, file_of
 
 Ints = NDArray[np.int64]
-PLAIN, MULTIPLES, BINARY32, BINARY64 = 0, 32, 88, 117  # forms; 1 to 15: digits of base 10
+PLAIN, MULTIPLES, PRODUCTS, BINARY32, BINARY64 = (
+    0,
+    32,
+    33,
+    88,
+    117,
+)  # forms; 1 to 15: digits of base 10
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 HEADING = "Codec 1: lossless"
 WHOLE, SIX = Grid(GridKind.INTEGER), Grid(GridKind.GENERAL, 6)
@@ -36,7 +42,7 @@ DOUBLE, SINGLE = Grid(GridKind.BINARY64), Grid(GridKind.BINARY32)
 class Coded:
     """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top`` None: as
     great as the ordinals need. Nothing is checked, so that what is forbidden can be written.
-    ``multiples``: what is coded in place of the ordinals, for form 32 with its ``unit``."""
+    ``multiples``: what is coded in place of the ordinals, for forms 32 and 33 with their ``unit``."""
 
     form: int | None = None
     drop: int = 0
@@ -63,7 +69,7 @@ Head = Coded | Constant | Copy
 USUAL = Coded()
 
 
-def codec_of(*segments: Sequence[Head]) -> Codec:
+def codec_of(*segments: Sequence[Head], version: int = 0) -> Codec:
     """Codec 1 with these heads, channel by channel, in the first segment, the second, ...
 
     The last counts for all further segments; a channel without a head is ``USUAL``. A parameter
@@ -81,7 +87,7 @@ def codec_of(*segments: Sequence[Head]) -> Codec:
             streams = _streams(layout, source.ordinals(start, stop), heads)
             made.append(Segment(start, stop - start, streams))
             start = stop
-        return Encoded(b"", iter(made))
+        return Encoded(b"", iter(made), version=version)
 
     return replace(lossless.CODEC, encode=encode)
 
@@ -128,7 +134,7 @@ def build_stream(
 
 def _shape(head: Coded, grid: Grid, column: Sequence[int]) -> Lattice:
     form = lossless_heads.form_of_grid(grid) if head.form is None else head.form
-    if form in (PLAIN, MULTIPLES):
+    if form in (PLAIN, MULTIPLES, PRODUCTS):
         return Lattice(0, 0, head.drop)
     base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)
     greatest = max(o if o >= 0 else -1 - o for o in column) >> head.drop
@@ -171,5 +177,6 @@ class Streams(Whole):
         **rest: Any,
     ) -> None:
         parts = rest.pop("parts", ())
-        data = file_of(motion, codec=codec_of(heads), **rest)
+        codec = codec_of(heads, version=rest.pop("version", 0))
+        data = file_of(motion, codec=codec, **rest)
         self.hold(name, spec, purpose, data, motion, parts=parts)
