@@ -13,12 +13,13 @@ import {
   binary32Ordinal,
 } from "../grids.js";
 import { halvesOf, setHalves, setInteger } from "../int64.js";
+import { ordinalOf } from "../ordinals.js";
 import { Residuals, side } from "../residuals.js";
 import { restart, startModels } from "../start-models.js";
 
 export const id = 1;
 export const name = "lossless";
-export const version = 0;
+export const version = 1;
 
 const CODED = 0;
 const CONSTANT = 1;
@@ -27,6 +28,7 @@ const COPY = 2;
 // Forms; 1 to 15 are classes of so many decimal digits.
 const PLAIN = 0;
 const MULTIPLES = 32;
+const PRODUCTS = 33; // from version 1 on
 const CLASSES_24 = 88;
 const CLASSES_53 = 117;
 
@@ -64,10 +66,11 @@ const POWERS_OF_10 = Float64Array.from({ length: 64 }, (_, j) => Number(`1e${Mat
  *
  * @param {Uint8Array} header the codec's header in CLIP
  * @param {{channels: object[], groups: number[][], grids: object[], nResolutions: number}} layout
+ * @param {number} codecVersion 0 or 1
  * @returns {{decodes: "ordinals", alone: true, decode: (segments: object[]) => BigInt64Array}}
  * @throws {Refused}
  */
-export function open(header, layout) {
+export function open(header, layout, codecVersion) {
   if (header.length !== 0) throw new Refused("lossless: the header is not empty");
   if (layout.nResolutions !== 1) {
     throw new Refused(`lossless: ${layout.nResolutions} resolutions, not 1`);
@@ -75,7 +78,7 @@ export function open(header, layout) {
   return {
     decodes: "ordinals",
     alone: true, // lead, tail and freshness mean nothing
-    decode: (segments) => new SignalDecoder(layout, segments).decode(),
+    decode: (segments) => new SignalDecoder(layout, segments, codecVersion).decode(),
   };
 }
 
@@ -89,12 +92,13 @@ export function open(header, layout) {
  * @throws {Refused}
  */
 export function decodeGroups(layout, segments, groups) {
-  return new SignalDecoder(layout, segments, groups).decode();
+  return new SignalDecoder(layout, segments, 0, groups).decode();
 }
 
 /** Decodes a run of segments: all groups, or those of these numbers, without copies. */
 class SignalDecoder {
-  constructor(layout, segments, numbers = null) {
+  constructor(layout, segments, codecVersion, numbers = null) {
+    this.codecVersion = codecVersion;
     this.layout = layout;
     this.segments = segments;
     this.copying = numbers === null;
@@ -120,7 +124,13 @@ class SignalDecoder {
     const groups = this.numbers.map((g) => {
       const columns = this.layout.groups[g];
       const reader = new ByteReader(streams[0][g], `lossless stream of group ${g}`);
-      const heads = columns.map((column) => readHead(reader, grids[column], column));
+      const heads = columns.map((column) => {
+        const head = readHead(reader, grids[column], column);
+        if (head.form === PRODUCTS && this.codecVersion < 1) {
+          reader.refuse(`form ${PRODUCTS} in version 0`);
+        }
+        return head;
+      });
       return { columns, heads, reader };
     });
     const heads = groups.flatMap((group) => group.heads);
@@ -204,7 +214,8 @@ function readCoded(reader, kind, grid) {
   if (drop > greatestDrop(form)) reader.refuse(`form ${form} with a drop of ${drop}`);
   let unit = 1;
   let top = 0;
-  if (form === MULTIPLES) {
+  if (form === PRODUCTS && grid.kind !== GENERAL) reader.refuse(`form ${form}, grid ${grid.kind}`);
+  if (form === MULTIPLES || form === PRODUCTS) {
     unit = reader.f64();
     if (!(unit >= 2 ** -200 && unit <= 2 ** 80)) reader.refuse(`unit ${unit}`);
   } else if (form !== PLAIN) {
@@ -219,7 +230,7 @@ function readCoded(reader, kind, grid) {
     taps[i] = reader.zigzag();
     if (Math.abs(taps[i]) > MAX_TAP) reader.refuse(`a tap of ${taps[i]}`);
   }
-  return { form, drop, unit, top, scale, taps, fromLast: (kind & 4) !== 0 };
+  return { form, drop, unit, grid, top, scale, taps, fromLast: (kind & 4) !== 0 };
 }
 
 /** The form of a channel whose head does not tell. */
@@ -242,7 +253,7 @@ function formOf(grid) {
 /** Greatest `drop` of a form; -1 where there is no such form. */
 function greatestDrop(form) {
   if (form === PLAIN) return 19;
-  if (form <= 15 || form === MULTIPLES) return 0;
+  if (form <= 15 || form === MULTIPLES || form === PRODUCTS) return 0;
   if (form === CLASSES_24) return 22;
   if (form === CLASSES_53) return 51;
   return -1;
@@ -258,9 +269,11 @@ function greatestTop(form) {
 class CodedChannel {
   constructor(head) {
     this.column = head.column;
+    this.isPlain = [PLAIN, MULTIPLES, PRODUCTS].includes(head.form);
     this.form = head.form;
     this.drop = head.drop;
     this.unit = head.unit;
+    this.grid = head.grid;
     this.fromLast = head.fromLast;
     this.taps = head.taps;
     this.last = 0;
@@ -327,7 +340,7 @@ class BitDecoder {
       const first = firstIndex + row * nChannels;
       for (let i = 0; i < channels.length; i++) {
         const channel = channels[i];
-        if (channel.form === PLAIN || channel.form === MULTIPLES) {
+        if (channel.isPlain) {
           this.plain(channel, first + channel.column);
         } else {
           this.classes(channel, first + channel.column);
@@ -356,7 +369,7 @@ class BitDecoder {
     channel.side1 = side(error);
   }
 
-  /** Forms 0 and 32. */
+  /** Forms 0, 32 and 33. */
   plain(channel, index) {
     const predicted = clamp(channel.predict(), -TWO_44, TWO_44);
     const value = predicted + this.residual(channel, false, channel.fast, channel.slow);
@@ -367,6 +380,8 @@ class BitDecoder {
     const { drop } = channel;
     if (channel.form === MULTIPLES) {
       setInteger(this.halves, index, binary32Ordinal(value * channel.unit));
+    } else if (channel.form === PRODUCTS) {
+      this.ordinals[index] = ordinalOf(channel.grid, value * channel.unit);
     } else if (drop <= 8) {
       setInteger(this.halves, index, value * 2 ** drop + this.coder.number(drop));
     } else {

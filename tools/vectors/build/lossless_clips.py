@@ -42,7 +42,7 @@ DOUBLE, SINGLE = Grid(GridKind.BINARY64), Grid(GridKind.BINARY32)
 class Coded:
     """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top`` None: as
     great as the ordinals need. Nothing is checked, so that what is forbidden can be written.
-    ``multiples``: what is coded in place of the ordinals, for forms 32 and 33 with their ``unit``."""
+    ``multiples``: coded in place of the ordinals, with ``unit``: forms 32, 33."""
 
     form: int | None = None
     drop: int = 0
