@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from typing import Any
 
 from construct import (
@@ -36,7 +37,11 @@ class Varint(Construct):
     """Unsigned, up to ``MAX_COUNT``: 7 bits a byte, least significant first, shortest form."""
 
     def _parse(self, stream: Any, context: Any, path: str) -> int:
-        return take_varint(iter(lambda: stream_read(stream, 1, path)[0], None), path)
+        first: int = stream_read(stream, 1, path)[0]
+        if first < 0x80:
+            return first
+        more = iter(lambda: stream_read(stream, 1, path)[0], None)
+        return take_varint(chain((first,), more), path)
 
     def _build(self, obj: Any, stream: Any, context: Any, path: str) -> Any:
         _write(stream, varint(obj), path)
@@ -76,6 +81,12 @@ def take_varint(source: Iterable[int], where: str) -> int:
 
 def read_varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
     """The varint at offset ``at`` of ``data`` and the offset after it."""
+    if at + 1 < len(data):  # most have one byte or two
+        low, high = data[at], data[at + 1]
+        if low < 0x80:
+            return low, at + 1
+        if 0 < high < 0x80:
+            return low & 0x7F | high << 7, at + 2
     value = take_varint(data[at : at + 9], f"offset {at}")
     return value, at + max(1, -(-value.bit_length() // 7))  # its form is the shortest
 

@@ -173,6 +173,28 @@ def test_floats_are_neither_fused_nor_reordered(floats: ModuleType, a: float, b:
     assert same(floats.ordered(a, b), floats.ordered.loop(a, b))
 
 
+@pytest.fixture(scope="module")
+def lengths(load: Load) -> ModuleType:
+    jit.MODE = jit.COMPILED
+    return load("""
+from mcz.jit import bit_length, inlined, truncated
+
+@inlined
+def both(size: int, number: float) -> tuple[int, int]:
+    return bit_length(size), truncated(number)
+
+@kernel
+def lengths(size: int, number: float) -> tuple[int, int]:
+    n, whole = both(size, number)
+    return n, whole
+""")
+
+
+@given(st.integers(0, 2**63 - 1), st.floats(-(2.0**62), 2.0**62))
+def test_lengths_and_whole_parts(lengths: ModuleType, size: int, number: float) -> None:
+    assert lengths.lengths(size, number) == (size.bit_length(), int(number))
+
+
 @given(st.floats(-16, 16), st.integers(-60, 60))
 def test_powers_of_two_are_exact(floats: ModuleType, a: float, power: int) -> None:
     assert floats.scaled(a, power) == math.ldexp(a, power)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from mcz import schema
 from mcz.errors import FormatError, OptionError, SourceError
-from mcz.numbers import GRID, Grid, GridFlag, GridKind, Tokens, choose_grid, fit, scan
+from mcz.numbers import GRID, Grid, GridFlag, GridKind, Tokens, choose_grid, fit, scan, values_of
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 PLAIN = [flag for flag in GridFlag if flag not in (GridFlag.POINT, GridFlag.EXPONENT1)]
@@ -533,3 +533,27 @@ def test_hostile_grids(data: bytes) -> None:
 def test_grids_that_cannot_be(fields: dict[str, float]) -> None:
     with pytest.raises(OptionError):
         Grid(**fields)
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=repr)
+@given(data=st.data())
+def test_values_of_a_matrix_are_those_of_each_grid(grid: Grid, data: st.DataObject) -> None:
+    grids = [grid, data.draw(st.sampled_from(GRIDS)), grid]
+    columns = []
+    for own in grids:
+        low = -1 - own.limit if own.signed_magnitude else -own.limit
+        near = st.integers(max(low, -(10**7)), min(own.limit, 10**7))
+        columns.append(st.one_of(near, st.integers(low, own.limit)))
+    rows = data.draw(st.lists(st.tuples(*columns), max_size=9))
+    ordinals = np.array(rows, np.int64).reshape(len(rows), 3)
+    found = values_of(ordinals, grids)
+    for column, own in enumerate(grids):
+        wanted = own.values(ordinals[:, column])
+        np.testing.assert_array_equal(found[:, column].view(np.int64), wanted.view(np.int64))
+
+
+def test_values_of_a_matrix_refuse_what_is_no_ordinal() -> None:
+    for grid in GRIDS:
+        if grid.limit < 2**63 - 1:
+            with pytest.raises(FormatError, match="not an ordinal"):
+                values_of(np.array([[0], [grid.limit + 1]], np.int64), [grid])

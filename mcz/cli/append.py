@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from mcz.cli.common import Exit, Failure, about, existing
-from mcz.cli.options import chosen, copies_option, encoding_options, json_option
+from mcz.cli.options import copies_option, encoding_options, json_option
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
@@ -73,7 +73,7 @@ def command(
             force=force,
             copies=copies,
             progress=progress,
-            **_known(chosen(**options)),
+            **_known(options),
         )
     return conclude(report, target, as_json)
 

@@ -23,7 +23,6 @@ from mcz.cli.common import (
 )
 from mcz.cli.figures import reached
 from mcz.cli.options import (
-    chosen,
     copies_option,
     encoding_options,
     force_option,
@@ -135,7 +134,7 @@ def _encode_file(
             force=force,
             copies=bool(copies),
             progress=progress,
-            **chosen(**options),
+            **options,
         )
     for note in written.notes:
         say(f"{source}: {note}")

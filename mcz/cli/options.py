@@ -9,6 +9,7 @@ import click
 
 from mcz.cli.common import echo, to_bytes, to_params, to_rate
 
+EFFORTS = ("fast", "normal")  # as in mcz.codecs, which takes longer to import
 UNITS = ("mm", "cm", "dm", "m", "in", "ft")
 Function = Callable[..., Any]
 
@@ -100,9 +101,14 @@ def up_option(what: str) -> Callable[[Function], Function]:
 
 
 def encoding_options(function: Function) -> Function:
-    """``--codec --param --rate --unit --up ...``, as the arguments of those names."""
+    """``--codec --effort --param --rate --unit --up ...``, as the arguments of those names."""
     options = (
-        click.option("--codec", metavar="NAME", help="Default: the best lossless codec there is."),
+        click.option("--codec", metavar="NAME", help="Default: fast, which is lossless."),
+        click.option(
+            "--effort",
+            type=click.Choice(EFFORTS),
+            help="A lossless codec: read fastest, or a little smaller.",
+        ),
         param_option,
         click.option(
             "--rate",
@@ -118,8 +124,3 @@ def encoding_options(function: Function) -> Function:
     for option in reversed(options):
         function = option(function)
     return function
-
-
-def chosen(codec: str | None, **others: Any) -> dict[str, Any]:
-    """The arguments of ``mcz.encode`` and its kin, ``codec`` only where it was given."""
-    return others if codec is None else {"codec": codec, **others}

@@ -8,7 +8,6 @@ import click
 
 from mcz.cli.common import Exit, about
 from mcz.cli.options import (
-    chosen,
     copies_option,
     encoding_options,
     force_option,
@@ -50,6 +49,6 @@ def command(
             copies=copies is not False,
             force=force,
             progress=progress,
-            **chosen(**options),
+            **options,
         )
     return conclude(report, target, as_json)

@@ -80,7 +80,7 @@ def encode_lines(
     from mcz.live.text_writer import encode_live
     from mcz.writing.entry import Terms
 
-    for name in ("verbatim", "archive", "copies"):
+    for name in ("verbatim", "archive", "copies", "effort"):
         if options.pop(name):
             raise Failure(f"--{name} has no meaning for what is coded frame by frame", Exit.USAGE)
     stream = live_input()

@@ -25,6 +25,7 @@ HOMES = {
     10: "spatial.pca_rdo",
     11: "online.online",
     13: "posewave.posewave",
+    14: "lossless.fast",
 }
 
 
@@ -63,7 +64,8 @@ class Codecs(MutableMapping[int, Codec]):
 
 
 CODECS = Codecs()
-DEFAULT = "lossless"  # the best lossless one there is
+DEFAULT = "fast"
+EFFORTS = {"fast": "fast", "normal": "lossless"}  # the lossless codecs, by what they cost
 ALIASES = {"lossy": "posewave"}  # the best lossy one there is
 
 
@@ -76,6 +78,15 @@ def by_name(name: str) -> Codec:
     return CODECS[names[name]]
 
 
+def chosen(codec: str | None, effort: str | None) -> str:
+    """The codec of that name or of that effort, by default ``DEFAULT``; raises OptionError."""
+    if codec is not None and effort is not None:
+        raise OptionError(f"codec {codec!r} and effort {effort!r}: one of them, not both")
+    if effort is not None and effort not in EFFORTS:
+        raise OptionError(f"no effort is called {effort!r}; there are: {', '.join(EFFORTS)}")
+    return codec or EFFORTS.get(effort or "", DEFAULT)
+
+
 def by_id(id_: int, version: int) -> Codec:
     """The codec with this id; raises UnsupportedError where it or its version is not known."""
     codec = CODECS.get(id_)
@@ -84,5 +95,5 @@ def by_id(id_: int, version: int) -> Codec:
     if version > codec.version:  # CODEC-04, HEAD-05
         raise UnsupportedError(f"codec {codec.name}: version {version}, known is {codec.version}")
     if version < codec.version:
-        return replace(codec, version=version, decode=codec.earlier[version])
+        return replace(codec, version=version, decode=codec.earlier.get(version, codec.decode))
     return codec

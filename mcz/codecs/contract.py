@@ -330,7 +330,7 @@ class Codec:
 
 def refuse_extras(name: str, header: bytes, layout: Layout) -> None:
     """Raise FormatError where a codec without header and resolutions is given some."""
-    if header:  # LOSS-01, RAW-01
+    if header:  # LOSS-01, RAW-01, FAST-01
         raise FormatError(f"{name}: a header of {len(header)} bytes, which it does not have")
     if layout.n_resolutions != 1:  # CLIP-15
         raise FormatError(f"{name}: {layout.n_resolutions} resolutions, it has 1")

@@ -47,6 +47,7 @@ from mcz.container.packets import (
     is_head,
 )
 from mcz.container.restoring import is_like, restored
+from mcz.container.runs import Runs
 from mcz.container.scan import scan
 from mcz.container.segments import (
     FRESH,
@@ -64,6 +65,7 @@ from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.motion import Skeleton
 from mcz.schema import MAX_COUNT, parse
 
+KEPT_SKELETONS = 8  # parsed ones, of a file
 TABLE_PEEK = 32  # bytes of a segment that are read to find its table, and 7/4 a stream
 
 
@@ -89,7 +91,9 @@ class Container:
         self.broken: list[tuple[int, Chunk | None]] = []
         self.feet: list[int] = []  # offsets of FOOTs, as far as salvage found them
         self.unverified = 0
+        self.runs = Runs()
         self.index: Foot | None = None
+        self._skeletons: dict[bytes, tuple[Any, Skeleton]] = {}
         self.directory = self._salvage() if salvage else self._open()
         self.profile: Profile = parse_head(self.directory.head)
 
@@ -201,8 +205,22 @@ class Container:
 
     def skeleton(self, id_: bytes) -> Skeleton:
         """The skeleton in the SKEL with this id, its own source file not read."""
-        fields = self.shared(b"SKEL", id_, payloads.SKEL)
-        return parse_skeleton(fields, self.profile, f"SKEL {id_.hex()}")
+        return self._skeleton(id_)[1]
+
+    def skeleton_fields(self, id_: bytes) -> Any:
+        """The fields of the SKEL with this id, its hash checked."""
+        return self._skeleton(id_)[0]
+
+    def _skeleton(self, id_: bytes) -> tuple[Any, Skeleton]:
+        """Both; the last ones are kept, since the clips of a file share them."""
+        if id_ not in self._skeletons:
+            fields = self.shared(b"SKEL", id_, payloads.SKEL)
+            found = fields, parse_skeleton(fields, self.profile, f"SKEL {id_.hex()}")
+            while len(self._skeletons) >= KEPT_SKELETONS:
+                self._skeletons.pop(next(iter(self._skeletons)), None)
+            self._skeletons[id_] = found
+            return found
+        return self._skeletons[id_]
 
     def template(self, id_: bytes, format_id: int) -> bytes:
         """The template in the SRCE with this id."""

@@ -82,9 +82,7 @@ class StreamTable:
         return self._codec_start() + resolution * self.counts.n_groups + group
 
     def _codec_start(self) -> int:
-        return self.counts.total(self.header.flags) - (
-            self.counts.n_groups * self.counts.n_resolutions
-        )
+        return len(self.lengths) - self.counts.n_groups * self.counts.n_resolutions
 
 
 def build_segment(header: SegmentHeader, streams: Sequence[bytes]) -> bytes:

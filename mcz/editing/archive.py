@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from mcz.codecs import DEFAULT
+from mcz.codecs import chosen
 from mcz.container import payloads
 from mcz.container.reader import Container
 from mcz.container.strict import check_path
@@ -38,7 +38,8 @@ def pack(
     directory: str | os.PathLike[str],
     target: Any,
     *,
-    codec: str = DEFAULT,
+    codec: str | None = None,
+    effort: str | None = None,
     params: Mapping[str, Any] | None = None,
     rate: float | None = None,
     unit: str | None = None,
@@ -54,9 +55,9 @@ def pack(
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
-    relative to ``directory``. ``copies`` is that of ``mcz.write``. An earlier MCZ file of the
-    target's name is no part of the new one; any other file that the target would replace is
-    refused, even with ``force``.
+    relative to ``directory``. ``effort`` and ``copies`` are those of ``mcz.write``. An earlier MCZ
+    file of the target's name is no part of the new one; any other file that the target would
+    replace is refused, even with ``force``.
     """
     root = Path(directory)
     if not root.is_dir():
@@ -66,7 +67,8 @@ def pack(
         paths, left = _motion_files(paths)
         others += [_left_out(path, root) for path in left]
     verbatim = verbatim or keep_all
-    terms = Terms(codec, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
+    coded = chosen(codec, effort)
+    terms = Terms(coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
     with replacing(target, force=force, inputs=(*paths, *(params or {}).values())) as stream:
         draft = Draft(stream, profile_of(archive), copies=copies)
@@ -139,7 +141,8 @@ def append(
     sources: Sequence[str | os.PathLike[str]],
     target: str | os.PathLike[str],
     *,
-    codec: str = DEFAULT,
+    codec: str | None = None,
+    effort: str | None = None,
     params: Mapping[str, Any] | None = None,
     skeleton: str | os.PathLike[str] | None = None,
     rate: float | None = None,
@@ -165,7 +168,8 @@ def append(
     another process is appending, OptionError where the target is a source itself.
     """
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
-    terms = Terms(codec, params, skeleton, rate, unit, verbatim, up=up)
+    coded = chosen(codec, effort)
+    terms = Terms(coded, params, skeleton, rate, unit, verbatim, up=up)
     entries = [Entry(Path(s), _name_below(s, root), terms) for s in sources]
     with growing(Path(target), salvage=salvage, force=force) as growth:
         container = growth.container

@@ -19,6 +19,9 @@ import os
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+from mcz.jit.functions import bit_length as bit_length
+from mcz.jit.functions import truncated as truncated
+
 Loop = TypeVar("Loop", bound=Callable[..., object])
 
 MODES = COMPILED, CHECKED, INTERPRETED = "compiled", "checked", "interpreted"
@@ -41,3 +44,9 @@ def inner(function: Loop) -> Loop:
     """``function``, to be called by other loops: compiled with each kernel that needs it."""
     function.__is_loop__ = True  # type: ignore[attr-defined]
     return function
+
+
+def inlined(function: Loop) -> Loop:
+    """``inner``, compiled into its callers whatever its size: for what is done once a value."""
+    function.__is_inlined__ = True  # type: ignore[attr-defined]
+    return inner(function)

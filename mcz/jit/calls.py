@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from mcz.jit.expressions import Expressions
+from mcz.jit.functions import bit_length, truncated
 from mcz.jit.types import (
     FLOAT,
     INT,
@@ -116,6 +117,15 @@ class Calls(Expressions):
             return Value(INT, (self.op(f"call i64 @llvm.abs.i64(i64 {part}, i1 false)"),))
         return Value(FLOAT, (self.op(f"call double @llvm.fabs.f64(double {part})"),))
 
+    def bit_length(self, value: Value) -> Value:
+        part = self.convert(value, INT).parts[0]
+        zeros = self.op(f"call i64 @llvm.ctlz.i64(i64 {part}, i1 false)")
+        return Value(INT, (self.op(f"sub i64 64, {zeros}"),))
+
+    def truncated(self, value: Value) -> Value:
+        part = self.convert(value, FLOAT).parts[0]
+        return Value(INT, (self.op(f"fptosi double {part} to i64"),))
+
     def length(self, value: Value) -> Value:
         """As ``len``."""
         if not isinstance(value.type, Array):
@@ -159,6 +169,8 @@ MAKERS: dict[Any, Maker] = {
     builtins.max: lambda calls, values: calls.least_or_greatest(values, "gt"),
     builtins.abs: _one(Calls.size),
     builtins.len: _one(Calls.length),
+    bit_length: _one(Calls.bit_length),
+    truncated: _one(Calls.truncated),
     builtins.int: _one(Calls.whole),
     builtins.float: _one(lambda calls, value: calls.convert(value, FLOAT)),
     np.int64: _one(Calls.whole),

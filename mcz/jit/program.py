@@ -19,6 +19,7 @@ DECLARED = (
     "declare double @llvm.pow.f64(double, double)",
     "declare double @llvm.ldexp.f64.i32(double, i32)",
     "declare i64 @llvm.fptosi.sat.i64.f64(double)",
+    "declare i64 @llvm.ctlz.i64(i64, i1)",
     *(f"declare double @llvm.{name}.f64(double)" for name in ONE_FLOAT.values()),
 )
 CHECKS = f"{FAULT} = internal global i64 0\n{NOWHERE} = internal global i64 0"

@@ -44,6 +44,8 @@ class Function(Calls):
         result = self.result[0] if self.result else NOTHING
         body = "\n  ".join([*self.slots, *self.lines])
         head = f"define internal {returned(result)} {name}({', '.join(parameters)}) nounwind"
+        if getattr(self.function, "__is_inlined__", False):
+            head += " alwaysinline"
         return f"{head} {{\n  {body}\n}}\n", result
 
     def _leave(self) -> None:

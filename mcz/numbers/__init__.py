@@ -14,6 +14,7 @@ from mcz.numbers.choose import choose_grid, fit
 from mcz.numbers.grid import GRID, GRID_FIELDS, Grid
 from mcz.numbers.rules import GridFlag, GridKind
 from mcz.numbers.tokens import Texts, Tokens, scan, values_of_texts
+from mcz.numbers.values import values_of
 
 __all__ = [
     "GRID",
@@ -26,5 +27,6 @@ __all__ = [
     "choose_grid",
     "fit",
     "scan",
+    "values_of",
     "values_of_texts",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,7 @@ class Grid:
     digits: int = 0
     flags: int = 0
     scale: float = 1.0
+    _hash: int = field(init=False, repr=False, compare=False)  # many grids are looked up at once
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kind", GridKind(self.kind))
@@ -48,6 +49,11 @@ class Grid:
         fault = rules.fault(self.kind, self.digits, self.flags, self.scale)
         if fault:
             raise OptionError(f"a {self.kind.name} grid cannot have {fault}")
+        known = hash((int(self.kind), self.digits, self.flags, self.scale))
+        object.__setattr__(self, "_hash", known)
+
+    def __hash__(self) -> int:
+        return self._hash
 
     @property
     def is_text(self) -> bool:

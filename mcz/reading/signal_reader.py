@@ -14,15 +14,16 @@ from mcz.container.limits import check_decoded
 from mcz.container.masks import parse_mask
 from mcz.container.packets import SHORT
 from mcz.container.reader import Container
-from mcz.container.segments import FRESH, StreamTable
+from mcz.container.runs import MOST_OF_ONE, Run
+from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable
 from mcz.errors import FormatError
-from mcz.motion import Exceptions, Signal, grid_blocks
-from mcz.numbers import Grid, GridKind
+from mcz.motion import Exceptions, Signal
+from mcz.numbers import Grid, GridKind, values_of
 from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values_of_exceptions
 from mcz.reading.salvage import salvage
 from mcz.reading.signal_info import SignalInfo
 
-BLOCK_ROWS = 2048  # decoded at a time, at least
+BLOCK_ROWS = 512  # decoded at a time, at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +91,11 @@ class SignalReader:
             self._shape(start, stop), np.int64 if self.info.is_integer else np.float64
         )
         mask: NDArray[np.bool_] | None = None
-        for block in self.blocks(start, stop):
+        near = ordinals is None and not self.container.reads_parts
+        for block in (self._near if near else self.blocks)(start, stop, values):
             rows = slice((block.start - start) * per_frame, (block.stop - start) * per_frame)
-            values[rows] = block.values
+            if block.values.base is not values:
+                values[rows] = block.values
             if ordinals is not None:
                 ordinals[rows] = block.coded
             if block.mask is not None:
@@ -105,14 +108,70 @@ class SignalReader:
         n_columns = sum(len(layout.groups[group]) for group in self.groups)
         return (stop - start) * layout.samples_per_frame, n_columns
 
-    def blocks(self, start: int, stop: int) -> Iterator[Block]:
-        """The same block by block."""
+    def blocks(self, start: int, stop: int, out: NDArray[Any] | None = None) -> Iterator[Block]:
+        """The same block by block; values may lie in ``out``, of all rows, already."""
         spans = self._prepare(start, stop)
         if start == stop:  # the header has to be right all the same (CODEC-05)
             self._decode(spans, start, stop)
         for a, b in self._ranges(start, stop):
             coded = self._decode(spans, a, b)
-            yield Block(a, b, coded, *self._finish(coded, a, b))
+            per_frame = self.info.layout.samples_per_frame
+            rows = slice((a - start) * per_frame, (b - start) * per_frame)
+            own = out[rows] if out is not None and not self.info.is_integer else None
+            yield Block(a, b, coded, *self._finish(coded, a, b, own))
+
+    def _near(self, start: int, stop: int, out: NDArray[Any]) -> Iterator[Block]:
+        """The same; a run of which the range has a part is decoded whole, and kept."""
+        per_frame = self.info.layout.samples_per_frame
+        at = start
+        if start < stop:
+            run = self._run(start)
+            if run is not None and (run[0] < start or stop < run[1]):
+                at = min(run[1], stop)
+                yield self._cut(run, start, at)
+        if at < stop:
+            run = self._run(stop - 1)
+            if run is not None and stop < run[1]:
+                yield from self.blocks(at, run[0], out[(at - start) * per_frame :])
+                at = stop
+                yield self._cut(run, run[0], stop)
+        if at < stop or start == stop:
+            yield from self.blocks(at, stop, out[(at - start) * per_frame :])
+
+    def _run(self, frame: int) -> tuple[int, int] | None:
+        """The shown frames that hang together with one; None where they are too many to keep."""
+        info, rows = self.info, self.info.rows
+        per_frame = self._shape(0, 1)[0] * self._shape(0, 1)[1] * 8
+        most = min(MOST_OF_ONE, self.container.max_decoded) // max(per_frame, 1)
+        first = last = info.covering(frame, frame + 1)[0]
+        while not rows[first].header.flags & FRESH and frame - rows[first].header.first < most:
+            first -= 1
+        while last + 1 < len(rows) and not rows[last + 1].header.flags & FRESH:
+            last += 1
+            if rows[last].header.stop - frame > most:
+                return None
+        start = max(rows[first].header.first, info.skip)
+        stop = min(rows[last].header.stop, info.layout.n_frames - info.spare)
+        return (start, stop) if stop - start <= most else None
+
+    def _cut(self, run: tuple[int, int], start: int, stop: int) -> Block:
+        """Frames of a run, which is decoded where it is not at hand."""
+        rows = self.info.covering(run[0], run[0] + 1)
+        key = self.info.rows[rows[0]].offset, self.groups, self.resolution
+        held = self.container.runs.get(key)
+        if held is None:
+            blocks = list(self.blocks(*run))
+            masks = [block.mask for block in blocks]
+            held = Run(
+                run[0],
+                np.concatenate([block.values for block in blocks]),
+                None if all(mask is None for mask in masks) else _joined(blocks),
+            )
+            self.container.runs.put(key, held)
+        per_frame = self.info.layout.samples_per_frame
+        wanted = slice((start - run[0]) * per_frame, (stop - run[0]) * per_frame)
+        mask = None if held.mask is None else held.mask[wanted]
+        return Block(start, stop, held.values[wanted], held.values[wanted], mask)
 
     def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
         """The range in blocks of a few segments, which bound the memory beside the result."""
@@ -142,7 +201,7 @@ class SignalReader:
             values[:, ~is_exact] = self._decode_groups(lossy, spans, start, stop)
         number = {int(column): n for n, column in enumerate(np.flatnonzero(is_exact))}
         changes = self.exceptions(start, stop, columns)[1]
-        values[:, is_exact] = _values_of(  # CODEC-06
+        values[:, is_exact] = values_of(  # CODEC-06
             self._decode_groups(exact, spans, start, stop),
             [layout.grids[columns[column]] for column in number],
             [(row, number[column], grid) for row, column, grid in changes if column in number],
@@ -214,7 +273,7 @@ class SignalReader:
 
     def fetch(self, segment: int, resolution: int, group: int) -> bytes:
         """One stream of the codec."""
-        table, streams = self._streams(segment)
+        table, streams = self._cache.get(segment) or self._streams(segment)
         index = table.codec(resolution, group)
         if index not in streams:  # a group that another depends upon
             streams.update(
@@ -243,9 +302,9 @@ class SignalReader:
         return wanted
 
     def _finish(
-        self, coded: NDArray[Any], start: int, stop: int
+        self, coded: NDArray[Any], start: int, stop: int, out: NDArray[Any] | None = None
     ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-        """Ordinals to values, exceptions and masks put in."""
+        """Ordinals to values, in ``out`` where that is given, exceptions and masks put in."""
         layout = self.info.layout
         columns = [c for g in self.groups for c in layout.groups[g]]
         exceptions, changes = self.exceptions(start, stop, columns)
@@ -258,7 +317,7 @@ class SignalReader:
                 )
             Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
         if self.info.codec.domain == "ordinals" and not self.info.is_integer:
-            values = _values_of(coded, [layout.grids[c] for c in columns], changes)  # NOTES-09
+            values = values_of(coded, [layout.grids[c] for c in columns], changes, out)  # NOTES-09
         if len(exceptions):  # NOTES-10
             values[exceptions.rows, exceptions.channels] = values_of_exceptions(
                 exceptions.texts, self.name
@@ -277,9 +336,10 @@ class SignalReader:
         column = {channel: number for number, channel in enumerate(of_signal)}
         noted = Noted([layout.grids[channel] for channel in column], (stop - start) * per_frame)
         for index in self.info.covering(start, stop):
-            shift = (self.info.rows[index].header.first - start) * per_frame
+            row = self.info.rows[index]
+            shift = (row.header.first - start) * per_frame
             noted.begin(shift)
-            if self.info.rows[index].packet in SHORT:
+            if row.packet in SHORT or not row.header.flags & GROUP_NOTES:
                 continue  # it has no notes, and the grids of the clip
             for group in self.groups:
                 notes = self._group_notes(index, group)
@@ -305,12 +365,10 @@ class SignalReader:
         layout, per_frame = self.info.layout, self.info.layout.samples_per_frame
         mask: NDArray[np.bool_] | None = None
         for index in self.info.covering(start, stop):
-            if self.info.rows[index].packet in SHORT:
-                continue  # all of it is valid
             header = self.info.rows[index].header
+            if self.info.rows[index].packet in SHORT or not header.flags & MASKS:
+                continue  # all of it is valid
             table, streams = self._streams(index)
-            if table.mask(0) is None:
-                continue
             a, b = max(start, header.first), min(stop, header.stop)
             rows = slice((a - start) * per_frame, (b - start) * per_frame)
             cut = slice((a - header.first) * per_frame, (b - header.first) * per_frame)
@@ -327,10 +385,7 @@ class SignalReader:
         return mask
 
 
-def _values_of(
-    ordinals: NDArray[np.int64], grids: Sequence[Grid], changes: Sequence[tuple[int, int, Grid]]
-) -> NDArray[np.float64]:
-    values = np.empty(ordinals.shape)
-    for rows, columns, grid in grid_blocks(len(ordinals), grids, changes):
-        values[rows, columns] = grid.values(ordinals[rows][:, columns])
-    return values
+def _joined(blocks: Sequence[Block]) -> NDArray[np.bool_]:
+    """The mask of blocks, some of which may be valid as a whole."""
+    masks = [np.ones(b.values.shape, np.bool_) if b.mask is None else b.mask for b in blocks]
+    return np.concatenate(masks)

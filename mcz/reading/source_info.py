@@ -70,7 +70,7 @@ def sourced_skeleton(container: Container, id_: bytes) -> Skeleton:
 
 def _skeleton_source(container: Container, id_: bytes) -> Source | None:
     """The source file of the skeleton ``id_``, under the first name that the file has for it."""
-    fields = container.shared(b"SKEL", id_, payloads.SKEL)
+    fields = container.skeleton_fields(id_)
     if not fields.source:
         return None
     source = fields.source[0]

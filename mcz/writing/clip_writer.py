@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs import DEFAULT, by_name
+from mcz.codecs import by_name
 from mcz.codecs.contract import Codec, Encoded, Request, Segment, Span, model_finder
 from mcz.codecs.parameters import TARGETS
 from mcz.container import payloads
@@ -29,6 +29,7 @@ from mcz.schema import MAX_COUNT, build
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource, as_stored, settle
 
+BESIDE = "lossless"  # the codec of all signals but the motion, where that one is lossy
 Progress = Callable[[int, int, str], None]
 # (entries of a quality record, decoded values of each signal) -> its entries
 Amend = Callable[[dict[str, str], Sequence[NDArray[Any]]], dict[str, str]]
@@ -148,7 +149,7 @@ def _coded(
     motion: Motion, index: int, codec: Codec, options: Mapping[str, Any], segment_bytes: int
 ) -> _Coded:
     if index and not codec.lossless:
-        codec = by_name(DEFAULT)
+        codec = by_name(BESIDE)
         options = codec.options({})
     signal = motion.signals[index]
     if not codec.lossless and signal.channels is not None:

@@ -13,7 +13,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from mcz.codecs import DEFAULT, by_name
+from mcz.codecs import by_name, chosen
 from mcz.container.limits import ARCHIVE, BASE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import OptionError, SkeletonWarning
@@ -31,8 +31,9 @@ from mcz.writing.written import Written, written
 def write(
     motion: Motion,
     target: Any,
-    codec: str = DEFAULT,
+    codec: str | None = None,
     *,
+    effort: str | None = None,
     force: bool = False,
     archive: bool = False,
     copies: bool = False,
@@ -41,9 +42,11 @@ def write(
 ) -> Written:
     """Write ``motion`` to a new MCZ file: a path, an fsspec target or a binary stream.
 
-    ``params`` are the codec's; ``archive`` chooses the profile of large limits. ``copies``: what
-    holds the clip together, skeleton and template among it, stands in the file a second time, so
-    that a flipped bit there costs no frame (``mcz.open`` with ``salvage``). Raises
+    ``effort`` names a lossless codec in place of ``codec``: "fast", the default, is read fastest,
+    "normal" is a little smaller. ``params`` are the codec's; ``archive`` chooses the profile of
+    large limits. ``copies``: what holds the clip together, skeleton and template among it, stands
+    in the file a second time, so that a flipped bit there costs no frame (``mcz.open`` with
+    ``salvage``). Raises
     OptionError, MotionError, or LimitError where the profile is too small; MotionError also for a
     key of the metadata that SPEC.md does not register, unless it is private (``x-...``).
     """
@@ -51,7 +54,7 @@ def write(
     with replacing(target, force=force, inputs=params.values()) as stream:
         writer = Writer(stream, profile=profile_of(archive), copies=copies)
         name_skeleton(writer, motion.skeleton)
-        quality = write_tuned(writer, motion, by_name(codec), params, progress)
+        quality = write_tuned(writer, motion, by_name(chosen(codec, effort)), params, progress)
         writer.finish()
     return written(writer.directory, writer.offset, quality)
 
@@ -64,7 +67,8 @@ def encode(
     source: str | os.PathLike[str],
     target: Any,
     *,
-    codec: str = DEFAULT,
+    codec: str | None = None,
+    effort: str | None = None,
     params: Mapping[str, Any] | None = None,
     skeleton: str | os.PathLike[str] | None = None,
     rate: Fraction | float | None = None,
@@ -80,7 +84,7 @@ def encode(
 
     ``skeleton`` is the ASF of an AMC, as ``mcz.read`` takes it, with the same SkeletonWarning.
     ``verbatim`` keeps a file that cannot be parsed as an attachment. ``up`` is the axis that points
-    up ("x", "y", "z"). ``copies`` is that of ``mcz.write``.
+    up ("x", "y", "z"). ``effort`` and ``copies`` are those of ``mcz.write``.
     Raises SourceError, OptionError, MotionError or LimitError; nothing is left
     under the final name then. A target that is the source or its skeleton is refused, even with
     ``force``.
@@ -88,7 +92,8 @@ def encode(
     path = Path(source)
     if up is not None and path.suffix.lower() == ".asf":
         raise OptionError(f"{path}: a skeleton alone is kept as it is; say the up axis of its AMC")
-    terms = Terms(codec, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up)
+    coded = chosen(codec, effort)
+    terms = Terms(coded, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up)
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with replacing(target, force=force, inputs=inputs) as stream:

@@ -2,6 +2,7 @@
 
 import * as awt from "./codecs/awt.js";
 import * as dwt from "./codecs/dwt.js";
+import * as fast from "./codecs/fast.js";
 import * as lossless from "./codecs/lossless.js";
 import * as lsdtClip from "./codecs/lsdt-clip.js";
 import * as lsdtFrame from "./codecs/lsdt-frame.js";
@@ -18,7 +19,7 @@ import { Unsupported } from "./errors.js";
 const CODECS = new Map(
   [
     ...[raw, lossless, mrdwt, qbc, pca, dwt, awt, lsdtFrame, lsdtClip, mdtt, pcaRdo, online],
-    posewave,
+    ...[posewave, fast],
   ].map((codec) => [codec.id, codec]),
 );
 

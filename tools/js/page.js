@@ -8,6 +8,7 @@ const ANNEX_FILES = [
   "bases_cmu31.bin",
   "bases_cmu31_virtual.bin",
   "bases_cmu38.bin",
+  "fast_counts.json",
   "frame_start.json",
   "lossless_start.json",
   "online_start.json",

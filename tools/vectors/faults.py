@@ -14,9 +14,16 @@ EFFECTS = ("crash", "memory", "hang", "wrong data", "silent loss")
 MOST_CHECKSUMS = 3  # vectors in which nothing is wrong but a checksum, beside those of PARTS
 PARTS = "invalid/parts/"  # is about checksums
 SHARED = "*"  # the folder of rows that count in every folder of a codec
-KIN = {"dwt": "mrdwt", "awt": "mrdwt", "mdtt": "lsdt-clip", "pca-rdo": "lsdt-clip"}
+KIN = {
+    "dwt": "mrdwt",
+    "awt": "mrdwt",
+    "mdtt": "lsdt-clip",
+    "pca-rdo": "lsdt-clip",
+    "fast": "lossless",
+}
 CODECS = tuple(
-    "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online posewave".split()
+    "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online "
+    "posewave fast".split()
 )
 
 

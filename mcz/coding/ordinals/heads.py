@@ -123,9 +123,13 @@ def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
     if at + 8 > len(stream):
         raise FormatError(f"lossless: the stream ends at {len(stream)}, in a unit")
     (unit,) = struct.unpack_from("<d", stream, at)
-    if not 2.0**-200 <= unit <= 2.0**80:  # LOSS-12
-        raise FormatError(f"lossless: a unit of {unit!r}")
+    check_unit("lossless", unit)
     return unit, at + 8
+
+
+def check_unit(codec: str, unit: float) -> None:
+    if not 2.0**-200 <= unit <= 2.0**80:  # LOSS-12
+        raise FormatError(f"{codec}: a unit of {unit!r}")
 
 
 def _shape(form: int, drop: int, version: int) -> Lattice:

@@ -1,40 +1,18 @@
 // SPEC.md, "Codec 1: lossless".
 
-import { ByteReader } from "../bytes.js";
 import { RangeDecoder, bits, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
-import {
-  BINARY32,
-  BINARY64,
-  GENERAL,
-  TEXT32,
-  TEXT64,
-  VAX_F,
-  binary32Ordinal,
-} from "../grids.js";
+import { binary32Ordinal } from "../grids.js";
+import { MULTIPLES, PLAIN, POWERS_OF_10, PRODUCTS, classesOf } from "../heads.js";
 import { halvesOf, setHalves, setInteger } from "../int64.js";
 import { ordinalOf } from "../ordinals.js";
+import { SignalDecoder } from "../ordinal-streams.js";
 import { Residuals, side } from "../residuals.js";
 import { restart, startModels } from "../start-models.js";
 
 export const id = 1;
 export const name = "lossless";
 export const version = 1;
-
-const CODED = 0;
-const CONSTANT = 1;
-const COPY = 2;
-
-// Forms; 1 to 15 are classes of so many decimal digits.
-const PLAIN = 0;
-const MULTIPLES = 32;
-const PRODUCTS = 33; // from version 1 on
-const CLASSES_24 = 88;
-const CLASSES_53 = 117;
-
-const MAX_TAPS = 8;
-const MAX_TAP = 511;
-const MAX_SCALE = 172;
 
 // The first context and the mixer of each kind of bit.
 const SAME = 0;
@@ -55,11 +33,13 @@ const RESIDUALS_MIXER = 6;
 const TWO_40 = 2 ** 40;
 const TWO_44 = 2 ** 44;
 const TWO_52 = 2 ** 52;
-const TWO_53 = 2 ** 53;
 
-/** B^j for 0 <= j <= 63; the last ones stand for "too large", and all are exact. */
-const POWERS_OF_2 = Float64Array.from({ length: 64 }, (_, j) => 2 ** Math.min(j, 62));
-const POWERS_OF_10 = Float64Array.from({ length: 64 }, (_, j) => Number(`1e${Math.min(j, 18)}`));
+/** The codec in each of its versions. */
+const VERSIONS = [false, true].map((hasProducts) => ({
+  name,
+  rules: { maxTaps: 8, hasDepth: false, hasProducts },
+  decoder: (ordinals) => new BitDecoder(ordinals),
+}));
 
 /**
  * Opens a signal.
@@ -78,7 +58,7 @@ export function open(header, layout, codecVersion) {
   return {
     decodes: "ordinals",
     alone: true, // lead, tail and freshness mean nothing
-    decode: (segments) => new SignalDecoder(layout, segments, codecVersion).decode(),
+    decode: (segments) => new SignalDecoder(VERSIONS[codecVersion], layout, segments).decode(),
   };
 }
 
@@ -92,175 +72,7 @@ export function open(header, layout, codecVersion) {
  * @throws {Refused}
  */
 export function decodeGroups(layout, segments, groups) {
-  return new SignalDecoder(layout, segments, 0, groups).decode();
-}
-
-/** Decodes a run of segments: all groups, or those of these numbers, without copies. */
-class SignalDecoder {
-  constructor(layout, segments, codecVersion, numbers = null) {
-    this.codecVersion = codecVersion;
-    this.layout = layout;
-    this.segments = segments;
-    this.copying = numbers === null;
-    this.numbers = numbers ?? [...layout.groups.keys()];
-    this.nChannels = layout.channels.length;
-    const nRows = segments.reduce((sum, segment) => sum + segment.nRows, 0);
-    this.ordinals = new BigInt64Array(nRows * this.nChannels);
-    this.bits = new BitDecoder(this.ordinals);
-  }
-
-  /** @returns {BigInt64Array} the ordinals of all rows, row after row */
-  decode() {
-    let row = 0;
-    for (const segment of this.segments) {
-      this.decodeSegment(segment, row);
-      row += segment.nRows;
-    }
-    return this.ordinals;
-  }
-
-  decodeSegment({ streams, nRows }, firstRow) {
-    const { grids } = this.layout;
-    const groups = this.numbers.map((g) => {
-      const columns = this.layout.groups[g];
-      const reader = new ByteReader(streams[0][g], `lossless stream of group ${g}`);
-      const heads = columns.map((column) => {
-        const head = readHead(reader, grids[column], column);
-        if (head.form === PRODUCTS && this.codecVersion < 1) {
-          reader.refuse(`form ${PRODUCTS} in version 0`);
-        }
-        return head;
-      });
-      return { columns, heads, reader };
-    });
-    const heads = groups.flatMap((group) => group.heads);
-    const copies = heads.filter(({ kind }) => kind === COPY);
-    if (copies.length > 0 && !this.copying) throw new Refused("lossless: a copy in an exact group");
-    const sources = copies.map((copy) => sourceOf(copy, groups));
-    for (const { column, ordinal } of heads.filter(({ kind }) => kind === CONSTANT)) {
-      this.eachRow(firstRow, nRows, column, () => ordinal);
-    }
-    for (const group of groups) this.decodeBits(group, nRows, firstRow);
-    copies.forEach(({ column }, i) => {
-      const from = sources[i] - column;
-      this.eachRow(firstRow, nRows, column, (at) => this.ordinals[at + from]);
-    });
-  }
-
-  /** Sets a column to what `ordinalAt` says, which is given the index in `ordinals`. */
-  eachRow(firstRow, nRows, column, ordinalAt) {
-    const start = firstRow * this.nChannels + column;
-    const end = start + nRows * this.nChannels;
-    for (let at = start; at < end; at += this.nChannels) this.ordinals[at] = ordinalAt(at);
-  }
-
-  decodeBits({ heads, reader }, nRows, firstRow) {
-    const coded = heads.filter(({ kind }) => kind === CODED);
-    if (coded.length === 0) {
-      reader.end();
-      return;
-    }
-    const channels = coded.map((head) => new CodedChannel(head));
-    this.bits.start(reader.rest());
-    this.bits.decode(channels, nRows, this.nChannels, firstRow * this.nChannels);
-    this.bits.coder.finish(reader.what);
-  }
-}
-
-/** The column that a copy repeats. */
-function sourceOf({ group, channel }, groups) {
-  const from = groups[group]?.heads[channel];
-  if (!from || from.kind === COPY) {
-    const why = from ? "which is a copy itself" : "which there is not";
-    throw new Refused(`lossless: a copy of channel ${channel} of group ${group}, ${why}`);
-  }
-  return from.column;
-}
-
-// Heads
-
-function readHead(reader, grid, column) {
-  const kind = reader.u8();
-  switch (kind & 3) {
-    case CODED:
-      return { kind: CODED, column, ...readCoded(reader, kind, grid) };
-    case CONSTANT:
-      return { kind: CONSTANT, column, ordinal: readConstant(reader, kind) };
-    case COPY:
-      if (kind !== COPY) reader.refuse(`kind ${kind} of a copy has reserved bits set`);
-      return { kind: COPY, column, group: reader.varint(), channel: reader.varint() };
-    default:
-      return reader.refuse(`kind ${kind} of a channel is reserved`);
-  }
-}
-
-function readConstant(reader, kind) {
-  const size = kind >> 2;
-  if (size > 8) reader.refuse(`kind ${kind} of a constant: more than 8 bytes, or reserved bits`);
-  let zigzag = 0n;
-  reader.take(size).forEach((byte, i) => {
-    if (i === size - 1 && byte === 0) reader.refuse("a constant has more bytes than it needs");
-    zigzag |= BigInt(byte) << BigInt(8 * i);
-  });
-  return zigzag & 1n ? -(zigzag >> 1n) - 1n : zigzag >> 1n;
-}
-
-function readCoded(reader, kind, grid) {
-  const nTaps = (kind >> 3) & 15;
-  if (nTaps > MAX_TAPS) reader.refuse(`${nTaps} taps`);
-  const spelled = (kind & 128) !== 0;
-  const form = spelled ? reader.u8() : formOf(grid);
-  const drop = spelled ? reader.u8() : 0;
-  if (drop > greatestDrop(form)) reader.refuse(`form ${form} with a drop of ${drop}`);
-  let unit = 1;
-  let top = 0;
-  if (form === PRODUCTS && grid.kind !== GENERAL) reader.refuse(`form ${form}, grid ${grid.kind}`);
-  if (form === MULTIPLES || form === PRODUCTS) {
-    unit = reader.f64();
-    if (!(unit >= 2 ** -200 && unit <= 2 ** 80)) reader.refuse(`unit ${unit}`);
-  } else if (form !== PLAIN) {
-    top = reader.varint();
-    if (top > greatestTop(form)) reader.refuse(`top class ${top} of form ${form}`);
-  }
-  const q = reader.u8();
-  if (q > MAX_SCALE) reader.refuse(`scale ${q}`);
-  const scale = Math.floor(((4 + (q % 4)) * 2 ** (q >> 2)) / 4);
-  const taps = new Float64Array(nTaps);
-  for (let i = 0; i < nTaps; i++) {
-    taps[i] = reader.zigzag();
-    if (Math.abs(taps[i]) > MAX_TAP) reader.refuse(`a tap of ${taps[i]}`);
-  }
-  return { form, drop, unit, grid, top, scale, taps, fromLast: (kind & 4) !== 0 };
-}
-
-/** The form of a channel whose head does not tell. */
-function formOf(grid) {
-  switch (grid.kind) {
-    case GENERAL:
-      return grid.digits;
-    case TEXT64:
-    case BINARY64:
-      return CLASSES_53;
-    case TEXT32:
-    case BINARY32:
-    case VAX_F:
-      return CLASSES_24;
-    default:
-      return PLAIN;
-  }
-}
-
-/** Greatest `drop` of a form; -1 where there is no such form. */
-function greatestDrop(form) {
-  if (form === PLAIN) return 19;
-  if (form <= 15 || form === MULTIPLES || form === PRODUCTS) return 0;
-  if (form === CLASSES_24) return 22;
-  if (form === CLASSES_53) return 51;
-  return -1;
-}
-
-function greatestTop(form) {
-  return form === CLASSES_24 ? 255 : form === CLASSES_53 ? 2047 : 614;
+  return new SignalDecoder(VERSIONS[0], layout, segments, groups).decode();
 }
 
 // Bits
@@ -283,20 +95,9 @@ class CodedChannel {
     this.side1 = 0;
     this.side2 = 0;
 
-    // The numbers of classes; they mean nothing for plain forms.
-    const decimal = head.form <= 15;
-    this.decimal = decimal;
+    Object.assign(this, classesOf(head));
     this.top = head.top;
-    this.powers = decimal ? POWERS_OF_10 : POWERS_OF_2;
-    this.nDigits = decimal ? head.form : head.form - 64 - head.drop; // P
-    this.width = decimal ? 13 : 44; // W
-    const least = decimal ? 10 ** (head.form - 1) : 2 ** (this.nDigits - 1);
-    this.least = least; // L
-    this.greatest = (decimal ? 10 : 2) * least - 1; // B * L - 1
-    this.perClass = (decimal ? 9 : 1) * least; // K
     this.limit = this.powers[this.width] - 1;
-    // Whether all magnitudes are below 2^53.
-    this.small = (head.top + 1) * this.perClass * 2 ** head.drop < TWO_53;
   }
 
   predict() {
@@ -326,10 +127,13 @@ class BitDecoder {
     this.other = 3;
   }
 
-  /** Begins with the bits of a group. */
-  start(data) {
+  /** Decodes the coded channels of a group; the arguments behind `data` are those of `decode`. */
+  decodeGroup(heads, data, nRows, nChannels, firstIndex, what) {
     restart(this.model, this.startModel);
     this.coder = new RangeDecoder(data);
+    const channels = heads.map((head) => new CodedChannel(head));
+    this.decode(channels, nRows, nChannels, firstIndex);
+    this.coder.finish(what);
   }
 
   /** Ordinal of row r and a channel goes to firstIndex + r * nChannels + its column. */

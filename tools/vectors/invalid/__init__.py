@@ -8,6 +8,7 @@ from tools.vectors.invalid import (
     cut,
     data,
     dwt,
+    fast,
     grammar,
     index,
     lossless,
@@ -55,5 +56,6 @@ MODULES = (
     pca_rdo,
     online,
     posewave,
+    fast,
     sources,
 )

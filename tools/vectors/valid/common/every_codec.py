@@ -19,6 +19,7 @@ from mcz.container.chunks import ANCILLARY
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from tools.vectors.build import (
     curve_clips,
+    fast_clips,
     online_clips,
     online_units,
     pca_clips,
@@ -35,7 +36,8 @@ from tools.vectors.build.pca_clips import Part, part_of
 from tools.vectors.build.spatial_clips import CLIP, FRAME, MDTT, PCA_RDO
 
 NAMES = tuple(
-    "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online posewave".split()
+    "raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online "
+    "posewave fast".split()
 )
 WAVES = ("mrdwt", "dwt", "awt")
 WINDOWS = (CLIP, MDTT, PCA_RDO)
@@ -80,14 +82,20 @@ class Sample:
 # Samples
 
 
+_OF_ORDINALS: dict[str, Callable[[], Codec]] = {
+    "raw": lambda: raw.CODEC,
+    "lossless": codec_of,
+    "fast": fast_clips.codec_of,
+}
+
+
 def sample(name: str, segments: Sequence[int], seed: int = 0) -> Sample:
     """A clip of ``name`` in segments of so many frames, all alike but the last."""
     n_frames = sum(segments)
-    if name in ("raw", "lossless"):
+    if name in _OF_ORDINALS:
         values = numbers(n_frames + seed, 3)[seed:]
         motion = Motion(_bones(3), (Signal(values, (HUNDREDTHS,) * 3),), name="common")
-        codec = raw.CODEC if name == "raw" else codec_of()
-        return Sample(codec, motion, "all", max(segments, default=0))
+        return Sample(_OF_ORDINALS[name](), motion, "all", max(segments, default=0))
     return _boned(
         _WITH[name](segments, seed) if name in _WITH else _with_space(name, segments, seed)
     )
@@ -264,7 +272,7 @@ def _cuts(shelf: Whole, spec: str, name: str) -> None:
 
 def _lengths(shelf: Whole, spec: str, name: str) -> None:
     """Clips of 1 and 2 frames and no channel, where the codec has none; long ones."""
-    taken = {"lossless", "mrdwt", "qbc", FRAME, CLIP, "online"}
+    taken = {"lossless", "fast", "mrdwt", "qbc", FRAME, CLIP, "online"}
     for n_frames in (1, 2) if name not in taken | {"pca", MDTT, PCA_RDO} else ():
         made = sample(name, (n_frames,))
         purpose = f"A clip of {n_frames} frames, of 0-channel joints and one that has some."

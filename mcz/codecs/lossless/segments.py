@@ -1,0 +1,85 @@
+"""What the codecs of ordinals share: segments of streams, each of one group, and copies in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs.contract import Encoded, Fetch, Layout, SignalSource, Span
+from mcz.codecs.parameters import Parameter, integer
+from mcz.codecs.segments import Sizing, guessing
+from mcz.errors import FormatError
+from mcz.numbers import Grid
+
+Ints = NDArray[np.int64]
+
+MAX_ROWS = 2**16
+
+# (ordinals, grids in force and of the clip, the groups' channels, their numbers, copying) -> the
+# streams of groups. ``copying``: a channel may repeat one before it.
+Build = Callable[
+    [Ints, Sequence[tuple[Grid, Grid]], Sequence[Sequence[int]], Sequence[int], bool], list[bytes]
+]
+
+
+def encode_groups(
+    build: Build, sizing: Sizing, source: SignalSource, params: Mapping[str, Any]
+) -> Encoded:
+    """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
+    code = partial(_build_segment, build, source)
+    return Encoded(header=b"", segments=guessing(source, params["segment_frames"], sizing, code))
+
+
+def _build_segment(build: Build, source: SignalSource, start: int, stop: int) -> tuple[bytes, ...]:
+    return _streams(build, source, start, stop, range(len(source.layout.groups)), True)
+
+
+def recode_groups(
+    build: Build,
+    header: bytes,
+    source: SignalSource,
+    groups: tuple[int, ...],
+    spans: Sequence[Span],
+    options: Mapping[str, Any],
+    fetch: Fetch,
+) -> Iterator[tuple[bytes, ...]]:
+    """The streams of some groups with new values, without copies.
+
+    What such a stream repeated, or who repeated it, need not be looked at then.
+    """
+    for span in spans:
+        yield _streams(build, source, span.first, span.stop, groups, False)
+
+
+def _streams(
+    build: Build,
+    source: SignalSource,
+    start: int,
+    stop: int,
+    groups: Sequence[int],
+    copying: bool,
+) -> tuple[bytes, ...]:
+    layout = source.layout
+    grids = list(zip(source.grids(start), layout.grids, strict=True))
+    channels = [layout.groups[group] for group in groups]
+    return tuple(build(source.ordinals(start, stop), grids, channels, groups, copying))
+
+
+def check_copy(name: str, layout: Layout, group: int, column: int) -> None:
+    """Raise FormatError for a copy of a channel that there is not."""
+    if not group < len(layout.groups) or not column < len(layout.groups[group]):  # LOSS-10
+        raise FormatError(f"{name}: a copy of channel {column} of group {group}")
+
+
+def segment_frames(size: str) -> Parameter:
+    """The parameter of their length, where 0 means about ``size``."""
+    return Parameter(
+        "segment_frames",
+        0,
+        f"frames a segment; 0: as many as make about {size} bytes",
+        integer("segment_frames", 0, MAX_ROWS),
+    )

@@ -1,0 +1,182 @@
+"""Compiled: the heads of channels.
+
+SPEC.md, "Codec 14: fast", is normative. Imported on first use only.
+"""
+
+from __future__ import annotations
+
+from mcz.coding.quick.kernels import (
+    BASE,
+    CODED,
+    COLUMN,
+    CONSTANT,
+    COPY,
+    DEPTH,
+    DIGITS,
+    DROP,
+    FROM_LAST,
+    GROUP,
+    KIND,
+    MAX_TAPS,
+    ORDINAL,
+    SCALE,
+    TAPS,
+    TOP,
+    UNIT,
+    Bytes,
+    Ints,
+)
+from mcz.jit import inner, kernel
+
+OWN_FORM = 128  # in kind: form and drop are in the stream
+MULTIPLES = 32  # form: integers that are multiplied by a unit
+MAX_DROP, MAX_TAP, MAX_SCALE = 19, 511, 172
+MAX_TOP_10, MAX_TOP_24, MAX_TOP_53 = 614, 255, 2047
+MAX_RANK = 1 << 60
+UNIT_SIZE = 8
+MOST = 0x7FFFFFFFFFFFFFFF
+
+# What is wrong: the place in ``FAULTS`` of streams.py.
+ENDS, BAD_KIND, BAD_CONSTANT, BAD_FORM, BAD_TOP, BAD_TAPS, BAD_SCALE, BAD_BITS = range(8)
+
+
+@inner
+def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:
+    """A varint below 2^53 and the offset behind it; -1 where there is none."""
+    value = shift = 0
+    while at < end and shift < 56:
+        byte = int(data[at])
+        at += 1
+        value |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            if (byte == 0 and shift > 7) or value >> 53:
+                return 0, -1
+            return value, at
+    return 0, -1
+
+
+@inner
+def set_form(head: Ints, form: int, drop: int) -> bool:
+    """Note base and digits of a form; False for one that there is not."""
+    head[DROP] = drop
+    if (form == 0 and drop <= MAX_DROP) or (form == MULTIPLES and drop == 0):
+        head[BASE] = head[DIGITS] = 0
+    elif 1 <= form <= 15 and drop == 0:
+        head[BASE], head[DIGITS] = 10, form
+    elif (form == 88 or form == 117) and drop <= form - 66:
+        head[BASE], head[DIGITS] = 2, form - 64 - drop
+    else:
+        return False
+    return True
+
+
+@inner
+def read_constant(data: Bytes, at: int, end: int, size: int, head: Ints) -> int:
+    """Note a constant of so many bytes; the offset behind it, -1 where there is none."""
+    if size > 8 or at + size > end or (size and data[at + size - 1] == 0):
+        return -1
+    folded = 0
+    for n in range(size):
+        folded |= int(data[at + n]) << (8 * n)
+    half = (folded >> 1) & MOST
+    head[ORDINAL] = -1 - half if folded & 1 else half
+    return at + size
+
+
+@inner
+def most_classes(form: int) -> int:
+    return MAX_TOP_10 if form < 16 else MAX_TOP_24 if form == 88 else MAX_TOP_53
+
+
+@inner
+def read_coded(
+    data: Bytes, at: int, end: int, kind: int, form: int, head: Ints, powers: Ints
+) -> tuple[int, int]:
+    """Note the head of a coded channel: the offset behind it, or a fault below 0; and what."""
+    drop = 0
+    if kind & OWN_FORM:
+        if at + 2 > end:
+            return -1, ENDS
+        form, drop = int(data[at]), int(data[at + 1])
+        at += 2
+    if not set_form(head, form, drop):
+        return -1, BAD_FORM
+    head[UNIT] = -1
+    if form == MULTIPLES:
+        head[UNIT] = at
+        at += UNIT_SIZE
+    head[TOP] = head[DEPTH] = 0
+    if head[BASE]:
+        head[TOP], at = varint(data, at, end)
+        if at < 0:
+            return -1, ENDS
+        head[DEPTH], at = varint(data, at, end)
+        if at < 0:
+            return -1, ENDS
+        if head[TOP] > most_classes(form):  # FAST-02, LOSS-18
+            return -1, BAD_TOP
+        if head[DEPTH] > head[TOP]:  # FAST-03
+            return -1, BAD_TOP
+        row = 1 if head[BASE] == 10 else 0
+        if (head[DEPTH] + 1) * (head[BASE] - 1) > MAX_RANK // powers[
+            row, head[DIGITS] - 1
+        ]:  # FAST-04
+            return -1, BAD_TOP
+    if at >= end:
+        return -1, ENDS
+    scale = int(data[at])
+    at += 1
+    if scale > MAX_SCALE:
+        return -1, BAD_SCALE
+    head[SCALE] = (4 + (scale & 3) << (scale >> 2)) >> 2
+    n_taps = kind >> 3 & 15
+    if n_taps > MAX_TAPS:  # FAST-05
+        return -1, BAD_TAPS
+    for tap in range(MAX_TAPS):
+        head[TAPS + tap] = 0
+    for tap in range(n_taps):
+        folded, at = varint(data, at, end)
+        if at < 0:
+            return -1, ENDS
+        found = -1 - (folded >> 1) if folded & 1 else folded >> 1
+        if abs(found) > MAX_TAP:
+            return -1, BAD_TAPS
+        head[TAPS + tap] = found
+    head[FROM_LAST] = kind >> 2 & 1
+    return at, 0
+
+
+@inner
+def read_head(
+    data: Bytes, at: int, end: int, form: int, head: Ints, powers: Ints
+) -> tuple[int, int]:
+    """Note the head of a channel: the offset behind it, or -1; and what is wrong."""
+    if at >= end:
+        return -1, ENDS
+    kind = int(data[at])
+    at += 1
+    head[KIND] = kind & 3
+    if kind & 3 == CODED:
+        return read_coded(data, at, end, kind, form, head, powers)
+    if kind & 3 == CONSTANT:
+        return read_constant(data, at, end, kind >> 2, head), BAD_CONSTANT
+    if kind != COPY:
+        return -1, BAD_KIND
+    head[GROUP], at = varint(data, at, end)
+    if at >= 0:
+        head[COLUMN], at = varint(data, at, end)
+    return at, ENDS
+
+
+@kernel
+def read_ends(
+    data: Bytes, at: int, end: int, forms: Ints, heads: Ints, ends: Ints, powers: Ints
+) -> int:
+    """Note the heads of a stream and where each ends. Returns a fault or -1."""
+    for n in range(len(heads)):
+        at, fault = read_head(data, at, end, forms[n], heads[n], powers)
+        if at < 0:
+            return fault
+        ends[n] = at
+    return -1

@@ -1,0 +1,236 @@
+"""The stream of a group as codec 14, ``fast``, has it: heads of its channels, then their values.
+
+SPEC.md, "Codec 14: fast", is normative; the names below are its field names.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.coding.ordinals.choices import Lattice, base_and_digits, max_top
+from mcz.coding.ordinals.heads import (
+    CODED,
+    COPY,
+    MULTIPLES,
+    OWN_FORM,
+    check_unit,
+    form_of,
+    form_of_grid,
+)
+from mcz.coding.ordinals.streams import constant_head
+from mcz.coding.ordinals.units import find_unit, of_multiples
+from mcz.errors import FormatError
+from mcz.numbers import Grid, GridKind
+from mcz.schema import varint
+
+Ints = NDArray[np.int64]
+
+SPARE = 32  # bytes at both ends of the streams that a reader of a hostile one may look at
+FAULTS = (
+    "it ends in the head",
+    "its kind is unknown",
+    "its constant is not as short as it can be",
+    "its form is unknown",
+    "its classes are out of range",
+    "its taps are out of range",
+    "its scale is out of range",
+    "it cannot be decoded",
+)
+
+
+@cache
+def loops() -> tuple[Any, Any, Any, Any]:
+    """The compiled loops, imported on first use: of values, of streams; of an encoder."""
+    from mcz.coding.quick import choice_kernels, kernels, record_kernels, stream_kernels
+
+    return kernels, stream_kernels, choice_kernels, record_kernels
+
+
+@cache
+def tables() -> Any:
+    """The distributions that all streams have."""
+    from mcz.coding.quick import tables
+
+    return tables.tables()
+
+
+@dataclass(slots=True)
+class Coded:
+    """A coded channel: what is coded, its form in the clip, and what its head says."""
+
+    numbers: Ints
+    clip_form: int
+    shape: Lattice
+    unit: float | None = None
+    plan: Ints | None = None
+    scale: int = 0
+
+    def head(self) -> bytes:
+        own = loops()[0]
+        assert self.plan is not None
+        base, digits, drop, top, depth = self.plan[own.BASE : own.DEPTH + 1].tolist()
+        taps = self.plan[own.TAPS : own.TAPS + own.MAX_TAPS].tolist()
+        while taps and not taps[-1]:
+            taps.pop()
+        form = form_of(Lattice(base, digits, drop)) if self.unit is None else MULTIPLES
+        own_form = drop > 0 or form != self.clip_form
+        kind = CODED | int(self.plan[own.FROM_LAST]) << 2 | len(taps) << 3 | OWN_FORM * own_form
+        parts = [bytes((kind,)), bytes((form, drop)) if own_form else b""]
+        parts += [struct.pack("<d", self.unit)] if self.unit is not None else []
+        parts += [varint(top), varint(depth)] if base else []
+        parts += [bytes((self.scale,)), *(varint(2 * t if t >= 0 else -2 * t - 1) for t in taps)]
+        return b"".join(parts)
+
+
+def build_streams(
+    ordinals: Ints,
+    grids: Sequence[tuple[Grid, Grid]],
+    groups: Sequence[Sequence[int]],
+    numbers: Sequence[int],
+    copying: bool,
+) -> list[bytes]:
+    """The streams of some groups, whose channels ``groups`` are columns of ``ordinals``.
+
+    ``grids`` are those in force and of the clip, ``numbers`` the groups'. ``copying``: a channel
+    may repeat one before it.
+    """
+    heads = _heads(np.ascontiguousarray(ordinals.T), grids, groups, numbers, copying)
+    records = plan([head for group in heads for head in group if isinstance(head, Coded)])
+    n_coded = [sum(isinstance(head, Coded) for head in group) for group in heads]
+    return [
+        b"".join(head.head() if isinstance(head, Coded) else head for head in group) + bits
+        for group, bits in zip(
+            heads, write(records, len(ordinals) * np.cumsum(n_coded, dtype=np.int64)), strict=True
+        )
+    ]
+
+
+def _heads(
+    columns: Ints,
+    grids: Sequence[tuple[Grid, Grid]],
+    groups: Sequence[Sequence[int]],
+    numbers: Sequence[int],
+    copying: bool,
+) -> list[list[Coded | bytes]]:
+    """Of each group what its channels are; those of constants and copies as they are written."""
+    seen: dict[bytes, bytes] = {}
+    heads: list[list[Coded | bytes]] = []
+    for number, group in zip(numbers, groups, strict=True):
+        heads.append([])
+        for place, channel in enumerate(group):
+            column = columns[channel]
+            key = column.tobytes()
+            if (column == column[0]).all():
+                heads[-1].append(constant_head(int(column[0])))
+            elif copying and key in seen:
+                heads[-1].append(seen[key])
+            else:
+                seen[key] = bytes((COPY,)) + varint(number) + varint(place)
+                heads[-1].append(_coded(column, *grids[channel]))
+    return heads
+
+
+def _coded(column: Ints, grid: Grid, clip_grid: Grid) -> Coded:
+    found = find_unit(column) if grid.kind == GridKind.BINARY32 else None
+    if found is not None:
+        return Coded(found[1], form_of_grid(clip_grid), Lattice(0, 0), found[0])
+    return Coded(column, form_of_grid(clip_grid), Lattice(*base_and_digits(grid)))
+
+
+def plan(coded: Sequence[Coded]) -> Ints:
+    """Choose how channels are coded; what is coded, one after the other, for ``write``."""
+    own, _, choice, record = loops()
+    if not coded:
+        return np.empty((0, record.RECORD_SIZE), np.int64)
+    columns = np.stack([head.numbers for head in coded])
+    plans = np.zeros((len(coded), own.PLAN_SIZE), np.int64)
+    plans[:, own.BASE] = [head.shape.base for head in coded]
+    plans[:, own.DIGITS] = [head.shape.digits for head in coded]
+    max_tops = np.array([max_top(head.shape) for head in coded], np.int64)
+    scales = np.zeros(len(coded), np.int64)
+    records = np.empty((columns.size, record.RECORD_SIZE), np.int64)
+    choice.plan_columns(columns, max_tops, plans, tables().powers, scales, records)
+    for head, found, scale in zip(coded, plans, scales.tolist(), strict=True):
+        head.plan, head.scale = found, scale
+    return records
+
+
+def write(records: Ints, ends: Ints) -> list[bytes]:
+    """State, words and bits of groups whose records end at ``ends``; b"" where there are none."""
+    own = loops()[3]
+    words = np.empty(len(records), np.int64)
+    data = np.zeros(own.MAX_VALUE_SIZE * len(records), np.uint8)
+    sizes = np.empty((len(ends), 3), np.int64)
+    own.write_records(records, ends, tables(), words, data, sizes)
+    parts, start = [], 0
+    for end, (state, n_words, n_bits) in zip(ends.tolist(), sizes.tolist(), strict=True):
+        at = own.MAX_VALUE_SIZE * start
+        coded = words[start : start + n_words][::-1].astype("<u2").tobytes()
+        bits = data[at : at + (n_bits + 7) // 8][::-1].tobytes()
+        parts.append(state.to_bytes(4, "little") + coded + bits if end > start else b"")
+        start = end
+    return parts
+
+
+def parse_streams(
+    streams: Sequence[bytes], sizes: Sequence[int], forms: Ints, out: Ints
+) -> dict[int, tuple[int, int]]:
+    """Fill ``out`` (rows, channels) with the ordinals of groups of ``sizes`` channels.
+
+    ``forms`` are those that channels have where their heads name none. Returns the columns that are
+    copies: of which group and which of its channels. Raises FormatError on bad bytes.
+    """
+    own, read, _, _ = loops()
+    data = _spared(streams)
+    words = np.ascontiguousarray(data[::-1]).view("<u4").astype(np.int64)
+    ends = SPARE + np.cumsum([len(stream) for stream in streams], dtype=np.int64)
+    firsts = np.cumsum([0, *sizes], dtype=np.int64)
+    plans = np.zeros((len(forms), own.PLAN_SIZE), np.int64)
+    channel, fault = read.read_streams(
+        data, words, SPARE, ends, firsts, forms, plans, out, tables()
+    )
+    if fault >= 0:
+        raise FormatError(f"fast: channel {channel} of those read: {FAULTS[fault]}")
+    for n in np.flatnonzero((plans[:, own.KIND] == CODED) & (plans[:, own.UNIT] > 0)):
+        (unit,) = struct.unpack_from("<d", data.data, plans[n, own.UNIT])
+        check_unit("fast", unit)
+        out[:, n] = of_multiples(out[:, n], unit)  # FAST-12
+    return {
+        int(n): (int(plans[n, own.GROUP]), int(plans[n, own.COLUMN]))
+        for n in np.flatnonzero(plans[:, own.KIND] == COPY)
+    }
+
+
+def renumbered(stream: bytes, forms: Ints, number_of: Callable[[int, int], int]) -> bytes:
+    """``stream`` with the groups that its copies name numbered anew."""
+    from mcz.coding.quick import head_kernels as read
+
+    own = loops()[0]
+    plans = np.zeros((len(forms), own.PLAN_SIZE), np.int64)
+    ends = np.zeros(len(forms), np.int64)
+    end = SPARE + len(stream)
+    fault = read.read_ends(_spared([stream]), SPARE, end, forms, plans, ends, tables().powers)
+    if fault >= 0:
+        raise FormatError(f"fast: {FAULTS[fault]}")
+    parts, start = [], 0
+    for head, end in zip(plans, (ends - SPARE).tolist(), strict=True):
+        part = stream[start:end]
+        if head[own.KIND] == COPY:
+            group, column = int(head[own.GROUP]), int(head[own.COLUMN])
+            part = bytes((COPY,)) + varint(number_of(group, column)) + varint(column)
+        parts.append(part)
+        start = end
+    return b"".join(parts) + stream[start:]
+
+
+def _spared(streams: Sequence[bytes]) -> NDArray[np.uint8]:
+    """The streams one behind the other, with zeros at both ends, in whole words."""
+    padding = bytes(SPARE - sum(map(len, streams)) % 4)
+    return np.frombuffer(bytearray(b"".join((bytes(SPARE), *streams, padding))), np.uint8)

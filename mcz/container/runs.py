@@ -1,0 +1,50 @@
+"""What was decoded of a file and may be asked for again, as neighboring windows do."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Hashable
+from threading import Lock
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+MOST_BYTES = 8 * 2**20  # of a file
+MOST_OF_ONE = MOST_BYTES // 2
+
+
+class Run(NamedTuple):
+    """All shown frames, from ``start`` on, of segments that hang together."""
+
+    start: int
+    values: NDArray[Any]
+    mask: NDArray[np.bool_] | None  # None: all valid
+
+    @property
+    def n_bytes(self) -> int:
+        return self.values.nbytes + (0 if self.mask is None else self.mask.nbytes)
+
+
+class Runs:
+    """Runs by key, those that were used last: at most ``MOST_BYTES`` of a file."""
+
+    def __init__(self) -> None:
+        self._runs: OrderedDict[Hashable, Run] = OrderedDict()
+        self._size = 0
+        self._lock = Lock()  # a file may be read by several threads
+
+    def get(self, key: Hashable) -> Run | None:
+        with self._lock:
+            if key in self._runs:
+                self._runs.move_to_end(key)
+            return self._runs.get(key)
+
+    def put(self, key: Hashable, run: Run) -> None:
+        """Keep a run, which nobody may change any more, in place of older ones."""
+        with self._lock:
+            if key not in self._runs:
+                self._runs[key] = run
+                self._size += run.n_bytes
+            while self._size > MOST_BYTES:
+                self._size -= self._runs.popitem(last=False)[1].n_bytes

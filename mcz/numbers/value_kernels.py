@@ -1,0 +1,78 @@
+"""Compiled: ordinals of decimal grids to values, a whole matrix at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.jit import inner, kernel
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+# Columns of ``rules``, one row a channel.
+DIGITS, POWER, LIMIT = range(3)
+RULE_SIZE = 3
+FIXED, OTHER = 0, -1  # digits of a grid of fixed decimals; of one that is not decimal
+ROWS = 256  # that are worked on at a time, so that they stay in the processor's memory
+EXACT_POWER = 22
+
+
+@inner
+def scaled(mantissa: int, power: int, tens: Floats) -> float:
+    """``mantissa * 10^power``, rounded once: both factors are exact."""
+    if power < 0:
+        return float(mantissa / tens[-power])
+    return float(mantissa * tens[power])
+
+
+@inner
+def general_column(
+    ordinals: Ints, values: Floats, c: int, start: int, stop: int, rule: Ints, tens: Floats
+) -> bool:
+    """Numbers of so many significant digits; False where one has too large a power of ten."""
+    low = int(tens[rule[DIGITS] - 1])
+    per_class = 9 * low
+    since = power = 0  # what magnitudes exceed mantissas by in the class of the last number
+    for t in range(start, stop):
+        magnitude = ordinals[t, c] ^ (ordinals[t, c] >> 63)
+        if magnitude > rule[LIMIT]:
+            return False
+        mantissa = magnitude - since
+        if mantissa < low or mantissa >= 10 * low or since == 0:
+            if magnitude == 0:
+                values[t, c] = -float(magnitude) if ordinals[t, c] < 0 else 0.0
+                continue
+            own = (magnitude - 1) // per_class
+            since, power = own * per_class + 1 - low, own + rule[POWER]
+            mantissa = magnitude - since
+        if abs(power) > EXACT_POWER:
+            return False
+        value = scaled(mantissa, power, tens)
+        values[t, c] = -value if ordinals[t, c] < 0 else value
+    return True
+
+
+@kernel
+def fill(ordinals: Ints, rules: Ints, tens: Floats, values: Floats, left: Ints) -> None:
+    """Fill ``values`` (rows, channels) with those of the ordinals; ``left``: channels not filled.
+
+    These have another grid than a decimal one, or a number that no exact division gives, or none.
+    """
+    for start in range(0, len(ordinals), ROWS):
+        stop = min(start + ROWS, len(ordinals))
+        for c in range(len(rules)):
+            if left[c]:
+                continue
+            if rules[c, DIGITS] == OTHER:
+                left[c] = 1
+            elif rules[c, DIGITS] != FIXED:
+                if not general_column(ordinals, values, c, start, stop, rules[c], tens):
+                    left[c] = 1
+            else:
+                ten = tens[rules[c, POWER]]
+                for t in range(start, stop):
+                    magnitude = ordinals[t, c] ^ (ordinals[t, c] >> 63)
+                    left[c] |= 1 if magnitude > rules[c, LIMIT] else 0
+                    value = float(magnitude) / ten
+                    values[t, c] = -value if ordinals[t, c] < 0 else value

@@ -1,0 +1,60 @@
+"""Values of a whole matrix of ordinals, whose channels have grids of their own."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from mcz.numbers.blocks import grid_blocks
+from mcz.numbers.grid import Grid
+from mcz.numbers.rules import MIN_POWER, GridKind
+from mcz.numbers.tokens import TENS, Floats, Ints
+
+
+def values_of(
+    ordinals: Ints,
+    grids: Sequence[Grid],
+    changes: Sequence[tuple[int, int, Grid]] = (),
+    out: Floats | None = None,
+) -> Floats:
+    """The binary64 of each ordinal, (rows, channels); see ``Signal.grid_changes``.
+
+    As ``Grid.values`` gives them, and refuses them. They go to ``out`` where that is given.
+    """
+    values = np.empty(ordinals.shape) if out is None else out
+    if not changes and ordinals.flags.c_contiguous:
+        left = np.zeros(len(grids), np.int64)
+        _kernels().fill(ordinals, _rules(tuple(grids)), TENS, values, left)
+        others = np.flatnonzero(left).tolist()
+        for grid in dict.fromkeys(grids[c] for c in others):
+            columns = [c for c in others if grids[c] == grid]
+            values[:, columns] = grid.values(ordinals[:, columns])
+        return values
+    for rows, columns, grid in grid_blocks(len(ordinals), grids, changes):
+        values[rows, columns] = grid.values(ordinals[rows][:, columns])
+    return values
+
+
+@lru_cache(maxsize=64)
+def _rules(grids: tuple[Grid, ...]) -> Ints:
+    """How the compiled loop makes values of each grid."""
+    loops = _kernels()
+    rules = np.empty((len(grids), loops.RULE_SIZE), np.int64)
+    for rule, grid in zip(rules, grids, strict=True):
+        match grid.kind:
+            case GridKind.GENERAL:
+                rule[:] = grid.digits, MIN_POWER + 1 - grid.digits, grid.limit
+            case GridKind.FIXED | GridKind.TRIMMED:
+                rule[:] = loops.FIXED, grid.digits, grid.limit
+            case _:
+                rule[:] = loops.OTHER, 0, 0
+    return rules
+
+
+def _kernels() -> Any:
+    """The compiled loops, imported on first use."""
+    return importlib.import_module("mcz.numbers.value_kernels")

@@ -1,0 +1,138 @@
+// SPEC.md, "Codec 1: lossless": the heads of channels, which codec 14 has, too.
+
+import { BINARY32, BINARY64, GENERAL, TEXT32, TEXT64, VAX_F } from "./grids.js";
+
+export const CODED = 0;
+export const CONSTANT = 1;
+export const COPY = 2;
+
+// Forms; 1 to 15 are classes of so many decimal digits.
+export const PLAIN = 0;
+export const MULTIPLES = 32;
+export const PRODUCTS = 33; // of version 1 of codec 1
+const CLASSES_24 = 88;
+const CLASSES_53 = 117;
+
+const MAX_TAP = 511;
+const MAX_SCALE = 172;
+
+/** B^j for 0 <= j <= 63; the last ones stand for "too large", and all are exact. */
+export const POWERS_OF_2 = Float64Array.from({ length: 64 }, (_, j) => 2 ** Math.min(j, 62));
+export const POWERS_OF_10 = Float64Array.from({ length: 64 }, (_, j) =>
+  Number(`1e${Math.min(j, 18)}`),
+);
+
+/**
+ * The head of a channel.
+ *
+ * @param {ByteReader} reader at the head
+ * @param {object} grid of the channel in CLIP
+ * @param {number} column the channel
+ * @param {{maxTaps: number, hasDepth: boolean, hasProducts: boolean}} rules of the codec
+ * @throws {Refused}
+ */
+export function readHead(reader, grid, column, rules) {
+  const kind = reader.u8();
+  switch (kind & 3) {
+    case CODED:
+      return { kind: CODED, column, ...readCoded(reader, kind, grid, rules) };
+    case CONSTANT:
+      return { kind: CONSTANT, column, ordinal: readConstant(reader, kind) };
+    case COPY:
+      if (kind !== COPY) reader.refuse(`kind ${kind} of a copy has reserved bits set`);
+      return { kind: COPY, column, group: reader.varint(), channel: reader.varint() };
+    default:
+      return reader.refuse(`kind ${kind} of a channel is reserved`);
+  }
+}
+
+function readConstant(reader, kind) {
+  const size = kind >> 2;
+  if (size > 8) reader.refuse(`kind ${kind} of a constant: more than 8 bytes, or reserved bits`);
+  let zigzag = 0n;
+  reader.take(size).forEach((byte, i) => {
+    if (i === size - 1 && byte === 0) reader.refuse("a constant has more bytes than it needs");
+    zigzag |= BigInt(byte) << BigInt(8 * i);
+  });
+  return zigzag & 1n ? -(zigzag >> 1n) - 1n : zigzag >> 1n;
+}
+
+function readCoded(reader, kind, grid, { maxTaps, hasDepth, hasProducts }) {
+  const nTaps = (kind >> 3) & 15;
+  if (nTaps > maxTaps) reader.refuse(`${nTaps} taps`);
+  const spelled = (kind & 128) !== 0;
+  const form = spelled ? reader.u8() : formOf(grid);
+  const drop = spelled ? reader.u8() : 0;
+  if (drop > greatestDrop(form)) reader.refuse(`form ${form} with a drop of ${drop}`);
+  if (form === PRODUCTS && !(hasProducts && grid.kind === GENERAL)) {
+    reader.refuse(`form ${form} in this version, or on a grid of kind ${grid.kind}`);
+  }
+  let unit = 1;
+  let top = 0;
+  let depth = 0;
+  if (form === MULTIPLES || form === PRODUCTS) {
+    unit = reader.f64();
+    if (!(unit >= 2 ** -200 && unit <= 2 ** 80)) reader.refuse(`unit ${unit}`);
+  } else if (form !== PLAIN) {
+    top = reader.varint();
+    if (top > greatestTop(form)) reader.refuse(`top class ${top} of form ${form}`);
+    if (hasDepth) depth = reader.varint();
+    if (depth > top) reader.refuse(`depth ${depth} of ${top} classes`);
+  }
+  const q = reader.u8();
+  if (q > MAX_SCALE) reader.refuse(`scale ${q}`);
+  const scale = Math.floor(((4 + (q % 4)) * 2 ** (q >> 2)) / 4);
+  const taps = new Float64Array(nTaps);
+  for (let i = 0; i < nTaps; i++) {
+    taps[i] = reader.zigzag();
+    if (Math.abs(taps[i]) > MAX_TAP) reader.refuse(`a tap of ${taps[i]}`);
+  }
+  return { form, drop, unit, grid, top, depth, scale, taps, fromLast: (kind & 4) !== 0 };
+}
+
+/** The form of a channel whose head does not tell. */
+function formOf(grid) {
+  switch (grid.kind) {
+    case GENERAL:
+      return grid.digits;
+    case TEXT64:
+    case BINARY64:
+      return CLASSES_53;
+    case TEXT32:
+    case BINARY32:
+    case VAX_F:
+      return CLASSES_24;
+    default:
+      return PLAIN;
+  }
+}
+
+/** Greatest `drop` of a form; -1 where there is no such form. */
+function greatestDrop(form) {
+  if (form === PLAIN) return 19;
+  if (form <= 15 || form === MULTIPLES || form === PRODUCTS) return 0;
+  if (form === CLASSES_24) return 22;
+  if (form === CLASSES_53) return 51;
+  return -1;
+}
+
+function greatestTop(form) {
+  return form === CLASSES_24 ? 255 : form === CLASSES_53 ? 2047 : 614;
+}
+
+/** What follows from a head for numbers in classes; it means nothing for plain forms. */
+export function classesOf({ form, drop, top }) {
+  const decimal = form <= 15;
+  const nDigits = decimal ? form : form - 64 - drop; // P
+  const least = decimal ? 10 ** (form - 1) : 2 ** (nDigits - 1); // L
+  return {
+    decimal,
+    nDigits,
+    least,
+    powers: decimal ? POWERS_OF_10 : POWERS_OF_2,
+    width: decimal ? 13 : 44, // W
+    greatest: (decimal ? 10 : 2) * least - 1, // B * L - 1
+    perClass: (decimal ? 9 : 1) * least, // K
+    small: (top + 1) * (decimal ? 9 : 1) * least * 2 ** drop < 2 ** 53, // all magnitudes
+  };
+}
