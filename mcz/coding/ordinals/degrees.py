@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +18,7 @@ DEGREE = 180 / np.pi  # in a radian
 LARGEST = 1e-12  # degrees: numbers near 1e-9 are products by chance
 MOST = 2**22  # units in a value
 _HALVINGS = range(44, 77)  # of a radian, that a unit may be
-_SAMPLE = 32
+_SAMPLE = 16
 
 
 def of_products(counts: Ints, unit: float, grid: Grid) -> Ints:
@@ -28,8 +30,15 @@ def is_tiny(ordinals: Ints, grid: Grid) -> bool:
     """Whether a column may be rounding noise: the cheap test."""
     if grid.kind != GridKind.GENERAL or not ordinals.any():
         return False
-    least, most = grid.ordinals(np.array([-LARGEST, LARGEST]))[0]
+    least, most = _bounds(grid)
     return bool(least < ordinals.min() and ordinals.max() < most)
+
+
+@cache
+def _bounds(grid: Grid) -> tuple[int, int]:
+    """The ordinals of -LARGEST and LARGEST."""
+    least, most = grid.ordinals(np.array([-LARGEST, LARGEST]))[0].tolist()
+    return least, most
 
 
 def find_degrees(ordinals: Ints, grid: Grid) -> tuple[float, Ints] | None:
