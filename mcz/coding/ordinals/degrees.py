@@ -11,19 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.numbers import Grid, GridKind
+from mcz.numbers.magnitudes import POWERS
+from mcz.numbers.tokens import TENS
 
 Ints = NDArray[np.int64]
 
 DEGREE = 180 / np.pi  # in a radian
 LARGEST = 1e-12  # degrees: numbers near 1e-9 are products by chance
-MOST = 2**22  # units in a value
+MOST = 2**24  # units in a value
 _HALVINGS = range(44, 77)  # of a radian, that a unit may be
 _SAMPLE = 16
 
 
 def of_products(counts: Ints, unit: float, grid: Grid) -> Ints:
     """The ordinals of ``counts * unit`` on ``grid``, which is GENERAL."""
-    return grid.ordinals(counts * np.float64(unit))[0]  # LOSS-31
+    from mcz.coding.ordinals import product_kernels as own  # on first use
+
+    counts = np.ascontiguousarray(counts)
+    out = np.empty(len(counts), np.int64)
+    if own.fill(counts, unit, TENS, POWERS, 10 ** (grid.digits - 1), out):
+        printed = out == own.PRINTED
+        few, places = np.unique(counts[printed], return_inverse=True)  # often small ones
+        out[printed] = grid.ordinals(few * np.float64(unit))[0][places.ravel()]
+    return out
 
 
 def is_tiny(ordinals: Ints, grid: Grid) -> bool:
