@@ -68,11 +68,14 @@ function readCoded(reader, kind, grid, { maxTaps, hasDepth, hasProducts }) {
     reader.refuse(`form ${form} in this version, or on a grid of kind ${grid.kind}`);
   }
   let unit = 1;
+  let shifts = 0;
   let top = 0;
   let depth = 0;
   if (form === MULTIPLES || form === PRODUCTS) {
     unit = reader.f64();
     if (!(unit >= 2 ** -200 && unit <= 2 ** 80)) reader.refuse(`unit ${unit}`);
+    if (form === PRODUCTS) shifts = reader.u8();
+    if (form === PRODUCTS && !(shifts >= 1 && shifts <= 63)) reader.refuse(`${shifts} shifts`);
   } else if (form !== PLAIN) {
     top = reader.varint();
     if (top > greatestTop(form)) reader.refuse(`top class ${top} of form ${form}`);
@@ -87,7 +90,7 @@ function readCoded(reader, kind, grid, { maxTaps, hasDepth, hasProducts }) {
     taps[i] = reader.zigzag();
     if (Math.abs(taps[i]) > MAX_TAP) reader.refuse(`a tap of ${taps[i]}`);
   }
-  return { form, drop, unit, grid, top, depth, scale, taps, fromLast: (kind & 4) !== 0 };
+  return { form, drop, unit, shifts, grid, top, depth, scale, taps, fromLast: (kind & 4) !== 0 };
 }
 
 /** The form of a channel whose head does not tell. */

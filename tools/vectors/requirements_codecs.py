@@ -81,6 +81,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "LOSS-31": ("invalid/lossless/products-in-version-0",),
     "LOSS-32": ("invalid/lossless/products-on-*",),
     "LOSS-33": ("valid/lossless/products-*",),
+    "LOSS-34": ("invalid/lossless/products-shifts-*",),
     "WAVE-01": ("valid/mrdwt/wavelet-*",),
     "WAVE-02": ("valid/mrdwt/*", "invalid/mrdwt/hash-*"),
     "MRDWT-03": ("invalid/mrdwt/resolutions*",),

@@ -27,9 +27,10 @@ CODED, CONSTANT, COPY = range(3)  # bits 0 and 1 of a channel's first byte
 MAX_DROP = 19
 MAX_SCALE = 172  # 2^43
 MAX_TAPS = 8
+MAX_SHIFTS = 63
 OWN_FORM = 128  # in kind: form and drop are in the stream
 MULTIPLES = 32  # form: integers that are multiplied by a unit, to binary32
-PRODUCTS = 33  # form, from version 1 on: the same, to numbers of the grid
+PRODUCTS = 33  # form, from version 1 on: odd numbers, shifts and a unit, to a decimal grid
 
 
 def read_heads(
@@ -116,7 +117,10 @@ def parse_mapping(stream: bytes, at: int, form: int, grid: Grid) -> tuple[Mappin
         return partial(of_multiples, unit=unit), at
     if grid.kind != GridKind.GENERAL:  # LOSS-32
         raise FormatError(f"lossless: form {form} on the grid {grid.kind.name}")
-    return partial(of_products, unit=unit, grid=grid), at
+    shifts, at = _byte(stream, at)
+    if not 1 <= shifts <= MAX_SHIFTS:  # LOSS-34
+        raise FormatError(f"lossless: {shifts} shifts")
+    return partial(of_products, unit=unit, shifts=shifts, grid=grid), at
 
 
 def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:

@@ -1,4 +1,4 @@
-"""Compiled: products of integers and a unit to ordinals of a GENERAL grid, a column at a time.
+"""Compiled: multiples of a unit to ordinals of a GENERAL grid, a column at a time.
 
 SPEC.md, "Value to ordinal", is normative. Imported on first use only.
 """
@@ -20,7 +20,9 @@ PRINTED = 1 << 62  # no ordinal: the decimal of such a product is to be printed
 
 
 @kernel
-def fill(counts: Ints, unit: float, tens: Floats, powers: Floats, block: int, out: Ints) -> int:
+def fill(
+    codes: Ints, unit: float, shifts: int, tens: Floats, powers: Floats, block: int, out: Ints
+) -> int:
     """Fill ``out`` with ordinals, ``PRINTED`` where one product is not exact enough: how many.
 
     ``block``: the least mantissa; ``tens``: the exact powers of ten; ``powers``: all of them, from
@@ -30,11 +32,13 @@ def fill(counts: Ints, unit: float, tens: Floats, powers: Floats, block: int, ou
     while int(tens[digits - 1]) < block:
         digits += 1
     power = left = 0  # power: of ten, of the number before
-    for t in range(len(counts)):
-        value = abs(float(counts[t]) * unit)  # LOSS-33
-        if value == 0.0:
+    for t in range(len(codes)):
+        if codes[t] == 0:
             out[t] = 0
             continue
+        before = abs(codes[t]) - 1
+        odd = 2 * (before // shifts) + 1  # LOSS-33
+        value = float(odd) * float(1 << before % shifts) * unit
         while value < powers[power - LEAST_POWER]:
             power -= 1
         while value >= powers[power + 1 - LEAST_POWER]:
@@ -50,5 +54,5 @@ def fill(counts: Ints, unit: float, tens: Floats, powers: Floats, block: int, ou
             left += 1
             continue
         magnitude = (power - MIN_POWER) * 9 * block + 1 + mantissa - block
-        out[t] = -1 - magnitude if counts[t] < 0 else magnitude
+        out[t] = -1 - magnitude if codes[t] < 0 else magnitude
     return left

@@ -80,7 +80,7 @@ def _coded_head(
     column: Ints, grid: Grid, clip_grid: Grid, version: int
 ) -> tuple[bytes, Ints, Ints]:
     """The head of a coded channel, its plan for the compiled loop, and the integers to code."""
-    own, unit, column = _in_units(column, grid, version if grid == clip_grid else 0)
+    own, fields, column = _in_units(column, grid, version if grid == clip_grid else 0)
     shape = lattice(grid if own is None else PLAIN, column)
     if shape.base and shape.top > max_top(shape):
         shape = lattice(PLAIN, column)
@@ -89,20 +89,21 @@ def _coded_head(
     form = form_of(shape) if own is None else own
     own_form = shape.drop > 0 or form != form_of_grid(clip_grid)
     kind = CODED | from_last << 2 | len(taps) << 3 | OWN_FORM * own_form
-    head = [bytes((kind,)), bytes((form, shape.drop)) if own_form else b""]
-    head += [struct.pack("<d", unit)] if own is not None else []
+    head = [bytes((kind,)), bytes((form, shape.drop)) if own_form else b"", fields]
     head += [varint(shape.top)] if shape.base else []
     head += [bytes((scale,)), *(varint(2 * t if t >= 0 else -2 * t - 1) for t in taps)]
     return b"".join(head), make_plan(shape, scale, from_last, taps), column
 
 
-def _in_units(column: Ints, grid: Grid, version: int) -> tuple[int | None, float, Ints]:
-    """A form with a unit, the unit, and its integers; (None, 0, the column) where none fits."""
+def _in_units(column: Ints, grid: Grid, version: int) -> tuple[int | None, bytes, Ints]:
+    """A form with a unit, its fields, and its integers; no form and the column where none fits."""
     if grid.kind == GridKind.BINARY32 and (found := find_unit(column)) is not None:
-        return MULTIPLES, *found
-    if version >= 1 and (found := find_degrees(column, grid)) is not None:
-        return PRODUCTS, *found
-    return None, 0.0, column
+        return MULTIPLES, struct.pack("<d", found[0]), found[1]
+    products = find_degrees(column, grid) if version >= 1 else None
+    if products is not None:
+        unit, shifts, codes = products
+        return PRODUCTS, struct.pack("<dB", unit, shifts), codes
+    return None, b"", column
 
 
 @cache

@@ -85,6 +85,7 @@ class CodedChannel {
     this.form = head.form;
     this.drop = head.drop;
     this.unit = head.unit;
+    this.shifts = head.shifts;
     this.grid = head.grid;
     this.fromLast = head.fromLast;
     this.taps = head.taps;
@@ -111,6 +112,14 @@ class CodedChannel {
 /** beside(value, scale) of the specification. */
 function beside(value, scale) {
   return clamp(bits(value) - bits(scale) + 3, 0, 7);
+}
+
+/** The product that a code of form 33 says. */
+function productOf({ unit, shifts }, code) {
+  if (code === 0) return 0;
+  const before = Math.abs(code) - 1;
+  const size = (2 * Math.floor(before / shifts) + 1) * 2 ** (before % shifts) * unit;
+  return code < 0 ? -size : size;
 }
 
 /** Decodes the coded channels of a group in a segment, one group after the other. */
@@ -185,7 +194,7 @@ class BitDecoder {
     if (channel.form === MULTIPLES) {
       setInteger(this.halves, index, binary32Ordinal(value * channel.unit));
     } else if (channel.form === PRODUCTS) {
-      this.ordinals[index] = ordinalOf(channel.grid, value * channel.unit);
+      this.ordinals[index] = ordinalOf(channel.grid, productOf(channel, value));
     } else if (drop <= 8) {
       setInteger(this.halves, index, value * 2 ** drop + this.coder.number(drop));
     } else {

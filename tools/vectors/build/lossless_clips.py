@@ -42,7 +42,7 @@ DOUBLE, SINGLE = Grid(GridKind.BINARY64), Grid(GridKind.BINARY32)
 class Coded:
     """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top`` None: as
     great as the ordinals need. Nothing is checked, so that what is forbidden can be written.
-    ``multiples``: coded in place of the ordinals, with ``unit``: forms 32, 33."""
+    ``multiples``: coded in place of the ordinals, with ``unit`` and ``shifts``: forms 32, 33."""
 
     form: int | None = None
     drop: int = 0
@@ -51,6 +51,7 @@ class Coded:
     from_last: int = 1
     taps: tuple[int, ...] = ()
     unit: float | None = None
+    shifts: int | None = None
     multiples: tuple[int, ...] = ()
 
 
@@ -148,6 +149,7 @@ def _coded_head(head: Coded, shape: Lattice) -> bytes:
     kind = head.from_last << 2 | len(head.taps) << 3 | lossless_heads.OWN_FORM * own
     data = bytes((kind, *((head.form, head.drop) if head.form is not None else ())))
     data += struct.pack("<d", head.unit) if head.unit is not None else b""
+    data += bytes((head.shifts,)) if head.shifts is not None else b""
     data += varint(shape.top) if shape.base else b""
     folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)
     return data + bytes((head.scale,)) + b"".join(map(varint, folded))

@@ -195,7 +195,7 @@ def _units(shelf: Broken) -> None:
 
 def _products(shelf: Broken) -> None:
     def refused(name: str, purpose: str, grid: Grid, version: int = 1, **rest: Any) -> None:
-        head = Coded(PRODUCTS, multiples=(0,) * 5, **{"unit": 0.25, **rest})
+        head = Coded(PRODUCTS, multiples=(0,) * 5, **{"unit": 0.25, "shifts": 1, **rest})
         data = file_of(column([0.0] * 5, grid), codec=codec_of([head], version=version))
         shelf.add(f"products-{name}", HEADING, f"{purpose}.", data)
 
@@ -203,6 +203,9 @@ def _products(shelf: Broken) -> None:
     refused("on-binary32", "Products on the grid BINARY32", SINGLE)
     refused("on-fixed", "Products on the grid FIXED", HUNDREDTHS)
     refused("drop", "A drop of 1 bit from products", SIX, drop=1)
+    refused("shifts-0", "No shifts", SIX, shifts=0)
+    refused("shifts-64", "64 shifts", SIX, shifts=64)
+    refused("shifts-255", "255 shifts", SIX, shifts=255)
     refused("unit", "A unit of 0 of products", SIX, unit=0.0)
 
 
