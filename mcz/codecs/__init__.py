@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, MutableMapping
+from dataclasses import replace
 from importlib import import_module
 
 from mcz.codecs.contract import Codec
@@ -94,4 +95,6 @@ def by_id(id_: int, version: int) -> Codec:
         raise UnsupportedError(f"codec {id_} is unknown")  # CODEC-03, CONV-16
     if version > codec.version:  # CODEC-04, HEAD-05
         raise UnsupportedError(f"codec {codec.name}: version {version}, known is {codec.version}")
+    if version < codec.version:
+        return replace(codec, version=version, decode=codec.earlier.get(version, codec.decode))
     return codec

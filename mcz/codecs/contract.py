@@ -149,7 +149,8 @@ class Encoded:
     """An encoded signal: what goes into CLIP, then the segments as they are made.
 
     ``models`` are written before the clip that refers to them, once a file. ``known`` are those of
-    SPEC.md's annexes that it refers to: a file of the archive profile has them, too.
+    SPEC.md's annexes that it refers to: a file of the archive profile has them, too. ``version``
+    is the least of the codec's that reads it (None: the codec's own).
     """
 
     header: bytes
@@ -157,6 +158,7 @@ class Encoded:
     n_resolutions: int = 1
     models: tuple[Model, ...] = ()
     known: tuple[Model, ...] = ()
+    version: int | None = None
 
 
 Encode = Callable[[SignalSource, Mapping[str, Any]], Encoded]
@@ -270,7 +272,7 @@ class Codec:
 
     ``recode`` codes some groups anew (None: the codec cannot do that), of a codec with ``regroup``
     in any of the segments, of others in all. ``preview`` says what can be read without decoding
-    the rest (None: nothing exactly).
+    the rest (None: nothing exactly). ``earlier`` has the ``decode`` of each earlier version.
     """
 
     id: int
@@ -295,6 +297,7 @@ class Codec:
     live: Live | None = None
     follow: Follow | None = None
     live_options: Mapping[str, Any] = field(default_factory=dict)
+    earlier: Mapping[int, Decode] = field(default_factory=dict)
 
     def has(self, name: str) -> bool:
         """Whether it has a parameter of that name."""

@@ -15,7 +15,7 @@ from mcz.numbers.tokens import EXACT_POWER, NAN, TENS, Floats, Ints, scan_texts
 FIRST_NAN32 = 0x7F800001
 FIRST_NAN64 = 0x7FF0000000000001
 _LEAST_POWER = -324  # of ten, at or below every binary64 above 0
-_POWERS = np.array([float(f"1e{power}") for power in range(_LEAST_POWER, 309)])
+POWERS = np.array([float(f"1e{power}") for power in range(_LEAST_POWER, 309)])
 _VAX_TINY = 0x00800000  # below it the exponent is 0: zero, or reserved with a minus sign
 
 
@@ -34,7 +34,7 @@ def general_magnitudes(values: Floats, digits: int) -> Ints:
     values = np.where(zero, 1.0, values)
     power = np.floor(np.log10(values)).astype(np.int64)
     # GRID-11
-    power -= values < _POWERS[power - _LEAST_POWER]  # just below a power, the logarithm is its own
+    power -= values < POWERS[power - _LEAST_POWER]  # just below a power, the logarithm is its own
     shift = digits - 1 - power
     odd = np.abs(shift) > EXACT_POWER
     tens = TENS[np.where(odd, 0, np.abs(shift))]

@@ -245,7 +245,7 @@ def _signal_fields(source: MemorySource, codec: Codec, part: Encoded) -> dict[st
         "spare": 0,
         "grids": runs,
         "codec": codec.id,
-        "codec_version": codec.version,
+        "codec_version": codec.version if part.version is None else part.version,
         "header": part.header,
         "groups": {"kind": kind, "sizes": sizes},
         "n_resolutions": part.n_resolutions,

@@ -17,6 +17,7 @@ from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless import lossless
 from mcz.coding.logistic import NODES, squash_table, stretch_table
 from mcz.coding.ordinals import heads, streams
+from mcz.coding.ordinals.degrees import DEGREE, codes_of, find_degrees, multiples_of, of_products
 from mcz.coding.ordinals.units import find_unit, of_multiples
 from mcz.errors import FormatError
 from mcz.formats import FORMATS
@@ -279,3 +280,49 @@ def test_bad_units_are_refused(unit: float) -> None:
     assert broken != stream
     with pytest.raises(FormatError, match="unit"):
         decoded(broken, 49, 1, Grid(GridKind.BINARY32))
+
+
+@given(
+    st.integers(1, 15),
+    st.floats(2.0**-200, 2.0**80),
+    st.integers(1, 63),
+    st.lists(st.integers(-(2**44), 2**44 - 1) | st.integers(-9, 9), min_size=1),
+)
+def test_products_are_numbers_of_their_grid(
+    digits: int, unit: float, shifts: int, some: list[int]
+) -> None:
+    grid, codes = Grid(GridKind.GENERAL, digits), np.array(some, np.int64)
+    products = multiples_of(codes, shifts) * unit
+    expected = grid.ordinals(products)[0]
+    assert of_products(codes, unit, shifts, grid).tolist() == expected.tolist()
+    printed = [float(f"{product:.{digits - 1}e}") for product in products.tolist()]
+    assert np.allclose(grid.values(expected), printed, rtol=10.0**-digits * 1.1, atol=0)
+
+
+@given(st.lists(st.integers(-(2**44), 2**44), min_size=1))
+def test_codes_say_multiples(some: list[int]) -> None:
+    codes, shifts = codes_of(np.array(some, np.int64))
+    assert multiples_of(codes, shifts).tolist() == some
+
+
+def test_rounding_noise_is_coded_as_products() -> None:
+    counts = np.array([0, 1, -1, 500, -77, 3, 1234], np.int64)
+    grid = Grid(GridKind.GENERAL, 6)
+    ordinals = of_products(counts, DEGREE * 2.0**-60, 3, grid)
+    found = find_degrees(ordinals, grid)
+    assert found is not None
+    assert (of_products(found[2], found[0], found[1], grid) == ordinals).all()
+    assert find_degrees(grid.ordinals(np.array([1e-14, 0.5]))[0], grid) is None
+    assert find_degrees(np.array([-1, 5]), grid) is None  # -0 is no product
+
+
+def test_products_need_version_1_and_a_decimal_grid() -> None:
+    grid = Grid(GridKind.GENERAL, 6)
+    column = of_products(np.array([[0, 1, -1, 500, -77, 3]]).T[:, 0], DEGREE * 2.0**-60, 4, grid)
+    stream = streams.build_stream(column[:, None], [(grid, grid)], 0, None, 1)
+    assert stream[1] == heads.PRODUCTS
+    assert (streams.parse_stream(stream, [grid], 6, 1)[0][:, 0] == column).all()
+    with pytest.raises(FormatError, match="form 33"):
+        streams.parse_stream(stream, [grid], 6, 0)
+    with pytest.raises(FormatError, match="form 33"):
+        streams.parse_stream(stream, [Grid(GridKind.FIXED, 4)], 6, 1)

@@ -42,8 +42,8 @@ export function codecLabel(id) {
 export function findCodec({ codec: id, codecVersion }) {
   const codec = CODECS.get(id);
   if (!codec) throw new Unsupported(`codec ${id}`);
-  if (codec.version !== codecVersion) {
+  if (codecVersion > codec.version) {
     throw new Unsupported(`version ${codecVersion} of codec ${codec.name}`);
   }
-  return codec;
+  return { ...codec, open: (header, layout) => codec.open(header, layout, codecVersion) };
 }

@@ -9,6 +9,7 @@ export const COPY = 2;
 // Forms; 1 to 15 are classes of so many decimal digits.
 export const PLAIN = 0;
 export const MULTIPLES = 32;
+export const PRODUCTS = 33; // of version 1 of codec 1
 const CLASSES_24 = 88;
 const CLASSES_53 = 117;
 
@@ -27,7 +28,7 @@ export const POWERS_OF_10 = Float64Array.from({ length: 64 }, (_, j) =>
  * @param {ByteReader} reader at the head
  * @param {object} grid of the channel in CLIP
  * @param {number} column the channel
- * @param {{maxTaps: number, hasDepth: boolean}} rules of the codec
+ * @param {{maxTaps: number, hasDepth: boolean, hasProducts: boolean}} rules of the codec
  * @throws {Refused}
  */
 export function readHead(reader, grid, column, rules) {
@@ -56,19 +57,25 @@ function readConstant(reader, kind) {
   return zigzag & 1n ? -(zigzag >> 1n) - 1n : zigzag >> 1n;
 }
 
-function readCoded(reader, kind, grid, { maxTaps, hasDepth }) {
+function readCoded(reader, kind, grid, { maxTaps, hasDepth, hasProducts }) {
   const nTaps = (kind >> 3) & 15;
   if (nTaps > maxTaps) reader.refuse(`${nTaps} taps`);
   const spelled = (kind & 128) !== 0;
   const form = spelled ? reader.u8() : formOf(grid);
   const drop = spelled ? reader.u8() : 0;
   if (drop > greatestDrop(form)) reader.refuse(`form ${form} with a drop of ${drop}`);
+  if (form === PRODUCTS && !(hasProducts && grid.kind === GENERAL)) {
+    reader.refuse(`form ${form} in this version, or on a grid of kind ${grid.kind}`);
+  }
   let unit = 1;
+  let shifts = 0;
   let top = 0;
   let depth = 0;
-  if (form === MULTIPLES) {
+  if (form === MULTIPLES || form === PRODUCTS) {
     unit = reader.f64();
     if (!(unit >= 2 ** -200 && unit <= 2 ** 80)) reader.refuse(`unit ${unit}`);
+    if (form === PRODUCTS) shifts = reader.u8();
+    if (form === PRODUCTS && !(shifts >= 1 && shifts <= 63)) reader.refuse(`${shifts} shifts`);
   } else if (form !== PLAIN) {
     top = reader.varint();
     if (top > greatestTop(form)) reader.refuse(`top class ${top} of form ${form}`);
@@ -83,7 +90,7 @@ function readCoded(reader, kind, grid, { maxTaps, hasDepth }) {
     taps[i] = reader.zigzag();
     if (Math.abs(taps[i]) > MAX_TAP) reader.refuse(`a tap of ${taps[i]}`);
   }
-  return { form, drop, unit, top, depth, scale, taps, fromLast: (kind & 4) !== 0 };
+  return { form, drop, unit, shifts, grid, top, depth, scale, taps, fromLast: (kind & 4) !== 0 };
 }
 
 /** The form of a channel whose head does not tell. */
@@ -106,7 +113,7 @@ function formOf(grid) {
 /** Greatest `drop` of a form; -1 where there is no such form. */
 function greatestDrop(form) {
   if (form === PLAIN) return 19;
-  if (form <= 15 || form === MULTIPLES) return 0;
+  if (form <= 15 || form === MULTIPLES || form === PRODUCTS) return 0;
   if (form === CLASSES_24) return 22;
   if (form === CLASSES_53) return 51;
   return -1;

@@ -109,7 +109,7 @@ class _Segment:
 
 def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int]) -> bytes:
     """``stream`` of ``group`` with its copies referring to the groups' new ``numbers``."""
-    heads, end = read_heads(stream, [layout.grids[c] for c in layout.groups[group]])
+    heads, end = read_heads(stream, [layout.grids[c] for c in layout.groups[group]], 1)
     parts = []
     for kind, found, head in heads:
         if kind == COPY:

@@ -10,6 +10,8 @@ that are copies of another group's.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,16 +30,30 @@ from mcz.codecs.contract import (
 from mcz.codecs.lossless.copying import decode_streams, encode_streams, recode_streams, regroup
 from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
 from mcz.codecs.segments import TARGET_BYTES, Sizing
+from mcz.coding.ordinals.degrees import is_tiny
 from mcz.coding.ordinals.streams import build_stream, parse_stream
+from mcz.numbers import GridKind
 
 Ints = NDArray[np.int64]
 
+FIRST_FRAMES = 64  # that decide on the version
 SIZING = Sizing(target=TARGET_BYTES, value_bytes=2, aim=95, most_rows=MAX_ROWS, spare=1)
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
-    return encode_streams(source, params, SIZING, build_stream)
+    version = _least_version(source)
+    encoded = encode_streams(source, params, SIZING, partial(build_stream, version=version))
+    return replace(encoded, version=version)
+
+
+def _least_version(source: SignalSource) -> int:
+    """1 where the first rows have a channel that its form may help, else 0."""
+    if not any(grid.kind == GridKind.GENERAL for grid in source.layout.grids):
+        return 0
+    columns = source.ordinals(0, min(FIRST_FRAMES, source.layout.n_frames)).T
+    pairs = zip(columns, source.layout.grids, strict=True)
+    return int(any(column.size > 0 and is_tiny(column, grid) for column, grid in pairs))
 
 
 def recode(
@@ -56,17 +72,24 @@ def recode(
 
 
 def decode(
-    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+    header: bytes,
+    layout: Layout,
+    spans: Sequence[Span],
+    request: Request,
+    fetch: Fetch,
+    version: int = 1,
 ) -> Ints:
     """Return the ordinals, int64 (rows, channels of the groups); raise FormatError on bad bytes."""
     refuse_extras("lossless", header, layout)
-    return decode_streams(layout, spans, request, fetch, parse_stream)
+    parse = partial(parse_stream, version=version)
+    return decode_streams(layout, spans, request, fetch, parse)
 
 
 CODEC = Codec(
     id=1,
     name="lossless",
-    version=0,
+    version=1,
+    earlier={0: partial(decode, version=0)},
     domain="ordinals",
     lossless=True,
     encode=encode,

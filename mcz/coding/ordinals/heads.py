@@ -6,31 +6,40 @@ SPEC.md, "Codec 1: lossless", is normative.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.ordinals.choices import MAX_TAP, Lattice, base_and_digits, max_top
+from mcz.coding.ordinals.degrees import of_products
+from mcz.coding.ordinals.units import of_multiples
 from mcz.errors import FormatError
-from mcz.numbers import Grid
+from mcz.numbers import Grid, GridKind
 from mcz.schema import read_varint
 
 Ints = NDArray[np.int64]
+Mapping = Callable[[Ints], Ints]
 
 CODED, CONSTANT, COPY = range(3)  # bits 0 and 1 of a channel's first byte
 MAX_DROP = 19
 MAX_SCALE = 172  # 2^43
 MAX_TAPS = 8
+MAX_SHIFTS = 63
 OWN_FORM = 128  # in kind: form and drop are in the stream
-MULTIPLES = 32  # form: integers that are multiplied by a unit
+MULTIPLES = 32  # form: integers that are multiplied by a unit, to binary32
+PRODUCTS = 33  # form, from version 1 on: odd numbers, shifts and a unit, to a decimal grid
 
 
-def read_heads(stream: bytes, grids: Sequence[Grid]) -> tuple[list[tuple[int, Any, bytes]], int]:
-    """Of each channel its kind, its plan and unit, ordinal or what it copies, and its head's bytes.
+def read_heads(
+    stream: bytes, grids: Sequence[Grid], version: int = 0
+) -> tuple[list[tuple[int, Any, bytes]], int]:
+    """Of each channel its kind, its plan and map, ordinal or what it copies, and its head's bytes.
 
-    Also the offset after the heads.
+    Also the offset after the heads. The map (None: none) turns coded integers into ordinals.
+    ``version``: that of codec 1; streams within other codecs are of 0.
     """
     heads: list[tuple[int, Any, bytes]] = []
     at = 0
@@ -39,8 +48,8 @@ def read_heads(stream: bytes, grids: Sequence[Grid]) -> tuple[list[tuple[int, An
         start = at
         kind, at = _byte(stream, at)
         if kind & 3 == CODED:
-            plan, unit, at = _parse_coded(stream, at, kind, grid)
-            found = plan, unit
+            plan, mapping, at = _parse_coded(stream, at, kind, grid, version)
+            found = plan, mapping
         elif kind & 3 == CONSTANT:  # LOSS-02
             found, at = _parse_constant(stream, at, kind)
         elif kind == COPY:  # LOSS-03
@@ -69,15 +78,16 @@ def _parse_constant(stream: bytes, at: int, kind: int) -> tuple[int, int]:
     return (folded >> 1) ^ -(folded & 1), at + size
 
 
-def _parse_coded(stream: bytes, at: int, kind: int, grid: Grid) -> tuple[Ints, float | None, int]:
-    """The plan of a coded channel, its unit if it has one, and the offset after its head."""
-    form, drop, unit = form_of_grid(grid), 0, None  # LOSS-15
+def _parse_coded(
+    stream: bytes, at: int, kind: int, grid: Grid, version: int
+) -> tuple[Ints, Mapping | None, int]:
+    """The plan of a coded channel, its map if it has one, and the offset after its head."""
+    form, drop = form_of_grid(grid), 0  # LOSS-15
     if kind & OWN_FORM:
         form, at = _byte(stream, at)
         drop, at = _byte(stream, at)
-    if form == MULTIPLES:
-        unit, at = _parse_unit(stream, at)
-    shape = _shape(form, drop)
+    shape = _shape(form, drop, version)
+    mapping, at = parse_mapping(stream, at, form, grid)
     top = 0
     if shape.base:
         top, at = read_varint(stream, at)
@@ -95,7 +105,22 @@ def _parse_coded(stream: bytes, at: int, kind: int, grid: Grid) -> tuple[Ints, f
     if scale > MAX_SCALE:  # LOSS-20
         raise FormatError(f"lossless: scale {scale}")
     shape = Lattice(shape.base, shape.digits, drop, top)
-    return make_plan(shape, scale, kind >> 2 & 1, taps), unit, at
+    return make_plan(shape, scale, kind >> 2 & 1, taps), mapping, at
+
+
+def parse_mapping(stream: bytes, at: int, form: int, grid: Grid) -> tuple[Mapping | None, int]:
+    """The map of coded integers, of whole columns, to ordinals; the offset after its fields."""
+    if form not in (MULTIPLES, PRODUCTS):
+        return None, at
+    unit, at = _parse_unit(stream, at)
+    if form == MULTIPLES:
+        return partial(of_multiples, unit=unit), at
+    if grid.kind != GridKind.GENERAL:  # LOSS-32
+        raise FormatError(f"lossless: form {form} on the grid {grid.kind.name}")
+    shifts, at = _byte(stream, at)
+    if not 1 <= shifts <= MAX_SHIFTS:  # LOSS-34
+        raise FormatError(f"lossless: {shifts} shifts")
+    return partial(of_products, unit=unit, shifts=shifts, grid=grid), at
 
 
 def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
@@ -111,8 +136,10 @@ def check_unit(codec: str, unit: float) -> None:
         raise FormatError(f"{codec}: a unit of {unit!r}")
 
 
-def _shape(form: int, drop: int) -> Lattice:
+def _shape(form: int, drop: int, version: int) -> Lattice:
     if (form == 0 and drop <= MAX_DROP) or (form == MULTIPLES and drop == 0):  # LOSS-17
+        return Lattice(0, 0, drop)
+    if form == PRODUCTS and drop == 0 and version >= 1:  # LOSS-17, LOSS-31
         return Lattice(0, 0, drop)
     if 1 <= form <= 15 and drop == 0:  # LOSS-16, LOSS-17
         return Lattice(10, form)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.ordinals.choices import choose_predictor, fixed_point, lattice, max_top
+from mcz.coding.ordinals.degrees import find_degrees
 from mcz.coding.ordinals.heads import (
     CODED,
     CONSTANT,
@@ -21,13 +22,14 @@ from mcz.coding.ordinals.heads import (
     MAX_SCALE,
     MULTIPLES,
     OWN_FORM,
+    PRODUCTS,
     form_of,
     form_of_grid,
     make_plan,
     read_heads,
     scale_of,
 )
-from mcz.coding.ordinals.units import find_unit, of_multiples
+from mcz.coding.ordinals.units import find_unit
 from mcz.coding.start import start_states
 from mcz.errors import FormatError
 from mcz.numbers import Grid, GridKind
@@ -42,12 +44,15 @@ Own = tuple[Grid, Grid]  # the grid in force and that of the clip
 Seen = dict[bytes, tuple[int, int]]  # the ordinals of a channel -> its group and place
 
 
-def build_stream(ordinals: Ints, grids: Sequence[Own], group: int, seen: Seen | None) -> bytes:
+def build_stream(
+    ordinals: Ints, grids: Sequence[Own], group: int, seen: Seen | None, version: int = 0
+) -> bytes:
     """One stream: ``ordinals`` of one group, (rows, channels); grids in force and of the clip.
 
     ``seen``: where a channel was coded that a later one may repeat; None: there shall be no copies.
+    ``version``: of codec 1, which says what forms there are.
     """
-    heads, plans, coded = plan_stream(ordinals, grids, group, seen)
+    heads, plans, coded = plan_stream(ordinals, grids, group, seen, version)
     return heads + (code(coded, plans) if plans else b"")
 
 
@@ -56,6 +61,7 @@ def plan_stream(
     grids: Sequence[Own],
     group: int,
     seen: Seen | None,
+    version: int = 0,
     *,
     fitted: bool = True,
 ) -> tuple[bytes, list[Ints], Ints]:
@@ -74,7 +80,7 @@ def plan_stream(
         else:
             if seen is not None:
                 seen[key] = group, channel
-            head, plan, numbers = _coded_head(column, *grids[channel], fitted=fitted)
+            head, plan, numbers = _coded_head(column, *grids[channel], version, fitted=fitted)
             heads.append(head)
             plans.append(plan)
             coded.append(numbers)
@@ -89,24 +95,33 @@ def constant_head(ordinal: int) -> bytes:
 
 
 def _coded_head(
-    column: Ints, grid: Grid, clip_grid: Grid, *, fitted: bool
+    column: Ints, grid: Grid, clip_grid: Grid, version: int, *, fitted: bool
 ) -> tuple[bytes, Ints, Ints]:
     """The head of a coded channel, its plan for the compiled loop, and the integers to code."""
-    found = find_unit(column) if grid.kind == GridKind.BINARY32 else None
-    unit, column = found if found is not None else (0.0, column)
-    shape = lattice(grid if found is None else PLAIN, column)
+    own, fields, column = _in_units(column, grid, version if grid == clip_grid else 0)
+    shape = lattice(grid if own is None else PLAIN, column)
     if shape.base and shape.top > max_top(shape):
         shape = lattice(PLAIN, column)
     from_last, taps, error = choose_predictor(fixed_point(column, shape), fitted=fitted)
     scale = next((q for q in range(MAX_SCALE) if scale_of(q) >= error), MAX_SCALE)
-    form = form_of(shape) if found is None else MULTIPLES
+    form = form_of(shape) if own is None else own
     own_form = shape.drop > 0 or form != form_of_grid(clip_grid)
     kind = CODED | from_last << 2 | len(taps) << 3 | OWN_FORM * own_form
-    head = [bytes((kind,)), bytes((form, shape.drop)) if own_form else b""]
-    head += [struct.pack("<d", unit)] if form == MULTIPLES else []
+    head = [bytes((kind,)), bytes((form, shape.drop)) if own_form else b"", fields]
     head += [varint(shape.top)] if shape.base else []
     head += [bytes((scale,)), *(varint(2 * t if t >= 0 else -2 * t - 1) for t in taps)]
     return b"".join(head), make_plan(shape, scale, from_last, taps), column
+
+
+def _in_units(column: Ints, grid: Grid, version: int) -> tuple[int | None, bytes, Ints]:
+    """A form with a unit, its fields, and its integers; no form and the column where none fits."""
+    if grid.kind == GridKind.BINARY32 and (found := find_unit(column)) is not None:
+        return MULTIPLES, struct.pack("<d", found[0]), found[1]
+    products = find_degrees(column, grid) if version >= 1 else None
+    if products is not None:
+        unit, shifts, codes = products
+        return PRODUCTS, struct.pack("<dB", unit, shifts), codes
+    return None, b"", column
 
 
 @cache
@@ -146,14 +161,19 @@ Uncode = Callable[[bytes, Sequence[Ints], int], Ints]  # bits, plans, rows -> wh
 
 
 def parse_stream(
-    stream: bytes, grids: Sequence[Grid], n_rows: int, uncode: Uncode | None = None
+    stream: bytes,
+    grids: Sequence[Grid],
+    n_rows: int,
+    uncode: Uncode | None = None,
+    *,
+    version: int = 0,
 ) -> tuple[Ints, dict[int, tuple[int, int]]]:
     """The ordinals of a group, (n_rows, channels), and which channels are copies of which.
 
     ``uncode``: how what follows the heads is decoded, if not as codec 1 does.
     """
     columns = np.zeros((n_rows, len(grids)), np.int64)
-    heads, end = read_heads(stream, grids)
+    heads, end = read_heads(stream, grids, version)
     coded = [channel for channel, (kind, _, _) in enumerate(heads) if kind == CODED]
     plans = [heads[channel][1][0] for channel in coded]
     columns[:, coded] = (uncode or _uncode)(stream[end:], plans, n_rows)
@@ -164,7 +184,7 @@ def parse_stream(
         elif kind == CONSTANT:
             columns[:, channel] = found  # LOSS-08
         elif found[1] is not None:
-            columns[:, channel] = of_multiples(columns[:, channel], found[1])
+            columns[:, channel] = found[1](columns[:, channel])
     return columns, copies
 
 

@@ -19,7 +19,7 @@ const TWO_44 = 2 ** 44;
 
 const CODEC = {
   name,
-  rules: { maxTaps: 4, hasDepth: true },
+  rules: { maxTaps: 4, hasDepth: true, hasProducts: false },
   decoder: (ordinals) => new GroupDecoder(ordinals),
 };
 

@@ -3,15 +3,16 @@
 import { RangeDecoder, bits, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
 import { binary32Ordinal } from "../grids.js";
-import { MULTIPLES, PLAIN, POWERS_OF_10, classesOf } from "../heads.js";
+import { MULTIPLES, PLAIN, POWERS_OF_10, PRODUCTS, classesOf } from "../heads.js";
 import { halvesOf, setHalves, setInteger } from "../int64.js";
+import { ordinalOf } from "../ordinals.js";
 import { SignalDecoder } from "../ordinal-streams.js";
 import { Residuals, side } from "../residuals.js";
 import { restart, startModels } from "../start-models.js";
 
 export const id = 1;
 export const name = "lossless";
-export const version = 0;
+export const version = 1;
 
 // The first context and the mixer of each kind of bit.
 const SAME = 0;
@@ -33,21 +34,23 @@ const TWO_40 = 2 ** 40;
 const TWO_44 = 2 ** 44;
 const TWO_52 = 2 ** 52;
 
-const CODEC = {
+/** The codec in each of its versions. */
+const VERSIONS = [false, true].map((hasProducts) => ({
   name,
-  rules: { maxTaps: 8, hasDepth: false },
+  rules: { maxTaps: 8, hasDepth: false, hasProducts },
   decoder: (ordinals) => new BitDecoder(ordinals),
-};
+}));
 
 /**
  * Opens a signal.
  *
  * @param {Uint8Array} header the codec's header in CLIP
  * @param {{channels: object[], groups: number[][], grids: object[], nResolutions: number}} layout
+ * @param {number} codecVersion 0 or 1
  * @returns {{decodes: "ordinals", alone: true, decode: (segments: object[]) => BigInt64Array}}
  * @throws {Refused}
  */
-export function open(header, layout) {
+export function open(header, layout, codecVersion) {
   if (header.length !== 0) throw new Refused("lossless: the header is not empty");
   if (layout.nResolutions !== 1) {
     throw new Refused(`lossless: ${layout.nResolutions} resolutions, not 1`);
@@ -55,7 +58,7 @@ export function open(header, layout) {
   return {
     decodes: "ordinals",
     alone: true, // lead, tail and freshness mean nothing
-    decode: (segments) => new SignalDecoder(CODEC, layout, segments).decode(),
+    decode: (segments) => new SignalDecoder(VERSIONS[codecVersion], layout, segments).decode(),
   };
 }
 
@@ -69,7 +72,7 @@ export function open(header, layout) {
  * @throws {Refused}
  */
 export function decodeGroups(layout, segments, groups) {
-  return new SignalDecoder(CODEC, layout, segments, groups).decode();
+  return new SignalDecoder(VERSIONS[0], layout, segments, groups).decode();
 }
 
 // Bits
@@ -78,10 +81,13 @@ export function decodeGroups(layout, segments, groups) {
 export class CodedChannel {
   constructor(head) {
     this.column = head.column;
+    this.isPlain = [PLAIN, MULTIPLES, PRODUCTS].includes(head.form);
     this.form = head.form;
     this.isPlain = head.form === PLAIN || head.form === MULTIPLES;
     this.drop = head.drop;
     this.unit = head.unit;
+    this.shifts = head.shifts;
+    this.grid = head.grid;
     this.fromLast = head.fromLast;
     this.taps = head.taps;
     this.last = 0;
@@ -107,6 +113,14 @@ export class CodedChannel {
 /** beside(value, scale) of the specification. */
 function beside(value, scale) {
   return clamp(bits(value) - bits(scale) + 3, 0, 7);
+}
+
+/** The product that a code of form 33 says. */
+function productOf({ unit, shifts }, code) {
+  if (code === 0) return 0;
+  const before = Math.abs(code) - 1;
+  const size = (2 * Math.floor(before / shifts) + 1) * 2 ** (before % shifts) * unit;
+  return code < 0 ? -size : size;
 }
 
 /** Decodes the coded channels of a group in a segment, one group after the other. */
@@ -170,7 +184,7 @@ export class BitDecoder {
     channel.side1 = side(error);
   }
 
-  /** Forms 0 and 32. */
+  /** Forms 0, 32 and 33. */
   plain(channel, index) {
     this.plainOf(channel, index, clamp(channel.predict(), -TWO_44, TWO_44));
   }
@@ -185,6 +199,8 @@ export class BitDecoder {
     const { drop } = channel;
     if (channel.form === MULTIPLES) {
       setInteger(this.halves, index, binary32Ordinal(value * channel.unit));
+    } else if (channel.form === PRODUCTS) {
+      this.ordinals[index] = ordinalOf(channel.grid, productOf(channel, value));
     } else if (drop <= 8) {
       setInteger(this.halves, index, value * 2 ** drop + this.coder.number(drop));
     } else {

@@ -25,7 +25,13 @@ from mcz.schema import varint
 from tools.vectors.build.files import Whole, file_of
 
 Ints = NDArray[np.int64]
-PLAIN, MULTIPLES, BINARY32, BINARY64 = 0, 32, 88, 117  # forms; 1 to 15: digits of base 10
+PLAIN, MULTIPLES, PRODUCTS, BINARY32, BINARY64 = (
+    0,
+    32,
+    33,
+    88,
+    117,
+)  # forms; 1 to 15: digits of base 10
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 HEADING = "Codec 1: lossless"
 WHOLE, SIX = Grid(GridKind.INTEGER), Grid(GridKind.GENERAL, 6)
@@ -36,7 +42,7 @@ DOUBLE, SINGLE = Grid(GridKind.BINARY64), Grid(GridKind.BINARY32)
 class Coded:
     """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top`` None: as
     great as the ordinals need. Nothing is checked, so that what is forbidden can be written.
-    ``multiples``: what is coded in place of the ordinals, for form 32 with its ``unit``."""
+    ``multiples``: coded in place of the ordinals, with ``unit`` and ``shifts``: forms 32, 33."""
 
     form: int | None = None
     drop: int = 0
@@ -45,6 +51,7 @@ class Coded:
     from_last: int = 1
     taps: tuple[int, ...] = ()
     unit: float | None = None
+    shifts: int | None = None
     multiples: tuple[int, ...] = ()
 
 
@@ -63,7 +70,7 @@ Head = Coded | Constant | Copy
 USUAL = Coded()
 
 
-def codec_of(*segments: Sequence[Head]) -> Codec:
+def codec_of(*segments: Sequence[Head], version: int = 0) -> Codec:
     """Codec 1 with these heads, channel by channel, in the first segment, the second, ...
 
     The last counts for all further segments; a channel without a head is ``USUAL``. A parameter
@@ -81,7 +88,7 @@ def codec_of(*segments: Sequence[Head]) -> Codec:
             streams = _streams(layout, source.ordinals(start, stop), heads)
             made.append(Segment(start, stop - start, streams))
             start = stop
-        return Encoded(b"", iter(made))
+        return Encoded(b"", iter(made), version=version)
 
     return replace(lossless.CODEC, encode=encode)
 
@@ -136,7 +143,7 @@ def heads_of(
 
 def _shape(head: Coded, grid: Grid, column: Sequence[int]) -> Lattice:
     form = lossless_heads.form_of_grid(grid) if head.form is None else head.form
-    if form in (PLAIN, MULTIPLES):
+    if form in (PLAIN, MULTIPLES, PRODUCTS):
         return Lattice(0, 0, head.drop)
     base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)
     greatest = max(o if o >= 0 else -1 - o for o in column) >> head.drop
@@ -150,6 +157,7 @@ def _coded_head(head: Coded, shape: Lattice) -> bytes:
     kind = head.from_last << 2 | len(head.taps) << 3 | lossless_heads.OWN_FORM * own
     data = bytes((kind, *((head.form, head.drop) if head.form is not None else ())))
     data += struct.pack("<d", head.unit) if head.unit is not None else b""
+    data += bytes((head.shifts,)) if head.shifts is not None else b""
     data += varint(shape.top) if shape.base else b""
     folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)
     return data + bytes((head.scale,)) + b"".join(map(varint, folded))
@@ -179,5 +187,6 @@ class Streams(Whole):
         **rest: Any,
     ) -> None:
         parts = rest.pop("parts", ())
-        data = file_of(motion, codec=codec_of(heads), **rest)
+        codec = codec_of(heads, version=rest.pop("version", 0))
+        data = file_of(motion, codec=codec, **rest)
         self.hold(name, spec, purpose, data, motion, parts=parts)

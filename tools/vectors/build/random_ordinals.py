@@ -196,7 +196,7 @@ def clip_of_ordinals(chance: Chance, name: str) -> Clip:
     def encode(source: Any, params: Any) -> Encoded:
         which = next(count)
         made = _segments(chance, source, parts[which], found[which][1], write)
-        return Encoded(b"", iter(made))
+        return Encoded(b"", iter(made), version=0)
 
     codec = replace(by_name(name), encode=encode, parameters=raw.CODEC.parameters)
     return Clip(codec, motion, grouping)

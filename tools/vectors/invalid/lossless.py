@@ -22,6 +22,7 @@ from tools.vectors.build.lossless_clips import (
     HEADING,
     MULTIPLES,
     PLAIN,
+    PRODUCTS,
     SINGLE,
     SIX,
     WHOLE,
@@ -43,6 +44,7 @@ def vectors() -> Iterable[Vector]:
     _coded(shelf)
     _cut(shelf)
     _units(shelf)
+    _products(shelf)
     _sizes(shelf)
     _out_of_range(shelf)
     _ordinals(shelf)
@@ -189,6 +191,22 @@ def _units(shelf: Broken) -> None:
     head = replace(head, multiples=(0, 2**44))
     purpose = "2^44 units"
     _faulty(shelf, "multiple-beyond", purpose, SINGLE, [[0], [0]], head, [[0.0], [2.0**42]])
+
+
+def _products(shelf: Broken) -> None:
+    def refused(name: str, purpose: str, grid: Grid, version: int = 1, **rest: Any) -> None:
+        head = Coded(PRODUCTS, multiples=(0,) * 5, **{"unit": 0.25, "shifts": 1, **rest})
+        data = file_of(column([0.0] * 5, grid), codec=codec_of([head], version=version))
+        shelf.add(f"products-{name}", HEADING, f"{purpose}.", data)
+
+    refused("in-version-0", "Products in a signal of version 0", SIX, 0)
+    refused("on-binary32", "Products on the grid BINARY32", SINGLE)
+    refused("on-fixed", "Products on the grid FIXED", HUNDREDTHS)
+    refused("drop", "A drop of 1 bit from products", SIX, drop=1)
+    refused("shifts-0", "No shifts", SIX, shifts=0)
+    refused("shifts-64", "64 shifts", SIX, shifts=64)
+    refused("shifts-255", "255 shifts", SIX, shifts=255)
+    refused("unit", "A unit of 0 of products", SIX, unit=0.0)
 
 
 def _sizes(shelf: Broken) -> None:

@@ -62,9 +62,8 @@ def _late_model(shelf: Whole) -> None:
 
 def _lossless() -> Iterable[Vector]:
     shelf = Whole("uncommon/lossless")
-    later = replace(codec_of(), version=1)
-    data = file_of(dance(), codec=later)
-    purpose = "Version 1 of codec 1, which this format does not have."
+    data = file_of(dance(), codec=codec_of(version=2))
+    purpose = "Version 2 of codec 1, which this format does not have."
     shelf.add("newer-version", "Codecs", purpose, data, exit=(UNSUPPORTED,))
     return shelf.vectors
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mcz.coding.ordinals.degrees import of_products
 from mcz.coding.ordinals.heads import MAX_SCALE
 from mcz.coding.ordinals.streams import parse_stream
 from mcz.numbers import Grid, GridKind
@@ -19,6 +20,7 @@ from tools.vectors.build.lossless_clips import (
     HEADING,
     MULTIPLES,
     PLAIN,
+    PRODUCTS,
     SINGLE,
     SIX,
     WHOLE,
@@ -44,6 +46,7 @@ def add(shelf: Streams) -> None:
     _copies(shelf)
     _forms(shelf)
     _multiples(shelf)
+    _products(shelf)
     _classes(shelf)
     _residuals(shelf)
     _ends(shelf)
@@ -160,6 +163,30 @@ def _forms(shelf: Streams) -> None:
     for name, (grid, top) in wide.items():
         purpose = f"A greatest class that no number reaches: {name}."
         shelf.code(f"top-{name}", purpose, column(half, grid), [Coded(top=top)])
+
+
+def _products(shelf: Streams) -> None:
+    near, most = [0, 1, -1, 2, 3, -5, 7, 1000, -999, 2**20, 5, 0], 2**44 - 1
+    wide = [2**31 + 1, -(2**33) - 3, 2**40 + 7, most, -most - 1, 0, 1, 63, -64]
+    halves, nines = [500_001, 500_002, -500_003, 0], [1, 11, -101, 3]
+    one, fifteen = Grid(GridKind.GENERAL, 1), Grid(GridKind.GENERAL, 15)
+    degree = 180 / np.pi
+    cases: dict[str, tuple[str, Grid, float, int, list[int]]] = {
+        "degrees": ("Angles of a few units in the last place", SIX, degree * 2.0**-60, 12, near),
+        "ties": ("Products in the middle of two decimals: to even", SIX, 0.5, 1, halves),
+        "nines": ("Products that round up to a power of ten", SIX, 0.0999999999, 2, nines),
+        "least": ("The least unit", SIX, 2.0**-200, 3, near),
+        "greatest": ("The greatest unit, integers and shifts", SIX, 2.0**80, 63, wide),
+        "digits-1": ("One digit", one, degree * 2.0**-50, 5, near),
+        "digits-15": ("Fifteen digits", fifteen, degree * 2.0**-50, 4, near),
+    }
+    for name, (purpose, grid, unit, shifts, codes) in cases.items():
+        ordinals = of_products(np.array(codes, np.int64), unit, shifts, grid)
+        values = grid.values(ordinals).tolist()
+        head = Coded(form=PRODUCTS, unit=unit, shifts=shifts, multiples=tuple(codes))
+        shelf.code(f"products-{name}", f"{purpose}.", column(values, grid), [head], version=1)
+    motion = column([0.07, 0.08, 0.07], HUNDREDTHS)
+    shelf.code("version-1", "Version 1 without its form.", motion, [Coded()], version=1)
 
 
 def _multiples(shelf: Streams) -> None:

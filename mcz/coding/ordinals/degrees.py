@@ -1,0 +1,94 @@
+"""Channels of rounding noise: angles that were a few units in the last place, printed in degrees.
+
+``of_products`` is normative (SPEC.md, "Codec 1: lossless", form 33); finding a unit is not.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.numbers import Grid, GridKind
+from mcz.numbers.magnitudes import POWERS
+from mcz.numbers.tokens import TENS
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+DEGREE = 180 / np.pi  # in a radian
+LARGEST = 1e-12  # degrees: numbers near 1e-9 are products by chance
+MOST = 2**24  # units in a value
+_UNITS = DEGREE * 2.0 ** -np.arange(44, 77)
+_SAMPLE = 16
+
+
+def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
+    """The ordinals on ``grid``, which is GENERAL, of the multiples of ``unit`` that ``codes`` say.
+
+    A code has a sign, and its size less 1 is q * shifts + z: it says (2q + 1) * 2^z units.
+    """
+    from mcz.coding.ordinals import product_kernels as own  # on first use
+
+    codes = np.ascontiguousarray(codes)
+    out = np.empty(len(codes), np.int64)
+    if own.fill(codes, unit, shifts, TENS, POWERS, 10 ** (grid.digits - 1), out):
+        printed = out == own.PRINTED
+        few, places = np.unique(codes[printed], return_inverse=True)  # often small ones
+        out[printed] = grid.ordinals(multiples_of(few, shifts) * np.float64(unit))[0][
+            places.ravel()
+        ]
+    return out
+
+
+def multiples_of(codes: Ints, shifts: int) -> Floats:
+    """The multiples that codes say, exact; 0 for 0."""
+    q, z = np.divmod(np.abs(codes) - 1, shifts)
+    return np.where(codes == 0, 0.0, np.copysign(np.ldexp(2.0 * q + 1, z), codes))
+
+
+def codes_of(counts: Ints) -> tuple[Ints, int]:
+    """The codes of some multiples below 2^53, and ``shifts``, as few as there may be."""
+    sizes = np.maximum(np.abs(counts), 1)
+    z = np.frexp((sizes & -sizes).astype(np.float64))[1].astype(np.int64) - 1
+    shifts = int(z.max()) + 1
+    return np.sign(counts) * ((sizes >> z + 1) * shifts + z + 1), shifts
+
+
+def is_tiny(ordinals: Ints, grid: Grid) -> bool:
+    """Whether a column may be rounding noise: the cheap test."""
+    if grid.kind != GridKind.GENERAL or not ordinals.any():
+        return False
+    least, most = _bounds(grid)
+    return bool(least < ordinals.min() and ordinals.max() < most)
+
+
+@cache
+def _bounds(grid: Grid) -> tuple[int, int]:
+    """The ordinals of -LARGEST and LARGEST."""
+    least, most = grid.ordinals(np.array([-LARGEST, LARGEST]))[0].tolist()
+    return least, most
+
+
+def find_degrees(ordinals: Ints, grid: Grid) -> tuple[float, int, Ints] | None:
+    """A unit, shifts and the codes that ``of_products`` turns into these ordinals, or None."""
+    if not is_tiny(ordinals, grid):
+        return None
+    sample = np.unique(ordinals)
+    sample = sample[:: max(1, len(sample) // _SAMPLE)]
+    fits = _fitting(sample, _UNITS[:, None], grid)[1].all(axis=1)
+    for unit in _UNITS[fits].tolist():
+        counts, fitting = _fitting(ordinals, unit, grid)
+        if fitting.all():
+            codes, shifts = codes_of(counts)
+            return unit, shifts, codes
+    return None
+
+
+def _fitting(ordinals: Ints, units: Any, grid: Grid) -> tuple[Ints, NDArray[np.bool_]]:
+    """Multiples of units close to numbers, and which of them give these ordinals back."""
+    counts = np.rint(grid.values(ordinals) / units)
+    back = grid.ordinals(counts * units)[0] == ordinals
+    return counts.astype(np.int64), back & (np.abs(counts) < MOST)
