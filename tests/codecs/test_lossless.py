@@ -321,8 +321,8 @@ def test_products_need_version_1_and_a_decimal_grid() -> None:
     column = of_products(np.array([[0, 1, -1, 500, -77, 3]]).T[:, 0], DEGREE * 2.0**-60, 4, grid)
     stream = streams.build_stream(column[:, None], [(grid, grid)], 0, None, 1)
     assert stream[1] == heads.PRODUCTS
-    assert (streams.parse_stream(stream, [grid], 6, 1)[0][:, 0] == column).all()
+    assert (streams.parse_stream(stream, [grid], 6, version=1)[0][:, 0] == column).all()
     with pytest.raises(FormatError, match="form 33"):
-        streams.parse_stream(stream, [grid], 6, 0)
+        streams.parse_stream(stream, [grid], 6, version=0)
     with pytest.raises(FormatError, match="form 33"):
-        streams.parse_stream(stream, [Grid(GridKind.FIXED, 4)], 6, 1)
+        streams.parse_stream(stream, [Grid(GridKind.FIXED, 4)], 6, version=1)
