@@ -74,5 +74,5 @@ def fill(ordinals: Ints, rules: Ints, tens: Floats, values: Floats, left: Ints) 
                 for t in range(start, stop):
                     magnitude = ordinals[t, c] ^ (ordinals[t, c] >> 63)
                     left[c] |= 1 if magnitude > rules[c, LIMIT] else 0
-                    value = float(magnitude) / ten
+                    value = float(magnitude) / ten  # GRID-08
                     values[t, c] = -value if ordinals[t, c] < 0 else value

@@ -144,7 +144,11 @@ class SignalReader:
         per_frame = self._shape(0, 1)[0] * self._shape(0, 1)[1] * 8
         most = min(MOST_OF_ONE, self.container.max_decoded) // max(per_frame, 1)
         first = last = info.covering(frame, frame + 1)[0]
-        while not rows[first].header.flags & FRESH and frame - rows[first].header.first < most:
+        while (
+            first
+            and not rows[first].header.flags & FRESH
+            and frame - rows[first].header.first < most
+        ):
             first -= 1
         while last + 1 < len(rows) and not rows[last + 1].header.flags & FRESH:
             last += 1

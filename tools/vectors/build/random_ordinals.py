@@ -15,6 +15,7 @@ from mcz.coding.ordinals.heads import form_of_grid
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.numbers import Grid, GridFlag, GridKind
 from tools.vectors.build import (
+    fast_clips,
     lossless_clips,
 )
 from tools.vectors.build.edits import raw_stream
@@ -189,7 +190,7 @@ def clip_of_ordinals(chance: Chance, name: str) -> Clip:
     bones = skeleton(chance, partition(chance, n))
     motion = Motion(bones, tuple(signal for signal, _ in found))
     grouping = chance.choice(("all", "joint", "channel"))
-    write = _raw_streams if name == "raw" else _lossless_streams
+    write = {"raw": _raw_streams, "lossless": _lossless_streams, "fast": _fast_streams}[name]
     count = iter(range(len(found)))
 
     def encode(source: Any, params: Any) -> Encoded:
@@ -247,6 +248,33 @@ def _lossless_streams(
             own = form != form_of_grid(layout.grids[c]) or chance.random() < 0.1
             heads.append(_coded(chance, form if own else None))
     return lossless_clips._streams(layout, block, heads)
+
+
+def _fast_streams(
+    chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
+) -> tuple[bytes, ...]:
+    """The same of codec 14; numbers of too many classes are plain."""
+    place = {c: (g, k) for g, group in enumerate(layout.groups) for k, c in enumerate(group)}
+    heads: list[fast_clips.Head] = []
+    for c in range(layout.n_channels):
+        column, twin, form = block[:, c], copies.get(c), form_of_grid(grids[c])
+        if twin is not None and (column == block[:, twin]).all() and chance.random() < 0.8:
+            heads.append(lossless_clips.Copy(*place[twin]))
+        elif (column == column[0]).all() and chance.random() < 0.7:
+            heads.append(lossless_clips.Constant())
+        else:
+            made = _coded(chance, form if form != form_of_grid(layout.grids[c]) else None)
+            wide = form == lossless_clips.BINARY64 or abs(column >> 44).max() > 1
+            heads.append(
+                fast_clips.Coded(
+                    lossless_clips.PLAIN if wide else made.form,
+                    drop=19 if wide else 0,
+                    scale=made.scale,
+                    from_last=made.from_last,
+                    taps=made.taps[:4],
+                )
+            )
+    return fast_clips.streams_of(layout, block, heads)
 
 
 def _coded(chance: Chance, form: int | None) -> lossless_clips.Coded:

@@ -1,0 +1,89 @@
+"""Windows of a clip, and what a file keeps of those before."""
+
+from __future__ import annotations
+
+import io
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import mcz
+from mcz.container.runs import MOST_BYTES, Run, Runs
+from mcz.errors import ChecksumError
+from tests.motions import smooth
+
+LENGTH = 90
+
+
+def file_of(codec: str, **options: object) -> bytes:
+    out = io.BytesIO()
+    mcz.write(smooth(LENGTH), out, codec=codec, **options)
+    return out.getvalue()
+
+
+FILES = {codec: file_of(codec, segment_frames=16) for codec in ("fast", "lossless", "mrdwt")}
+
+
+@pytest.mark.parametrize("codec", sorted(FILES))
+@settings(max_examples=30)
+@given(data=st.data())
+def test_windows_are_those_of_the_whole(codec: str, data: st.DataObject) -> None:
+    with mcz.open(FILES[codec]) as file:
+        clip = file.only_clip()
+        joints = [joint.name for joint in clip.skeleton.joints if joint.channels]
+        whole = {None: clip.read(), **{name: clip.read(joints=[name]) for name in joints}}
+    with mcz.open(FILES[codec]) as file:
+        clip = file.only_clip()
+        for _ in range(data.draw(st.integers(1, 8))):
+            a = data.draw(st.integers(0, LENGTH))
+            b = data.draw(st.integers(a, LENGTH))
+            name = data.draw(st.sampled_from([None, *joints]))
+            found = clip.read((a, b), None if name is None else [name])
+            np.testing.assert_array_equal(found, whole[name][a:b])
+            found[:] = np.nan  # a caller's own
+
+
+def test_a_file_keeps_no_more_than_it_says() -> None:
+    runs = Runs()
+    for number in range(40):
+        runs.put(number, Run(0, np.zeros(MOST_BYTES // 16), None))
+        held = sum(run.n_bytes for run in map(runs.get, range(number + 1)) if run)
+        assert held <= MOST_BYTES
+    assert runs.get(39) is not None
+    assert runs.get(0) is None
+
+
+def test_damage_is_told_each_time() -> None:
+    data = bytearray(FILES["fast"])
+    with mcz.open(bytes(data)) as file:
+        row = file.only_clip().signals[0].rows[2]
+        data[row.offset + row.size - 3] ^= 1
+    with mcz.open(bytes(data)) as file:
+        clip = file.only_clip()
+        clip.read((0, 20))
+        for _ in range(2):
+            with pytest.raises(ChecksumError):
+                clip.read((30, 40))
+        clip.read((60, 70))
+
+
+def test_threads_share_a_file() -> None:
+    with mcz.open(FILES["lossless"]) as file:
+        clip = file.only_clip()
+        whole = clip.read()
+        wrong: list[int] = []
+
+        def look(seed: int) -> None:
+            starts = np.random.default_rng(seed).integers(0, LENGTH - 9, 60).tolist()
+            found = {a: clip.read((a, a + 9)) for a in starts}
+            wrong.extend(a for a in starts if not np.array_equal(found[a], whole[a : a + 9]))
+
+        threads = [threading.Thread(target=look, args=(seed,)) for seed in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert not wrong
