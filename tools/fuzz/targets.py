@@ -85,6 +85,7 @@ TARGETS: dict[str, Target] = {
             mutator(0.2, vectors, hashed=0.5),
         ),
         _decoder("lossless", "lossless", "raw", "numbers", "notes"),
+        _decoder("best", "best"),
         _decoder("fast", "fast"),
         _decoder("wavelets", "mrdwt", "dwt", "awt"),
         _decoder("qbc", "qbc"),

@@ -46,7 +46,7 @@ from tools.vectors.build.spatial_clips import FRAME, PCA_RDO
 
 def clip(chance: Chance, name: str, codec: str) -> Clip:
     """A clip of ``codec`` called ``name``."""
-    if codec in ("raw", "lossless", "fast"):
+    if codec in ("raw", "lossless", "best", "fast"):
         made = clip_of_ordinals(chance, codec)
     elif codec in _MAKERS:
         made = _MAKERS[codec](chance, codec)

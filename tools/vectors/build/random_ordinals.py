@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from mcz.codecs import by_name, raw
 from mcz.codecs.contract import Encoded, Segment
+from mcz.codecs.lossless.best_streams import Link
 from mcz.coding.ordinals.heads import form_of_grid
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.numbers import Grid, GridFlag, GridKind
 from tools.vectors.build import (
+    best_clips,
     fast_clips,
     lossless_clips,
 )
@@ -190,7 +192,7 @@ def clip_of_ordinals(chance: Chance, name: str) -> Clip:
     bones = skeleton(chance, partition(chance, n))
     motion = Motion(bones, tuple(signal for signal, _ in found))
     grouping = chance.choice(("all", "joint", "channel"))
-    write = {"raw": _raw_streams, "lossless": _lossless_streams, "fast": _fast_streams}[name]
+    write = _WRITERS[name]
     count = iter(range(len(found)))
 
     def encode(source: Any, params: Any) -> Encoded:
@@ -233,6 +235,34 @@ def _raw_streams(
 def _lossless_streams(
     chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
 ) -> tuple[bytes, ...]:
+    """Streams of ``_heads``."""
+    return lossless_clips._streams(layout, block, _heads(chance, layout, grids, block, copies))
+
+
+def _best_streams(
+    chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
+) -> tuple[bytes, ...]:
+    """The same of codec 12, with any links."""
+    every = _heads(chance, layout, grids, block, copies)
+    streams = []
+    for group in layout.groups:
+        links = [_link(chance, channel) for channel in range(len(group))]
+        own = [layout.grids[channel] for channel in group]
+        heads, method = [every[channel] for channel in group], int(chance.random() < 0.8)
+        made = best_clips.build_stream(block[:, list(group)], own, heads, links, method=method)
+        streams.append(made)
+    return tuple(streams)
+
+
+def _link(chance: Chance, channel: int) -> Link:
+    seen = [chance.randrange(channel) for _ in range(chance.randrange(9))] if channel else []
+    unit = chance.randrange(45)
+    return Link(unit, unit + chance.randrange(16), tuple(seen))
+
+
+def _heads(
+    chance: Chance, layout: Any, grids: Sequence[Grid], block: Ints, copies: dict[int, int]
+) -> list[lossless_clips.Head]:
     """Constants, copies where the ordinals allow it, and coded channels with any taps."""
     place = {c: (g, k) for g, group in enumerate(layout.groups) for k, c in enumerate(group)}
     heads: list[lossless_clips.Head] = []
@@ -247,7 +277,7 @@ def _lossless_streams(
             form = form_of_grid(grids[c])
             own = form != form_of_grid(layout.grids[c]) or chance.random() < 0.1
             heads.append(_coded(chance, form if own else None))
-    return lossless_clips._streams(layout, block, heads)
+    return heads
 
 
 def _fast_streams(
@@ -286,3 +316,11 @@ def _coded(chance: Chance, form: int | None) -> lossless_clips.Coded:
         from_last=chance.randrange(2),
         taps=tuple(taps[: chance.randrange(9)]),
     )
+
+
+_WRITERS: dict[str, Streams] = {
+    "raw": _raw_streams,
+    "lossless": _lossless_streams,
+    "best": _best_streams,
+    "fast": _fast_streams,
+}

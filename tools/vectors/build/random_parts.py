@@ -16,7 +16,7 @@ Chance = random.Random
 Ints = NDArray[np.int64]
 MOST = 2**40  # of an integer that a lossy codec codes
 OLDER = tuple("raw lossless mrdwt qbc pca dwt awt lsdt-frame lsdt-clip mdtt pca-rdo online".split())
-NAMES = (*OLDER, "posewave", "fast")
+NAMES = (*OLDER, "best", "posewave", "fast")
 LETTERS = "abc\u00e4\u00df 0\u03c9\U0001f6b6\ufeff"
 
 

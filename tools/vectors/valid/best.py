@@ -80,12 +80,12 @@ def _methods(shelf: Streams) -> None:
     for grouping in ("joint", "all", "channel"):
         purpose = f"Groups by {grouping}: each has a coder of its own."
         shelf.code(f"groups-{grouping}", purpose, motion, grouping=grouping, parts=parts)
-    purpose = "A stream of codec 1, and one with links; copies go from one to the other."
     values = [wave(12, 1), wave(12, 2), wave(12, 1), wave(12, 2)]
     motion = panel(values, (HUNDREDTHS,) * 4, (2, 2))
     heads = [Coded(), Coded(taps=(32,)), Copy(0, 0), Coded(from_last=0)]
     for name, methods in (("0-1", (AS_CODEC_1, LINKED)), ("1-0", (LINKED, AS_CODEC_1))):
         given = {"grouping": "joint", "methods": methods}
+        purpose = f"Methods {name}: one stream as of codec 1, one with links, and copies between."
         shelf.code(f"methods-{name}", purpose, motion, heads, **given)
     motion = panel([[0.5] * 9, wave(9), [0.25] * 9, wave(9)], (HUNDREDTHS,) * 4, (4,))
     heads = [Constant(), Coded(), Constant(), Copy(0, 1)]

@@ -31,7 +31,7 @@ from tools.vectors.build.random_parts import LETTERS, OLDER, Chance, Clip, skele
 from tools.vectors.build.source_files import ODD, PLAIN, take
 
 OLD_COUNT = 80  # files that are older than codec 13, and stay as they are
-COUNT = OLD_COUNT + 8 + 8  # vectors: eight begin with codec 13, and eight with codec 14
+COUNT = OLD_COUNT + 3 * 8  # vectors: eight each begin with codecs 13, 14 and 12
 SPEC = ("Grammar", "CLIP", "DATA")
 TYPES = (b"xtra", b"zVOL", b"Qnot", b"NOTE")
 
@@ -77,7 +77,7 @@ def _parts(chance: Chance, motions: Sequence[Motion]) -> Iterator[Any]:
 
 def random_file(seed: int) -> Made:
     """The file of this seed."""
-    newer = {10: "posewave", 11: "fast"}  # of eight seeds each
+    newer = {10: "posewave", 11: "fast", 12: "best"}  # of eight seeds each
     first = newer.get(seed // 8 if seed < COUNT else 0, OLDER[seed % len(OLDER)])
     return _Maker(random.Random(f"file {seed}"), first=first).file()
 
