@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz.container.runs import MOST_BYTES, Run, Runs
 from mcz.errors import ChecksumError
+from mcz.motion import Signal
 from tests.motions import smooth
 
 LENGTH = 90
@@ -87,3 +88,15 @@ def test_threads_share_a_file() -> None:
         for thread in threads:
             thread.join()
     assert not wrong
+
+
+def test_segments_that_no_channel_needs_are_checked() -> None:
+    still = mcz.Motion(mcz.Skeleton((mcz.Joint("rock"),)), (Signal(np.zeros((7, 0))),), name="rock")
+    out = io.BytesIO()
+    mcz.write(still, out)
+    data = bytearray(out.getvalue())
+    with mcz.open(bytes(data)) as file:
+        row = file.only_clip().signals[0].rows[0]
+    data[row.offset + 1] ^= 4
+    with mcz.open(bytes(data)) as file, pytest.raises(mcz.MczError):
+        file.only_clip().read()

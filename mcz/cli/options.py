@@ -9,7 +9,7 @@ import click
 
 from mcz.cli.common import echo, to_bytes, to_params, to_rate
 
-EFFORTS = ("fast", "normal")  # as in mcz.codecs, which takes longer to import
+EFFORTS = ("fast", "normal", "best")  # as in mcz.codecs, which takes longer to import
 UNITS = ("mm", "cm", "dm", "m", "in", "ft")
 Function = Callable[..., Any]
 
@@ -107,7 +107,7 @@ def encoding_options(function: Function) -> Function:
         click.option(
             "--effort",
             type=click.Choice(EFFORTS),
-            help="A lossless codec: read fastest, or a little smaller.",
+            help="A lossless codec: read fastest, a little smaller, or smallest.",
         ),
         param_option,
         click.option(

@@ -66,7 +66,7 @@ class Codecs(MutableMapping[int, Codec]):
 
 CODECS = Codecs()
 DEFAULT = "fast"
-EFFORTS = {"fast": "fast", "normal": "lossless"}  # the lossless codecs, by what they cost
+EFFORTS = {"fast": "fast", "normal": "lossless", "best": "best"}  # by what they cost
 ALIASES = {"lossy": "posewave"}  # the best lossy one there is
 
 

@@ -54,6 +54,7 @@ class SignalReader:
         self.resolution = resolution
         self.name = name
         self._cache: dict[int, tuple[StreamTable, dict[int, bytes]]] = {}
+        self._read_ones: set[int] = set()  # segments
 
     def read(self, start: int, stop: int) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
         """Values and mask of frames start <= f < stop, groups side by side."""
@@ -294,6 +295,7 @@ class SignalReader:
                 table = self.container.table(row, counts)
                 wanted = self._wanted(table)
             self._cache[segment] = self.container.streams(row, counts, wanted, table)
+            self._read_ones.add(segment)
             while len(self._cache) > 4:  # neighbors only: memory is bounded by segments
                 self._cache.pop(next(iter(self._cache)))
         return self._cache[segment]
@@ -310,6 +312,9 @@ class SignalReader:
     ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
         """Ordinals to values, in ``out`` where that is given, exceptions and masks put in."""
         layout = self.info.layout
+        for index in self.info.covering(start, stop):
+            if index not in self._read_ones:  # the codec wanted nothing of it: it is checked yet
+                self._streams(index)
         columns = [c for g in self.groups for c in layout.groups[g]]
         exceptions, changes = self.exceptions(start, stop, columns)
         values = coded

@@ -83,7 +83,6 @@ export class CodedChannel {
     this.column = head.column;
     this.isPlain = [PLAIN, MULTIPLES, PRODUCTS].includes(head.form);
     this.form = head.form;
-    this.isPlain = head.form === PLAIN || head.form === MULTIPLES;
     this.drop = head.drop;
     this.unit = head.unit;
     this.shifts = head.shifts;
