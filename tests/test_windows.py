@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,11 +13,13 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.container.runs import MOST_BYTES, Run, Runs
+from mcz.container.segments import FRESH
 from mcz.errors import ChecksumError
 from mcz.motion import Signal
 from tests.motions import smooth
 
 LENGTH = 90
+VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"
 
 
 def file_of(codec: str, **options: object) -> bytes:
@@ -69,6 +72,23 @@ def test_damage_is_told_each_time() -> None:
             with pytest.raises(ChecksumError):
                 clip.read((30, 40))
         clip.read((60, 70))
+
+
+@pytest.mark.parametrize("name", ["appended", "clips"])
+def test_damage_later_in_a_run_leaves_what_is_before(name: str) -> None:
+    data = bytearray((VECTORS / f"valid/lsdt-frame/{name}.mcz").read_bytes())
+    with mcz.open(bytes(data)) as file:
+        whole, rows = file.clips["common"].read(), file.clips["common"].signals[0].rows
+    first, last = rows[-2].header, rows[-1]
+    assert not last.header.flags & FRESH
+    data[last.offset + last.size - 1] ^= 1
+    with mcz.open(bytes(data)) as file:
+        clip = file.clips["common"]
+        for _ in range(2):
+            found = clip.read((first.first, first.stop))
+            np.testing.assert_array_equal(found, whole[first.first : first.stop])
+            with pytest.raises(ChecksumError):
+                clip.read((last.header.first, last.header.stop))
 
 
 def test_threads_share_a_file() -> None:

@@ -16,7 +16,7 @@ from mcz.container.packets import SHORT
 from mcz.container.reader import Container
 from mcz.container.runs import MOST_OF_ONE, Run
 from mcz.container.segments import FRESH, GROUP_NOTES, MASKS, StreamTable
-from mcz.errors import FormatError
+from mcz.errors import FormatError, MczError
 from mcz.motion import Exceptions, Signal
 from mcz.numbers import Grid, GridKind, values_of
 from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values_of_exceptions
@@ -129,13 +129,13 @@ class SignalReader:
             run = self._run(start)
             if run is not None and (run[0] < start or stop < run[1]):
                 at = min(run[1], stop)
-                yield self._cut(run, start, at)
+                yield from self._cut(run, start, at)
         if at < stop:
             run = self._run(stop - 1)
             if run is not None and stop < run[1]:
                 yield from self.blocks(at, run[0], out[(at - start) * per_frame :])
                 at = stop
-                yield self._cut(run, run[0], stop)
+                yield from self._cut(run, run[0], stop)
         if at < stop or start == stop:
             yield from self.blocks(at, stop, out[(at - start) * per_frame :])
 
@@ -159,13 +159,17 @@ class SignalReader:
         stop = min(rows[last].header.stop, info.layout.n_frames - info.spare)
         return (start, stop) if stop - start <= most else None
 
-    def _cut(self, run: tuple[int, int], start: int, stop: int) -> Block:
+    def _cut(self, run: tuple[int, int], start: int, stop: int) -> Iterator[Block]:
         """Frames of a run, which is decoded where it is not at hand."""
         rows = self.info.covering(run[0], run[0] + 1)
         key = self.info.rows[rows[0]].offset, self.groups, self.resolution
         held = self.container.runs.get(key)
         if held is None:
-            blocks = list(self.blocks(*run))
+            try:
+                blocks = list(self.blocks(*run))
+            except MczError:  # perhaps of a segment that these frames do not need
+                yield from self.blocks(start, stop)
+                return
             masks = [block.mask for block in blocks]
             held = Run(
                 run[0],
@@ -176,7 +180,7 @@ class SignalReader:
         per_frame = self.info.layout.samples_per_frame
         wanted = slice((start - run[0]) * per_frame, (stop - run[0]) * per_frame)
         mask = None if held.mask is None else held.mask[wanted]
-        return Block(start, stop, held.values[wanted], held.values[wanted], mask)
+        yield Block(start, stop, held.values[wanted], held.values[wanted], mask)
 
     def _ranges(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
         """The range in blocks of a few segments, which bound the memory beside the result."""
