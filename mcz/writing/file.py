@@ -43,10 +43,10 @@ def write(
     """Write ``motion`` to a new MCZ file: a path, an fsspec target or a binary stream.
 
     ``effort`` names a lossless codec in place of ``codec``: "fast", the default, is read fastest,
-    "normal" is a little smaller, "best" smallest. ``params`` are the codec's; ``archive`` chooses the profile of
-    large limits. ``copies``: what holds the clip together, skeleton and template among it, stands
-    in the file a second time, so that a flipped bit there costs no frame (``mcz.open`` with
-    ``salvage``). Raises
+    "normal" is a little smaller, "best" smallest. ``params`` are the codec's; ``archive`` chooses
+    the profile of large limits. ``copies``: what holds the clip together, skeleton and template
+    among it, stands in the file a second time, so that a flipped bit there costs no frame
+    (``mcz.open`` with ``salvage``). Raises
     OptionError, MotionError, or LimitError where the profile is too small; MotionError also for a
     key of the metadata that SPEC.md does not register, unless it is private (``x-...``).
     """

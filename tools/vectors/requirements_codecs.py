@@ -34,6 +34,16 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "BEST-09": ("invalid/best/*-missing", "invalid/best/another-value"),
     "BEST-10": ("valid/best/*",),
     "BEST-12": ("valid/best/class-*", "valid/best/grid-*", "valid/best/multiples"),
+    "BEST-03": ("invalid/best/constants-linked",),
+    "BEST-05": (
+        "invalid/best/links-9",
+        "invalid/best/links-15",
+    ),
+    "BEST-13": (
+        "invalid/best/value-beyond",
+        "invalid/best/value-below",
+    ),
+    "BEST-14": ("invalid/best/class-far",),
     "FAST-01": ("invalid/fast/header", "invalid/fast/resolutions"),
     "FAST-02": (
         "invalid/fast/c*",

@@ -51,7 +51,7 @@ def code_number(
     flow: Ints,
     powers: Ints,
 ) -> int:
-    """Code an ordinal against what is ``predicted``; return it, or set BAD."""  # BEST-12
+    """Code an ordinal against what is ``predicted``; return it, or set BAD."""
     if plan[BASE] == 0:
         return code_plain(state, data, ordinal, predicted, plan, track, flow)
     base = powers[1 if plan[BASE] == 10 else 0]
@@ -102,7 +102,7 @@ def code_digits(
     limit = powers[width] - 1
     predicted = clamp(predicted, -limit, limit)
     bound = min(abs(predicted) + (track[SLOW] >> 1), limit)
-    unit = max(class_of(bound, plan[BASE], powers) - n_digits, 0)
+    unit = max(class_of(bound, plan[BASE], powers) - n_digits, 0)  # BEST-12
     negative, magnitude = 1 if ordinal < 0 else 0, (ordinal ^ (ordinal >> 63)) >> plan[DROP]
     own = (magnitude - first) // per_class + least
     mantissa = (magnitude - first) % per_class + low if magnitude > 0 else 0

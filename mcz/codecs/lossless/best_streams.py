@@ -91,8 +91,10 @@ def read_links(data: bytes, n_coded: int) -> tuple[list[Link], int]:
             raise FormatError(f"best: the stream ends in the links, channel {channel}")
         unit, n_seen, reach = data[at], data[at + 1] & 15, data[at + 1] >> 4
         at += 2
-        if unit > MAX_UNIT or n_seen > MAX_SEEN:  # BEST-04, BEST-05
-            raise FormatError(f"best: a unit of 2^{unit}, {n_seen} links")
+        if unit > MAX_UNIT:  # BEST-04
+            raise FormatError(f"best: a unit of 2^{unit}")
+        if n_seen > MAX_SEEN:  # BEST-05
+            raise FormatError(f"best: {n_seen} links of one channel")
         seen = []
         for _ in range(n_seen):
             other, at = read_varint(data, at)
