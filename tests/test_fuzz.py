@@ -116,7 +116,8 @@ def test_seeds_pass(name: str) -> None:
 
 
 def test_properties_can_break(monkeypatch: pytest.MonkeyPatch) -> None:
-    some = [path.read_bytes() for path in vectors()[:400:20] if path.stat().st_size < 1000]
+    paths = [path for path in vectors()[:400:20] if "long" not in path.stem]  # decoded sizes
+    some = [path.read_bytes() for path in paths if path.stat().st_size < 1000]
     assert all(map(files.check_file, some))
     whole = files._whole
 
