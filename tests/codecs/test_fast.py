@@ -13,6 +13,7 @@ import mcz
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless import fast
 from mcz.coding.ordinals import heads
+from mcz.coding.ordinals.degrees import DEGREE, of_products
 from mcz.coding.quick import kernels, streams, tables
 from mcz.errors import FormatError
 from mcz.numbers import Grid
@@ -63,6 +64,17 @@ def test_any_motion_comes_back(motion: mcz.Motion) -> None:
         back = file.clips[motion.name].motion()
     for one, other in zip(motion.signals, back.signals, strict=True):
         np.testing.assert_array_equal(one.values, other.values)
+
+
+def test_rounding_noise_is_coded_as_products() -> None:
+    grid, codes = GRIDS[3], np.random.default_rng(2).integers(-500, 500, 300)
+    wanted = of_products(codes, DEGREE * 2.0**-60, 4, grid)[:, None]
+    stream = coded(wanted, grid)
+    assert stream[1] == heads.PRODUCTS
+    assert len(stream) < 300 * 12 / 8
+    np.testing.assert_array_equal(decoded(stream, 300, 1, grid), wanted)
+    with pytest.raises(FormatError, match="products on the grid FIXED"):
+        decoded(stream, 300, 1, GRIDS[0])
 
 
 def test_constants_and_copies_cost_almost_nothing() -> None:

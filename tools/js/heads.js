@@ -9,7 +9,7 @@ export const COPY = 2;
 // Forms; 1 to 15 are classes of so many decimal digits.
 export const PLAIN = 0;
 export const MULTIPLES = 32;
-export const PRODUCTS = 33; // of version 1 of codec 1
+export const PRODUCTS = 33; // not in version 0 of codec 1
 const CLASSES_24 = 88;
 const CLASSES_53 = 117;
 
@@ -138,4 +138,12 @@ export function classesOf({ form, drop, top }) {
     perClass: (decimal ? 9 : 1) * least, // K
     small: (top + 1) * (decimal ? 9 : 1) * least * 2 ** drop < 2 ** 53, // all magnitudes
   };
+}
+
+/** The product that a code of form 33 says. */
+export function productOf({ unit, shifts }, code) {
+  if (code === 0) return 0;
+  const before = Math.abs(code) - 1;
+  const size = (2 * Math.floor(before / shifts) + 1) * 2 ** (before % shifts) * unit;
+  return code < 0 ? -size : size;
 }

@@ -23,8 +23,13 @@ from mcz.codecs.lossless.segments import (
     segment_frames,
 )
 from mcz.codecs.segments import Sizing
-from mcz.coding.ordinals.heads import form_of_grid
-from mcz.coding.quick.streams import build_streams, parse_streams, renumbered
+from mcz.coding.quick.streams import (
+    Channels,
+    build_streams,
+    channels_of,
+    parse_streams,
+    renumbered,
+)
 from mcz.errors import FormatError
 from mcz.numbers import Grid
 
@@ -41,7 +46,7 @@ def decode(
     refuse_extras("fast", header, layout)
     per_frame = layout.samples_per_frame
     n_channels = sum(len(layout.groups[group]) for group in request.groups)
-    forms = _forms(layout.grids, tuple(layout.groups[group] for group in request.groups))
+    channels = _channels(layout.grids, tuple(layout.groups[group] for group in request.groups))
     out = np.empty(((request.stop - request.start) * per_frame, n_channels), np.int64)
     for index, span in enumerate(spans):
         start, stop = max(span.first, request.start), min(span.stop, request.stop)
@@ -50,7 +55,7 @@ def decode(
         target = out[(start - request.start) * per_frame : (stop - request.start) * per_frame]
         n_rows = span.n_frames * per_frame
         rows = target if len(target) == n_rows else np.empty((n_rows, n_channels), np.int64)
-        _read_segment(layout, request.groups, forms, partial(fetch, index, 0), rows)
+        _read_segment(layout, request.groups, channels, partial(fetch, index, 0), rows)
         if rows is not target:
             first = (start - span.first) * per_frame
             target[:] = rows[first : first + len(target)]
@@ -58,13 +63,17 @@ def decode(
 
 
 def _read_segment(
-    layout: Layout, groups: tuple[int, ...], forms: Ints, stream: partial[bytes], rows: Ints
+    layout: Layout,
+    groups: tuple[int, ...],
+    channels: Channels,
+    stream: partial[bytes],
+    rows: Ints,
 ) -> None:
     """Fill ``rows``, those of one segment, with the channels of the groups."""
     copies = parse_streams(
         [stream(group) for group in groups],
         [len(layout.groups[group]) for group in groups],
-        forms,
+        channels,
         rows,
     )
     if not copies:
@@ -80,8 +89,8 @@ def _read_segment(
         if group not in columns:
             if group not in apart:
                 other = np.empty((len(rows), len(layout.groups[group])), np.int64)
-                own = _forms(layout.grids, (layout.groups[group],))
-                apart[group] = other, parse_streams([stream(group)], [len(own)], own, other)
+                own = _channels(layout.grids, (layout.groups[group],))
+                apart[group] = other, parse_streams([stream(group)], [len(own.grids)], own, other)
             source, known = apart[group]
         if at in known:  # FAST-02, LOSS-11
             raise FormatError(f"fast: a copy of a copy, channel {channel} of group {group}")
@@ -89,20 +98,19 @@ def _read_segment(
 
 
 @lru_cache(maxsize=64)
-def _forms(grids: tuple[Grid, ...], groups: tuple[tuple[int, ...], ...]) -> Ints:
-    """The forms that channels have where their heads name none."""
-    return np.array([form_of_grid(grids[c]) for group in groups for c in group], np.int64)
+def _channels(grids: tuple[Grid, ...], groups: tuple[tuple[int, ...], ...]) -> Channels:
+    return channels_of(grids[c] for group in groups for c in group)
 
 
 def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int]) -> bytes:
     """``stream`` of ``group`` with its copies referring to the groups' new ``numbers``."""
-    forms = _forms(layout.grids, (layout.groups[group],))
+    channels = _channels(layout.grids, (layout.groups[group],))
 
     def number_of(other: int, channel: int) -> int:
         check_copy("fast", layout, other, channel)
         return numbers[other]
 
-    return renumbered(stream, forms, number_of)
+    return renumbered(stream, channels, number_of)
 
 
 CODEC = Codec(

@@ -20,6 +20,7 @@ from mcz.coding.quick.kernels import (
     MAX_TAPS,
     ORDINAL,
     SCALE,
+    SHIFTS,
     TAPS,
     TOP,
     UNIT,
@@ -29,8 +30,8 @@ from mcz.coding.quick.kernels import (
 from mcz.jit import inner, kernel
 
 OWN_FORM = 128  # in kind: form and drop are in the stream
-MULTIPLES = 32  # form: integers that are multiplied by a unit
-MAX_DROP, MAX_TAP, MAX_SCALE = 19, 511, 172
+MULTIPLES, PRODUCTS = 32, 33  # forms: integers that are multiplied by a unit
+MAX_DROP, MAX_TAP, MAX_SCALE, MAX_SHIFTS = 19, 511, 172, 63
 MAX_TOP_10, MAX_TOP_24, MAX_TOP_53 = 614, 255, 2047
 MAX_RANK = 1 << 60
 UNIT_SIZE = 8
@@ -60,7 +61,7 @@ def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:
 def set_form(head: Ints, form: int, drop: int) -> bool:
     """Note base and digits of a form; False for one that there is not."""
     head[DROP] = drop
-    if (form == 0 and drop <= MAX_DROP) or (form == MULTIPLES and drop == 0):
+    if (form == 0 and drop <= MAX_DROP) or ((form == MULTIPLES or form == PRODUCTS) and drop == 0):
         head[BASE] = head[DIGITS] = 0
     elif 1 <= form <= 15 and drop == 0:
         head[BASE], head[DIGITS] = 10, form
@@ -102,10 +103,15 @@ def read_coded(
         at += 2
     if not set_form(head, form, drop):
         return -1, BAD_FORM
-    head[UNIT] = -1
-    if form == MULTIPLES:
+    head[UNIT], head[SHIFTS] = -1, 0
+    if form == MULTIPLES or form == PRODUCTS:
         head[UNIT] = at
         at += UNIT_SIZE
+    if form == PRODUCTS:
+        head[SHIFTS] = data[at]
+        at += 1
+        if head[SHIFTS] < 1 or head[SHIFTS] > MAX_SHIFTS:  # FAST-02, LOSS-34
+            return -1, BAD_FORM
     head[TOP] = head[DEPTH] = 0
     if head[BASE]:
         head[TOP], at = varint(data, at, end)

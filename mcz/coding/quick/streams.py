@@ -6,20 +6,22 @@ SPEC.md, "Codec 14: fast", is normative; the names below are its field names.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.ordinals.choices import Lattice, base_and_digits, max_top
+from mcz.coding.ordinals.degrees import find_degrees, of_products
 from mcz.coding.ordinals.heads import (
     CODED,
     COPY,
     MULTIPLES,
     OWN_FORM,
+    PRODUCTS,
     check_unit,
     form_of,
     form_of_grid,
@@ -43,6 +45,18 @@ FAULTS = (
     "its scale is out of range",
     "it cannot be decoded",
 )
+
+
+class Channels(NamedTuple):
+    """Channels of streams: their grids in the clip, and what forms these name."""
+
+    grids: tuple[Grid, ...]
+    forms: Ints
+
+
+def channels_of(grids: Iterable[Grid]) -> Channels:
+    known = tuple(grids)
+    return Channels(known, np.array([form_of_grid(grid) for grid in known], np.int64))
 
 
 @cache
@@ -69,6 +83,7 @@ class Coded:
     clip_form: int
     shape: Lattice
     unit: float | None = None
+    shifts: int = 0
     plan: Ints | None = None
     scale: int = 0
 
@@ -79,11 +94,14 @@ class Coded:
         taps = self.plan[own.TAPS : own.TAPS + own.MAX_TAPS].tolist()
         while taps and not taps[-1]:
             taps.pop()
-        form = form_of(Lattice(base, digits, drop)) if self.unit is None else MULTIPLES
+        form = form_of(Lattice(base, digits, drop))
+        if self.unit is not None:
+            form = PRODUCTS if self.shifts else MULTIPLES
         own_form = drop > 0 or form != self.clip_form
         kind = CODED | int(self.plan[own.FROM_LAST]) << 2 | len(taps) << 3 | OWN_FORM * own_form
         parts = [bytes((kind,)), bytes((form, drop)) if own_form else b""]
         parts += [struct.pack("<d", self.unit)] if self.unit is not None else []
+        parts += [bytes((self.shifts,))] if self.shifts else []
         parts += [varint(top), varint(depth)] if base else []
         parts += [bytes((self.scale,)), *(varint(2 * t if t >= 0 else -2 * t - 1) for t in taps)]
         return b"".join(parts)
@@ -138,10 +156,14 @@ def _heads(
 
 
 def _coded(column: Ints, grid: Grid, clip_grid: Grid) -> Coded:
-    found = find_unit(column) if grid.kind == GridKind.BINARY32 else None
-    if found is not None:
-        return Coded(found[1], form_of_grid(clip_grid), Lattice(0, 0), found[0])
-    return Coded(column, form_of_grid(clip_grid), Lattice(*base_and_digits(grid)))
+    clip_form, plain = form_of_grid(clip_grid), Lattice(0, 0)
+    if grid.kind == GridKind.BINARY32 and (found := find_unit(column)) is not None:
+        unit, counts = found
+        return Coded(counts, clip_form, plain, unit)
+    if grid == clip_grid and (products := find_degrees(column, grid)) is not None:
+        unit, shifts, codes = products
+        return Coded(codes, clip_form, plain, unit, shifts)
+    return Coded(column, clip_form, Lattice(*base_and_digits(grid)))
 
 
 def plan(coded: Sequence[Coded]) -> Ints:
@@ -180,39 +202,46 @@ def write(records: Ints, ends: Ints) -> list[bytes]:
 
 
 def parse_streams(
-    streams: Sequence[bytes], sizes: Sequence[int], forms: Ints, out: Ints
+    streams: Sequence[bytes], sizes: Sequence[int], channels: Channels, out: Ints
 ) -> dict[int, tuple[int, int]]:
     """Fill ``out`` (rows, channels) with the ordinals of groups of ``sizes`` channels.
 
-    ``forms`` are those that channels have where their heads name none. Returns the columns that are
-    copies: of which group and which of its channels. Raises FormatError on bad bytes.
+    Returns the columns that are copies: of which group and which of its channels. Raises
+    FormatError on bad bytes.
     """
     own, read, _, _ = loops()
     data = _spared(streams)
     words = np.ascontiguousarray(data[::-1]).view("<u4").astype(np.int64)
     ends = SPARE + np.cumsum([len(stream) for stream in streams], dtype=np.int64)
     firsts = np.cumsum([0, *sizes], dtype=np.int64)
-    plans = np.zeros((len(forms), own.PLAN_SIZE), np.int64)
+    plans = np.zeros((len(channels.forms), own.PLAN_SIZE), np.int64)
     channel, fault = read.read_streams(
-        data, words, SPARE, ends, firsts, forms, plans, out, tables()
+        data, words, SPARE, ends, firsts, channels.forms, plans, out, tables()
     )
     if fault >= 0:
         raise FormatError(f"fast: channel {channel} of those read: {FAULTS[fault]}")
     for n in np.flatnonzero((plans[:, own.KIND] == CODED) & (plans[:, own.UNIT] > 0)):
         (unit,) = struct.unpack_from("<d", data.data, plans[n, own.UNIT])
         check_unit("fast", unit)
-        out[:, n] = of_multiples(out[:, n], unit)  # FAST-12
+        shifts, grid = int(plans[n, own.SHIFTS]), channels.grids[n]
+        if not shifts:
+            out[:, n] = of_multiples(out[:, n], unit)  # FAST-12
+        elif grid.kind == GridKind.GENERAL:  # FAST-02, LOSS-32
+            out[:, n] = of_products(out[:, n], unit, shifts, grid)  # FAST-12
+        else:
+            raise FormatError(f"fast: products on the grid {grid.kind.name}")
     return {
         int(n): (int(plans[n, own.GROUP]), int(plans[n, own.COLUMN]))
         for n in np.flatnonzero(plans[:, own.KIND] == COPY)
     }
 
 
-def renumbered(stream: bytes, forms: Ints, number_of: Callable[[int, int], int]) -> bytes:
+def renumbered(stream: bytes, channels: Channels, number_of: Callable[[int, int], int]) -> bytes:
     """``stream`` with the groups that its copies name numbered anew."""
     from mcz.coding.quick import head_kernels as read
 
     own = loops()[0]
+    forms = channels.forms
     plans = np.zeros((len(forms), own.PLAN_SIZE), np.int64)
     ends = np.zeros(len(forms), np.int64)
     end = SPARE + len(stream)

@@ -4,8 +4,9 @@ import { annexJson } from "../annex.js";
 import { bits, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
 import { binary32Ordinal } from "../grids.js";
-import { MULTIPLES, PLAIN, classesOf } from "../heads.js";
+import { MULTIPLES, PLAIN, PRODUCTS, classesOf, productOf } from "../heads.js";
 import { halvesOf, setHalves, setInteger } from "../int64.js";
+import { ordinalOf } from "../ordinals.js";
 import { SignalDecoder } from "../ordinal-streams.js";
 
 export const id = 14;
@@ -19,7 +20,7 @@ const TWO_44 = 2 ** 44;
 
 const CODEC = {
   name,
-  rules: { maxTaps: 4, hasDepth: true, hasProducts: false },
+  rules: { maxTaps: 4, hasDepth: true, hasProducts: true },
   decoder: (ordinals) => new GroupDecoder(ordinals),
 };
 
@@ -130,7 +131,7 @@ class Source {
 class Channel {
   constructor(head, what) {
     Object.assign(this, head, classesOf(head));
-    this.plain = head.form === PLAIN || head.form === MULTIPLES;
+    this.plain = [PLAIN, MULTIPLES, PRODUCTS].includes(head.form);
     this.lowest = this.width - head.depth; // class, by digits in fixed point
     this.limit = this.plain ? TWO_44 : this.powers[this.width] - 1;
     this.ranks = (head.depth + 1) * this.perClass;
@@ -295,10 +296,13 @@ class GroupDecoder {
     }
   }
 
-  plainNumber({ form, unit, drop }, v, index) {
+  plainNumber(channel, v, index) {
+    const { form, unit, drop } = channel;
     if (!(v >= -TWO_44 && v < TWO_44)) this.source.refuse(`the value ${v} is beyond 2^44`);
     if (form === MULTIPLES) {
       setInteger(this.halves, index, binary32Ordinal(v * unit));
+    } else if (form === PRODUCTS) {
+      this.ordinals[index] = ordinalOf(channel.grid, productOf(channel, v));
     } else {
       // v * 2^drop, and the low bits apart: drop is at most 19.
       const low = (v % 2 ** (32 - drop)) * 2 ** drop + this.source.take(drop);

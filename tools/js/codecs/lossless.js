@@ -3,7 +3,7 @@
 import { RangeDecoder, bits, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
 import { binary32Ordinal } from "../grids.js";
-import { MULTIPLES, PLAIN, POWERS_OF_10, PRODUCTS, classesOf } from "../heads.js";
+import { MULTIPLES, PLAIN, POWERS_OF_10, PRODUCTS, classesOf, productOf } from "../heads.js";
 import { halvesOf, setHalves, setInteger } from "../int64.js";
 import { ordinalOf } from "../ordinals.js";
 import { SignalDecoder } from "../ordinal-streams.js";
@@ -112,14 +112,6 @@ export class CodedChannel {
 /** beside(value, scale) of the specification. */
 function beside(value, scale) {
   return clamp(bits(value) - bits(scale) + 3, 0, 7);
-}
-
-/** The product that a code of form 33 says. */
-function productOf({ unit, shifts }, code) {
-  if (code === 0) return 0;
-  const before = Math.abs(code) - 1;
-  const size = (2 * Math.floor(before / shifts) + 1) * 2 ** (before % shifts) * unit;
-  return code < 0 ? -size : size;
 }
 
 /** Decodes the coded channels of a group in a segment, one group after the other. */

@@ -22,7 +22,7 @@ from mcz.motion import Motion
 from mcz.numbers import Grid
 from mcz.schema import varint
 from tools.vectors.build.files import Whole, file_of
-from tools.vectors.build.lossless_clips import MULTIPLES, PLAIN, Constant, Copy
+from tools.vectors.build.lossless_clips import MULTIPLES, PLAIN, PRODUCTS, Constant, Copy
 
 Ints = NDArray[np.int64]
 HEADING = "Codec 14: fast"
@@ -32,7 +32,7 @@ HEADING = "Codec 14: fast"
 class Coded:
     """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top``, ``depth``
     None: as the ordinals need. Nothing is checked, so that what is forbidden can be written.
-    ``multiples``: what is coded in place of the ordinals, for form 32 with its ``unit``."""
+    ``multiples``: coded in place of the ordinals, with ``unit`` and ``shifts``: forms 32, 33."""
 
     form: int | None = None
     drop: int = 0
@@ -42,6 +42,7 @@ class Coded:
     from_last: int = 1
     taps: tuple[int, ...] = ()
     unit: float | None = None
+    shifts: int | None = None
     multiples: tuple[int, ...] = ()
 
 
@@ -115,7 +116,7 @@ def _plan(head: Coded, grid: Grid, column: Sequence[int]) -> Ints:
     own = quick.loops()[0]
     form = form_of_grid(grid) if head.form is None else head.form
     plan: Ints = np.zeros(own.PLAN_SIZE, np.int64)
-    if form not in (PLAIN, MULTIPLES):
+    if form not in (PLAIN, MULTIPLES, PRODUCTS):
         base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)
         sizes = sorted({(o if o >= 0 else -1 - o) >> head.drop for o in column} - {0} or {1})
         per_class = (base - 1) * base ** (digits - 1)
@@ -136,6 +137,7 @@ def _head(head: Coded, plan: Ints) -> bytes:
     kind = head.from_last << 2 | len(head.taps) << 3 | OWN_FORM * (head.form is not None)
     data = bytes((kind, *((head.form, head.drop) if head.form is not None else ())))
     data += struct.pack("<d", head.unit) if head.unit is not None else b""
+    data += bytes((head.shifts,)) if head.shifts is not None else b""
     if plan[own.BASE]:
         data += varint(int(plan[own.TOP])) + varint(int(plan[own.DEPTH]))
     folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)

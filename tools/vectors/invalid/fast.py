@@ -23,6 +23,7 @@ from tools.vectors.build.lossless_clips import (
     DOUBLE,
     MULTIPLES,
     PLAIN,
+    PRODUCTS,
     SINGLE,
     SIX,
     WHOLE,
@@ -40,6 +41,7 @@ def vectors() -> Iterable[Vector]:
     _heads(shelf)
     _coded(shelf)
     _units(shelf)
+    _products(shelf)
     _sizes(shelf)
     _out_of_range(shelf)
     _ordinals(shelf)
@@ -149,6 +151,20 @@ def _units(shelf: Broken) -> None:
 
     data = file_of(motion, codec=codec_of([replace(head, drop=0)]), segments=stream(0, cut))
     shelf.add("cut-in-unit", HEADING, "The stream ends within a unit.", data)
+
+
+def _products(shelf: Broken) -> None:
+    def refused(name: str, purpose: str, grid: Grid, **rest: Any) -> None:
+        head = Coded(PRODUCTS, multiples=(0,) * 5, **{"unit": 0.25, "shifts": 1, **rest})
+        data = file_of(column([0.0] * 5, grid), codec=codec_of([head]))
+        shelf.add(f"products-{name}", HEADING, f"{purpose}.", data)
+
+    refused("on-binary32", "Products on the grid BINARY32", SINGLE)
+    refused("on-fixed", "Products on the grid FIXED", HUNDREDTHS)
+    refused("drop", "A drop of 1 bit from products", SIX, drop=1)
+    refused("shifts-0", "No shifts", SIX, shifts=0)
+    refused("shifts-64", "64 shifts", SIX, shifts=64)
+    refused("unit", "A unit of 0 of products", SIX, unit=0.0)
 
 
 def _sizes(shelf: Broken) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from mcz.coding.ordinals.degrees import of_products
 from mcz.coding.ordinals.heads import MAX_SCALE
 from mcz.numbers import Grid, GridKind
 from tools.vectors.build.fast_clips import HEADING, Coded, Head, Streams
@@ -16,6 +17,7 @@ from tools.vectors.build.lossless_clips import (
     DOUBLE,
     MULTIPLES,
     PLAIN,
+    PRODUCTS,
     SINGLE,
     SIX,
     WHOLE,
@@ -37,6 +39,7 @@ def add(shelf: Streams) -> None:
     _copies(shelf)
     _forms(shelf)
     _multiples(shelf)
+    _products(shelf)
     _ranks(shelf)
     _symbols(shelf)
 
@@ -171,6 +174,22 @@ def _multiples(shelf: Streams) -> None:
     motion = panel([values, values, wave(12)], (SINGLE, SINGLE, HUNDREDTHS), (1, 2))
     purpose = "A copy of multiples has the ordinals that they make."
     shelf.code("multiples-copied", purpose, motion, [Copy(1, 0), head, Coded()])
+
+
+def _products(shelf: Streams) -> None:
+    near, most = [0, 1, -1, 2, 3, -5, 7, 1000, -999, 2**20, 5, 0], 2**44 - 1
+    wide = [2**31 + 1, -(2**33) - 3, most, -most - 1, 0, 1, 63, -64]
+    degree = 180 / np.pi
+    cases: dict[str, tuple[str, Grid, float, int, list[int]]] = {
+        "degrees": ("Angles of a few units in the last place", SIX, degree * 2.0**-60, 12, near),
+        "greatest": ("The greatest unit, integers and shifts", SIX, 2.0**80, 63, wide),
+        "digits-15": ("Fifteen digits", FIFTEEN, degree * 2.0**-50, 4, near),
+    }
+    for name, (purpose, grid, unit, shifts, codes) in cases.items():
+        ordinals = of_products(np.array(codes, np.int64), unit, shifts, grid)
+        head = Coded(form=PRODUCTS, unit=unit, shifts=shifts, multiples=tuple(codes), taps=(32,))
+        motion = column(grid.values(ordinals).tolist(), grid)
+        shelf.code(f"products-{name}", f"{purpose}.", motion, [head])
 
 
 def _ranks(shelf: Streams) -> None:
