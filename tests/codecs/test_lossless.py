@@ -317,6 +317,17 @@ def test_rounding_noise_is_coded_as_products() -> None:
     assert find_degrees(np.array([-1, 5]), grid) is None  # -0 is no product
 
 
+@given(st.lists(st.integers(-3, 3) | st.just(-1), min_size=1), st.integers(1, 15))
+def test_what_products_say_comes_back(some: list[int], digits: int) -> None:
+    grid = Grid(GridKind.GENERAL, digits)
+    ordinals = np.array(some, np.int64)  # zeros of both signs, and the least numbers
+    found = find_degrees(ordinals, grid)
+    if found is not None:
+        unit, shifts, codes = found
+        assert of_products(codes, unit, shifts, grid).tolist() == some
+    assert found is None or -1 not in some
+
+
 def test_products_need_version_1_and_a_decimal_grid() -> None:
     grid = Grid(GridKind.GENERAL, 6)
     column = of_products(np.array([[0, 1, -1, 500, -77, 3]]).T[:, 0], DEGREE * 2.0**-60, 4, grid)

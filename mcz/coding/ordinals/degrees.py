@@ -89,6 +89,6 @@ def find_degrees(ordinals: Ints, grid: Grid) -> tuple[float, int, Ints] | None:
 
 def _fitting(ordinals: Ints, units: Any, grid: Grid) -> tuple[Ints, NDArray[np.bool_]]:
     """Multiples of units close to numbers, and which of them give these ordinals back."""
-    counts = np.rint(grid.values(ordinals) / units)
+    counts = np.rint(grid.values(ordinals) / units).astype(np.int64)  # which have no -0
     back = grid.ordinals(counts * units)[0] == ordinals
-    return counts.astype(np.int64), back & (np.abs(counts) < MOST)
+    return counts, back & (np.abs(counts) < MOST)
