@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from mcz.cli.common import Exit, Failure, about, existing
-from mcz.cli.options import copies_option, encoding_options, json_option
+from mcz.cli.options import copies_option, encoding_options, json_option, threads_option
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
@@ -37,6 +37,7 @@ from mcz.cli.progress import Progress
 )
 @copies_option("where the file has some")
 @encoding_options
+@threads_option
 @json_option
 def command(
     sources: tuple[str, ...],

@@ -25,6 +25,7 @@ from mcz.cli.options import (
     force_option,
     json_option,
     salvage_option,
+    threads_option,
     up_option,
 )
 from mcz.cli.parts import Filtered, Part, Preview
@@ -139,6 +140,7 @@ class _Wanted(NamedTuple):
 )
 @decoded_option
 @force_option
+@threads_option
 @json_option
 def command(
     file: str,

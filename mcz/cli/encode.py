@@ -27,6 +27,7 @@ from mcz.cli.options import (
     encoding_options,
     force_option,
     json_option,
+    threads_option,
 )
 from mcz.cli.progress import Progress
 
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
 @copies_option("no")
 @encoding_options
 @force_option
+@threads_option
 @json_option
 def command(
     source: str,

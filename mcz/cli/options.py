@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 import click
@@ -57,6 +58,26 @@ def decoded_option(function: Function) -> Function:
         callback=to_bytes,
         help="Decode up to BYTES (200M, 2G) of one file. Default: 64 MiB, or 4096 times its size.",
     )(function)
+
+
+def threads_option(function: Function) -> Function:
+    """``--threads``, as the argument ``threads`` of ``mcz.open`` and ``mcz.write``."""
+
+    @wraps(function)
+    def command(*args: Any, threads: int | None, **options: Any) -> Any:
+        if threads is None:
+            return function(*args, **options)
+        from mcz.threads import limited
+
+        with limited(threads):
+            return function(*args, **options)
+
+    return click.option(
+        "--threads",
+        metavar="N",
+        type=click.IntRange(1),
+        help="Decode and code with N threads. Default: one a processor.",
+    )(command)
 
 
 def copies_option(default: str) -> Callable[[Function], Function]:

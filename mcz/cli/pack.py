@@ -12,6 +12,7 @@ from mcz.cli.options import (
     encoding_options,
     force_option,
     json_option,
+    threads_option,
 )
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
@@ -24,6 +25,7 @@ from mcz.cli.progress import Progress
 @click.option("--keep-all", is_flag=True, help="Keep files of other kinds too, as attachments.")
 @copies_option("yes")
 @force_option
+@threads_option
 @json_option
 def command(
     folder: str,

@@ -12,6 +12,7 @@ from mcz.cli.options import (
     force_option,
     json_option,
     salvage_option,
+    threads_option,
 )
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
@@ -32,6 +33,7 @@ from mcz.cli.progress import Progress
 )
 @decoded_option
 @force_option
+@threads_option
 @json_option
 def command(
     file: str,

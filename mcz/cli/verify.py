@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mcz.cli.common import Exit, Failure, about, echo, existing, opened, print_json, say
-from mcz.cli.options import decoded_option, json_option
+from mcz.cli.options import decoded_option, json_option, threads_option
 from mcz.cli.progress import Progress
 from mcz.errors import FormatError, LimitError, UnsupportedError
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     help="Compare with this source file, too.",
 )
 @decoded_option
+@threads_option
 @json_option
 def command(file: str, source: str | None, max_decoded: int | None, as_json: bool) -> Exit:
     """Check every checksum, decode everything, restore every source and compare its SHA-256."""

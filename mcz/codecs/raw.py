@@ -8,7 +8,7 @@ for each of its channels the least ordinal, the width, and one offset a row.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ from mcz.codecs.segments import Sizing, gather, guessing
 from mcz.errors import FormatError
 
 MAX_ROWS = 2**20
-SIZING = Sizing(target=60_000, value_bytes=4, aim=97, most_rows=MAX_ROWS)
+SIZING = Sizing(target=58_000, most=62_000, value_bytes=4, most_rows=MAX_ROWS)
 
 HEAD_SIZE = 9
 
@@ -37,11 +37,11 @@ HEAD_SIZE = 9
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
 
-    def code(first: int, stop: int) -> tuple[bytes, ...]:
+    def prepare(first: int, stop: int) -> Callable[[], tuple[bytes, ...]]:
         ordinals = source.ordinals(first, stop)
-        return tuple(_build(ordinals[:, list(group)]) for group in source.layout.groups)
+        return lambda: tuple(_build(ordinals[:, list(group)]) for group in source.layout.groups)
 
-    return Encoded(header=b"", segments=guessing(source, params["segment_frames"], SIZING, code))
+    return Encoded(b"", guessing(source, params["segment_frames"], SIZING, prepare))
 
 
 def _build(ordinals: NDArray[np.int64]) -> bytes:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs.ahead import Ahead, Prepare
 from mcz.codecs.contract import Layout, Request, Segment, SignalSource, Span
 from mcz.codecs.parameters import Parameter, integer
 from mcz.errors import MotionError
@@ -77,41 +78,54 @@ def halving(
 class Sizing:
     """How a codec of ordinals guesses the frames that fill a segment.
 
-    ``target`` bytes at most; ``value_bytes`` a value, before anything is known; ``aim``: percent of
-    the target that a guess aims at; ``spare`` bytes are counted beside the streams; ``most_rows``.
+    About ``target`` bytes, ``most`` at most; ``value_bytes`` a value, before anything is known;
+    ``spare`` bytes are counted beside the streams; ``most_rows``.
     """
 
     target: int
-    value_bytes: int
-    aim: int
+    most: int
+    value_bytes: float
     most_rows: int
     spare: int = 0
 
 
-def guessing(source: SignalSource, fixed: int, sizing: Sizing, code: Code) -> Iterator[Segment]:
+def guessing(
+    source: SignalSource, fixed: int, sizing: Sizing, prepare: Prepare, threads: int = 1
+) -> Iterator[Segment]:
     """Segments of ``fixed`` frames, or, where that is 0, of as many as their size allows.
 
-    One begins wherever the grids change.
+    One begins wherever the grids change. A length stays while it is about right, so that
+    ``threads`` can work on those that follow: worth it where loops take most of the time.
     """
     layout = source.layout
     per_frame = max(1, layout.n_channels) * layout.samples_per_frame
     ends = sorted({*source.breaks, layout.n_frames})
     most = min(layout.most_frames, max(1, sizing.most_rows // layout.samples_per_frame))
-    guess = fixed or max(1, sizing.target // (sizing.value_bytes * per_frame))
+    guess = fixed or max(1, int(sizing.target / (sizing.value_bytes * per_frame)))
     first = 0
-    while first < layout.n_frames:
-        end = next(e for e in ends if e > first)
-        n_frames = min(guess, end - first, most)
-        streams = code(first, first + n_frames)
-        size = _size(streams) + sizing.spare
-        fitting = n_frames * sizing.target * sizing.aim // (size * 100) if size else guess
-        if size > sizing.target and n_frames > 1 and not fixed:
-            guess = max(1, fitting)
-            continue
-        yield Segment(first, n_frames, streams)
-        first += n_frames
-        if not fixed and size:
-            guess = max(1, min(4 * n_frames, fitting))
+    with Ahead(prepare, threads) as ahead:
+        while first < layout.n_frames:
+            spans = _spans(first, min(guess, most), ends)
+            span = next(spans)
+            n_frames = span[1] - first
+            streams = ahead.code(span, spans)
+            size = _size(streams) + sizing.spare
+            fitting = n_frames * sizing.target // size if size else guess
+            if size > sizing.most and n_frames > 1 and not fixed:
+                guess = max(1, fitting)
+                continue
+            yield Segment(first, n_frames, streams)
+            first = span[1]
+            if not (fixed or not size or 0.85 * guess <= fitting <= 1.15 * guess):
+                guess = max(1, min(4 * n_frames, fitting))
+
+
+def _spans(first: int, length: int, ends: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Segments of ``length`` frames from a frame on, shorter before ``ends``."""
+    for end in ends:
+        while first < end:
+            yield first, min(first + length, end)
+            first = min(first + length, end)
 
 
 def _size(streams: Streams) -> int:

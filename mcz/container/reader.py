@@ -82,11 +82,13 @@ class Container:
         salvage: bool = False,
         max_decoded: int | None = None,
         reads_parts: bool = False,
+        threads: int | None = None,
     ) -> None:
         self.source = source
         self.salvage = salvage
         self.reads_parts = reads_parts and not salvage
         self.max_decoded = output_limit(source.size) if max_decoded is None else max_decoded
+        self.threads = threads  # that may decode; None: as many as are in force
         self.damage: list[str] = []
         self.broken: list[tuple[int, Chunk | None]] = []
         self.feet: list[int] = []  # offsets of FOOTs, as far as salvage found them
@@ -98,7 +100,13 @@ class Container:
         self.profile: Profile = parse_head(self.directory.head)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _reopened, (self.source, self.salvage, self.max_decoded, self.reads_parts)
+        return _reopened, (
+            self.source,
+            self.salvage,
+            self.max_decoded,
+            self.reads_parts,
+            self.threads,
+        )
 
     def strictly(self) -> Container:
         """The same file, of which what is read is checked as in a sound one."""
@@ -376,10 +384,14 @@ class Container:
 
 def _reopened(source: ByteSource, *options: Any) -> Container:
     """What a pickled Container becomes: the same file, opened anew, closed when it is let go."""
-    salvage, max_decoded, reads_parts = options
+    salvage, max_decoded, reads_parts, threads = options
     try:
         container = Container(
-            source, salvage=salvage, max_decoded=max_decoded, reads_parts=reads_parts
+            source,
+            salvage=salvage,
+            max_decoded=max_decoded,
+            reads_parts=reads_parts,
+            threads=threads,
         )
     except BaseException:
         source.close()

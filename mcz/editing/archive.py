@@ -23,6 +23,7 @@ from mcz.formats import FORMATS
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.source_files import read_bytes
+from mcz.threads import limited
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Digest, Draft
@@ -49,15 +50,16 @@ def pack(
     force: bool = False,
     archive: bool = False,
     copies: bool = True,
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Pack every motion file below ``directory`` into one MCZ file.
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
-    relative to ``directory``. ``effort`` and ``copies`` are those of ``mcz.write``. An earlier MCZ
-    file of the target's name is no part of the new one; any other file that the target would
-    replace is refused, even with ``force``.
+    relative to ``directory``. ``effort``, ``copies`` and ``threads`` are those of ``mcz.write``. An
+    earlier MCZ file of the target's name is no part of the new one; any other file that the target
+    would replace is refused, even with ``force``.
     """
     root = Path(directory)
     if not root.is_dir():
@@ -70,7 +72,8 @@ def pack(
     coded = chosen(codec, effort)
     terms = Terms(coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
-    with replacing(target, force=force, inputs=(*paths, *(params or {}).values())) as stream:
+    inputs = (*paths, *(params or {}).values())
+    with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
         draft = Draft(stream, profile_of(archive), copies=copies)
         report = _write_entries(draft, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
@@ -153,6 +156,7 @@ def append(
     salvage: bool = False,
     force: bool = False,
     copies: bool | None = None,
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Add files after the last valid FOOT of an MCZ file; what it held stays readable throughout.
@@ -163,15 +167,16 @@ def append(
 
     A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
     lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
-    them. Where its end is damaged, one of the two has to be given. ``copies`` is that of
-    ``mcz.write``, of all that has none yet; None: where the file has some. Raises AccessError while
-    another process is appending, OptionError where the target is a source itself.
+    them. Where its end is damaged, one of the two has to be given. ``threads`` is that of
+    ``mcz.write``, and so is ``copies``, of all that has none yet; None: where the file has some.
+    Raises AccessError while another process is appending, OptionError where the target is a source
+    itself.
     """
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
     coded = chosen(codec, effort)
     terms = Terms(coded, params, skeleton, rate, unit, verbatim, up=up)
     entries = [Entry(Path(s), _name_below(s, root), terms) for s in sources]
-    with growing(Path(target), salvage=salvage, force=force) as growth:
+    with limited(threads), growing(Path(target), salvage=salvage, force=force) as growth:
         container = growth.container
         wanted = bool(container.copies()) if copies is None else copies
         draft = Draft(
@@ -269,6 +274,7 @@ def unpack(
     force: bool = False,
     names: str = "stored",
     max_decoded: int | None = None,
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Write every source file and attachment of an MCZ file below ``directory``.
@@ -277,6 +283,7 @@ def unpack(
     when it is whole and its hash is right. No symbolic link
     below ``directory`` is followed. Clips without a source are reported as skipped. With
     ``salvage`` the file may be damaged: what is whole is written, the rest is reported as damaged.
+    ``max_decoded`` and ``threads`` are those of ``mcz.open``.
 
     ``names`` decides about names that some system cannot hold, or not beside another: "stored"
     writes them as they are, and refuses what this system or disk cannot hold; "portable" gives
@@ -286,7 +293,7 @@ def unpack(
     if names not in NAMES:
         raise OptionError(f"names is {names!r}, not one of {', '.join(NAMES)}")
     folder, report = Folder(Path(directory)), Report()
-    with open(target, salvage=salvage, max_decoded=max_decoded) as opened:
+    with open(target, salvage=salvage, max_decoded=max_decoded, threads=threads) as opened:
         file = File(opened.container.strictly())
         report.damage += opened.damage
         wanted = list(file.clips.values()) if clips is None else file.clips_called(clips)

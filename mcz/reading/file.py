@@ -32,6 +32,7 @@ from mcz.reading.lost_skeletons import restore_skeletons
 from mcz.reading.names import clip_called, listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
+from mcz.threads import checked
 
 
 class Attachment:
@@ -199,6 +200,7 @@ def open(
     salvage: bool = False,
     max_decoded: int | None = None,
     unverified: bool = False,
+    threads: int | None = None,
 ) -> File:
     """Open an MCZ file lazily: a path, an fsspec target, bytes or a binary stream.
 
@@ -207,15 +209,21 @@ def open(
     ``unverified`` reads no more of a segment than what is asked for (joints, a resolution), so that
     its checksum cannot be checked and a damaged file may give wrong numbers; ``File.unverified``
     counts such segments. It saves bytes where segments are large, and does nothing in salvage.
-    Raises FormatError, in particular TruncatedError where there is no FOOT at the end, and
-    AccessError where the file cannot be read.
+    ``threads`` may decode at once, by default one a processor; the numbers are the same.
+    Raises FormatError, in particular TruncatedError where there is no FOOT at the end,
+    AccessError where the file cannot be read, and OptionError.
     """
+    options = {
+        "salvage": salvage,
+        "max_decoded": max_decoded,
+        "reads_parts": unverified,
+        "threads": checked(threads),
+    }
     try:
         source = open_source(target)
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
         text = getattr(error, "strerror", None) or error
         raise AccessError(f"{target}: {text}") from None
-    options = {"salvage": salvage, "max_decoded": max_decoded, "reads_parts": unverified}
     try:
         return _opened(source, options)
     except MczError as error:

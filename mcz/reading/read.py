@@ -24,6 +24,7 @@ def read(
     up: str | None = None,
     clip: str | None = None,
     max_decoded: int | None = None,
+    threads: int | None = None,
 ) -> Motion:
     """The motion in a BVH, AMC, C3D or MCZ file.
 
@@ -31,11 +32,11 @@ def read(
     found stands in the metadata, and a SkeletonWarning tells of one whose name or dofs do not fit.
     ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
     ("x", "y", "z"), say what the file does not. Of an MCZ file ``clip`` is read, with
-    ``max_decoded`` as in ``open``. Raises SourceError, FormatError or OptionError.
+    ``max_decoded`` and ``threads`` as in ``open``. Raises SourceError, FormatError or OptionError.
     """
     path = Path(path)
     if path.suffix.lower() == ".mcz":
-        with open(path, max_decoded=max_decoded) as file:
+        with open(path, max_decoded=max_decoded, threads=threads) as file:
             motion = file.only_clip(clip).motion()
     else:
         source_format = format_of(path)

@@ -280,13 +280,15 @@ def _heading(file: File, offset: int) -> str:
     return kind if kind in HEADINGS else "Chunks"
 
 
-def verify(target: Any, max_decoded: int | None = None) -> list[Problem]:
+def verify(
+    target: Any, max_decoded: int | None = None, threads: int | None = None
+) -> list[Problem]:
     """Check every checksum of a file, decode everything, restore every source.
 
     Returns the faults, none for a sound file; raises FormatError where it cannot even be opened.
-    ``max_decoded`` is that of ``mcz.open``.
+    ``max_decoded`` and ``threads`` are those of ``mcz.open``.
     """
-    with open(target, max_decoded=max_decoded) as file:
+    with open(target, max_decoded=max_decoded, threads=threads) as file:
         return validate(file)
 
 

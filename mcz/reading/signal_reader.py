@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,10 @@ from mcz.numbers import Grid, GridKind, values_of
 from mcz.reading.group_notes import GroupNotes, Noted, parse_group_notes, values_of_exceptions
 from mcz.reading.salvage import salvage
 from mcz.reading.signal_info import SignalInfo
+from mcz.threads import in_force, in_order
 
 BLOCK_ROWS = 512  # decoded at a time, at least
+NEIGHBORS = 4  # segments whose streams are kept for a thread
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,8 @@ class SignalReader:
         self.name = name
         self._cache: dict[int, tuple[StreamTable, dict[int, bytes]]] = {}
         self._read_ones: set[int] = set()  # segments
+        self._lock = Lock()  # of both
+        self._threads = container.threads or in_force()
 
     def read(self, start: int, stop: int) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
         """Values and mask of frames start <= f < stop, groups side by side."""
@@ -114,12 +119,17 @@ class SignalReader:
         spans = self._prepare(start, stop)
         if start == stop:  # the header has to be right all the same (CODEC-05)
             self._decode(spans, start, stop)
-        for a, b in self._ranges(start, stop):
+        per_frame = self.info.layout.samples_per_frame
+
+        def block(ends: tuple[int, int]) -> Block:
+            a, b = ends
+            own = None
+            if out is not None and not self.info.is_integer:
+                own = out[(a - start) * per_frame : (b - start) * per_frame]
             coded = self._decode(spans, a, b)
-            per_frame = self.info.layout.samples_per_frame
-            rows = slice((a - start) * per_frame, (b - start) * per_frame)
-            own = out[rows] if out is not None and not self.info.is_integer else None
-            yield Block(a, b, coded, *self._finish(coded, a, b, own))
+            return Block(a, b, coded, *self._finish(coded, a, b, own))
+
+        yield from in_order(block, list(self._ranges(start, stop)), self._threads)
 
     def _near(self, start: int, stop: int, out: NDArray[Any]) -> Iterator[Block]:
         """The same; a run of which the range has a part is decoded whole, and kept."""
@@ -285,24 +295,29 @@ class SignalReader:
         table, streams = self._cache.get(segment) or self._streams(segment)
         index = table.codec(resolution, group)
         if index not in streams:  # a group that another depends upon
-            streams.update(
-                self.container.streams(self.info.rows[segment], table.counts, [index], table)[1]
-            )
+            with self._lock:
+                row = self.info.rows[segment]
+                streams.update(self.container.streams(row, table.counts, [index], table)[1])
         return streams[index]
 
     def _streams(self, segment: int) -> tuple[StreamTable, dict[int, bytes]]:
-        if segment not in self._cache:
-            row, counts = self.info.rows[segment], self.info.counts
-            everything = len(self.groups) == counts.n_groups and not self.resolution
-            table = wanted = None
-            if not everything and self.container.in_part(row):
-                table = self.container.table(row, counts)
-                wanted = self._wanted(table)
-            self._cache[segment] = self.container.streams(row, counts, wanted, table)
-            self._read_ones.add(segment)
-            while len(self._cache) > 4:  # neighbors only: memory is bounded by segments
-                self._cache.pop(next(iter(self._cache)))
-        return self._cache[segment]
+        with self._lock:
+            found = self._cache.get(segment)
+            if found is None:
+                found = self._cache[segment] = self._fetched(segment)
+                self._read_ones.add(segment)
+                while len(self._cache) > NEIGHBORS * self._threads:  # bounds the memory
+                    self._cache.pop(next(iter(self._cache)))
+            return found
+
+    def _fetched(self, segment: int) -> tuple[StreamTable, dict[int, bytes]]:
+        row, counts = self.info.rows[segment], self.info.counts
+        everything = len(self.groups) == counts.n_groups and not self.resolution
+        table = wanted = None
+        if not everything and self.container.in_part(row):
+            table = self.container.table(row, counts)
+            wanted = self._wanted(table)
+        return self.container.streams(row, counts, wanted, table)
 
     def _wanted(self, table: StreamTable) -> list[int]:
         stored = range(table.counts.n_resolutions - self.resolution)

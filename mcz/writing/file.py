@@ -18,6 +18,7 @@ from mcz.container.limits import ARCHIVE, BASE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import OptionError, SkeletonWarning
 from mcz.motion import Motion
+from mcz.threads import limited
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
@@ -37,6 +38,7 @@ def write(
     force: bool = False,
     archive: bool = False,
     copies: bool = False,
+    threads: int | None = None,
     progress: Progress | None = None,
     **params: Any,
 ) -> Written:
@@ -46,12 +48,13 @@ def write(
     "normal" is a little smaller, "best" smallest. ``params`` are the codec's; ``archive`` chooses
     the profile of large limits. ``copies``: what holds the clip together, skeleton and template
     among it, stands in the file a second time, so that a flipped bit there costs no frame
-    (``mcz.open`` with ``salvage``). Raises
-    OptionError, MotionError, or LimitError where the profile is too small; MotionError also for a
-    key of the metadata that SPEC.md does not register, unless it is private (``x-...``).
+    (``mcz.open`` with ``salvage``). ``threads`` may code at once, by default one a processor; the
+    bytes are the same. Raises OptionError, MotionError, or LimitError where the profile is too
+    small; MotionError also for a key of the metadata that SPEC.md does not register, unless it is
+    private (``x-...``).
     """
     check_metadata(motion.metadata, motion.name)
-    with replacing(target, force=force, inputs=params.values()) as stream:
+    with limited(threads), replacing(target, force=force, inputs=params.values()) as stream:
         writer = Writer(stream, profile=profile_of(archive), copies=copies)
         name_skeleton(writer, motion.skeleton)
         quality = write_tuned(writer, motion, by_name(chosen(codec, effort)), params, progress)
@@ -78,14 +81,15 @@ def encode(
     force: bool = False,
     archive: bool = False,
     copies: bool = False,
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> Written:
     """Turn one ASF, AMC, BVH or C3D file into an MCZ file.
 
     ``skeleton`` is the ASF of an AMC, as ``mcz.read`` takes it, with the same SkeletonWarning.
     ``verbatim`` keeps a file that cannot be parsed as an attachment. ``up`` is the axis that points
-    up ("x", "y", "z"). ``effort`` and ``copies`` are those of ``mcz.write``.
-    Raises SourceError, OptionError, MotionError or LimitError; nothing is left
+    up ("x", "y", "z"). ``effort``, ``copies`` and ``threads`` are those of
+    ``mcz.write``. Raises SourceError, OptionError, MotionError or LimitError; nothing is left
     under the final name then. A target that is the source or its skeleton is refused, even with
     ``force``.
     """
@@ -96,7 +100,7 @@ def encode(
     terms = Terms(coded, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up)
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
-    with replacing(target, force=force, inputs=inputs) as stream:
+    with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
         draft = Draft(stream, profile_of(archive), hold=verbatim, copies=copies)
         entry.write(draft, progress)
         refuse_inputs(target, entry.inputs)

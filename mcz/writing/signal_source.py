@@ -24,6 +24,7 @@ from mcz.motion import Exceptions, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind, values_of_texts
 from mcz.schema import build
 
+KEPT_BLOCKS = 8
 MAX_INTEGER = 2**53  # what a binary64, and so every language, holds exactly
 Block = tuple[NDArray[np.int64], Signal]
 
@@ -62,7 +63,7 @@ class MemorySource:
         )
         frames = {row // signal.samples_per_frame for row, _, _ in signal.grid_changes}
         self.breaks: Sequence[int] = sorted(frames - {0})
-        self._settled: dict[tuple[int, int], Block] = {}  # the last block
+        self._settled: dict[tuple[int, int], Block] = {}  # the last blocks
 
     def grids(self, frame: int) -> tuple[Grid, ...]:
         return self.signal.cut(frame, frame).grids
@@ -85,14 +86,16 @@ class MemorySource:
             signal = self.signal.cut(start, stop)
             ordinals, settled = settle(signal if self.is_lossless else _freed(signal, self.exact))
             signal = replace(signal, exceptions=settled.exceptions)
-            self._settled = {(start, stop): (ordinals, signal)}
+            self._settled[start, stop] = ordinals, signal
+            while len(self._settled) > KEPT_BLOCKS:
+                self._settled.pop(next(iter(self._settled)))
         return self._settled[start, stop]
 
     def group_notes(self, start: int, stop: int) -> list[bytes]:
         """The group notes of frames start <= f < stop, b"" for a group that needs none."""
         signal = self.signal.cut(start, stop)
-        if (start, stop) in self._settled:
-            signal = self._settled[start, stop][1]
+        if self.is_lossless or self.exact:
+            signal = self._block(start, stop)[1]
         changed = [c for c, grid in enumerate(signal.grids) if grid != self.layout.grids[c]]
         if not changed and not len(signal.exceptions):
             return []

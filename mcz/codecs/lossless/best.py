@@ -26,15 +26,15 @@ from mcz.codecs.lossless import copying
 from mcz.codecs.lossless.best_streams import build_stream, parse_stream
 from mcz.codecs.lossless.copying import Ints
 from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
-from mcz.codecs.segments import TARGET_BYTES, Sizing
+from mcz.codecs.segments import Sizing
+from mcz.threads import in_force
 
-# Longer segments than codec 1 guesses, and closer to the target: what is learned is lost with each.
-SIZING = Sizing(target=TARGET_BYTES, value_bytes=1, aim=98, most_rows=MAX_ROWS, spare=1)
+SIZING = Sizing(57_000, 64_000, value_bytes=1.5, most_rows=MAX_ROWS, spare=1)
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
-    return copying.encode_streams(source, params, SIZING, build_stream)
+    return copying.encode_streams(source, params, SIZING, build_stream, in_force())
 
 
 def decode(
@@ -73,5 +73,5 @@ CODEC = Codec(
     decode=decode,
     regroup=regroup,
     recode=recode,
-    parameters=(segment_frames("62,000"),),
+    parameters=(segment_frames("57,000"),),
 )

@@ -29,23 +29,30 @@ Build = Callable[[Ints, Sequence[Own], int, Seen | None], bytes]  # makes the st
 
 
 def encode_streams(
-    source: SignalSource, params: Mapping[str, Any], sizing: Sizing, build: Build
+    source: SignalSource,
+    params: Mapping[str, Any],
+    sizing: Sizing,
+    build: Build,
+    threads: int = 1,
 ) -> Encoded:
     """Code the ordinals of ``source`` in streams that ``build`` makes."""
-    code = partial(_build_segment, source, build)
-    return Encoded(header=b"", segments=guessing(source, params["segment_frames"], sizing, code))
+    prepare = partial(_prepare, source, build)
+    return Encoded(b"", guessing(source, params["segment_frames"], sizing, prepare, threads))
 
 
-def _build_segment(source: SignalSource, build: Build, start: int, stop: int) -> tuple[bytes, ...]:
-    ordinals = source.ordinals(start, stop)
-    grids = source.grids(start)
-    seen: Seen = {}
-    streams = []
-    for index, group in enumerate(source.layout.groups):
-        columns = ordinals[:, list(group)]
-        own = [(grids[c], source.layout.grids[c]) for c in group]
-        streams.append(build(columns, own, index, seen))
-    return tuple(streams)
+def _prepare(
+    source: SignalSource, build: Build, start: int, stop: int
+) -> Callable[[], tuple[bytes, ...]]:
+    """What makes the streams of a segment."""
+    layout, grids, ordinals = source.layout, source.grids(start), source.ordinals(start, stop)
+
+    def streams() -> Iterator[bytes]:
+        seen: Seen = {}
+        for index, group in enumerate(layout.groups):
+            own = [(grids[c], layout.grids[c]) for c in group]
+            yield build(ordinals[:, list(group)], own, index, seen)
+
+    return lambda: tuple(streams())
 
 
 def recode_streams(

@@ -35,8 +35,7 @@ from mcz.numbers import Grid
 
 Ints = NDArray[np.int64]
 
-TARGET = 44_000
-SIZING = Sizing(target=TARGET, value_bytes=2, aim=95, most_rows=MAX_ROWS, spare=1)
+SIZING = Sizing(43_000, 50_000, value_bytes=2, most_rows=MAX_ROWS, spare=1)
 
 
 def decode(
@@ -123,5 +122,5 @@ CODEC = Codec(
     decode=decode,
     regroup=regroup,
     recode=partial(recode_groups, build_streams),
-    parameters=(segment_frames("44,000"),),
+    parameters=(segment_frames("43,000"),),
 )

@@ -29,7 +29,7 @@ from mcz.codecs.contract import (
 )
 from mcz.codecs.lossless.copying import decode_streams, encode_streams, recode_streams, regroup
 from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
-from mcz.codecs.segments import TARGET_BYTES, Sizing
+from mcz.codecs.segments import Sizing
 from mcz.coding.ordinals.degrees import is_tiny
 from mcz.coding.ordinals.streams import build_stream, parse_stream
 from mcz.numbers import GridKind
@@ -37,7 +37,7 @@ from mcz.numbers import GridKind
 Ints = NDArray[np.int64]
 
 FIRST_FRAMES = 64  # that decide on the version
-SIZING = Sizing(target=TARGET_BYTES, value_bytes=2, aim=95, most_rows=MAX_ROWS, spare=1)
+SIZING = Sizing(57_000, 64_000, value_bytes=2, most_rows=MAX_ROWS, spare=1)
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
@@ -96,5 +96,5 @@ CODEC = Codec(
     decode=decode,
     regroup=regroup,
     recode=recode,
-    parameters=(segment_frames("62,000"),),
+    parameters=(segment_frames("57,000"),),
 )

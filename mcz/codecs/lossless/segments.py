@@ -30,12 +30,8 @@ def encode_groups(
     build: Build, sizing: Sizing, source: SignalSource, params: Mapping[str, Any]
 ) -> Encoded:
     """Code the ordinals of ``source``; ``segment_frames`` 0 lets the size decide."""
-    code = partial(_build_segment, build, source)
-    return Encoded(header=b"", segments=guessing(source, params["segment_frames"], sizing, code))
-
-
-def _build_segment(build: Build, source: SignalSource, start: int, stop: int) -> tuple[bytes, ...]:
-    return _streams(build, source, start, stop, range(len(source.layout.groups)), True)
+    prepare = partial(_prepare, build, source, range(len(source.layout.groups)), True)
+    return Encoded(b"", guessing(source, params["segment_frames"], sizing, prepare))
 
 
 def recode_groups(
@@ -52,21 +48,23 @@ def recode_groups(
     What such a stream repeated, or who repeated it, need not be looked at then.
     """
     for span in spans:
-        yield _streams(build, source, span.first, span.stop, groups, False)
+        yield _prepare(build, source, groups, False, span.first, span.stop)()
 
 
-def _streams(
+def _prepare(
     build: Build,
     source: SignalSource,
-    start: int,
-    stop: int,
     groups: Sequence[int],
     copying: bool,
-) -> tuple[bytes, ...]:
+    start: int,
+    stop: int,
+) -> Callable[[], tuple[bytes, ...]]:
+    """What makes the streams of some groups in a segment."""
     layout = source.layout
     grids = list(zip(source.grids(start), layout.grids, strict=True))
     channels = [layout.groups[group] for group in groups]
-    return tuple(build(source.ordinals(start, stop), grids, channels, groups, copying))
+    ordinals = source.ordinals(start, stop)
+    return lambda: tuple(build(ordinals, grids, channels, groups, copying))
 
 
 def check_copy(name: str, layout: Layout, group: int, column: int) -> None:

@@ -1,0 +1,75 @@
+"""How many threads work on a file, and work that they share.
+
+Compiled loops and hashes let other threads run, so segments that need nothing of each other are
+decoded and coded at once. What comes out does not depend on the number.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, TypeVar
+
+from mcz.errors import OptionError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+_LIMIT: ContextVar[int | None] = ContextVar("threads", default=None)
+
+
+def in_force() -> int:
+    """How many threads a call may use: by default one a processor that the process may use."""
+    return _LIMIT.get() or _processors()
+
+
+def _processors() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextmanager
+def limited(threads: int | None) -> Iterator[None]:
+    """Let what is called meanwhile use so many threads; None: as many as before."""
+    token = _LIMIT.set(checked(threads) or _LIMIT.get())
+    try:
+        yield
+    finally:
+        _LIMIT.reset(token)
+
+
+def checked(threads: int | None) -> int | None:
+    """The same number; raises OptionError for one below 1."""
+    if threads is not None and threads < 1:
+        raise OptionError(f"threads: {threads}, not at least 1")
+    return threads
+
+
+def in_order(
+    function: Callable[[Item], Result], items: Sequence[Item], threads: int
+) -> Iterator[Result]:
+    """``function`` of each item, in order; few results wait, so that memory is bounded."""
+    if threads < 2 or len(items) < 2:
+        yield from map(function, items)
+        return
+    from concurrent.futures import ThreadPoolExecutor  # on first use
+
+    waiting: deque[Future[Result]] = deque()
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            for item in items:
+                waiting.append(pool.submit(function, item))
+                if len(waiting) > threads:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()

@@ -1,0 +1,131 @@
+"""Threads: the same numbers and bytes however many there are, and faults where they were."""
+
+from __future__ import annotations
+
+import io
+import threading
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.codecs import CODECS
+from mcz.codecs.ahead import Ahead
+from mcz.errors import ChecksumError, OptionError
+from mcz.threads import in_force, in_order, limited
+from tests.motions import smooth
+
+MOTION = smooth(1800)
+SEGMENTED = sorted(
+    codec.name
+    for codec in CODECS.values()
+    if any(parameter.name == "segment_frames" for parameter in codec.parameters)
+)
+
+
+def file_of(codec: str, threads: int | None = None, **params: object) -> bytes:
+    out = io.BytesIO()
+    mcz.write(MOTION, out, codec=codec, threads=threads, **params)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("codec", SEGMENTED)
+def test_numbers_do_not_depend_on_threads(codec: str) -> None:
+    data = file_of(codec, segment_frames=270)
+    found = []
+    for threads in (1, 2, 5):
+        with mcz.open(data, threads=threads) as file:
+            clip = file.only_clip()
+            found.append((clip.values[:], clip.values[100:1700], clip.read(joints=["spine"])))
+    for arrays in found[1:]:
+        for one, other in zip(arrays, found[0], strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("codec", ["raw", "lossless", "fast", "best"])
+@pytest.mark.parametrize("segment_frames", [0, 250])
+def test_bytes_do_not_depend_on_threads(codec: str, segment_frames: int) -> None:
+    files = {file_of(codec, threads, segment_frames=segment_frames) for threads in (1, 2, 5)}
+    assert len(files) == 1
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+def test_damage_is_found_where_it_is(threads: int) -> None:
+    data = bytearray(file_of("fast", segment_frames=300))
+    with mcz.open(bytes(data)) as file:
+        rows = file.only_clip().signals[0].rows
+    data[rows[3].offset + 40] ^= 1
+    with mcz.open(bytes(data), threads=threads) as file:
+        clip = file.only_clip()
+        with pytest.raises(ChecksumError, match=f"DATA at {rows[3].chunk().offset}"):
+            clip.values[:]
+        np.testing.assert_array_equal(clip.values[:900], MOTION.values[:900])
+        np.testing.assert_array_equal(clip.values[1200:], MOTION.values[1200:])
+
+
+def test_how_many_threads_there_are() -> None:
+    usual = in_force()
+    assert usual >= 1
+    with limited(3):
+        assert in_force() == 3
+        with limited(None):
+            assert in_force() == 3
+        with limited(1):
+            assert in_force() == 1
+    assert in_force() == usual
+    with pytest.raises(OptionError, match="threads: 0"):
+        mcz.open(b"", threads=0)
+    with pytest.raises(OptionError, match="threads: -1"):
+        mcz.write(MOTION, io.BytesIO(), threads=-1)
+
+
+@given(st.integers(1, 4), st.integers(0, 12), st.integers(0, 12))
+def test_results_come_in_order(threads: int, n: int, fault: int) -> None:
+    def square(item: int) -> int:
+        if item == fault:
+            raise ValueError(item)
+        return item * item
+
+    found = []
+    if fault < n:
+        with pytest.raises(ValueError, match=str(fault)):
+            found.extend(in_order(square, range(n), threads))
+    else:
+        found.extend(in_order(square, range(n), threads))
+    assert found[: min(n, fault)] == [item * item for item in range(min(n, fault))]
+
+
+def test_few_results_wait() -> None:
+    begun: list[int] = []
+    before = threading.active_count()
+    results = in_order(lambda item: begun.append(item) or item, range(100), 3)
+    assert next(results) == 0
+    assert len(begun) <= 5
+    results.close()
+    assert len(begun) <= 5
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_what_follows_is_a_guess(threads: int) -> None:
+    prepared: list[tuple[int, int]] = []
+
+    def prepare(first: int, stop: int) -> Callable[[], tuple[bytes, ...]]:
+        assert threading.current_thread() is threading.main_thread()
+        prepared.append((first, stop))
+        return lambda: (f"{first}-{stop}".encode(),)
+
+    def spans(first: int, length: int) -> Iterator[tuple[int, int]]:
+        for at in range(first, 100, length):
+            yield at, at + length
+
+    with Ahead(prepare, threads) as ahead:
+        for first, length in ((0, 10), (10, 10), (20, 5), (25, 5), (95, 5)):
+            following = spans(first, length)
+            span = next(following)
+            assert ahead.code(span, following) == (f"{span[0]}-{span[1]}".encode(),)
+    assert len(set(prepared)) == len(prepared) or threads == 1
+    assert len(prepared) <= 5 * threads + 5
