@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mcz import brief
 from mcz.errors import MotionError
-from mcz.numbers import Grid, GridKind
+from mcz.numbers import Grid, GridKind, ordinals_of
 from mcz.numbers.blocks import grid_blocks as grid_blocks
 from mcz.numbers.exceptions import Exceptions as Exceptions
 from mcz.numbers.scaling import Scaling
@@ -170,6 +170,8 @@ class Signal:
         """
         if self.scaling is not None:
             return self.as_stored().to_ordinals()
+        if self.ordinals is None and not self.grid_changes:
+            return ordinals_of(self.values, self.grids)
         ordinals = np.empty(self.values.shape, np.int64)
         exact = np.empty(self.values.shape, np.bool_)
         for rows, columns, grid in self.grid_blocks():

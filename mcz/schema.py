@@ -52,10 +52,15 @@ def _write(stream: Any, data: bytes, path: str) -> None:
     stream_write(stream, data, len(data), path)
 
 
+ONE_BYTE = [bytes((value,)) for value in range(0x80)]
+
+
 def varint(value: int) -> bytes:
     """The bytes of ``value``, 0 <= value <= 2^53 - 1."""
     if not 0 <= value <= MAX_COUNT:
         raise LimitError(f"{value} is not between 0 and 2^53 - 1")
+    if value < 0x80:
+        return ONE_BYTE[value]
     out = bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)

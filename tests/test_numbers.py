@@ -14,7 +14,18 @@ from hypothesis import strategies as st
 
 from mcz import schema
 from mcz.errors import FormatError, OptionError, SourceError
-from mcz.numbers import GRID, Grid, GridFlag, GridKind, Tokens, choose_grid, fit, scan, values_of
+from mcz.numbers import (
+    GRID,
+    Grid,
+    GridFlag,
+    GridKind,
+    Tokens,
+    choose_grid,
+    fit,
+    ordinals_of,
+    scan,
+    values_of,
+)
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 PLAIN = [flag for flag in GridFlag if flag not in (GridFlag.POINT, GridFlag.EXPONENT1)]
@@ -184,7 +195,7 @@ def edges(grid: Grid) -> list[int]:
     return [low, low + 1, -2, -1, 0, 1, 2, grid.limit - 1, grid.limit]
 
 
-@pytest.mark.parametrize("grid", GRIDS, ids=str)
+@pytest.mark.parametrize("grid", GRIDS, ids=repr)
 @given(st.lists(INT64, max_size=8), st.lists(DOUBLES, max_size=8))
 def test_every_ordinal(grid: Grid, extra: list[int], values: list[float]) -> None:
     """In range: a value, a text and back. Out of range: FormatError."""
@@ -216,7 +227,7 @@ def test_every_ordinal(grid: Grid, extra: list[int], values: list[float]) -> Non
                     grid.texts(np.array([wild]))
 
 
-@pytest.mark.parametrize("grid", GRIDS, ids=str)
+@pytest.mark.parametrize("grid", GRIDS, ids=repr)
 def test_values_that_a_grid_lacks(grid: Grid) -> None:
     """NaN is 0 and inexact, infinities are the ends, except on IEEE grids."""
     ordinals, exact = grid.ordinals(np.array([np.nan, np.inf, -np.inf, -0.0]))
@@ -480,7 +491,7 @@ def test_scaled_and_integer() -> None:
         Grid(GridKind.FIXED, 4).bits(np.array([1]))
 
 
-@pytest.mark.parametrize("grid", GRIDS, ids=str)
+@pytest.mark.parametrize("grid", GRIDS, ids=repr)
 def test_schema(grid: Grid) -> None:
     fields = {"kind": grid.kind, "digits": grid.digits, "flags": grid.flags}
     wrapped = schema.Struct("grid" / GRID)
@@ -550,6 +561,21 @@ def test_values_of_a_matrix_are_those_of_each_grid(grid: Grid, data: st.DataObje
     for column, own in enumerate(grids):
         wanted = own.values(ordinals[:, column])
         np.testing.assert_array_equal(found[:, column].view(np.int64), wanted.view(np.int64))
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=repr)
+@given(data=st.data())
+def test_ordinals_of_a_matrix_are_those_of_each_grid(grid: Grid, data: st.DataObject) -> None:
+    values = DOUBLES | st.sampled_from([0.0, -0.0, np.nan, np.inf, -np.inf, 5e-324, 1e308, 0.5])
+    held = INT64.map(lambda o: float(grid.values(np.array([o % (grid.limit + 1)]))[0]))
+    rows = data.draw(st.lists(st.tuples(values | held, values), min_size=1, max_size=6))
+    table = np.array(rows)
+    grids = (grid, GRIDS[0])
+    ordinals, exact = ordinals_of(table, grids)
+    for c, own in enumerate(grids):
+        wanted, back = own.ordinals(np.ascontiguousarray(table[:, c]))
+        assert ordinals[:, c].tolist() == wanted.tolist()
+        assert exact[:, c].tolist() == back.tolist()
 
 
 def test_values_of_a_matrix_refuse_what_is_no_ordinal() -> None:

@@ -43,6 +43,7 @@ from mcz.container.packets import (
 )
 from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.errors import FormatError, MotionError
+from mcz.motion import Skeleton
 from mcz.schema import build, deflate
 
 ATTACHMENT_PART = MIB  # decoded bytes of one ATTA
@@ -89,6 +90,7 @@ class Writer:
         self.directory = directory or Directory()
         self._clip: ClipRow | None = None
         self._next_packet: int | None = None  # while a DATA is open
+        self.last_skeleton: tuple[Skeleton, bytes] | None = None  # and its id
         self._copies = list(uncopied) if copies else None  # of what was written so far
         if offset == 0:
             self._write_head(head_extension)

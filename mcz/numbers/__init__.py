@@ -14,7 +14,7 @@ from mcz.numbers.choose import choose_grid, fit
 from mcz.numbers.grid import GRID, GRID_FIELDS, Grid
 from mcz.numbers.rules import GridFlag, GridKind
 from mcz.numbers.tokens import Texts, Tokens, scan, values_of_texts
-from mcz.numbers.values import values_of
+from mcz.numbers.values import ordinals_of, values_of
 
 __all__ = [
     "GRID",
@@ -26,6 +26,7 @@ __all__ = [
     "Tokens",
     "choose_grid",
     "fit",
+    "ordinals_of",
     "scan",
     "values_of",
     "values_of_texts",

@@ -1,9 +1,9 @@
-"""Values of a whole matrix of ordinals, whose channels have grids of their own."""
+"""Values and ordinals of a whole matrix, whose channels have grids of their own."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from mcz.numbers.blocks import grid_blocks
 from mcz.numbers.grid import Grid
+from mcz.numbers.magnitudes import POWERS
 from mcz.numbers.rules import MIN_POWER, GridKind
-from mcz.numbers.tokens import TENS, Floats, Ints
+from mcz.numbers.tokens import TENS, Bools, Floats, Ints
 
 
 def values_of(
@@ -28,10 +29,8 @@ def values_of(
     values = np.empty(ordinals.shape) if out is None else out
     if not changes and ordinals.flags.c_contiguous:
         left = np.zeros(len(grids), np.int64)
-        _kernels().fill(ordinals, _rules(tuple(grids)), TENS, values, left)
-        others = np.flatnonzero(left).tolist()
-        for grid in dict.fromkeys(grids[c] for c in others):
-            columns = [c for c in others if grids[c] == grid]
+        _kernels("value").fill(ordinals, _rules(tuple(grids)), TENS, values, left)
+        for grid, columns in _left(left, grids):
             values[:, columns] = grid.values(ordinals[:, columns])
         return values
     for rows, columns, grid in grid_blocks(len(ordinals), grids, changes):
@@ -39,10 +38,31 @@ def values_of(
     return values
 
 
+def ordinals_of(values: Floats, grids: Sequence[Grid]) -> tuple[Ints, Bools]:
+    """The ordinal of each value, (rows, channels), and whether it gives exactly this value back.
+
+    As ``Grid.ordinals`` finds them.
+    """
+    values = np.ascontiguousarray(values, np.float64)
+    ordinals, exact = np.empty(values.shape, np.int64), np.empty(values.shape, np.uint8)
+    left = np.zeros(len(grids), np.int64)
+    _kernels("ordinal").fill(values, _rules(tuple(grids)), TENS, POWERS, ordinals, exact, left)
+    for grid, columns in _left(left, grids):
+        ordinals[:, columns], exact[:, columns] = grid.ordinals(values[:, columns])
+    return ordinals, exact.view(np.bool_)
+
+
+def _left(left: Ints, grids: Sequence[Grid]) -> Iterator[tuple[Grid, list[int]]]:
+    """The channels that a compiled loop left, by grid."""
+    others = np.flatnonzero(left).tolist()
+    for grid in dict.fromkeys(grids[c] for c in others):
+        yield grid, [c for c in others if grids[c] == grid]
+
+
 @lru_cache(maxsize=64)
 def _rules(grids: tuple[Grid, ...]) -> Ints:
     """How the compiled loop makes values of each grid."""
-    loops = _kernels()
+    loops = _kernels("value")
     rules = np.empty((len(grids), loops.RULE_SIZE), np.int64)
     for rule, grid in zip(rules, grids, strict=True):
         match grid.kind:
@@ -55,6 +75,6 @@ def _rules(grids: tuple[Grid, ...]) -> Ints:
     return rules
 
 
-def _kernels() -> Any:
+def _kernels(what: str) -> Any:
     """The compiled loops, imported on first use."""
-    return importlib.import_module("mcz.numbers.value_kernels")
+    return importlib.import_module(f"mcz.numbers.{what}_kernels")

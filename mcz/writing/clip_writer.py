@@ -37,6 +37,11 @@ Amend = Callable[[dict[str, str], Sequence[NDArray[Any]]], dict[str, str]]
 
 def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
     """Write SKEL, after the SRCE of its own file if it has one; return its id."""
+    given = skeleton
+    if writer.last_skeleton is not None and writer.last_skeleton[0] is given:
+        id_ = writer.last_skeleton[1]
+        if (b"SKEL", id_) in writer.directory.shared:  # not taken back with what failed
+            return id_
     check("joints", skeleton.n_joints, writer.profile.joints)
     check("channels", skeleton.n_channels, writer.profile.channels)
     if skeleton.base and (b"SKEL", skeleton.base) not in writer.directory.shared:
@@ -50,7 +55,9 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
             "size": skeleton.source.size,
             "sha256": skeleton.source.sha256,
         }
-    return writer.shared(b"SKEL", build_skeleton(skeleton, source))
+    id_ = writer.shared(b"SKEL", build_skeleton(skeleton, source))
+    writer.last_skeleton = given, id_
+    return id_
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,7 @@ DEGREE = 180 / np.pi  # in a radian
 LARGEST = 1e-12  # degrees: numbers near 1e-9 are products by chance
 MOST = 2**24  # units in a value
 _UNITS = DEGREE * 2.0 ** -np.arange(44, 77)
-_SAMPLE = 16
+_SAMPLE = 8
 
 
 def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
@@ -34,7 +33,7 @@ def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
 
     codes = np.ascontiguousarray(codes)
     out = np.empty(len(codes), np.int64)
-    if own.fill(codes, unit, shifts, TENS, POWERS, 10 ** (grid.digits - 1), out):
+    if own.fill(codes, unit, shifts, TENS, POWERS, grid.digits, out):
         printed = out == own.PRINTED
         few, places = np.unique(codes[printed], return_inverse=True)  # often small ones
         out[printed] = grid.ordinals(multiples_of(few, shifts) * np.float64(unit))[0][
@@ -59,10 +58,12 @@ def codes_of(counts: Ints) -> tuple[Ints, int]:
 
 def is_tiny(ordinals: Ints, grid: Grid) -> bool:
     """Whether a column may be rounding noise: the cheap test."""
-    if grid.kind != GridKind.GENERAL or not ordinals.any():
+    if grid.kind != GridKind.GENERAL or not len(ordinals):
         return False
     least, most = _bounds(grid)
-    return bool(least < ordinals.min() and ordinals.max() < most)
+    if not least < ordinals[0] < most:  # nearly all columns
+        return False
+    return bool(least < ordinals.min() and ordinals.max() < most and ordinals.any())
 
 
 @cache
@@ -76,19 +77,14 @@ def find_degrees(ordinals: Ints, grid: Grid) -> tuple[float, int, Ints] | None:
     """A unit, shifts and the codes that ``of_products`` turns into these ordinals, or None."""
     if not is_tiny(ordinals, grid):
         return None
-    sample = np.unique(ordinals)
-    sample = sample[:: max(1, len(sample) // _SAMPLE)]
-    fits = _fitting(sample, _UNITS[:, None], grid)[1].all(axis=1)
+    values = grid.values(ordinals)
+    some = np.argsort(ordinals)[:: max(1, len(ordinals) // _SAMPLE)]
+    products = np.rint(values[some] / _UNITS[:, None]) * _UNITS[:, None]
+    fits = (grid.ordinals(products)[0] == ordinals[some]).all(axis=1)
     for unit in _UNITS[fits].tolist():
-        counts, fitting = _fitting(ordinals, unit, grid)
-        if fitting.all():
+        counts = np.rint(values / unit).astype(np.int64)
+        if np.abs(counts).max() < MOST:
             codes, shifts = codes_of(counts)
-            return unit, shifts, codes
+            if (of_products(codes, unit, shifts, grid) == ordinals).all():
+                return unit, shifts, codes
     return None
-
-
-def _fitting(ordinals: Ints, units: Any, grid: Grid) -> tuple[Ints, NDArray[np.bool_]]:
-    """Multiples of units close to numbers, and which of them give these ordinals back."""
-    counts = np.rint(grid.values(ordinals) / units).astype(np.int64)  # which have no -0
-    back = grid.ordinals(counts * units)[0] == ordinals
-    return counts, back & (np.abs(counts) < MOST)

@@ -84,21 +84,20 @@ class Coded:
     shape: Lattice
     unit: float | None = None
     shifts: int = 0
-    plan: Ints | None = None
+    plan: Sequence[int] = ()
     scale: int = 0
 
     def head(self) -> bytes:
         own = loops()[0]
-        assert self.plan is not None
-        base, digits, drop, top, depth = self.plan[own.BASE : own.DEPTH + 1].tolist()
-        taps = self.plan[own.TAPS : own.TAPS + own.MAX_TAPS].tolist()
+        base, digits, drop, top, depth = self.plan[own.BASE : own.DEPTH + 1]
+        taps = list(self.plan[own.TAPS : own.TAPS + own.MAX_TAPS])
         while taps and not taps[-1]:
             taps.pop()
         form = form_of(Lattice(base, digits, drop))
         if self.unit is not None:
             form = PRODUCTS if self.shifts else MULTIPLES
         own_form = drop > 0 or form != self.clip_form
-        kind = CODED | int(self.plan[own.FROM_LAST]) << 2 | len(taps) << 3 | OWN_FORM * own_form
+        kind = CODED | self.plan[own.FROM_LAST] << 2 | len(taps) << 3 | OWN_FORM * own_form
         parts = [bytes((kind,)), bytes((form, drop)) if own_form else b""]
         parts += [struct.pack("<d", self.unit)] if self.unit is not None else []
         parts += [bytes((self.shifts,))] if self.shifts else []
@@ -179,7 +178,7 @@ def plan(coded: Sequence[Coded]) -> Ints:
     scales = np.zeros(len(coded), np.int64)
     records = np.empty((columns.size, record.RECORD_SIZE), np.int64)
     choice.plan_columns(columns, max_tops, plans, tables().powers, scales, records)
-    for head, found, scale in zip(coded, plans, scales.tolist(), strict=True):
+    for head, found, scale in zip(coded, plans.tolist(), scales.tolist(), strict=True):
         head.plan, head.scale = found, scale
     return records
 
