@@ -19,7 +19,7 @@ PACKAGE = Path(mcz.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # What a part may import; a part is the first name after ``mcz.``. Each may import itself.
-GROUND = {"brief", "errors", "schema", "numbers"}
+GROUND = {"brief", "errors", "schema", "numbers", "threads"}
 MODEL = GROUND | {"motion", "skeleton", "source"}
 # Where motion, codec and container meet: what each of the doors below needs of the layers.
 JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
@@ -40,6 +40,7 @@ ALLOWED = {
     "bjontegaard": GROUND,
     "joint_errors": MODEL | {"kinematics"},
     "units": MODEL,
+    "threads": {"errors"},
     "annexes": set(),
     "coding": GROUND | {"annexes"},
     "transforms": GROUND,

@@ -105,7 +105,8 @@ def guessing(
     first = 0
     with Ahead(prepare, threads) as ahead:
         while first < layout.n_frames:
-            spans = _spans(first, min(guess, most), ends)
+            longest = min(most, guess if fixed else guess * 11 // 10)
+            spans = _spans(first, min(guess, most), longest, ends)
             span = next(spans)
             n_frames = span[1] - first
             streams = ahead.code(span, spans)
@@ -120,12 +121,13 @@ def guessing(
                 guess = max(1, min(4 * n_frames, fitting))
 
 
-def _spans(first: int, length: int, ends: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """Segments of ``length`` frames from a frame on, shorter before ``ends``."""
+def _spans(first: int, length: int, longest: int, ends: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """Segments of ``length`` frames from a frame on; before ``ends`` shorter, or a bit longer."""
     for end in ends:
         while first < end:
-            yield first, min(first + length, end)
-            first = min(first + length, end)
+            stop = end if end - first <= longest else first + length
+            yield first, stop
+            first = stop
 
 
 def _size(streams: Streams) -> int:

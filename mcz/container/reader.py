@@ -100,13 +100,8 @@ class Container:
         self.profile: Profile = parse_head(self.directory.head)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _reopened, (
-            self.source,
-            self.salvage,
-            self.max_decoded,
-            self.reads_parts,
-            self.threads,
-        )
+        names = "salvage", "max_decoded", "reads_parts", "threads"
+        return _reopened, (self.source, {name: getattr(self, name) for name in names})
 
     def strictly(self) -> Container:
         """The same file, of which what is read is checked as in a sound one."""
@@ -382,17 +377,10 @@ class Container:
         check(f"DATA at {row.offset}: bytes", row.size, limit)
 
 
-def _reopened(source: ByteSource, *options: Any) -> Container:
+def _reopened(source: ByteSource, options: dict[str, Any]) -> Container:
     """What a pickled Container becomes: the same file, opened anew, closed when it is let go."""
-    salvage, max_decoded, reads_parts, threads = options
     try:
-        container = Container(
-            source,
-            salvage=salvage,
-            max_decoded=max_decoded,
-            reads_parts=reads_parts,
-            threads=threads,
-        )
+        container = Container(source, **options)
     except BaseException:
         source.close()
         raise
