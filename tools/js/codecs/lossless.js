@@ -3,7 +3,15 @@
 import { RangeDecoder, bits, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
 import { binary32Ordinal } from "../grids.js";
-import { MULTIPLES, PLAIN, POWERS_OF_10, PRODUCTS, classesOf } from "../heads.js";
+import {
+  COUNTS,
+  MULTIPLES,
+  PLAIN,
+  POWERS_OF_10,
+  PRODUCTS,
+  classesOf,
+  headOfRests,
+} from "../heads.js";
 import { halvesOf, setHalves, setInteger } from "../int64.js";
 import { ordinalOf } from "../ordinals.js";
 import { SignalDecoder } from "../ordinal-streams.js";
@@ -35,9 +43,9 @@ const TWO_44 = 2 ** 44;
 const TWO_52 = 2 ** 52;
 
 /** The codec in each of its versions. */
-const VERSIONS = [false, true].map((hasProducts) => ({
+const VERSIONS = [false, true].map((hasForms) => ({
   name,
-  rules: { maxTaps: 8, hasDepth: false, hasProducts },
+  rules: { maxTaps: 8, hasDepth: false, hasProducts: hasForms, hasCounts: hasForms },
   decoder: (ordinals) => new BitDecoder(ordinals),
 }));
 
@@ -81,11 +89,14 @@ export function decodeGroups(layout, segments, groups) {
 export class CodedChannel {
   constructor(head) {
     this.column = head.column;
-    this.isPlain = [PLAIN, MULTIPLES, PRODUCTS].includes(head.form);
+    this.isPlain = [PLAIN, MULTIPLES, PRODUCTS, COUNTS].includes(head.form);
     this.form = head.form;
     this.drop = head.drop;
     this.unit = head.unit;
     this.shifts = head.shifts;
+    this.law = head.law;
+    this.counted = 0; // the ordinal of the last count
+    this.restOf = null; // of a channel of rests: the one that they belong to
     this.grid = head.grid;
     this.fromLast = head.fromLast;
     this.taps = head.taps;
@@ -122,6 +133,22 @@ function productOf({ unit, shifts }, code) {
   return code < 0 ? -size : size;
 }
 
+/** The ordinal of what a count says. */
+function ordinalOfCount({ unit, law }, count) {
+  let x = count * unit;
+  if (law.offset !== null) x += law.offset;
+  x = Math.fround(x);
+  if (law.shift !== null) x += law.shift;
+  return binary32Ordinal(x);
+}
+
+/** What decodes the rests of a channel of counts. */
+function restsOf(head, channel) {
+  const rests = new CodedChannel(headOfRests(head));
+  rests.restOf = channel;
+  return rests;
+}
+
 /** Decodes the coded channels of a group in a segment, one group after the other. */
 export class BitDecoder {
   /**
@@ -145,7 +172,8 @@ export class BitDecoder {
     restart(this.model, this.startModel);
     this.coder = new RangeDecoder(data);
     const channels = heads.map((head) => new CodedChannel(head));
-    this.decode(channels, nRows, nChannels, firstIndex);
+    const rests = heads.flatMap((head, i) => (head.law?.hasRests ? restsOf(head, channels[i]) : []));
+    this.decode([...channels, ...rests], nRows, nChannels, firstIndex);
     this.coder.finish(what);
   }
 
@@ -183,7 +211,7 @@ export class BitDecoder {
     channel.side1 = side(error);
   }
 
-  /** Forms 0, 32 and 33. */
+  /** Forms 0 and 32 to 34, and rests. */
   plain(channel, index) {
     this.plainOf(channel, index, clamp(channel.predict(), -TWO_44, TWO_44));
   }
@@ -196,7 +224,12 @@ export class BitDecoder {
     }
     this.remember(channel, value, predicted);
     const { drop } = channel;
-    if (channel.form === MULTIPLES) {
+    if (channel.restOf !== null) {
+      setInteger(this.halves, index, channel.restOf.counted + value);
+    } else if (channel.form === COUNTS) {
+      channel.counted = ordinalOfCount(channel, value);
+      setInteger(this.halves, index, channel.counted);
+    } else if (channel.form === MULTIPLES) {
       setInteger(this.halves, index, binary32Ordinal(value * channel.unit));
     } else if (channel.form === PRODUCTS) {
       this.ordinals[index] = ordinalOf(channel.grid, productOf(channel, value));
