@@ -92,7 +92,8 @@ def _cheapest(laws: Iterable[tuple[Law, Ints]], ordinals: Ints) -> Counted | Non
 
 def _spacing(values: Floats, least: float = 2.0**-126) -> Floats:
     """The spacing of binary32 numbers at values, those below ``least`` taken for it."""
-    return np.spacing(np.maximum(np.abs(values), least).astype("<f4")).astype(np.float64)
+    sizes = np.maximum(np.abs(values), least).astype("<f4")
+    return np.asarray(np.spacing(sizes), np.float64)
 
 
 def find_line(distinct: Floats) -> Line | None:
@@ -189,7 +190,8 @@ def _laws(values: Floats, distinct: Floats, line: Line) -> Iterator[tuple[Law, I
         if fitted is not None and _usable(*fitted):
             yield Law(*fitted), counts
     off = np.abs(distinct - unit * few - offset)
-    steps = {int(np.ceil(np.log2(2 * size))) for size in (off.max(), np.quantile(off, 0.9)) if size > 0}
+    sizes = float(off.max()), float(np.quantile(off, 0.9))
+    steps = {int(np.ceil(np.log2(2 * size))) for size in sizes if size > 0}
     for power in sorted({power - down for power in steps for down in (0, 1)}):
         law = _rounded_law(distinct, few, unit, 2.0**power)
         if law is not None:
@@ -219,7 +221,7 @@ def _without_offset(
 def _rounded_law(distinct: Floats, few: Floats, unit: float, step: float) -> Law | None:
     """A law whose first sum was rounded to ``step``: all values are whole steps apart."""
     span = float(distinct[-1] - distinct[0])
-    if not step < unit / 2 or span > step * 2.0**21:
+    if not 0 < step < unit / 2 or span > step * 2.0**21:
         return None
     finest = float(distinct[np.argmin(_spacing(distinct))])
     steps = np.rint((distinct - finest) / step)

@@ -39,7 +39,7 @@ WITH_UNIT = MULTIPLES, PRODUCTS, COUNTS
 def read_heads(
     stream: bytes, grids: Sequence[Grid], version: int = 0
 ) -> tuple[list[tuple[int, Any, bytes]], int]:
-    """Of each channel its kind, its plan, map and rests, ordinal or what it copies; its head's bytes.
+    """Of each channel its kind; its plan, map and rests, ordinal or what it copies; its head.
 
     Also the offset after the heads. The map (None: none) turns coded integers into ordinals.
     Rests: whether further integers are coded, which are added to these.

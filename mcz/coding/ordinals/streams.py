@@ -89,9 +89,7 @@ def plan_stream(
         else:
             if seen is not None:
                 seen[key] = group, channel
-            head, plan, numbers, rest = _coded_head(
-                column, *grids[channel], version, fitted=fitted
-            )
+            head, plan, numbers, rest = _coded_head(column, *grids[channel], version, fitted=fitted)
             heads.append(head)
             plans.append(plan)
             coded.append(numbers)

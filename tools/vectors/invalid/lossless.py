@@ -215,10 +215,12 @@ def _products(shelf: Broken) -> None:
 def _counts(shelf: Broken) -> None:
     offset, beyond = Law(0.25, 0.5), 2.0**80 * (1 + 2.0**-52)
     base = Coded(COUNTS, law=offset, multiples=(0,) * 5)
-    motion = column([0.5] * 5, SINGLE)
 
-    def refused(name: str, purpose: str, head: Coded = base, version: int = 1, **rest: Any) -> None:
-        data = file_of(motion, codec=codec_of([head], version=version), **rest)
+    def refused(
+        name: str, purpose: str, head: Coded = base, value: float = 0.5, **rest: Any
+    ) -> None:
+        codec = codec_of([head], version=rest.pop("version", 1))
+        data = file_of(column([value] * 5, SINGLE), codec=codec, **rest)
         shelf.add(f"counts-{name}", HEADING, f"{purpose}.", data)
 
     refused("in-version-0", "Counts in a signal of version 0", version=0)
@@ -229,8 +231,11 @@ def _counts(shelf: Broken) -> None:
         refused(f"parts-{parts}", f"Parts of {parts}: a bit that means nothing", head)
     terms = {"NaN": float("nan"), "infinite": float("inf"), "huge": beyond, "low": -beyond}
     for name, term in terms.items():
-        refused(f"offset-{name}", f"An offset of {term!r}", replace(base, law=Law(0.25, term)))
-        refused(f"shift-{name}", f"A shift of {term!r}", replace(base, law=Law(0.25, 0.5, term)))
+        value = float(np.float32(term))
+        head = replace(base, law=Law(0.25, term))
+        refused(f"offset-{name}", f"An offset of {term!r}", head, value)
+        head = replace(base, law=Law(0.25, 0.5, term))
+        refused(f"shift-{name}", f"A shift of {term!r}", head, value)
     for what, size in (("before-parts", 11), ("in-offset", 15), ("in-shift", 27)):
 
         def cut(data: bytes, size: int = size) -> bytes:

@@ -38,7 +38,11 @@ def _laws(shelf: Streams) -> None:
         "offset": ("An offset", Law(VOLT, 0.3), NEAR),
         "shift": ("A shift alone: the product is rounded before", Law(VOLT, None, -1.7), NEAR),
         "both": ("Offset and shift, as of a mean that was taken off", Law(VOLT, 6.0, -6.01), NEAR),
-        "ties": ("First sums in the middle of two binary32: to even", Law(ONE, 2.0**-24, 0.0), NEAR),
+        "ties": (
+            "First sums in the middle: to even",
+            Law(ONE, 2.0**-24, 0.0),
+            NEAR,
+        ),
         "ties-last": ("Second sums in the middle: to even", Law(1.0, 0.0, 2.0**-24), NEAR),
         "order": ("Products are rounded before they are added to", Law(0.1, -1.0), (10, 30, 7, 0)),
         "zeros": ("Rounded to -0, with nothing added then", Law(2.0**-200, -0.0), NEAR),
