@@ -100,13 +100,13 @@ function readCoded(reader, kind, grid, rules) {
   return { form, drop, unit, shifts, law, grid, top, depth, scale, taps, fromLast };
 }
 
-/** What follows the unit of counts; null for a sum that is not made. */
+/** What follows the unit of counts; null for a sum that is not made. `counted`: the last ordinal. */
 function readLaw(reader) {
   const parts = reader.u8();
   if (parts > 7) reader.refuse(`parts ${parts}`);
   const offset = parts & 1 ? readTerm(reader) : null;
   const shift = parts & 2 ? readTerm(reader) : null;
-  return { offset, shift, hasRests: (parts & 4) !== 0 };
+  return { offset, shift, hasRests: (parts & 4) !== 0, counted: 0 };
 }
 
 function readTerm(reader) {
@@ -115,11 +115,15 @@ function readTerm(reader) {
   return term;
 }
 
-/** The head of the rests of a channel of counts: plain, and predicted to be 0. */
-export function headOfRests({ column, grid }) {
+/** The heads of coded channels, and of the rests that follow them: plain ones, predicted to be 0. */
+export function withRests(heads) {
+  const counts = heads.filter(({ law }) => law?.hasRests);
   const taps = new Float64Array(0);
   const plain = { form: PLAIN, drop: 0, unit: 1, shifts: 0, law: null, top: 0, depth: 0 };
-  return { kind: CODED, column, grid, ...plain, scale: 1, taps, fromLast: false };
+  const rests = counts.map(({ column, grid, law }) => {
+    return { kind: CODED, column, grid, ...plain, scale: 1, taps, fromLast: false, restsOf: law };
+  });
+  return [...heads, ...rests];
 }
 
 /** The form of a channel whose head does not tell. */

@@ -10,7 +10,7 @@ import {
   POWERS_OF_10,
   PRODUCTS,
   classesOf,
-  headOfRests,
+  withRests,
 } from "../heads.js";
 import { halvesOf, setHalves, setInteger } from "../int64.js";
 import { ordinalOf } from "../ordinals.js";
@@ -95,8 +95,7 @@ export class CodedChannel {
     this.unit = head.unit;
     this.shifts = head.shifts;
     this.law = head.law;
-    this.counted = 0; // the ordinal of the last count
-    this.restOf = null; // of a channel of rests: the one that they belong to
+    this.restsOf = head.restsOf ?? null; // of rests: the law that they are added to
     this.grid = head.grid;
     this.fromLast = head.fromLast;
     this.taps = head.taps;
@@ -142,13 +141,6 @@ function ordinalOfCount({ unit, law }, count) {
   return binary32Ordinal(x);
 }
 
-/** What decodes the rests of a channel of counts. */
-function restsOf(head, channel) {
-  const rests = new CodedChannel(headOfRests(head));
-  rests.restOf = channel;
-  return rests;
-}
-
 /** Decodes the coded channels of a group in a segment, one group after the other. */
 export class BitDecoder {
   /**
@@ -171,9 +163,8 @@ export class BitDecoder {
   decodeGroup(heads, data, nRows, nChannels, firstIndex, what) {
     restart(this.model, this.startModel);
     this.coder = new RangeDecoder(data);
-    const channels = heads.map((head) => new CodedChannel(head));
-    const rests = heads.flatMap((head, i) => (head.law?.hasRests ? restsOf(head, channels[i]) : []));
-    this.decode([...channels, ...rests], nRows, nChannels, firstIndex);
+    const channels = withRests(heads).map((head) => new CodedChannel(head));
+    this.decode(channels, nRows, nChannels, firstIndex);
     this.coder.finish(what);
   }
 
@@ -224,11 +215,11 @@ export class BitDecoder {
     }
     this.remember(channel, value, predicted);
     const { drop } = channel;
-    if (channel.restOf !== null) {
-      setInteger(this.halves, index, channel.restOf.counted + value);
+    if (channel.restsOf !== null) {
+      setInteger(this.halves, index, channel.restsOf.counted + value);
     } else if (channel.form === COUNTS) {
-      channel.counted = ordinalOfCount(channel, value);
-      setInteger(this.halves, index, channel.counted);
+      channel.law.counted = ordinalOfCount(channel, value);
+      setInteger(this.halves, index, channel.law.counted);
     } else if (channel.form === MULTIPLES) {
       setInteger(this.halves, index, binary32Ordinal(value * channel.unit));
     } else if (channel.form === PRODUCTS) {
