@@ -75,7 +75,7 @@ def _rests(shelf: Streams) -> None:
         Coded(form=COUNTS, law=Law(0.25), multiples=NEAR),
         Coded(form=COUNTS, law=Law(0.1), multiples=NEAR, rests=near[::-1]),
     )
-    made = [_values(head, SINGLE) for head in (first, second, third)]
+    made = [values_of(head, SINGLE) for head in (first, second, third)]
     columns = [made[0], wave(12), made[1], [2.5] * 12, made[2], made[0]]
     heads = [first, Coded(), second, Constant(), third, Copy(0, 0)]
     grids = (SINGLE, HUNDREDTHS, SINGLE, SINGLE, SINGLE, SINGLE)
@@ -95,11 +95,12 @@ def _column(
     **rest: Any,
 ) -> None:
     head = Coded(form=COUNTS, law=law, multiples=tuple(counts), rests=tuple(rests), **rest)
-    motion = column(_values(head, grid), grid)
+    motion = column(values_of(head, grid), grid)
     shelf.code(f"counts-{name}", f"{purpose}.", motion, [head], version=1)
 
 
-def _values(head: Coded, grid: Grid) -> list[float]:
+def values_of(head: Coded, grid: Grid) -> list[float]:
+    """What a head's counts and rests say on a grid."""
     assert head.law is not None
     ordinals = head.law.ordinals(np.array(head.multiples, np.int64))
     values: list[float] = grid.values(ordinals + np.array(head.rests or 0, np.int64)).tolist()
