@@ -23,6 +23,7 @@ COARSE = 8  # multiples of a unit that all lie so far apart may be counts of a g
 _QUANTILES = np.array([0, 0.05, 0.1, 0.2, 0.35, 0.5])  # of gaps: one may be the unit
 _SOME = 128  # gaps that are looked at first
 _NEAR = 8  # units that a gap may have to tell something
+_REACHES = 8 * 4.0 ** np.arange(24)  # units on both sides of the middle, one after the other
 _OFF = 0.15  # of a unit, on average: beyond, there is no law
 _ROUNDS = 25  # to bring the greatest distance from a line down
 _HOPELESS = 4.0  # times the slack, at first
@@ -129,11 +130,11 @@ def _off(values: Floats, line: Line) -> float:
 def _grown(distinct: Floats, unit: float) -> Line | None:
     """A line fitted to ever more of the values around the middle one, or None."""
     middle = float(distinct[len(distinct) // 2])
-    line, reach = (unit, middle), float(_NEAR)
+    line = unit, middle
     span = max(middle - float(distinct[0]), float(distinct[-1]) - middle)
     if unit < LEAST_UNIT or span > unit * MOST_COUNT:
         return None
-    while True:
+    for reach in _REACHES:
         around = [middle - reach * line[0], middle + reach * line[0]]
         first, stop = np.searchsorted(distinct, around)
         part = distinct[first:stop]
@@ -143,7 +144,7 @@ def _grown(distinct: Floats, unit: float) -> Line | None:
             return None
         if len(part) == len(distinct):
             return line if _off(distinct, line) < _OFF else None
-        reach *= 4
+    return None
 
 
 def _fit(counts: Floats, values: Floats, weights: Floats | None = None) -> Line | None:
