@@ -108,6 +108,30 @@ def test_a_joint_is_replaced(codec: str) -> None:
     assert mcz.verify(out.getvalue()) == []
 
 
+def test_a_lossless_clip_is_coded_anew_without_an_error() -> None:
+    values = motion().values.copy()
+    values[3, 2], values[7, 9] = 1 / 3, -0.0  # on no grid; with a sign
+    given = motion().with_values(values)
+    out = io.BytesIO()
+    mcz.write(given, out, codec="best", segment_frames=15)
+    data, part, edited = out.getvalue(), io.BytesIO(), io.BytesIO()
+    with pytest.raises(
+        OptionError, match=r"with those of spine; recode \(--recode\) codes them anew$"
+    ):
+        mcz.extract(data, io.BytesIO(), joints=["hips"])
+    found = mcz.extract(data, part, joints=["hips", "knee"], frames=(2, 20), recode=True)
+    own = columns(clip(data), "hips", "knee")
+    assert found.clips[0].recoded and clip(part.getvalue()).quality is None
+    assert clip(part.getvalue()).values[:].tobytes() == values[2:20][:, own].tobytes()
+    knee = columns(clip(data), "knee")
+    done = mcz.replace(data, None, "knee", values[:, knee] + 0.5, edited, recode=True)
+    assert done.anew and (done.max_error, done.others_error) == (0, 0)
+    values[:, knee] += 0.5
+    after = clip(edited.getvalue())
+    assert after.codec == "best" and after.values[:].tobytes() == values.tobytes()
+    assert mcz.verify(part.getvalue()) == mcz.verify(edited.getvalue()) == []
+
+
 def test_an_edit_of_an_edit_remembers_both() -> None:
     data = written([motion()], "posewave")
     for joint in ("knee", "spine"):

@@ -53,8 +53,8 @@ if TYPE_CHECKING:
 @click.option(
     "--recode",
     is_flag=True,
-    help="Decode joints that are coded together with others, and code them anew, with another "
-    "small error. Default: such joints are refused.",
+    help="Decode joints that are coded together with others, and code them anew, if lossy with "
+    "another small error. Default: such joints are refused.",
 )
 @clips_option
 @salvage_option

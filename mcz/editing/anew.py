@@ -31,9 +31,7 @@ def check_anew(clip: Clip) -> None:
         raise OptionError(
             f"clip {clip.name!r}: some of its joints are coded exactly, and would not be any more"
         )
-    if info.codec.lossless:
-        raise OptionError(f"clip {clip.name!r}: codec {info.codec.name} cannot code a clip anew")
-    if (clip.quality or {}).get("codec") != info.codec.name:
+    if not info.codec.lossless and (clip.quality or {}).get("codec") != info.codec.name:
         raise OptionError(
             f"clip {clip.name!r}: no quality record says how it was coded; decode it and encode it "
             "anew"
@@ -63,11 +61,14 @@ def joints_alone(cut: ClipCut) -> Motion:
     )
     skeleton = replace(motion.skeleton, joints=joints, base=cut.clip.skeleton_id, source=None)
     whole = motion.signals[0]
+    number = {int(column): place for place, column in enumerate(columns)}
     signal = Signal(
         whole.values[:, columns],
         grids=tuple(whole.grids[column] for column in columns),
         name=whole.name,
         mask=None if whole.mask is None else whole.mask[:, columns],
+        grid_changes=tuple((r, number[c], g) for r, c, g in whole.grid_changes if c in number),
+        ordinals=None if whole.ordinals is None else whole.ordinals[:, columns],
     )
     metadata = dict(motion.metadata)
     add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
@@ -98,9 +99,8 @@ def write_anew(
 ) -> dict[str, str]:
     """Write ``motion`` with the codec of ``clip``.
 
-    ``amend`` makes the quality record from that of this coding, which is returned.
+    ``amend`` makes the quality record from that of this coding, which is returned; a lossless
+    codec has none.
     """
     codec = clip.signals[0].codec
-    record = write_tuned(writer, motion, codec, settings, progress, amend=amend)
-    assert record is not None  # the codec is lossy
-    return record
+    return write_tuned(writer, motion, codec, settings, progress, amend=amend) or {}

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from mcz.codecs.contract import Codec
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.frame_numbers import KEY, frame_number_metadata
@@ -21,7 +22,6 @@ from mcz.reading.joints import Chosen, Joints, joint_list
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build, parse
 
-ANEW = "recode (--recode) codes them anew, with another small error"
 WITHOUT_SOURCE = "the source file was left out when joints were cut"
 WITHOUT_CHANNELS = "the channels of other joints were cut"
 
@@ -146,8 +146,15 @@ def _is_of_groups(clip: Clip, joints: frozenset[int]) -> bool:
     return all(len(group) < 2 for group in groups)
 
 
+def how_anew(codec: Codec) -> str:
+    """What an error says of channels that are coded in one group with others."""
+    hint = "recode (--recode) codes them anew"
+    return hint if codec.lossless else f"{hint}, with another small error"
+
+
 def _kept_groups(clip: Clip, info: SignalInfo, joints: frozenset[int]) -> tuple[int, ...]:
     owners, groups = joint_of_column(clip.skeleton), []
+    how = how_anew(info.codec)
     for number, columns in enumerate(info.layout.groups):
         inside = {owners[column] for column in columns if owners[column] in joints}
         outside = {owners[column] for column in columns} - inside
@@ -155,7 +162,7 @@ def _kept_groups(clip: Clip, info: SignalInfo, joints: frozenset[int]) -> tuple[
             names = clip.skeleton.addresses()
             raise OptionError(
                 f"clip {clip.name!r}: joint {names[min(inside)]} cannot be cut out, its channels "
-                f"are coded in one group with those of {names[min(outside)]}; {ANEW}"
+                f"are coded in one group with those of {names[min(outside)]}; {how}"
             )
         if inside:
             groups.append(number)

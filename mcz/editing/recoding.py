@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Request
 from mcz.codecs.parameters import TARGETS
-from mcz.editing.cutting import ANEW, joint_of_column
+from mcz.editing.cutting import how_anew, joint_of_column
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
@@ -144,7 +144,7 @@ def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...
             raise OptionError(
                 f"clip {clip.name!r}: joint {names[index]} cannot be replaced alone, codec "
                 f"{info.codec.name} codes its channels in one group with those of {names[other]}; "
-                f"{ANEW}"
+                f"{how_anew(info.codec)}"
             )
         if index in joints:
             groups.append(number)

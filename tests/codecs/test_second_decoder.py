@@ -124,6 +124,8 @@ CONTACTS: tuple[dict[str, Any], ...] = (
 SETTINGS: dict[str, tuple[dict[str, Any], ...]] = {
     "raw": ({}, {"segment_frames": 17}),
     "lossless": ({}, {"segment_frames": 17}),
+    "fast": ({}, {"segment_frames": 17}),
+    "best": ({}, {"segment_frames": 17}),
     "mrdwt": MRDWT,
     "qbc": QBC,
     "pca": PCA,

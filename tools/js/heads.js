@@ -10,6 +10,7 @@ export const COPY = 2;
 export const PLAIN = 0;
 export const MULTIPLES = 32;
 export const PRODUCTS = 33; // not in version 0 of codec 1
+export const COUNTS = 34; // nor is this
 const CLASSES_24 = 88;
 const CLASSES_53 = 117;
 
@@ -28,7 +29,8 @@ export const POWERS_OF_10 = Float64Array.from({ length: 64 }, (_, j) =>
  * @param {ByteReader} reader at the head
  * @param {object} grid of the channel in CLIP
  * @param {number} column the channel
- * @param {{maxTaps: number, hasDepth: boolean, hasProducts: boolean}} rules of the codec
+ * @param {{maxTaps: number, hasDepth: boolean, hasProducts: boolean, hasCounts: boolean}} rules of
+ *     the codec
  * @throws {Refused}
  */
 export function readHead(reader, grid, column, rules) {
@@ -57,7 +59,8 @@ function readConstant(reader, kind) {
   return zigzag & 1n ? -(zigzag >> 1n) - 1n : zigzag >> 1n;
 }
 
-function readCoded(reader, kind, grid, { maxTaps, hasDepth, hasProducts }) {
+function readCoded(reader, kind, grid, rules) {
+  const { maxTaps, hasDepth, hasProducts, hasCounts } = rules;
   const nTaps = (kind >> 3) & 15;
   if (nTaps > maxTaps) reader.refuse(`${nTaps} taps`);
   const spelled = (kind & 128) !== 0;
@@ -67,15 +70,18 @@ function readCoded(reader, kind, grid, { maxTaps, hasDepth, hasProducts }) {
   if (form === PRODUCTS && !(hasProducts && grid.kind === GENERAL)) {
     reader.refuse(`form ${form} in this version, or on a grid of kind ${grid.kind}`);
   }
+  if (form === COUNTS && !hasCounts) reader.refuse(`form ${form} in this version`);
   let unit = 1;
   let shifts = 0;
+  let law = null;
   let top = 0;
   let depth = 0;
-  if (form === MULTIPLES || form === PRODUCTS) {
+  if (form === MULTIPLES || form === PRODUCTS || form === COUNTS) {
     unit = reader.f64();
     if (!(unit >= 2 ** -200 && unit <= 2 ** 80)) reader.refuse(`unit ${unit}`);
     if (form === PRODUCTS) shifts = reader.u8();
     if (form === PRODUCTS && !(shifts >= 1 && shifts <= 63)) reader.refuse(`${shifts} shifts`);
+    if (form === COUNTS) law = readLaw(reader);
   } else if (form !== PLAIN) {
     top = reader.varint();
     if (top > greatestTop(form)) reader.refuse(`top class ${top} of form ${form}`);
@@ -90,7 +96,34 @@ function readCoded(reader, kind, grid, { maxTaps, hasDepth, hasProducts }) {
     taps[i] = reader.zigzag();
     if (Math.abs(taps[i]) > MAX_TAP) reader.refuse(`a tap of ${taps[i]}`);
   }
-  return { form, drop, unit, shifts, grid, top, depth, scale, taps, fromLast: (kind & 4) !== 0 };
+  const fromLast = (kind & 4) !== 0;
+  return { form, drop, unit, shifts, law, grid, top, depth, scale, taps, fromLast };
+}
+
+/** What follows the unit of counts; null for a sum that is not made. `counted`: the last ordinal. */
+function readLaw(reader) {
+  const parts = reader.u8();
+  if (parts > 7) reader.refuse(`parts ${parts}`);
+  const offset = parts & 1 ? readTerm(reader) : null;
+  const shift = parts & 2 ? readTerm(reader) : null;
+  return { offset, shift, hasRests: (parts & 4) !== 0, counted: 0 };
+}
+
+function readTerm(reader) {
+  const term = reader.f64();
+  if (!(Math.abs(term) <= 2 ** 80)) reader.refuse(`an offset or shift of ${term}`);
+  return term;
+}
+
+/** The heads of coded channels, and of the rests that follow them: plain ones, predicted to be 0. */
+export function withRests(heads) {
+  const counts = heads.filter(({ law }) => law?.hasRests);
+  const taps = new Float64Array(0);
+  const plain = { form: PLAIN, drop: 0, unit: 1, shifts: 0, law: null, top: 0, depth: 0 };
+  const rests = counts.map(({ column, grid, law }) => {
+    return { kind: CODED, column, grid, ...plain, scale: 1, taps, fromLast: false, restsOf: law };
+  });
+  return [...heads, ...rests];
 }
 
 /** The form of a channel whose head does not tell. */
@@ -113,7 +146,7 @@ function formOf(grid) {
 /** Greatest `drop` of a form; -1 where there is no such form. */
 function greatestDrop(form) {
   if (form === PLAIN) return 19;
-  if (form <= 15 || form === MULTIPLES || form === PRODUCTS) return 0;
+  if (form <= 15 || [MULTIPLES, PRODUCTS, COUNTS].includes(form)) return 0;
   if (form === CLASSES_24) return 22;
   if (form === CLASSES_53) return 51;
   return -1;

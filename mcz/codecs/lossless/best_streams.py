@@ -24,6 +24,7 @@ from mcz.schema import read_varint, varint
 Ints = NDArray[np.int64]
 
 AS_CODEC_1, LINKED = 0, 1  # method
+HEADS = 1  # the version of codec 1 that has them
 MAX_UNIT = 44
 MAX_SEEN = 8
 MAX_LINKS = 4096  # in a stream, so that what is learned takes little memory
@@ -45,8 +46,8 @@ class Link:
 def build_stream(ordinals: Ints, grids: Sequence[Own], group: int, seen: Seen | None) -> bytes:
     """One stream, as ``mcz.coding.ordinals.streams.build_stream``: the shorter of both methods."""
     seen_before = None if seen is None else dict(seen)
-    heads, plans, coded = plan_stream(ordinals, grids, group, seen, fitted=False)
-    simple = streams.build_stream(ordinals, grids, group, seen_before)
+    heads, plans, coded = plan_stream(ordinals, grids, group, seen, HEADS, fitted=False)
+    simple = streams.build_stream(ordinals, grids, group, seen_before, HEADS)
     if not plans:
         return bytes((AS_CODEC_1,)) + simple
     links = [Link(*link) for link in choose_links(coded, plans, MAX_LINKS)]
@@ -62,7 +63,7 @@ def parse_stream(
     if not stream or stream[0] > LINKED:  # BEST-02
         raise FormatError(f"best: method {stream[:1].hex() or 'missing'}")
     uncode = None if stream[0] == AS_CODEC_1 else _uncode
-    return streams.parse_stream(stream[1:], grids, n_rows, uncode)
+    return streams.parse_stream(stream[1:], grids, n_rows, uncode, version=HEADS)
 
 
 def _uncode(data: bytes, plans: Sequence[Ints], n_rows: int) -> Ints:

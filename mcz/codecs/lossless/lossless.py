@@ -30,13 +30,16 @@ from mcz.codecs.contract import (
 from mcz.codecs.lossless.copying import decode_streams, encode_streams, recode_streams, regroup
 from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
 from mcz.codecs.segments import Sizing
+from mcz.coding.ordinals.count_search import find_counts
 from mcz.coding.ordinals.degrees import is_tiny
 from mcz.coding.ordinals.streams import build_stream, parse_stream
+from mcz.coding.ordinals.units import find_unit
 from mcz.numbers import GridKind
 
 Ints = NDArray[np.int64]
 
-FIRST_FRAMES = 64  # that decide on the version
+FIRST_FRAMES = 64  # that decide on version 1 for form 33
+PLACES, TRIED_ROWS, TRIED_CHANNELS = 4, 512, 32  # that decide on it for form 34
 SIZING = Sizing(57_000, 64_000, value_bytes=2, most_rows=MAX_ROWS, spare=1)
 
 
@@ -48,12 +51,31 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
 
 
 def _least_version(source: SignalSource) -> int:
-    """1 where the first rows have a channel that its form may help, else 0."""
-    if not any(grid.kind == GridKind.GENERAL for grid in source.layout.grids):
-        return 0
-    columns = source.ordinals(0, min(FIRST_FRAMES, source.layout.n_frames)).T
-    pairs = zip(columns, source.layout.grids, strict=True)
-    return int(any(column.size > 0 and is_tiny(column, grid) for column, grid in pairs))
+    """1 where some rows have a channel that its forms may help, else 0."""
+    return int(_has_noise(source) or _has_counts(source))
+
+
+def _has_noise(source: SignalSource) -> bool:
+    """Whether the first rows have a channel that form 33 may help."""
+    layout = source.layout
+    if not any(grid.kind == GridKind.GENERAL for grid in layout.grids):
+        return False
+    columns = source.ordinals(0, min(FIRST_FRAMES, layout.n_frames)).T
+    pairs = zip(columns, layout.grids, strict=True)
+    return any(column.size > 0 and is_tiny(column, grid) for column, grid in pairs)
+
+
+def _has_counts(source: SignalSource) -> bool:
+    """Whether form 34 helps one of some channels in one of some runs of rows."""
+    layout = source.layout
+    known = [c for c, grid in enumerate(layout.grids) if grid.kind == GridKind.BINARY32]
+    tried = known[:: -(-len(known) // TRIED_CHANNELS)] if known else []
+    length = min(layout.n_frames, -(-TRIED_ROWS // layout.samples_per_frame))
+    if not tried or not length:
+        return False
+    places = {(layout.n_frames - length) * place // (PLACES - 1) for place in range(PLACES)}
+    runs = (source.ordinals(first, first + length) for first in sorted(places))
+    return any(find_counts(run[:, c], find_unit(run[:, c])) for run in runs for c in tried)
 
 
 def recode(

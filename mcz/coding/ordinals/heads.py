@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.ordinals.choices import MAX_TAP, Lattice, base_and_digits, max_top
+from mcz.coding.ordinals.counts import parse_law
 from mcz.coding.ordinals.degrees import of_products
 from mcz.coding.ordinals.units import of_multiples
 from mcz.errors import FormatError
@@ -31,14 +32,17 @@ MAX_SHIFTS = 63
 OWN_FORM = 128  # in kind: form and drop are in the stream
 MULTIPLES = 32  # form: integers that are multiplied by a unit, to binary32
 PRODUCTS = 33  # form, from version 1 on: odd numbers, shifts and a unit, to a decimal grid
+COUNTS = 34  # form, from version 1 on: integers that a law makes binary32 numbers, and rests
+WITH_UNIT = MULTIPLES, PRODUCTS, COUNTS
 
 
 def read_heads(
     stream: bytes, grids: Sequence[Grid], version: int = 0
 ) -> tuple[list[tuple[int, Any, bytes]], int]:
-    """Of each channel its kind, its plan and map, ordinal or what it copies, and its head's bytes.
+    """Of each channel its kind; its plan, map and rests, ordinal or what it copies; its head.
 
     Also the offset after the heads. The map (None: none) turns coded integers into ordinals.
+    Rests: whether further integers are coded, which are added to these.
     ``version``: that of codec 1; streams within other codecs are of 0.
     """
     heads: list[tuple[int, Any, bytes]] = []
@@ -48,8 +52,8 @@ def read_heads(
         start = at
         kind, at = _byte(stream, at)
         if kind & 3 == CODED:
-            plan, mapping, at = _parse_coded(stream, at, kind, grid, version)
-            found = plan, mapping
+            plan, mapping, rests, at = _parse_coded(stream, at, kind, grid, version)
+            found = plan, mapping, rests
         elif kind & 3 == CONSTANT:  # LOSS-02
             found, at = _parse_constant(stream, at, kind)
         elif kind == COPY:  # LOSS-03
@@ -80,14 +84,14 @@ def _parse_constant(stream: bytes, at: int, kind: int) -> tuple[int, int]:
 
 def _parse_coded(
     stream: bytes, at: int, kind: int, grid: Grid, version: int
-) -> tuple[Ints, Mapping | None, int]:
-    """The plan of a coded channel, its map if it has one, and the offset after its head."""
+) -> tuple[Ints, Mapping | None, bool, int]:
+    """The plan of a coded channel, its map if any, whether it has rests; the offset after it."""
     form, drop = form_of_grid(grid), 0  # LOSS-15
     if kind & OWN_FORM:
         form, at = _byte(stream, at)
         drop, at = _byte(stream, at)
     shape = _shape(form, drop, version)
-    mapping, at = parse_mapping(stream, at, form, grid)
+    mapping, rests, at = parse_mapping(stream, at, form, grid)
     top = 0
     if shape.base:
         top, at = read_varint(stream, at)
@@ -105,22 +109,27 @@ def _parse_coded(
     if scale > MAX_SCALE:  # LOSS-20
         raise FormatError(f"lossless: scale {scale}")
     shape = Lattice(shape.base, shape.digits, drop, top)
-    return make_plan(shape, scale, kind >> 2 & 1, taps), mapping, at
+    return make_plan(shape, scale, kind >> 2 & 1, taps), mapping, rests, at
 
 
-def parse_mapping(stream: bytes, at: int, form: int, grid: Grid) -> tuple[Mapping | None, int]:
-    """The map of coded integers, of whole columns, to ordinals; the offset after its fields."""
-    if form not in (MULTIPLES, PRODUCTS):
-        return None, at
+def parse_mapping(
+    stream: bytes, at: int, form: int, grid: Grid
+) -> tuple[Mapping | None, bool, int]:
+    """The map of coded integers, of whole columns, to ordinals; rests; the offset after both."""
+    if form not in WITH_UNIT:
+        return None, False, at
     unit, at = _parse_unit(stream, at)
     if form == MULTIPLES:
-        return partial(of_multiples, unit=unit), at
+        return partial(of_multiples, unit=unit), False, at
+    if form == COUNTS:
+        law, rests, at = parse_law(stream, at, unit)
+        return law.ordinals, rests, at
     if grid.kind != GridKind.GENERAL:  # LOSS-32
         raise FormatError(f"lossless: form {form} on the grid {grid.kind.name}")
     shifts, at = _byte(stream, at)
     if not 1 <= shifts <= MAX_SHIFTS:  # LOSS-34
         raise FormatError(f"lossless: {shifts} shifts")
-    return partial(of_products, unit=unit, shifts=shifts, grid=grid), at
+    return partial(of_products, unit=unit, shifts=shifts, grid=grid), False, at
 
 
 def _parse_unit(stream: bytes, at: int) -> tuple[float, int]:
@@ -139,7 +148,7 @@ def check_unit(codec: str, unit: float) -> None:
 def _shape(form: int, drop: int, version: int) -> Lattice:
     if (form == 0 and drop <= MAX_DROP) or (form == MULTIPLES and drop == 0):  # LOSS-17
         return Lattice(0, 0, drop)
-    if form == PRODUCTS and drop == 0 and version >= 1:  # LOSS-17, LOSS-31
+    if form in (PRODUCTS, COUNTS) and drop == 0 and version >= 1:  # LOSS-17, LOSS-31
         return Lattice(0, 0, drop)
     if 1 <= form <= 15 and drop == 0:  # LOSS-16, LOSS-17
         return Lattice(10, form)

@@ -13,12 +13,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.coding.ordinals.choices import choose_predictor, fixed_point, lattice, max_top
+from mcz.coding.ordinals.choices import (
+    Lattice,
+    choose_predictor,
+    fixed_point,
+    lattice,
+    max_top,
+)
+from mcz.coding.ordinals.count_search import find_counts
 from mcz.coding.ordinals.degrees import find_degrees
 from mcz.coding.ordinals.heads import (
     CODED,
     CONSTANT,
     COPY,
+    COUNTS,
     MAX_SCALE,
     MULTIPLES,
     OWN_FORM,
@@ -38,6 +46,7 @@ from mcz.schema import varint
 Ints = NDArray[np.int64]
 
 PLAIN = Grid(GridKind.INTEGER)
+REST = make_plan(Lattice(0, 0), 0, 0, ())  # of what a law is off
 
 
 Own = tuple[Grid, Grid]  # the grid in force and that of the clip
@@ -69,7 +78,7 @@ def plan_stream(
 
     ``fitted``: predictors may have taps that are fitted to the channel.
     """
-    heads, plans, coded = [], [], []
+    heads, plans, coded, rests = [], [], [], []
     for channel, column in enumerate(ordinals.T):
         column = np.ascontiguousarray(column)
         key = column.tobytes()
@@ -80,10 +89,12 @@ def plan_stream(
         else:
             if seen is not None:
                 seen[key] = group, channel
-            head, plan, numbers = _coded_head(column, *grids[channel], version, fitted=fitted)
+            head, plan, numbers, rest = _coded_head(column, *grids[channel], version, fitted=fitted)
             heads.append(head)
             plans.append(plan)
             coded.append(numbers)
+            rests += [] if rest is None else [rest]
+    coded, plans = coded + rests, plans + [REST] * len(rests)
     columns = np.stack(coded, axis=1) if coded else np.empty((len(ordinals), 0), np.int64)
     return b"".join(heads), plans, columns
 
@@ -96,9 +107,9 @@ def constant_head(ordinal: int) -> bytes:
 
 def _coded_head(
     column: Ints, grid: Grid, clip_grid: Grid, version: int, *, fitted: bool
-) -> tuple[bytes, Ints, Ints]:
-    """The head of a coded channel, its plan for the compiled loop, and the integers to code."""
-    own, fields, column = _in_units(column, grid, version if grid == clip_grid else 0)
+) -> tuple[bytes, Ints, Ints, Ints | None]:
+    """The head of a coded channel, its plan for the compiled loop, the integers to code, rests."""
+    own, fields, column, rests = _in_units(column, grid, version if grid == clip_grid else 0)
     shape = lattice(grid if own is None else PLAIN, column)
     if shape.base and shape.top > max_top(shape):
         shape = lattice(PLAIN, column)
@@ -110,18 +121,26 @@ def _coded_head(
     head = [bytes((kind,)), bytes((form, shape.drop)) if own_form else b"", fields]
     head += [varint(shape.top)] if shape.base else []
     head += [bytes((scale,)), *(varint(2 * t if t >= 0 else -2 * t - 1) for t in taps)]
-    return b"".join(head), make_plan(shape, scale, from_last, taps), column
+    return b"".join(head), make_plan(shape, scale, from_last, taps), column, rests
 
 
-def _in_units(column: Ints, grid: Grid, version: int) -> tuple[int | None, bytes, Ints]:
-    """A form with a unit, its fields, and its integers; no form and the column where none fits."""
-    if grid.kind == GridKind.BINARY32 and (found := find_unit(column)) is not None:
-        return MULTIPLES, struct.pack("<d", found[0]), found[1]
+def _in_units(
+    column: Ints, grid: Grid, version: int
+) -> tuple[int | None, bytes, Ints, Ints | None]:
+    """A form with a unit, its fields, integers and rests; none and the column where none fits."""
+    if grid.kind == GridKind.BINARY32:
+        found = find_unit(column)
+        law = find_counts(column, found) if version >= 1 else None
+        if law is not None:
+            rests = law.rests if law.rests.any() else None
+            return COUNTS, law.law.fields(rests=rests is not None), law.counts, rests
+        if found is not None:
+            return MULTIPLES, struct.pack("<d", found[0]), found[1], None
     products = find_degrees(column, grid) if version >= 1 else None
     if products is not None:
         unit, shifts, codes = products
-        return PRODUCTS, struct.pack("<dB", unit, shifts), codes
-    return None, b"", column
+        return PRODUCTS, struct.pack("<dB", unit, shifts), codes, None
+    return None, b"", column, None
 
 
 @cache
@@ -176,7 +195,9 @@ def parse_stream(
     heads, end = read_heads(stream, grids, version)
     coded = [channel for channel, (kind, _, _) in enumerate(heads) if kind == CODED]
     plans = [heads[channel][1][0] for channel in coded]
-    columns[:, coded] = (uncode or _uncode)(stream[end:], plans, n_rows)
+    resting = [channel for channel in coded if heads[channel][1][2]]  # LOSS-38
+    numbers = (uncode or _uncode)(stream[end:], plans + [REST] * len(resting), n_rows)
+    columns[:, coded] = numbers[:, : len(coded)]
     copies = {}
     for channel, (kind, found, _) in enumerate(heads):
         if kind == COPY:
@@ -185,6 +206,7 @@ def parse_stream(
             columns[:, channel] = found  # LOSS-08
         elif found[1] is not None:
             columns[:, channel] = found[1](columns[:, channel])
+    columns[:, resting] += numbers[:, len(coded) :]
     return columns, copies
 
 

@@ -3,7 +3,7 @@
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
-import { CODED } from "../heads.js";
+import { CODED, withRests } from "../heads.js";
 import { setHalves } from "../int64.js";
 import { SignalDecoder } from "../ordinal-streams.js";
 import { Learner, bounded } from "../regressions.js";
@@ -32,7 +32,7 @@ const EIGHT_OR_NINE = 13107;
 
 const CODEC = {
   name,
-  rules: { maxTaps: 8, hasDepth: false },
+  rules: { maxTaps: 8, hasDepth: false, hasProducts: true, hasCounts: true },
   decoder: (ordinals) => new BitDecoder(ordinals),
 };
 
@@ -182,7 +182,7 @@ class LinkedDecoder extends BitDecoder {
 
   decodeGroup(heads, data, nRows, nChannels, firstIndex, what) {
     const reader = new ByteReader(data, what);
-    const channels = readLinks(reader, heads);
+    const channels = readLinks(reader, withRests(heads));
     restart(this.model, this.startModel);
     this.coder = new RangeDecoder(reader.rest());
     this.decode(channels, nRows, nChannels, firstIndex);
@@ -210,7 +210,7 @@ class LinkedDecoder extends BitDecoder {
     else this.digits(channel, index, clamp(predicted, -channel.limit, channel.limit));
   }
 
-  /** A number of another form than 0 and 32, counted in units of its last digit. */
+  /** A number in classes, counted in units of its last digit. */
   digits(channel, index, predicted) {
     const { fast, slow, powers, nDigits, limit } = channel;
     const s = Math.abs(predicted);

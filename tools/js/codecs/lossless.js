@@ -3,7 +3,16 @@
 import { RangeDecoder, bits, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
 import { binary32Ordinal } from "../grids.js";
-import { MULTIPLES, PLAIN, POWERS_OF_10, PRODUCTS, classesOf, productOf } from "../heads.js";
+import {
+  COUNTS,
+  MULTIPLES,
+  PLAIN,
+  POWERS_OF_10,
+  PRODUCTS,
+  classesOf,
+  productOf,
+  withRests,
+} from "../heads.js";
 import { halvesOf, setHalves, setInteger } from "../int64.js";
 import { ordinalOf } from "../ordinals.js";
 import { SignalDecoder } from "../ordinal-streams.js";
@@ -35,9 +44,9 @@ const TWO_44 = 2 ** 44;
 const TWO_52 = 2 ** 52;
 
 /** The codec in each of its versions. */
-const VERSIONS = [false, true].map((hasProducts) => ({
+const VERSIONS = [false, true].map((hasForms) => ({
   name,
-  rules: { maxTaps: 8, hasDepth: false, hasProducts },
+  rules: { maxTaps: 8, hasDepth: false, hasProducts: hasForms, hasCounts: hasForms },
   decoder: (ordinals) => new BitDecoder(ordinals),
 }));
 
@@ -81,11 +90,13 @@ export function decodeGroups(layout, segments, groups) {
 export class CodedChannel {
   constructor(head) {
     this.column = head.column;
-    this.isPlain = [PLAIN, MULTIPLES, PRODUCTS].includes(head.form);
+    this.isPlain = [PLAIN, MULTIPLES, PRODUCTS, COUNTS].includes(head.form);
     this.form = head.form;
     this.drop = head.drop;
     this.unit = head.unit;
     this.shifts = head.shifts;
+    this.law = head.law;
+    this.restsOf = head.restsOf ?? null; // of rests: the law that they are added to
     this.grid = head.grid;
     this.fromLast = head.fromLast;
     this.taps = head.taps;
@@ -114,6 +125,15 @@ function beside(value, scale) {
   return clamp(bits(value) - bits(scale) + 3, 0, 7);
 }
 
+/** The ordinal of what a count says. */
+function ordinalOfCount({ unit, law }, count) {
+  let x = count * unit;
+  if (law.offset !== null) x += law.offset;
+  x = Math.fround(x);
+  if (law.shift !== null) x += law.shift;
+  return binary32Ordinal(x);
+}
+
 /** Decodes the coded channels of a group in a segment, one group after the other. */
 export class BitDecoder {
   /**
@@ -136,7 +156,7 @@ export class BitDecoder {
   decodeGroup(heads, data, nRows, nChannels, firstIndex, what) {
     restart(this.model, this.startModel);
     this.coder = new RangeDecoder(data);
-    const channels = heads.map((head) => new CodedChannel(head));
+    const channels = withRests(heads).map((head) => new CodedChannel(head));
     this.decode(channels, nRows, nChannels, firstIndex);
     this.coder.finish(what);
   }
@@ -175,7 +195,7 @@ export class BitDecoder {
     channel.side1 = side(error);
   }
 
-  /** Forms 0, 32 and 33. */
+  /** Forms 0 and 32 to 34, and rests. */
   plain(channel, index) {
     this.plainOf(channel, index, clamp(channel.predict(), -TWO_44, TWO_44));
   }
@@ -188,7 +208,12 @@ export class BitDecoder {
     }
     this.remember(channel, value, predicted);
     const { drop } = channel;
-    if (channel.form === MULTIPLES) {
+    if (channel.restsOf !== null) {
+      setInteger(this.halves, index, channel.restsOf.counted + value);
+    } else if (channel.form === COUNTS) {
+      channel.law.counted = ordinalOfCount(channel, value);
+      setInteger(this.halves, index, channel.law.counted);
+    } else if (channel.form === MULTIPLES) {
       setInteger(this.halves, index, binary32Ordinal(value * channel.unit));
     } else if (channel.form === PRODUCTS) {
       this.ordinals[index] = ordinalOf(channel.grid, productOf(channel, value));

@@ -18,6 +18,7 @@ from mcz.codecs.lossless import lossless
 from mcz.coding.ordinals import heads as lossless_heads
 from mcz.coding.ordinals import streams as ordinal_streams
 from mcz.coding.ordinals.choices import Lattice
+from mcz.coding.ordinals.counts import Law
 from mcz.coding.start import start_states
 from mcz.motion import Motion
 from mcz.numbers import Grid, GridKind
@@ -25,13 +26,8 @@ from mcz.schema import varint
 from tools.vectors.build.files import Whole, file_of
 
 Ints = NDArray[np.int64]
-PLAIN, MULTIPLES, PRODUCTS, BINARY32, BINARY64 = (
-    0,
-    32,
-    33,
-    88,
-    117,
-)  # forms; 1 to 15: digits of base 10
+# Forms; 1 to 15: digits of base 10.
+PLAIN, MULTIPLES, PRODUCTS, COUNTS, BINARY32, BINARY64 = 0, 32, 33, 34, 88, 117
 UNEXAMINED = 2**16  # bytes, more than any crafted stream has
 HEADING = "Codec 1: lossless"
 WHOLE, SIX = Grid(GridKind.INTEGER), Grid(GridKind.GENERAL, 6)
@@ -42,7 +38,8 @@ DOUBLE, SINGLE = Grid(GridKind.BINARY64), Grid(GridKind.BINARY32)
 class Coded:
     """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top`` None: as
     great as the ordinals need. Nothing is checked, so that what is forbidden can be written.
-    ``multiples``: coded in place of the ordinals, with ``unit`` and ``shifts``: forms 32, 33."""
+    ``multiples``: coded in place of the ordinals, with ``unit`` and ``shifts``: forms 32, 33; or
+    with a ``law`` and ``rests``: form 34. ``parts``: what form 34 says in their place."""
 
     form: int | None = None
     drop: int = 0
@@ -53,6 +50,9 @@ class Coded:
     unit: float | None = None
     shifts: int | None = None
     multiples: tuple[int, ...] = ()
+    law: Law | None = None
+    rests: tuple[int, ...] = ()
+    parts: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ def heads_of(
 ) -> tuple[bytes, list[Ints], Ints]:
     """The heads of a stream, the plans of its coded channels and what is coded of them."""
     table = np.array(ordinals, np.int64)
-    data, plans, coded = b"", [], []
+    data, plans, coded, rests = b"", [], [], []
     for place, head in enumerate(heads):
         column = table[:, place]
         if isinstance(head, Copy):
@@ -138,12 +138,14 @@ def heads_of(
                 )
             )
             coded.append(head.multiples or column.tolist())
-    return data, plans, np.array(coded, np.int64).T
+            rests += [head.rests] if head.rests else []
+    plans += [ordinal_streams.REST] * len(rests)
+    return data, plans, np.array(coded + rests, np.int64).T
 
 
 def _shape(head: Coded, grid: Grid, column: Sequence[int]) -> Lattice:
     form = lossless_heads.form_of_grid(grid) if head.form is None else head.form
-    if form in (PLAIN, MULTIPLES, PRODUCTS):
+    if form in (PLAIN, MULTIPLES, PRODUCTS, COUNTS):
         return Lattice(0, 0, head.drop)
     base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)
     greatest = max(o if o >= 0 else -1 - o for o in column) >> head.drop
@@ -158,9 +160,15 @@ def _coded_head(head: Coded, shape: Lattice) -> bytes:
     data = bytes((kind, *((head.form, head.drop) if head.form is not None else ())))
     data += struct.pack("<d", head.unit) if head.unit is not None else b""
     data += bytes((head.shifts,)) if head.shifts is not None else b""
+    data += _law_fields(head, head.law) if head.law is not None else b""
     data += varint(shape.top) if shape.base else b""
     folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)
     return data + bytes((head.scale,)) + b"".join(map(varint, folded))
+
+
+def _law_fields(head: Coded, law: Law) -> bytes:
+    fields = law.fields(rests=bool(head.rests))
+    return fields if head.parts is None else fields[:8] + bytes((head.parts,)) + fields[9:]
 
 
 def _code_to_the_fault(ordinals: Ints, plans: Sequence[Ints]) -> bytes:

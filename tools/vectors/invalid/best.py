@@ -54,7 +54,6 @@ def _links(shelf: Broken) -> None:
     motion = panel([wave(9), wave(9, 1)], (HUNDREDTHS,) * 2, (2,))
     first = Link(4, 9, ())
     cases = {
-        "unit-45": ("Steps in 2^45.", [Link(45, 45, ())]),
         "links-9": ("A channel that looks at nine others.", [first, Link(4, 9, (0,) * 9)]),
         "links-15": ("A channel that looks at fifteen others.", [first, Link(4, 9, (0,) * 15)]),
         "link-to-itself": ("A channel that looks at itself.", [first, Link(4, 9, (1,))]),
@@ -67,6 +66,9 @@ def _links(shelf: Broken) -> None:
         every = [*links, first][:2]
         data = good[:5] + b"".join(link.head() for link in every) + good[9:]
         shelf.add(name, HEADING, purpose, _with(motion, data))
+    codec = codec_of([Coded()] * 2, [Link(45, 45, ())] * 2)
+    data = file_of(motion, codec=codec, grouping="all")
+    shelf.add("unit-45", HEADING, "Steps in 2^45.", data)
     for size in (5, 6, 7, 8):
         purpose = f"The stream ends in the links, {size - 5} bytes behind the heads."
         shelf.add(f"cut-in-links-{size - 5}", HEADING, purpose, _with(motion, good[:size]))
@@ -107,7 +109,7 @@ def _numbers(shelf: Broken) -> None:
     for name, (what, ordinal) in plain.items():
         data = build_stream([[5], [ordinal]], (WHOLE,), [Coded()], faulty=True)
         purpose = f"The value {what} of a plain channel."
-        shelf.add(f"value-{name}", HEADING, purpose, _with(column([0.0] * 2, WHOLE), data))
+        shelf.add(f"value-{name}", HEADING, purpose, _with(column([5, ordinal], WHOLE), data))
     motion, head = column([0.0], SIX), b"\1\4\x64\0" + Link(4, 9, ()).head()
     seven = build_stream([[6 * 9_000_000 + 234568]], (SIX,), [Coded(form=7, top=12, scale=0)])
     assert seven[1:5] == b"\x84\7\0\x0c"

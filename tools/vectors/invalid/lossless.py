@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mcz.coding.ordinals.counts import Law
 from mcz.coding.ordinals.streams import constant_head
 from mcz.container import payloads
 from mcz.motion import Motion
@@ -18,6 +19,7 @@ from tools.vectors.build.files import Broken, Vector, file_of, rehash
 from tools.vectors.build.lossless_clips import (
     BINARY32,
     BINARY64,
+    COUNTS,
     DOUBLE,
     HEADING,
     MULTIPLES,
@@ -45,6 +47,7 @@ def vectors() -> Iterable[Vector]:
     _cut(shelf)
     _units(shelf)
     _products(shelf)
+    _counts(shelf)
     _sizes(shelf)
     _out_of_range(shelf)
     _ordinals(shelf)
@@ -76,14 +79,14 @@ def _zeros(n_channels: int, value: float = 0.0) -> Motion:
     return panel([[value / 100] * 4] * n_channels, (HUNDREDTHS,) * n_channels)
 
 
-def _with(motion: Motion, *streams: bytes, **edits: Any) -> bytes:
+def _with(motion: Motion, *streams: bytes, version: int = 0, **edits: Any) -> bytes:
     """The file of ``motion``, its groups' streams replaced; the values stay those hashed."""
 
     def replaced(made: Any) -> Any:
         ((header, old),) = made
         return [(header, [*streams, *old[len(streams) :]])]
 
-    constants = codec_of([Constant()] * motion.signals[0].n_channels)
+    constants = codec_of([Constant()] * motion.signals[0].n_channels, version=version)
     return file_of(motion, codec=constants, segments=replaced, **edits)
 
 
@@ -209,6 +212,46 @@ def _products(shelf: Broken) -> None:
     refused("unit", "A unit of 0 of products", SIX, unit=0.0)
 
 
+def _counts(shelf: Broken) -> None:
+    offset, beyond = Law(0.25, 0.5), 2.0**80 * (1 + 2.0**-52)
+    base = Coded(COUNTS, law=offset, multiples=(0,) * 5)
+
+    def refused(
+        name: str, purpose: str, head: Coded = base, value: float = 0.5, **rest: Any
+    ) -> None:
+        codec = codec_of([head], version=rest.pop("version", 1))
+        data = file_of(column([value] * 5, SINGLE), codec=codec, **rest)
+        shelf.add(f"counts-{name}", HEADING, f"{purpose}.", data)
+
+    refused("in-version-0", "Counts in a signal of version 0", version=0)
+    refused("drop", "A drop of 1 bit from counts", replace(base, drop=1))
+    refused("unit", "A unit of 0 of counts", replace(base, law=Law(0.0, 0.5)))
+    for parts in (8 | 1, 128 | 1):
+        head = replace(base, parts=parts)
+        refused(f"parts-{parts}", f"Parts of {parts}: a bit that means nothing", head)
+    terms = {"NaN": float("nan"), "infinite": float("inf"), "huge": beyond, "low": -beyond}
+    for name, term in terms.items():
+        value = float(np.float32(term))
+        head = replace(base, law=Law(0.25, term))
+        refused(f"offset-{name}", f"An offset of {term!r}", head, value)
+        head = replace(base, law=Law(0.25, 0.5, term))
+        refused(f"shift-{name}", f"A shift of {term!r}", head, value)
+    for what, size in (("before-parts", 11), ("in-offset", 15), ("in-shift", 27)):
+
+        def cut(data: bytes, size: int = size) -> bytes:
+            return data[:size]
+
+        head = replace(base, law=Law(0.25, 0.5, 0.0))
+        purpose = f"The stream ends {what.replace('-', ' ')} of a law"
+        refused(f"cut-{what}", purpose, head, segments=stream(0, cut))
+    head, zeros = Coded(COUNTS, law=offset, multiples=(0, 2**44)), [[0], [0]]
+    _faulty(shelf, "counts-beyond", "2^44 counts", SINGLE, zeros, head, [[0.5], [2.0**42]])
+    head = Coded(COUNTS, law=offset, multiples=(0, 0), rests=(0, 2**44))
+    (half,) = SINGLE.ordinals(np.array([0.5]))[0].tolist()
+    values = DOUBLE.values(np.array([[half], [half + 2**44]])).tolist()
+    _faulty(shelf, "counts-rest-beyond", "A rest of 2^44", DOUBLE, zeros, head, values)
+
+
 def _sizes(shelf: Broken) -> None:
     spec = "Entropy coding; Codec 1: lossless"
     cases: tuple[tuple[str, str, Edit], ...] = (
@@ -262,7 +305,8 @@ def _faulty(
     data = build_stream(ordinals, (grid,), [head], faulty=True)
     zeros = column([0.0] * len(ordinals), grid)
     found = np.array(values, zeros.signals[0].values.dtype)
-    shelf.add(name, HEADING, f"{purpose}.", _with(zeros, data, CEND=rehash(found)))
+    made = _with(zeros, data, version=int(head.form == COUNTS), CEND=rehash(found))
+    shelf.add(name, HEADING, f"{purpose}.", made)
 
 
 def _below(shelf: Broken) -> None:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
 from mcz.codecs.lossless.best_streams import AS_CODEC_1, LINKED, Link
+from mcz.coding.ordinals.counts import Law
+from mcz.coding.ordinals.degrees import of_products
 from mcz.motion import Motion
 from mcz.numbers import Grid, GridKind
 from tools.vectors.build.best_clips import HEADING, Streams
 from tools.vectors.build.files import Vector, partial
 from tools.vectors.build.lossless_clips import (
+    COUNTS,
     MULTIPLES,
     PLAIN,
+    PRODUCTS,
     SINGLE,
     SIX,
     WHOLE,
@@ -31,6 +36,7 @@ from tools.vectors.build.motions import (
     wave,
 )
 from tools.vectors.valid.common import every_codec
+from tools.vectors.valid.lossless.counts import values_of
 
 NO_MINUS = (GridKind.INTEGER, GridKind.SCALED, GridKind.VAX_F)  # grids without -0
 LONG = {"fixed", "fixed-integers", "fixed-22-digits", "integer", "scaled"}  # ordinals of 2^44
@@ -39,6 +45,7 @@ LONG = {"fixed", "fixed-integers", "fixed-22-digits", "integer", "scaled"}  # or
 def vectors() -> Iterable[Vector]:
     shelf = Streams("valid/best")
     _grids(shelf)
+    _counts(shelf)
     _methods(shelf)
     _links(shelf)
     _degenerate(shelf)
@@ -61,6 +68,34 @@ def _grids(shelf: Streams) -> None:
     motion = column([0.25 * count for count in counts], SINGLE)
     head = Coded(MULTIPLES, unit=0.25, multiples=counts)
     shelf.code("multiples", "Multiples of a unit, form 32.", motion, [head])
+    values = SIX.values(of_products(np.array(counts), 0.25, 3, SIX)).tolist()
+    head = Coded(PRODUCTS, unit=0.25, shifts=3, multiples=counts)
+    shelf.code("products", "Products, form 33.", column(values, SIX), [head])
+
+
+def _counts(shelf: Streams) -> None:
+    counts = tuple(round(50 * v) for v in wave(40))
+    rests = tuple((row % 7 == 3) - 40 * (row == 11) for row in range(40))
+    law = Law(10 / 65535, 6.0, -6.01)
+    first = Coded(COUNTS, law=law, multiples=counts)
+    shelf.code("counts", "Counts, form 34.", column(values_of(first, SINGLE), SINGLE), [first])
+    last = Coded(COUNTS, law=Law(0.1), multiples=counts[::-1], rests=rests[::-1])
+    heads = [replace(first, rests=rests), Coded(), last]
+    columns = [values_of(heads[0], SINGLE), wave(40, 3), values_of(last, SINGLE)]
+    motion = panel(columns, (SINGLE, HUNDREDTHS, SINGLE))
+    links = [
+        Link(4, 9, ()),
+        Link(4, 9, (0,)),
+        Link(4, 9, (0, 1)),
+        Link(0, 2, (0, 2)),
+        Link(1, 1, (3,)),
+    ]
+    purpose = (
+        "Rests of two channels are numbered behind the coded ones, and look at any before them."
+    )
+    shelf.code("counts-rests", purpose, motion, heads, links)
+    purpose = "The same, coded as codec 1 does."
+    shelf.code("counts-as-codec-1", purpose, motion, heads, methods=(AS_CODEC_1,))
 
 
 def _panel(n_rows: int, n: int) -> Motion:
