@@ -39,7 +39,7 @@ from mcz.numbers import GridKind
 Ints = NDArray[np.int64]
 
 FIRST_FRAMES = 64  # that decide on version 1 for form 33
-PLACES, TRIED_ROWS, TRIED_CHANNELS = 4, 512, 32  # that decide on it for form 34
+PLACES, TRIED_ROWS, TRIED_CHANNELS = 3, 512, 24  # that decide on it for form 34
 SIZING = Sizing(57_000, 64_000, value_bytes=2, most_rows=MAX_ROWS, spare=1)
 
 

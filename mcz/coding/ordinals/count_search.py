@@ -25,6 +25,8 @@ _SOME = 128  # gaps that are looked at first
 _NEAR = 8  # units that a gap may have to tell something
 _REACHES = 8 * 4.0 ** np.arange(24)  # units on both sides of the middle, one after the other
 _OFF = 0.15  # of a unit, on average: beyond, there is no law
+_SHARP = 0.02  # of a unit, the median: then the greatest unit is the one
+_TRIMS, _FAR = 3, 4.0  # rounds that leave out what is off by so many times the median
 _ROUNDS = 25  # to bring the greatest distance from a line down
 _HOPELESS = 4.0  # times the slack, at first
 _BIT_OF_A_REST = 1.3  # what the entropy coder takes for one
@@ -107,7 +109,8 @@ def find_line(distinct: Floats) -> Line | None:
         return None
     lines = (_grown(distinct, unit) for unit in _guesses(gaps))
     found = [line for line in lines if line is not None]
-    return min(found, key=lambda line: _off(distinct, line), default=None)
+    sharp = [line for line in found if np.median(_distances(distinct, line)) < _SHARP]
+    return max(sharp) if sharp else min(found, key=lambda line: _off(distinct, line), default=None)
 
 
 def _guesses(gaps: Floats) -> list[float]:
@@ -123,8 +126,13 @@ def _guesses(gaps: Floats) -> list[float]:
 
 def _off(values: Floats, line: Line) -> float:
     """How far values are from whole numbers, on average."""
+    return float(np.mean(_distances(values, line)))
+
+
+def _distances(values: Floats, line: Line) -> Floats:
+    """How far values are from whole numbers of a line's unit."""
     counts = (values - line[1]) / line[0]
-    return float(np.mean(np.abs(counts - np.rint(counts))))
+    return np.abs(counts - np.rint(counts))
 
 
 def _grown(distinct: Floats, unit: float) -> Line | None:
@@ -182,8 +190,8 @@ def _closest(counts: Floats, values: Floats, slack: Floats) -> Line | None:
 
 def _laws(values: Floats, distinct: Floats, line: Line) -> Iterator[tuple[Law, Ints]]:
     """Laws to try, with the counts of all values."""
+    distinct, few, line = _trimmed(distinct, line)
     unit, offset = line
-    few = np.rint((distinct - offset) / unit)
     counts = np.rint((values - offset) / unit).astype(np.int64)
     half = _spacing(distinct) / 2
     yield from _without_offset(distinct, few, line, counts)
@@ -197,6 +205,18 @@ def _laws(values: Floats, distinct: Floats, line: Line) -> Iterator[tuple[Law, I
         law = _rounded_law(distinct, few, unit, 2.0**power)
         if law is not None:
             yield law, counts
+
+
+def _trimmed(distinct: Floats, line: Line) -> tuple[Floats, Floats, Line]:
+    """The values that are not far off, their counts, and the line through them."""
+    few = np.rint((distinct - line[1]) / line[0])
+    kept, kept_few = distinct, few
+    for _ in range(_TRIMS):
+        off = np.abs(distinct - line[0] * few - line[1])
+        near = off <= _FAR * np.median(off)
+        kept, kept_few = distinct[near], few[near]
+        line = _fit(kept_few, kept) or line
+    return kept, kept_few, line
 
 
 def _usable(unit: float, *terms: float) -> bool:

@@ -25,6 +25,7 @@ NEAR = (0, 1, -1, 2, 3, -5, 7, 1000, -999, 2**20, 5, 0)
 WIDE = (2**31 + 1, -(2**33) - 3, 2**40 + 7, MOST, -MOST - 1, 0, 1, -1)
 VOLT = 10 / 65535  # of a converter of 16 bits
 ONE = 1 + 2.0**-24  # in the middle of two binary32
+NEARLY = 2.0**-24 + 2.0**-60  # what makes 1 a little more than that, but not in binary64
 
 
 def add(shelf: Streams) -> None:
@@ -44,6 +45,8 @@ def _laws(shelf: Streams) -> None:
             NEAR,
         ),
         "ties-last": ("Second sums in the middle: to even", Law(1.0, 0.0, 2.0**-24), NEAR),
+        "twice": ("First sums rounded to binary64, then to a tie", Law(1.0, NEARLY), NEAR),
+        "twice-last": ("Second sums rounded so", Law(1.0, None, NEARLY), NEAR),
         "order": ("Products are rounded before they are added to", Law(0.1, -1.0), (10, 30, 7, 0)),
         "zeros": ("Rounded to -0, with nothing added then", Law(2.0**-200, -0.0), NEAR),
         "zeros-plus": ("Rounded to -0, then 0 is added: +0", Law(2.0**-200, None, 0.0), NEAR),
