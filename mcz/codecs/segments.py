@@ -79,7 +79,8 @@ class Sizing:
     """How a codec of ordinals guesses the frames that fill a segment.
 
     About ``target`` bytes, ``most`` at most; ``value_bytes`` a value, before anything is known;
-    ``spare`` bytes are counted beside the streams; ``most_rows``.
+    ``spare`` bytes are counted beside the streams; ``most_rows``. ``full``: a segment that came out
+    much smaller is coded again, longer.
     """
 
     target: int
@@ -87,6 +88,7 @@ class Sizing:
     value_bytes: float
     most_rows: int
     spare: int = 0
+    full: bool = False
 
 
 def guessing(
@@ -102,7 +104,7 @@ def guessing(
     ends = sorted({*source.breaks, layout.n_frames})
     most = min(layout.most_frames, max(1, sizing.most_rows // layout.samples_per_frame))
     guess = fixed or max(1, int(sizing.target / (sizing.value_bytes * per_frame)))
-    first = 0
+    first, grows = 0, sizing.full and not fixed
     with Ahead(prepare, threads) as ahead:
         while first < layout.n_frames:
             longest = min(most, guess if fixed else guess * 11 // 10)
@@ -113,19 +115,27 @@ def guessing(
             size = _size(streams) + sizing.spare
             fitting = n_frames * sizing.target // size if size else guess
             if size > sizing.most and n_frames > 1 and not fixed:
-                guess = max(1, fitting)
+                guess, grows = max(1, fitting), False
+                continue
+            if grows and size < 0.85 * sizing.target and span[1] not in ends and n_frames < most:
+                guess, grows = min(4 * n_frames, fitting), False
                 continue
             yield Segment(first, n_frames, streams)
-            first = span[1]
+            first, grows = span[1], sizing.full and not fixed
             if not (fixed or not size or 0.85 * guess <= fitting <= 1.15 * guess):
                 guess = max(1, min(4 * n_frames, fitting))
 
 
 def _spans(first: int, length: int, longest: int, ends: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """Segments of ``length`` frames from a frame on; before ``ends`` shorter, or a bit longer."""
+    """Segments of ``length`` frames from a frame on; before ``ends`` shorter, or a bit longer.
+
+    Where ``longest`` leaves a choice, the last two are as long as each other.
+    """
     for end in ends:
         while first < end:
-            stop = end if end - first <= longest else first + length
+            rest = end - first
+            half = (rest + 1) // 2 if longest > length else length
+            stop = end if rest <= longest else first + min(length, max(half, 1))
             yield first, stop
             first = stop
 

@@ -29,7 +29,7 @@ from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
 from mcz.codecs.segments import Sizing
 from mcz.threads import in_force
 
-SIZING = Sizing(57_000, 64_000, value_bytes=1.5, most_rows=MAX_ROWS, spare=1)
+SIZING = Sizing(60_500, 65_000, value_bytes=1.5, most_rows=MAX_ROWS, spare=1, full=True)
 
 
 def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
