@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import threading
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from hypothesis import strategies as st
 import mcz
 from mcz.codecs import CODECS
 from mcz.codecs.ahead import Ahead
+from mcz.codecs.contract import Layout
+from mcz.codecs.segments import Sizing, guessing
 from mcz.errors import ChecksumError, OptionError
 from mcz.threads import in_force, in_order, limited
 from tests.motions import smooth
@@ -129,3 +132,51 @@ def test_what_follows_is_a_guess(threads: int) -> None:
             assert ahead.code(span, following) == (f"{span[0]}-{span[1]}".encode(),)
     assert len(set(prepared)) == len(prepared) or threads == 1
     assert len(prepared) <= 5 * threads + 5
+
+
+@given(
+    n_frames=st.integers(0, 60),
+    breaks=st.sets(st.integers(1, 59), max_size=3),
+    costs=st.lists(st.integers(0, 40), min_size=60, max_size=60),
+    target=st.integers(1, 100),
+    spare=st.integers(0, 30),
+    most_rows=st.integers(1, 80),
+    full=st.booleans(),
+    fixed=st.just(0) | st.integers(1, 70),
+    threads=st.integers(1, 3),
+)
+def test_segments_cover_all_frames(
+    n_frames: int,
+    breaks: set[int],
+    costs: list[int],
+    target: int,
+    spare: int,
+    most_rows: int,
+    full: bool,
+    fixed: int,
+    threads: int,
+) -> None:
+    """Whatever frames cost: no segment is too large that could be shorter, and there is an end."""
+    begun = 0
+
+    def prepare(first: int, stop: int) -> Callable[[], tuple[bytes, ...]]:
+        nonlocal begun
+        begun += 1
+        assert begun < 5000
+        return lambda: (bytes(7 + sum(costs[first:stop])),)
+
+    layout = Layout(n_frames, ((0,),))
+    source = SimpleNamespace(layout=layout, breaks=sorted(b for b in breaks if b < n_frames))
+    sizing = Sizing(target, target + spare, 1.5, most_rows, full=full)
+    at = 0
+    for segment in guessing(source, fixed, sizing, prepare, threads):
+        assert segment.first == at
+        at += segment.n_frames
+        assert 1 <= segment.n_frames <= most_rows
+        assert not any(segment.first < b < at for b in source.breaks)
+        if fixed:
+            ends = {*source.breaks, n_frames}
+            assert segment.n_frames == min(fixed, most_rows) or at in ends
+        elif segment.n_frames > 1:
+            assert len(segment.streams[0]) <= sizing.most
+    assert at == n_frames

@@ -104,24 +104,24 @@ def guessing(
     ends = sorted({*source.breaks, layout.n_frames})
     most = min(layout.most_frames, max(1, sizing.most_rows // layout.samples_per_frame))
     guess = fixed or max(1, int(sizing.target / (sizing.value_bytes * per_frame)))
-    first, grows = 0, sizing.full and not fixed
+    first, limit, grows = 0, most, sizing.full and not fixed
     with Ahead(prepare, threads) as ahead:
         while first < layout.n_frames:
-            longest = min(most, guess if fixed else guess * 11 // 10)
-            spans = _spans(first, min(guess, most), longest, ends)
+            longest = min(limit, guess if fixed else guess * 11 // 10)
+            spans = _spans(first, min(guess, limit), longest, ends)
             span = next(spans)
             n_frames = span[1] - first
             streams = ahead.code(span, spans)
             size = _size(streams) + sizing.spare
             fitting = n_frames * sizing.target // size if size else guess
             if size > sizing.most and n_frames > 1 and not fixed:
-                guess, grows = max(1, fitting), False
+                guess, limit, grows = max(1, fitting), n_frames - 1, False
                 continue
             if grows and size < 0.85 * sizing.target and span[1] not in ends and n_frames < most:
                 guess, grows = min(4 * n_frames, fitting), False
                 continue
             yield Segment(first, n_frames, streams)
-            first, grows = span[1], sizing.full and not fixed
+            first, limit, grows = span[1], most, sizing.full and not fixed
             if not (fixed or not size or 0.85 * guess <= fitting <= 1.15 * guess):
                 guess = max(1, min(4 * n_frames, fitting))
 
