@@ -13,12 +13,15 @@ import mcz
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless import fast
 from mcz.coding.ordinals import heads
+from mcz.coding.ordinals.counts import Law
 from mcz.coding.ordinals.degrees import DEGREE, of_products
 from mcz.coding.quick import kernels, streams, tables
 from mcz.errors import FormatError
-from mcz.numbers import Grid
+from mcz.numbers import Grid, GridKind
 from tests.codecs.test_lossless import GRIDS, columns
 from tests.motions import motions, smooth
+
+SINGLE = Grid(GridKind.BINARY32)
 
 
 def coded(wanted: np.ndarray, grid: Grid, clip_grid: Grid | None = None) -> bytes:
@@ -75,6 +78,19 @@ def test_rounding_noise_is_coded_as_products() -> None:
     np.testing.assert_array_equal(decoded(stream, 300, 1, grid), wanted)
     with pytest.raises(FormatError, match="products on the grid FIXED"):
         decoded(stream, 300, 1, GRIDS[0])
+
+
+@pytest.mark.parametrize("spread", [0, 2])
+def test_what_a_converter_counted(spread: int) -> None:
+    rng = np.random.default_rng(3)
+    counts = rng.integers(-3000, 3000, (400, 2))
+    off = np.rint(rng.normal(0, 0.2 * spread, counts.shape)).astype(np.int64)
+    law = Law(10 / 65535, 0.7, -0.2)
+    wanted = np.stack([law.ordinals(column) for column in counts.T], axis=1) + off
+    stream = coded(wanted, SINGLE)
+    assert stream[1] == heads.COUNTS
+    assert len(stream) < 2 * 400 * (16 + spread) / 8
+    np.testing.assert_array_equal(decoded(stream, 400, 2, SINGLE), wanted)
 
 
 def test_constants_and_copies_cost_almost_nothing() -> None:

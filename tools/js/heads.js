@@ -1,6 +1,6 @@
 // SPEC.md, "Codec 1: lossless": the heads of channels, which codec 14 has, too.
 
-import { BINARY32, BINARY64, GENERAL, TEXT32, TEXT64, VAX_F } from "./grids.js";
+import { BINARY32, BINARY64, GENERAL, TEXT32, TEXT64, VAX_F, binary32Ordinal } from "./grids.js";
 
 export const CODED = 0;
 export const CONSTANT = 1;
@@ -179,4 +179,13 @@ export function productOf({ unit, shifts }, code) {
   const before = Math.abs(code) - 1;
   const size = (2 * Math.floor(before / shifts) + 1) * 2 ** (before % shifts) * unit;
   return code < 0 ? -size : size;
+}
+
+/** The ordinal of what a count says. */
+export function ordinalOfCount({ unit, law }, count) {
+  let x = count * unit;
+  if (law.offset !== null) x += law.offset;
+  x = Math.fround(x);
+  if (law.shift !== null) x += law.shift;
+  return binary32Ordinal(x);
 }

@@ -51,6 +51,8 @@ VECTORS: dict[str, tuple[str, ...]] = {
         "invalid/fast/drop-*",
         "invalid/fast/kind-3",
         "invalid/fast/products-*",
+        "invalid/fast/counts-*",
+        "valid/fast/counts-*",
         "invalid/fast/stream-missing",
         "invalid/fast/tap-*",
         "invalid/fast/unit-*",
@@ -65,6 +67,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "FAST-12": (
         "valid/fast/multiples-*",
         "valid/fast/products-*",
+        "valid/fast/counts-*",
         "valid/fast/form-plain-*",
         "invalid/fast/ordinal-of-*",
     ),

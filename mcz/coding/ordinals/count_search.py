@@ -54,6 +54,8 @@ def find_counts(ordinals: Ints, multiples: tuple[float, Ints] | None) -> Counted
     """
     if multiples is not None and not _lie_apart(multiples[1]):
         return None
+    if ordinals.max() > BINARY32.limit or ordinals.min() < -1 - BINARY32.limit:
+        return None
     values = BINARY32.values(ordinals)
     if not np.isfinite(values).all():
         return None

@@ -109,7 +109,7 @@ def _coded_head(
     column: Ints, grid: Grid, clip_grid: Grid, version: int, *, fitted: bool
 ) -> tuple[bytes, Ints, Ints, Ints | None]:
     """The head of a coded channel, its plan for the compiled loop, the integers to code, rests."""
-    own, fields, column, rests = _in_units(column, grid, version if grid == clip_grid else 0)
+    own, fields, column, rests = in_units(column, grid, version if grid == clip_grid else 0)
     shape = lattice(grid if own is None else PLAIN, column)
     if shape.base and shape.top > max_top(shape):
         shape = lattice(PLAIN, column)
@@ -124,9 +124,7 @@ def _coded_head(
     return b"".join(head), make_plan(shape, scale, from_last, taps), column, rests
 
 
-def _in_units(
-    column: Ints, grid: Grid, version: int
-) -> tuple[int | None, bytes, Ints, Ints | None]:
+def in_units(column: Ints, grid: Grid, version: int) -> tuple[int | None, bytes, Ints, Ints | None]:
     """A form with a unit, its fields, integers and rests; none and the column where none fits."""
     if grid.kind == GridKind.BINARY32:
         found = find_unit(column)

@@ -19,6 +19,7 @@ from mcz.coding.quick.kernels import (
     KIND,
     MAX_TAPS,
     ORDINAL,
+    PARTS,
     SCALE,
     SHIFTS,
     TAPS,
@@ -30,7 +31,8 @@ from mcz.coding.quick.kernels import (
 from mcz.jit import inner, kernel
 
 OWN_FORM = 128  # in kind: form and drop are in the stream
-MULTIPLES, PRODUCTS = 32, 33  # forms: integers that are multiplied by a unit
+MULTIPLES, PRODUCTS, COUNTS = 32, 33, 34  # forms: integers that are multiplied by a unit
+MAX_PARTS = 7
 MAX_DROP, MAX_TAP, MAX_SCALE, MAX_SHIFTS = 19, 511, 172, 63
 MAX_TOP_10, MAX_TOP_24, MAX_TOP_53 = 614, 255, 2047
 MAX_RANK = 1 << 60
@@ -61,7 +63,7 @@ def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:
 def set_form(head: Ints, form: int, drop: int) -> bool:
     """Note base and digits of a form; False for one that there is not."""
     head[DROP] = drop
-    if (form == 0 and drop <= MAX_DROP) or ((form == MULTIPLES or form == PRODUCTS) and drop == 0):
+    if (form == 0 and drop <= MAX_DROP) or (MULTIPLES <= form <= COUNTS and drop == 0):
         head[BASE] = head[DIGITS] = 0
     elif 1 <= form <= 15 and drop == 0:
         head[BASE], head[DIGITS] = 10, form
@@ -103,10 +105,16 @@ def read_coded(
         at += 2
     if not set_form(head, form, drop):
         return -1, BAD_FORM
-    head[UNIT], head[SHIFTS] = -1, 0
-    if form == MULTIPLES or form == PRODUCTS:
+    head[UNIT], head[SHIFTS], head[PARTS] = -1, 0, 0
+    if MULTIPLES <= form <= COUNTS:
         head[UNIT] = at
         at += UNIT_SIZE
+    if form == COUNTS:
+        parts = int(data[at])
+        at += 1 + UNIT_SIZE * ((parts & 1) + (parts >> 1 & 1))
+        if parts > MAX_PARTS:  # FAST-02, LOSS-35
+            return -1, BAD_FORM
+        head[PARTS] = MAX_PARTS + 1 + parts
     if form == PRODUCTS:
         head[SHIFTS] = data[at]
         at += 1

@@ -21,14 +21,15 @@ MAX_TAPS = 4
 # Columns of plans, one row a channel: what its head says,
 KIND, BASE, DIGITS, DROP, TOP, DEPTH, SCALE, FROM_LAST, TAPS = range(9)
 UNIT = TAPS + MAX_TAPS  # where the unit lies in the data, or -1
-SHIFTS = UNIT + 1  # of products, or 0
+SHIFTS, PARTS = UNIT + 1, UNIT + 2  # of products, or 0; of a law, and 8 more, or 0
+RESTS = 4  # in parts: ordinals are added that are coded behind all channels
 ORDINAL = 1  # of a constant
 GROUP, COLUMN = 1, 2  # of a copy
 # and what follows from that for numbers in classes of mantissas: which powers; the least mantissa
 # and one more than the greatest; how many make a class; by how much magnitudes exceed ranks;
 # the lowest and the highest class, by digits in fixed point; the greatest prediction.
-ROW, LOW, HIGH, PER_CLASS, FIRST, LEAST, WIDTH, LIMIT = range(SHIFTS + 1, SHIFTS + 9)
-PLAN_SIZE = SHIFTS + 9
+ROW, LOW, HIGH, PER_CLASS, FIRST, LEAST, WIDTH, LIMIT = range(PARTS + 1, PARTS + 9)
+PLAN_SIZE = PARTS + 9
 CODED, CONSTANT, COPY = range(3)
 
 N_CONTEXTS, N_SYMBOLS = 32, 49

@@ -15,6 +15,9 @@ from mcz.coding.quick.kernels import (
     LEAST_STATE,
     MAX_DIFFERENCE,
     ORDINAL,
+    PARTS,
+    PLAN_SIZE,
+    RESTS,
     SCALE,
     TRACK_SIZE,
     Bytes,
@@ -33,6 +36,7 @@ from mcz.jit import inner, kernel
 # bit, and the first one; where it ends.
 X, AT, BIT, BEGIN, END = range(5)
 FLOW_SIZE = 5
+NO_ROOM = -2  # in place of a channel: there are rests, and no room for them
 
 
 @inner
@@ -114,6 +118,7 @@ def read_streams(
     forms: Ints,
     plans: Ints,
     out: Ints,
+    rests: Ints,
     tables: Tables,
 ) -> tuple[int, int]:
     """Decode the streams of groups, which lie one behind the other in ``data`` from ``at`` on.
@@ -121,8 +126,12 @@ def read_streams(
     ``ends`` and ``firsts``: where each stream ends, and its first channel among ``forms``,
     ``plans`` and the columns of ``out``; one more says how many there are. ``words`` of 32 bits are
     ``data`` backwards; both have more at their ends than streams have. Returns channel and fault,
-    or -1 -1. Copies are left to the caller.
+    or -1 -1. Copies are left to the caller, and so is to add ``rests``, which are as large as
+    ``out`` or have no columns: ``NO_ROOM`` says that they have to.
     """
+    rest = np.zeros(PLAN_SIZE, np.int64)
+    rest[KIND], rest[SCALE] = CODED, 1
+    settle(rest, tables.powers)
     flow = np.zeros(FLOW_SIZE, np.int64)
     track = np.zeros(TRACK_SIZE, np.int64)
     inverse = np.zeros(1, np.float64)
@@ -142,6 +151,12 @@ def read_streams(
                 if flow[X] == 0 and not start_values(data, flow):
                     return n, BAD_BITS
                 if not read_channel(data, words, tables, plans[n], flow, track, inverse, n, out):
+                    return n, BAD_BITS
+        for n in range(firsts[group], firsts[group + 1]):
+            if plans[n, KIND] == CODED and plans[n, PARTS] & RESTS:  # FAST-02, LOSS-38
+                if rests.shape[1] == 0:
+                    return NO_ROOM, BAD_BITS
+                if not read_channel(data, words, tables, rest, flow, track, inverse, n, rests):
                     return n, BAD_BITS
         if not ends_well(flow, words):
             return firsts[group + 1] - 1, BAD_BITS

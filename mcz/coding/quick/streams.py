@@ -15,25 +15,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.coding.ordinals.choices import Lattice, base_and_digits, max_top
-from mcz.coding.ordinals.degrees import find_degrees, of_products
+from mcz.coding.ordinals.counts import parse_law
+from mcz.coding.ordinals.degrees import of_products
 from mcz.coding.ordinals.heads import (
     CODED,
     COPY,
-    MULTIPLES,
     OWN_FORM,
-    PRODUCTS,
     check_unit,
     form_of,
     form_of_grid,
 )
-from mcz.coding.ordinals.streams import constant_head
-from mcz.coding.ordinals.units import find_unit, of_multiples
+from mcz.coding.ordinals.streams import constant_head, in_units
+from mcz.coding.ordinals.units import of_multiples
 from mcz.errors import FormatError
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
 
 Ints = NDArray[np.int64]
 
+UNIT_SIZE, LAW_SIZE = 8, 17  # bytes of a unit; of the longest law behind it
 SPARE = 32  # bytes at both ends of the streams that a reader of a hostile one may look at
 FAULTS = (
     "it ends in the head",
@@ -77,13 +77,17 @@ def tables() -> Any:
 
 @dataclass(slots=True)
 class Coded:
-    """A coded channel: what is coded, its form in the clip, and what its head says."""
+    """A coded channel: what is coded, its form in the clip, and what its head says.
+
+    ``form``: its own, which has ``fields`` and perhaps ``rests``; None: that of the ``shape``.
+    """
 
     numbers: Ints
     clip_form: int
     shape: Lattice
-    unit: float | None = None
-    shifts: int = 0
+    form: int | None = None
+    fields: bytes = b""
+    rests: Ints | None = None
     plan: Sequence[int] = ()
     scale: int = 0
 
@@ -93,14 +97,11 @@ class Coded:
         taps = list(self.plan[own.TAPS : own.TAPS + own.MAX_TAPS])
         while taps and not taps[-1]:
             taps.pop()
-        form = form_of(Lattice(base, digits, drop))
-        if self.unit is not None:
-            form = PRODUCTS if self.shifts else MULTIPLES
+        form = form_of(Lattice(base, digits, drop)) if self.form is None else self.form
         own_form = drop > 0 or form != self.clip_form
         kind = CODED | self.plan[own.FROM_LAST] << 2 | len(taps) << 3 | OWN_FORM * own_form
         parts = [bytes((kind,)), bytes((form, drop)) if own_form else b""]
-        parts += [struct.pack("<d", self.unit)] if self.unit is not None else []
-        parts += [bytes((self.shifts,))] if self.shifts else []
+        parts += [self.fields]
         parts += [varint(top), varint(depth)] if base else []
         parts += [bytes((self.scale,)), *(varint(2 * t if t >= 0 else -2 * t - 1) for t in taps)]
         return b"".join(parts)
@@ -119,14 +120,32 @@ def build_streams(
     may repeat one before it.
     """
     heads = _heads(np.ascontiguousarray(ordinals.T), grids, groups, numbers, copying)
-    records = plan([head for group in heads for head in group if isinstance(head, Coded)])
-    n_coded = [sum(isinstance(head, Coded) for head in group) for group in heads]
+    coded = [[head for head in group if isinstance(head, Coded)] for group in heads]
+    records = plan([head for group in coded for head in group])
+    ends = len(ordinals) * np.cumsum([len(group) for group in coded], dtype=np.int64)
     return [
         b"".join(head.head() if isinstance(head, Coded) else head for head in group) + bits
-        for group, bits in zip(
-            heads, write(records, len(ordinals) * np.cumsum(n_coded, dtype=np.int64)), strict=True
-        )
+        for group, bits in zip(heads, write(*_with_rests(records, ends, coded)), strict=True)
     ]
+
+
+def _with_rests(records: Ints, ends: Ints, groups: Sequence[Sequence[Coded]]) -> tuple[Ints, Ints]:
+    """The records of groups with those of their rests behind them, and where they end."""
+    own, _, choice, _ = loops()
+    found: list[list[Ints]] = [
+        [head.rests for head in group if head.rests is not None] for group in groups
+    ]
+    if not any(found):
+        return records, ends
+    parts = np.split(records, ends[:-1])
+    for place, rests in enumerate(found):
+        if rests:
+            plans = np.zeros((len(rests), own.PLAN_SIZE), np.int64)
+            plans[:, own.SCALE] = 1
+            more = np.zeros((len(rests) * len(rests[0]), records.shape[1]), np.int64)
+            choice.record_columns(np.stack(rests), plans, tables().powers, more)
+            parts[place] = np.concatenate([parts[place], more])
+    return np.concatenate(parts), np.cumsum([len(part) for part in parts], dtype=np.int64)
 
 
 def _heads(
@@ -155,14 +174,10 @@ def _heads(
 
 
 def _coded(column: Ints, grid: Grid, clip_grid: Grid) -> Coded:
-    clip_form, plain = form_of_grid(clip_grid), Lattice(0, 0)
-    if grid.kind == GridKind.BINARY32 and (found := find_unit(column)) is not None:
-        unit, counts = found
-        return Coded(counts, clip_form, plain, unit)
-    if grid == clip_grid and (products := find_degrees(column, grid)) is not None:
-        unit, shifts, codes = products
-        return Coded(codes, clip_form, plain, unit, shifts)
-    return Coded(column, clip_form, Lattice(*base_and_digits(grid)))
+    clip_form, version = form_of_grid(clip_grid), int(grid == clip_grid)
+    form, fields, numbers, rests = in_units(column, grid, version)
+    shape = Lattice(*base_and_digits(grid)) if form is None else Lattice(0, 0)
+    return Coded(numbers, clip_form, shape, form, fields, rests)
 
 
 def plan(coded: Sequence[Coded]) -> Ints:
@@ -214,16 +229,23 @@ def parse_streams(
     ends = SPARE + np.cumsum([len(stream) for stream in streams], dtype=np.int64)
     firsts = np.cumsum([0, *sizes], dtype=np.int64)
     plans = np.zeros((len(channels.forms), own.PLAN_SIZE), np.int64)
-    channel, fault = read.read_streams(
-        data, words, SPARE, ends, firsts, channels.forms, plans, out, tables()
-    )
+    rests = np.zeros((len(out), 0), np.int64)
+    given = data, words, SPARE, ends, firsts, channels.forms, plans, out
+    channel, fault = read.read_streams(*given, rests, tables())
+    if channel == read.NO_ROOM:
+        rests = np.zeros(out.shape, np.int64)
+        channel, fault = read.read_streams(*given, rests, tables())
     if fault >= 0:
         raise FormatError(f"fast: channel {channel} of those read: {FAULTS[fault]}")
     for n in np.flatnonzero((plans[:, own.KIND] == CODED) & (plans[:, own.UNIT] > 0)):
         (unit,) = struct.unpack_from("<d", data.data, plans[n, own.UNIT])
         check_unit("fast", unit)
         shifts, grid = int(plans[n, own.SHIFTS]), channels.grids[n]
-        if not shifts:
+        if plans[n, own.PARTS]:
+            at = int(plans[n, own.UNIT]) + UNIT_SIZE
+            law, has_rests, _ = parse_law(bytes(data[at : at + LAW_SIZE]), 0, unit)
+            out[:, n] = law.ordinals(out[:, n]) + (rests[:, n] if has_rests else 0)  # FAST-12
+        elif not shifts:
             out[:, n] = of_multiples(out[:, n], unit)  # FAST-12
         elif grid.kind == GridKind.GENERAL:  # FAST-02, LOSS-32
             out[:, n] = of_products(out[:, n], unit, shifts, grid)  # FAST-12

@@ -4,7 +4,16 @@ import { annexJson } from "../annex.js";
 import { bits, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
 import { binary32Ordinal } from "../grids.js";
-import { MULTIPLES, PLAIN, PRODUCTS, classesOf, productOf } from "../heads.js";
+import {
+  COUNTS,
+  MULTIPLES,
+  PLAIN,
+  PRODUCTS,
+  classesOf,
+  ordinalOfCount,
+  productOf,
+  withRests,
+} from "../heads.js";
 import { halvesOf, setHalves, setInteger } from "../int64.js";
 import { ordinalOf } from "../ordinals.js";
 import { SignalDecoder } from "../ordinal-streams.js";
@@ -20,7 +29,7 @@ const TWO_44 = 2 ** 44;
 
 const CODEC = {
   name,
-  rules: { maxTaps: 4, hasDepth: true, hasProducts: true },
+  rules: { maxTaps: 4, hasDepth: true, hasProducts: true, hasCounts: true },
   decoder: (ordinals) => new GroupDecoder(ordinals),
 };
 
@@ -131,7 +140,7 @@ class Source {
 class Channel {
   constructor(head, what) {
     Object.assign(this, head, classesOf(head));
-    this.plain = [PLAIN, MULTIPLES, PRODUCTS].includes(head.form);
+    this.plain = [PLAIN, MULTIPLES, PRODUCTS, COUNTS].includes(head.form);
     this.lowest = this.width - head.depth; // class, by digits in fixed point
     this.limit = this.plain ? TWO_44 : this.powers[this.width] - 1;
     this.ranks = (head.depth + 1) * this.perClass;
@@ -201,7 +210,7 @@ class GroupDecoder {
 
   /** Ordinal of row r and a channel goes to firstIndex + r * nChannels + its column. */
   decodeGroup(heads, data, nRows, nChannels, firstIndex, what) {
-    const channels = heads.map((head) => new Channel(head, what));
+    const channels = withRests(heads).map((head) => new Channel(head, what));
     this.source = new Source(data, what);
     for (const channel of channels) {
       const first = firstIndex + channel.column;
@@ -299,7 +308,11 @@ class GroupDecoder {
   plainNumber(channel, v, index) {
     const { form, unit, drop } = channel;
     if (!(v >= -TWO_44 && v < TWO_44)) this.source.refuse(`the value ${v} is beyond 2^44`);
-    if (form === MULTIPLES) {
+    if (channel.restsOf !== undefined) {
+      setInteger(this.halves, index, Number(this.ordinals[index]) + v);
+    } else if (form === COUNTS) {
+      setInteger(this.halves, index, ordinalOfCount(channel, v));
+    } else if (form === MULTIPLES) {
       setInteger(this.halves, index, binary32Ordinal(v * unit));
     } else if (form === PRODUCTS) {
       this.ordinals[index] = ordinalOf(channel.grid, productOf(channel, v));

@@ -10,6 +10,7 @@ import {
   POWERS_OF_10,
   PRODUCTS,
   classesOf,
+  ordinalOfCount,
   productOf,
   withRests,
 } from "../heads.js";
@@ -123,15 +124,6 @@ export class CodedChannel {
 /** beside(value, scale) of the specification. */
 function beside(value, scale) {
   return clamp(bits(value) - bits(scale) + 3, 0, 7);
-}
-
-/** The ordinal of what a count says. */
-function ordinalOfCount({ unit, law }, count) {
-  let x = count * unit;
-  if (law.offset !== null) x += law.offset;
-  x = Math.fround(x);
-  if (law.shift !== null) x += law.shift;
-  return binary32Ordinal(x);
 }
 
 /** Decodes the coded channels of a group in a segment, one group after the other. */

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Encoded, Segment
 from mcz.codecs.lossless import fast
+from mcz.coding.ordinals.counts import Law
 from mcz.coding.ordinals.heads import OWN_FORM, form_of_grid, scale_of
 from mcz.coding.ordinals.streams import constant_head
 from mcz.coding.quick import streams as quick
@@ -22,7 +23,15 @@ from mcz.motion import Motion
 from mcz.numbers import Grid
 from mcz.schema import varint
 from tools.vectors.build.files import Whole, file_of
-from tools.vectors.build.lossless_clips import MULTIPLES, PLAIN, PRODUCTS, Constant, Copy
+from tools.vectors.build.lossless_clips import (
+    COUNTS,
+    MULTIPLES,
+    PLAIN,
+    PRODUCTS,
+    Constant,
+    Copy,
+    law_fields,
+)
 
 Ints = NDArray[np.int64]
 HEADING = "Codec 14: fast"
@@ -32,7 +41,8 @@ HEADING = "Codec 14: fast"
 class Coded:
     """A coded channel. ``form`` None: that of the grid, without bit 7 of kind; ``top``, ``depth``
     None: as the ordinals need. Nothing is checked, so that what is forbidden can be written.
-    ``multiples``: coded in place of the ordinals, with ``unit`` and ``shifts``: forms 32, 33."""
+    ``multiples``: coded in place of the ordinals, with ``unit`` and ``shifts``: forms 32, 33; or
+    with a ``law`` and ``rests``: form 34. ``parts``: what form 34 says in their place."""
 
     form: int | None = None
     drop: int = 0
@@ -44,10 +54,14 @@ class Coded:
     unit: float | None = None
     shifts: int | None = None
     multiples: tuple[int, ...] = ()
+    law: Law | None = None
+    rests: tuple[int, ...] = ()
+    parts: int | None = None
 
 
 Head = Coded | Constant | Copy
 USUAL = Coded()
+REST = Coded(PLAIN, scale=0, from_last=0)
 
 
 def codec_of(*segments: Sequence[Head]) -> Codec:
@@ -88,7 +102,7 @@ def streams_of(layout: Any, ordinals: Ints, heads: Sequence[Head]) -> tuple[byte
 def build_stream(ordinals: Any, grids: Sequence[Grid], heads: Sequence[Head]) -> bytes:
     """The stream of a group: ``ordinals`` (rows, channels), the grids of the clip, the heads."""
     table = np.array(ordinals, np.int64)
-    data, plans, columns = b"", [], []
+    data, plans, columns, rests = b"", [], [], []
     for place, head in enumerate(heads):
         column = table[:, place]
         if isinstance(head, Copy):
@@ -100,6 +114,9 @@ def build_stream(ordinals: Any, grids: Sequence[Grid], heads: Sequence[Head]) ->
             data += _head(head, plan)
             plans.append(plan)
             columns.append(head.multiples or column.tolist())
+            rests += [head.rests] if head.rests else []
+    plans += [_plan(REST, grids[0], ())] * len(rests)
+    columns += rests
     return data + (values_of(np.array(columns, np.int64), np.stack(plans)) if plans else b"")
 
 
@@ -116,7 +133,7 @@ def _plan(head: Coded, grid: Grid, column: Sequence[int]) -> Ints:
     own = quick.loops()[0]
     form = form_of_grid(grid) if head.form is None else head.form
     plan: Ints = np.zeros(own.PLAN_SIZE, np.int64)
-    if form not in (PLAIN, MULTIPLES, PRODUCTS):
+    if form not in (PLAIN, MULTIPLES, PRODUCTS, COUNTS):
         base, digits = (10, form) if form < 64 else (2, form - 64 - head.drop)
         sizes = sorted({(o if o >= 0 else -1 - o) >> head.drop for o in column} - {0} or {1})
         per_class = (base - 1) * base ** (digits - 1)
@@ -138,6 +155,7 @@ def _head(head: Coded, plan: Ints) -> bytes:
     data = bytes((kind, *((head.form, head.drop) if head.form is not None else ())))
     data += struct.pack("<d", head.unit) if head.unit is not None else b""
     data += bytes((head.shifts,)) if head.shifts is not None else b""
+    data += law_fields(head, head.law) if head.law is not None else b""
     if plan[own.BASE]:
         data += varint(int(plan[own.TOP])) + varint(int(plan[own.DEPTH]))
     folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)

@@ -160,13 +160,14 @@ def _coded_head(head: Coded, shape: Lattice) -> bytes:
     data = bytes((kind, *((head.form, head.drop) if head.form is not None else ())))
     data += struct.pack("<d", head.unit) if head.unit is not None else b""
     data += bytes((head.shifts,)) if head.shifts is not None else b""
-    data += _law_fields(head, head.law) if head.law is not None else b""
+    data += law_fields(head, head.law) if head.law is not None else b""
     data += varint(shape.top) if shape.base else b""
     folded = (2 * tap if tap >= 0 else -2 * tap - 1 for tap in head.taps)
     return data + bytes((head.scale,)) + b"".join(map(varint, folded))
 
 
-def _law_fields(head: Coded, law: Law) -> bytes:
+def law_fields(head: Any, law: Law) -> bytes:
+    """The fields of form 34 in the head of a channel, of this codec or another."""
     fields = law.fields(rests=bool(head.rests))
     return fields if head.parts is None else fields[:8] + bytes((head.parts,)) + fields[9:]
 

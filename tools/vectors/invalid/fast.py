@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mcz.coding.ordinals.counts import Law
 from mcz.coding.quick import streams as quick
 from mcz.coding.quick.kernels import FAR
 from mcz.container import payloads
@@ -20,6 +21,7 @@ from tools.vectors.build.files import Broken, Vector, file_of, rehash
 from tools.vectors.build.lossless_clips import (
     BINARY32,
     BINARY64,
+    COUNTS,
     DOUBLE,
     MULTIPLES,
     PLAIN,
@@ -42,6 +44,7 @@ def vectors() -> Iterable[Vector]:
     _coded(shelf)
     _units(shelf)
     _products(shelf)
+    _counts(shelf)
     _sizes(shelf)
     _out_of_range(shelf)
     _ordinals(shelf)
@@ -165,6 +168,35 @@ def _products(shelf: Broken) -> None:
     refused("shifts-0", "No shifts", SIX, shifts=0)
     refused("shifts-64", "64 shifts", SIX, shifts=64)
     refused("unit", "A unit of 0 of products", SIX, unit=0.0)
+
+
+def _counts(shelf: Broken) -> None:
+    base = Coded(COUNTS, law=Law(0.25, 0.5), multiples=(0,) * 5)
+
+    def refused(
+        name: str, purpose: str, head: Coded = base, value: float = 0.5, **rest: Any
+    ) -> None:
+        data = file_of(column([value] * 5, SINGLE), codec=codec_of([head]), **rest)
+        shelf.add(f"counts-{name}", HEADING, f"{purpose}.", data)
+
+    refused("drop", "A drop of 1 bit from counts", replace(base, drop=1))
+    refused("unit", "A unit of 0 of counts", replace(base, law=Law(0.0, 0.5)))
+    refused("parts-9", "Parts of 9: a bit that means nothing", replace(base, parts=9))
+    for name, term in {"NaN": float("nan"), "huge": 2.0**80 * (1 + 2.0**-52)}.items():
+        value = float(np.float32(term))
+        refused(
+            f"offset-{name}", f"An offset of {term!r}", replace(base, law=Law(0.25, term)), value
+        )
+        head = replace(base, law=Law(0.25, None, term))
+        refused(f"shift-{name}", f"A shift of {term!r}", head, value)
+    for what, size in (("before-parts", 11), ("in-shift", 27)):
+
+        def cut(data: bytes, size: int = size) -> bytes:
+            return data[:size]
+
+        head = replace(base, law=Law(0.25, 0.5, 0.0))
+        purpose = f"The stream ends {what.replace('-', ' ')} of a law"
+        refused(f"cut-{what}", purpose, head, segments=stream(0, cut))
 
 
 def _sizes(shelf: Broken) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from mcz.coding.ordinals.counts import Law
 from mcz.coding.ordinals.degrees import of_products
 from mcz.coding.ordinals.heads import MAX_SCALE
 from mcz.numbers import Grid, GridKind
@@ -14,6 +15,7 @@ from tools.vectors.build.files import partial
 from tools.vectors.build.lossless_clips import (
     BINARY32,
     BINARY64,
+    COUNTS,
     DOUBLE,
     MULTIPLES,
     PLAIN,
@@ -25,6 +27,7 @@ from tools.vectors.build.lossless_clips import (
     Copy,
 )
 from tools.vectors.build.motions import HUNDREDTHS, column, grid_cases, panel, wave
+from tools.vectors.valid.lossless.counts import values_of
 
 NO_MINUS = (GridKind.INTEGER, GridKind.SCALED, GridKind.VAX_F)  # grids without -0
 # Cases of ``grid_cases`` whose ordinals exceed 2^44 on a plain grid, and those of too many classes.
@@ -40,6 +43,7 @@ def add(shelf: Streams) -> None:
     _forms(shelf)
     _multiples(shelf)
     _products(shelf)
+    _counts(shelf)
     _ranks(shelf)
     _symbols(shelf)
 
@@ -190,6 +194,35 @@ def _products(shelf: Streams) -> None:
         head = Coded(form=PRODUCTS, unit=unit, shifts=shifts, multiples=tuple(codes), taps=(32,))
         motion = column(grid.values(ordinals).tolist(), grid)
         shelf.code(f"products-{name}", f"{purpose}.", motion, [head])
+
+
+def _counts(shelf: Streams) -> None:
+    near = (0, 1, -1, 2, 3, -5, 7, 1000, -999, 2**20, 5, 0)
+    some, far = (0, 0, 1, 0, -1, 0, 0, 2, 0, 0, -40, 0), (0, 2**30, -(2**30), 77, 2**24, 0, -1, 3)
+    most, volt, far_off = 2**44 - 1, 10 / 65535, 2.0**80
+    wide = (2**31 + 1, -(2**33) - 3, most, -most - 1, 0, 1, -1)
+    ends = (most, -most - 1, 0, 5, most, most, -1, 0)
+    cases: dict[str, tuple[str, Law, tuple[int, ...], tuple[int, ...], Grid]] = {
+        "alone": ("No sum is made", Law(0.1), near, (), SINGLE),
+        "both": ("Offset and shift", Law(volt, 6.0, -6.01), near, (), SINGLE),
+        "shift": ("A shift alone", Law(volt, None, -1.7), near, (), SINGLE),
+        "greatest": ("The greatest of all", Law(far_off, far_off, far_off), wide, (), SINGLE),
+        "rests": ("Rests of some rows", Law(volt, 0.3), near, some, SINGLE),
+        "rests-far": ("Rests to far numbers", Law(volt, 0.3), near[:8], far, SINGLE),
+        "rests-most": ("Rests as far as they go", Law(volt, 6.0, -6.0), near[:8], ends, DOUBLE),
+    }
+    for name, (purpose, law, counts, rests, grid) in cases.items():
+        head = Coded(form=COUNTS, law=law, multiples=counts, rests=rests, taps=(32,))
+        motion = column(values_of(head, grid), grid)
+        shelf.code(f"counts-{name}", f"{purpose}.", motion, [head])
+    first = Coded(form=COUNTS, law=Law(volt, 0.3), multiples=near, rests=some, taps=(32,))
+    second = Coded(form=COUNTS, law=Law(0.1), multiples=near, rests=some[::-1])
+    made = [values_of(head, SINGLE) for head in (first, second)]
+    columns = [made[0], wave(12), [2.5] * 12, made[1], made[0]]
+    grids = (SINGLE, HUNDREDTHS, SINGLE, SINGLE, SINGLE)
+    purpose = "Rests of two channels lie behind the coded ones of their group; a copy has both."
+    heads = [first, Coded(), Constant(), second, Copy(0, 0)]
+    shelf.code("counts-among-others", purpose, panel(columns, grids, (4, 1)), heads)
 
 
 def _ranks(shelf: Streams) -> None:

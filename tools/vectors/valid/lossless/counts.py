@@ -102,7 +102,7 @@ def _column(
     shelf.code(f"counts-{name}", f"{purpose}.", motion, [head], version=1)
 
 
-def values_of(head: Coded, grid: Grid) -> list[float]:
+def values_of(head: Any, grid: Grid) -> list[float]:
     """What a head's counts and rests say on a grid."""
     assert head.law is not None
     ordinals = head.law.ordinals(np.array(head.multiples, np.int64))
