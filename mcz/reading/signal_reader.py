@@ -60,6 +60,7 @@ class SignalReader:
         self._read_ones: set[int] = set()  # segments
         self._lock = Lock()  # of both
         self._threads = container.threads or in_force()
+        self._n_columns = sum(len(info.layout.groups[group]) for group in groups)
 
     def read(self, start: int, stop: int) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
         """Values and mask of frames start <= f < stop, groups side by side."""
@@ -110,9 +111,7 @@ class SignalReader:
         return values, mask
 
     def _shape(self, start: int, stop: int) -> tuple[int, int]:
-        layout = self.info.layout
-        n_columns = sum(len(layout.groups[group]) for group in self.groups)
-        return (stop - start) * layout.samples_per_frame, n_columns
+        return (stop - start) * self.info.layout.samples_per_frame, self._n_columns
 
     def blocks(self, start: int, stop: int, out: NDArray[Any] | None = None) -> Iterator[Block]:
         """The same block by block; values may lie in ``out``, of all rows, already."""
@@ -183,7 +182,9 @@ class SignalReader:
             masks = [block.mask for block in blocks]
             held = Run(
                 run[0],
-                np.concatenate([block.values for block in blocks]),
+                blocks[0].values
+                if len(blocks) == 1
+                else np.concatenate([b.values for b in blocks]),
                 None if all(mask is None for mask in masks) else _joined(blocks),
             )
             self.container.runs.put(key, held)
