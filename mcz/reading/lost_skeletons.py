@@ -58,7 +58,7 @@ def _lost(container: Container) -> set[bytes]:
     for kind, id_ in directory.shared:
         if kind == b"SKEL":
             with suppress(MczError):
-                named |= set(map(bytes, container.shared(kind, id_, payloads.SKEL).base))
+                named |= set(map(bytes, container.skeleton_fields(id_).base))
     return {id_ for id_ in named if (b"SKEL", id_) not in directory.shared}
 
 
