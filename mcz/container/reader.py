@@ -38,6 +38,7 @@ from mcz.container.directory import (
 )
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.overlay import Overlay
+from mcz.container.packed import parse_skel
 from mcz.container.packets import (
     CHECK_SIZE,
     NUMBERED,
@@ -46,7 +47,6 @@ from mcz.container.packets import (
     head_size,
     is_head,
 )
-from mcz.container.packed import parse_skel
 from mcz.container.restoring import is_like, restored
 from mcz.container.runs import Runs
 from mcz.container.scan import scan

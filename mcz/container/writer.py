@@ -66,6 +66,7 @@ def build_head(profile: Profile) -> bytes:
     fields = dict(zip(names, version * 2, strict=True))
     return build(payloads.HEAD, fields | {"profile": profile.id, "extension": b""}, "HEAD")
 
+
 UNINDEXED = 8192  # bytes of a short file that is walked as fast as its index is read
 
 

@@ -138,7 +138,7 @@ def _templates(shelf: Broken) -> None:
         ),
         ("deflate-tail", "Conventions", "A byte follows the deflate stream.", plus(b"\0")),
         ("deflate-end", "Conventions", "The deflate stream has no end.", lambda data: data[:-1]),
-        ("encoding", "", "An encoding beyond the table.", field("encoding", b"\2")),
+        ("encoding", "", "An encoding beyond the table.", field("encoding", b"\3")),
         ("stored-size", "", "Stored, of another size than stated.", stored),
     )
     for name, heading, purpose, edit in cases:
