@@ -2,8 +2,8 @@
 
     python tools/make_words.py
 
-SPEC.md, "Conventions" ("deflate after words"). The bytes are the vocabulary of BVH and ASF, laid out
-as common writers do, and joint names that many rigs share. Nothing is taken from a recording. What
+SPEC.md, "Conventions" ("deflate after words"). The bytes are the vocabulary of BVH and ASF, laid
+out as common writers do, and joint names that many rigs share. Nothing is taken from a recording. What
 is used most often stands last: near distances cost fewer bits.
 """
 
@@ -39,22 +39,22 @@ ASF = """# AST/ASF file generated using VICON BodyLanguage
 :root
    order TX TY TZ RX RY RZ
    axis XYZ
-   position 0 0 0  
-   orientation 0 0 0 
+   position 0 0 0
+   orientation 0 0 0
 :bonedata
   begin
-     id 1 
+     id 1
      name lhipjoint
-     direction 0.0 0.0 0.0 
-     length 0 
-     axis 0 0 0  XYZ  
+     direction 0.0 0.0 0.0
+     length 0
+     axis 0 0 0  XYZ
   end
   begin
-     id 2 
+     id 2
      name lfemur
-     direction 0.34202 -0.939693 0  
-     length 1.0 
-     axis 0 0 20  XYZ  
+     direction 0.34202 -0.939693 0
+     length 1.0
+     axis 0 0 20  XYZ
     dof rx ry rz
     limits (-160.0 20.0)
            (-70.0 70.0)
@@ -87,7 +87,7 @@ ASF = """# AST/ASF file generated using VICON BodyLanguage
     rwrist rhand rthumb
     rhand rfingers
   end
-#!OML:ASF 
+#!OML:ASF
 :FULLY-SPECIFIED
 :DEGREES
 """
@@ -129,7 +129,7 @@ def words() -> bytes:
     all_names = names()
     common = all_names[:45]
     texts = (
-        ASF,
+        ASF.replace("\n", " \n"),  # as Vicon's files end lines
         ASF.replace("\n", "\r\n"),
         hierarchy(common, "\r\n", "\t", "Zrotation Xrotation Yrotation"),
         hierarchy(all_names[-18:], "\n", "  ", "Xrotation Yrotation Zrotation"),

@@ -74,8 +74,8 @@ class Writer:
     """Appends chunks to ``sink``; ``directory`` and ``offset`` continue an existing file.
 
     With ``copies`` the chunks that hold everything else together stand a second time before INDX,
-    those of ``uncopied``, which the file has already, among them. ``short``: texts and skeletons may
-    refer to the words of the annex, and a file of at most ``UNINDEXED`` bytes has no INDX.
+    those of ``uncopied``, which the file has already, among them. ``short``: texts and skeletons
+    may refer to the words of the annex, and a file of at most ``UNINDEXED`` bytes has no INDX.
     """
 
     def __init__(
