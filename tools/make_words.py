@@ -3,8 +3,8 @@
     python tools/make_words.py
 
 SPEC.md, "Conventions" ("deflate after words"). The bytes are the vocabulary of BVH and ASF, laid
-out as common writers do, and joint names that many rigs share. Nothing is taken from a recording. What
-is used most often stands last: near distances cost fewer bits.
+out as common writers do, and joint names that many rigs share. Nothing is taken from a recording.
+What is used most often stands last: near distances cost fewer bits.
 """
 
 from __future__ import annotations
