@@ -194,11 +194,14 @@ def _plain(error: Exception) -> str:
     return " ".join(str(error).split()).replace("(parsing) -> ", "") or type(error).__name__
 
 
-def inflate(data: bytes, size: int, where: str) -> bytes:
-    """The ``size`` bytes whose raw deflate is ``data``; never more memory than ``size`` + 1."""
+def inflate(data: bytes, size: int, where: str, *, words: bytes = b"") -> bytes:
+    """The ``size`` bytes whose raw deflate is ``data``; never more memory than ``size`` + 1.
+
+    ``words``: bytes that distances may reach back to, as if they came before.
+    """
     if size > MAX_RATIO * (len(data) + 1):  # LIMIT-14
         raise LimitError(f"{where}: {size} bytes cannot come of {len(data)}")
-    inflater = zlib.decompressobj(-15)
+    inflater = zlib.decompressobj(-15, words)
     try:
         out = inflater.decompress(data, size + 1)
     except zlib.error as error:
@@ -208,6 +211,7 @@ def inflate(data: bytes, size: int, where: str) -> bytes:
     return out
 
 
-def deflate(data: bytes) -> bytes:
-    deflater = zlib.compressobj(9, zlib.DEFLATED, -15, 9)
+def deflate(data: bytes, *, words: bytes = b"") -> bytes:
+    """The raw deflate of ``data``, which may refer to ``words``."""
+    deflater = zlib.compressobj(9, zlib.DEFLATED, -15, 9, zlib.Z_DEFAULT_STRATEGY, words)
     return deflater.compress(data) + deflater.flush()

@@ -88,7 +88,9 @@ SKELETON_SOURCE = Struct(
 
 SKEL = Struct(
     "name" / TEXT * "name of the skeleton",
-    "flags" / flags("intrinsic") * "bit 0: rotations apply about the turned axes",
+    "flags"
+    / flags("intrinsic")  # packed.py has cleared bit 1
+    * "bit 0: rotations apply about the turned axes; 1: packed",
     "unit_cm" / optional(FINITE) * "0 or 1 binary64: one length unit in cm; none: unknown",
     "angle_unit" / OneOf(Int8ul, range(3)) * "0 unknown, 1 degrees, 2 radians",
     "up_axis" / OneOf(Int8ul, range(4)) * "0 unknown, 1 x, 2 y, 3 z",
@@ -98,10 +100,11 @@ SKEL = Struct(
     "extension" / EXTENSION * "ignored, kept",
 )
 
-STORED, DEFLATED = 0, 1
+STORED, DEFLATED, AFTER_WORDS = 0, 1, 2
+ENCODING = OneOf(Int8ul, (STORED, DEFLATED, AFTER_WORDS))  # CONV-15
 SRCE = Struct(
     "format" / Int8ul * "source format id",
-    "encoding" / OneOf(Int8ul, (STORED, DEFLATED)) * "0 stored, 1 raw deflate",  # CONV-15
+    "encoding" / ENCODING * "0 stored, 1 raw deflate, 2 deflate after words",
     "size" / UVARINT * "bytes of the template",
     "data" / GreedyBytes * "the template, encoded",
 )
@@ -117,7 +120,7 @@ ATTA = Struct(
     "n_parts" / POSITIVE * "parts of the file, at least 1, all in one run",
     "size" / UVARINT * "bytes of the whole file",
     "sha256" / SHA256 * "hash of the whole file",
-    "encoding" / OneOf(Int8ul, (STORED, DEFLATED)) * "0 stored, 1 raw deflate",
+    "encoding" / ENCODING * "0 stored, 1 raw deflate, 2 deflate after words",
     "part_size" / UVARINT * "bytes of this part, decoded",
     "data" / GreedyBytes * "this part, encoded",
 )
@@ -195,7 +198,7 @@ CEND = Struct(
 )
 
 COPY = Struct(
-    "encoding" / OneOf(Int8ul, (STORED, DEFLATED)) * "0 stored, 1 raw deflate",
+    "encoding" / ENCODING * "0 stored, 1 raw deflate, 2 deflate after words",
     "size" / UVARINT * "bytes of the copies, decoded",
     "data" / GreedyBytes * "the copies, encoded",
 )

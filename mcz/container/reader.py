@@ -38,6 +38,7 @@ from mcz.container.directory import (
 )
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.overlay import Overlay
+from mcz.container.packed import parse_skel
 from mcz.container.packets import (
     CHECK_SIZE,
     NUMBERED,
@@ -197,14 +198,21 @@ class Container:
         self.directory.shared[kind, payload_id(payload)] = Chunk(kind, 0, end, len(payload))
 
     def shared(self, kind: bytes, id_: bytes, schema: Any) -> Any:
-        """The fields of the SKEL, MODL or SRCE with this id, its hash checked."""
+        """The fields of the MODL or SRCE with this id, its hash checked."""
+        payload, label = self._shared_payload(kind, id_)
+        return parse(schema, payload, label, self.profile.counts)
+
+    def _skel(self, id_: bytes) -> Any:
+        return parse_skel(*self._shared_payload(b"SKEL", id_), self.profile)
+
+    def _shared_payload(self, kind: bytes, id_: bytes) -> tuple[bytes, str]:
         chunk = self.directory.shared.get((kind, id_))
         if chunk is None:
             raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
         payload = self.payload(chunk)
         if payload_id(payload) != id_:
             raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
-        return parse(schema, payload, chunk.label, self.profile.counts)
+        return payload, chunk.label
 
     def skeleton(self, id_: bytes) -> Skeleton:
         """The skeleton in the SKEL with this id, its own source file not read."""
@@ -217,7 +225,7 @@ class Container:
     def _skeleton(self, id_: bytes) -> tuple[Any, Skeleton]:
         """Both; the last ones are kept, since the clips of a file share them."""
         if id_ not in self._skeletons:
-            fields = self.shared(b"SKEL", id_, payloads.SKEL)
+            fields = self._skel(id_)
             found = fields, parse_skeleton(fields, self.profile, f"SKEL {id_.hex()}")
             while len(self._skeletons) >= KEPT_SKELETONS:
                 self._skeletons.pop(next(iter(self._skeletons)), None)

@@ -13,6 +13,7 @@ from mcz.container import payloads
 from mcz.container.chunks import Chunk
 from mcz.container.directory import ClipRow, Directory, parse_index
 from mcz.container.limits import Profile, check
+from mcz.container.packed import parse_skel, words
 from mcz.container.skeletons import parse_skeleton
 from mcz.errors import FormatError
 from mcz.schema import inflate, parse
@@ -28,7 +29,8 @@ def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
         if len(data) != size:  # ATTA-03, SRCE-01
             raise FormatError(f"{where}: {len(data)} bytes stored, {size} stated")
         return bytes(data)
-    return inflate(data, size, where)
+    after = words() if encoding == payloads.AFTER_WORDS else b""
+    return inflate(data, size, where, words=after)
 
 
 def is_plain_path(name: str) -> bool:
@@ -48,7 +50,7 @@ def check_skeleton(
     payload: bytes, where: str, directory: Directory, templates: Templates, profile: Profile
 ) -> bool:
     """Check a SKEL; return whether it has a source file of its own."""
-    fields = parse(payloads.SKEL, payload, where, profile.counts)
+    fields = parse_skel(payload, where, profile)
     parse_skeleton(fields, profile, where)
     for base in fields.base:
         _refer(directory, b"SKEL", base, where)  # SKEL-02

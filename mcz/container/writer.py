@@ -33,6 +33,7 @@ from mcz.container.directory import (
     build_index,
 )
 from mcz.container.limits import BASE, MIB, Profile, check
+from mcz.container.packed import smallest
 from mcz.container.packets import (
     CHECK_SIZE,
     END,
@@ -44,7 +45,7 @@ from mcz.container.packets import (
 from mcz.container.segments import FRESH, SegmentHeader, build_segment
 from mcz.errors import FormatError, MotionError
 from mcz.motion import Skeleton
-from mcz.schema import build, deflate
+from mcz.schema import build
 
 ATTACHMENT_PART = MIB  # decoded bytes of one ATTA
 
@@ -66,11 +67,15 @@ def build_head(profile: Profile) -> bytes:
     return build(payloads.HEAD, fields | {"profile": profile.id, "extension": b""}, "HEAD")
 
 
+UNINDEXED = 8192  # bytes of a short file that is walked as fast as its index is read
+
+
 class Writer:
     """Appends chunks to ``sink``; ``directory`` and ``offset`` continue an existing file.
 
     With ``copies`` the chunks that hold everything else together stand a second time before INDX,
-    those of ``uncopied``, which the file has already, among them.
+    those of ``uncopied``, which the file has already, among them. ``short``: texts and skeletons
+    may refer to the words of the annex, and a file of at most ``UNINDEXED`` bytes has no INDX.
     """
 
     def __init__(
@@ -83,8 +88,10 @@ class Writer:
         head_extension: bytes = b"",
         copies: bool = False,
         uncopied: Iterable[Copy] = (),
+        short: bool = False,
     ) -> None:
         self._sink = sink
+        self.short = short
         self.profile = profile
         self.offset = offset
         self.directory = directory or Directory()
@@ -124,13 +131,12 @@ class Writer:
     def template(self, format_id: int, template: bytes) -> bytes:
         """Write a SRCE and return its id."""
         check("template: bytes", len(template), self.profile.text_bytes)
-        packed = deflate(template)
-        encoding = payloads.DEFLATED if len(packed) < len(template) else payloads.STORED
+        encoding, data = smallest(template, short=self.short)
         fields = {
             "format": format_id,
             "encoding": encoding,
             "size": len(template),
-            "data": packed if encoding else template,
+            "data": data,
         }
         return self.shared(b"SRCE", build(payloads.SRCE, fields, "SRCE"))
 
@@ -148,13 +154,12 @@ class Writer:
         row = AttachmentRow(name, len(data), [])
         for part in range(n_parts):
             piece = data[part * ATTACHMENT_PART :][:ATTACHMENT_PART]
-            packed = deflate(piece)
-            encoding = payloads.DEFLATED if len(packed) < len(piece) else payloads.STORED
+            encoding, packed = smallest(piece, short=self.short)
             fields = common | {
                 "part": part,
                 "encoding": encoding,
                 "part_size": len(piece),
-                "data": packed if encoding else piece,
+                "data": packed,
             }
             row.parts.append(self.chunk(b"ATTA", build(payloads.ATTA, fields, "ATTA")))
         self.directory.attachments[name] = row
@@ -272,7 +277,7 @@ class Writer:
         for run in runs(copies):
             self.ancillary(COPY, build_copies(run, self.offset), safe_to_copy=False)
         start, length = 0, 0
-        if index:
+        if index and not (self.short and self.offset <= UNINDEXED):
             chunk = build_index(self.directory)
             check("INDX: bytes", len(chunk), self.profile.chunk_bytes)
             start, length = self.offset, len(chunk)

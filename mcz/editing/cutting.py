@@ -13,6 +13,8 @@ from mcz.codecs.contract import Codec
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
 from mcz.container.frame_numbers import KEY, frame_number_metadata
+from mcz.container.limits import Profile
+from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.errors import MotionError, OptionError
@@ -20,7 +22,7 @@ from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.joints import Chosen, Joints, joint_list
 from mcz.reading.signal_info import SignalInfo
-from mcz.schema import build, parse
+from mcz.schema import build
 
 WITHOUT_SOURCE = "the source file was left out when joints were cut"
 WITHOUT_CHANNELS = "the channels of other joints were cut"
@@ -304,9 +306,9 @@ def cut_segment(
     return SegmentHeader(header.signal, first, header.n_frames, lead, header.tail, flags), kept
 
 
-def cut_skeleton(payload: bytes, id_: bytes, joints: frozenset[int]) -> bytes:
+def cut_skeleton(payload: bytes, id_: bytes, joints: frozenset[int], profile: Profile) -> bytes:
     """The payload of a SKEL whose other joints have no channels; ``id_`` is its base's."""
-    fields = parse(payloads.SKEL, payload, f"SKEL {id_.hex()}")
+    fields = parse_skel(payload, f"SKEL {id_.hex()}", profile)
     for index, joint in enumerate(fields.joints):
         if index not in joints:
             joint.channels = []

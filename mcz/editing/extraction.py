@@ -24,6 +24,7 @@ from mcz.container.chunks import (
     read_chunk,
 )
 from mcz.container.directory import ClipRow
+from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
 from mcz.container.value_hash import ValueDigest, value_hash
 from mcz.container.writer import Writer, payload_id
@@ -188,11 +189,12 @@ class Copier:
 
     def skeleton(self, id_: bytes) -> bytes:
         """Copy a SKEL after its bases and their templates; return its payload."""
+        profile = self.container.profile
         chain = [(id_, self.stored(b"SKEL", id_))]
-        while base := parse(payloads.SKEL, chain[-1][1], "SKEL").base:
+        while base := parse_skel(chain[-1][1], "SKEL", profile).base:
             chain.append((bytes(base[0]), self.stored(b"SKEL", bytes(base[0]))))
         for _, payload in reversed(chain):
-            for source in parse(payloads.SKEL, payload, "SKEL").source:
+            for source in parse_skel(payload, "SKEL", profile).source:
                 self.template(bytes(source.template))
             self.writer.shared(b"SKEL", payload)
         return chain[0][1]
@@ -238,7 +240,7 @@ class Copier:
         payload = self.skeleton(clip.skeleton_id)
         skeleton = payload_id(payload)
         if cut.joints is not None:
-            payload = cut_skeleton(payload, skeleton, cut.joints)
+            payload = cut_skeleton(payload, skeleton, cut.joints, self.container.profile)
             skeleton = self.writer.shared(b"SKEL", payload)
         whole = dict(fields) | {"skeleton": skeleton}
         new = whole if cut.is_whole else clip_fields(cut, skeleton, fields)

@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 from mcz.container import payloads
 from mcz.container.chunks import COPY, FOOT, Chunk, parse_foot
 from mcz.container.directory import ClipRow
+from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
 from mcz.container.source import ByteSource
 from mcz.container.writer import payload_id
@@ -27,7 +28,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.report import Problem, clip_problems, validate
 from mcz.reading.signal_reader import SignalReader
-from mcz.schema import build, parse
+from mcz.schema import build
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 
@@ -253,7 +254,8 @@ class _Repairer(Copier):
         return self._skeletons[id_]
 
     def _poorer_skeleton(self, id_: bytes) -> bytes:
-        fields = dict(parse(payloads.SKEL, self.stored(b"SKEL", id_), f"SKEL {id_.hex()}"))
+        stored, where = self.stored(b"SKEL", id_), f"SKEL {id_.hex()}"
+        fields = dict(parse_skel(stored, where, self.container.profile))
         bases = []
         for base in fields["base"]:
             with suppress(FormatError):

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 
 from mcz.container import payloads
+from mcz.container.packed import pack_skeleton
 from mcz.container.reader import Container
 from mcz.container.skeletons import UP_AXES, build_skeleton
 from mcz.container.writer import payload_id
@@ -58,7 +59,7 @@ def _lost(container: Container) -> set[bytes]:
     for kind, id_ in directory.shared:
         if kind == b"SKEL":
             with suppress(MczError):
-                named |= set(map(bytes, container.shared(kind, id_, payloads.SKEL).base))
+                named |= set(map(bytes, container.skeleton_fields(id_).base))
     return {id_ for id_ in named if (b"SKEL", id_) not in directory.shared}
 
 
@@ -74,14 +75,16 @@ def _of_asf(container: Container, template: bytes, lost: set[bytes]) -> Iterator
     for name in _names(container, lost):
         skeleton: Skeleton = ASF.read(text, name)
         for unit_cm in dict.fromkeys((skeleton.unit_cm, None, *UNIT_CM.values())):
-            yield build_skeleton(replace(skeleton, unit_cm=unit_cm), source)
+            payload = build_skeleton(replace(skeleton, unit_cm=unit_cm), source)
+            yield from (payload, pack_skeleton(payload))
 
 
 def _of_base(container: Container, base: bytes) -> Iterator[bytes]:
     """The payloads of SKEL that writers derive from a skeleton where another axis points up."""
     skeleton = container.skeleton(base)
     for up_axis in UP_AXES:
-        yield build_skeleton(replace(skeleton, up_axis=up_axis, base=base), None)
+        payload = build_skeleton(replace(skeleton, up_axis=up_axis, base=base), None)
+        yield from (payload, pack_skeleton(payload))
 
 
 def _names(container: Container, lost: set[bytes]) -> list[str]:

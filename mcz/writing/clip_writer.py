@@ -17,6 +17,7 @@ from mcz.codecs.parameters import TARGETS
 from mcz.container import payloads
 from mcz.container.frame_numbers import KEY, frame_number_metadata
 from mcz.container.limits import ARCHIVE, check
+from mcz.container.packed import pack_skeleton
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.skeletons import build_skeleton, channel_fields
 from mcz.container.strict import is_plain_path
@@ -55,7 +56,8 @@ def write_skeleton(writer: Writer, skeleton: Skeleton) -> bytes:
             "size": skeleton.source.size,
             "sha256": skeleton.source.sha256,
         }
-    id_ = writer.shared(b"SKEL", build_skeleton(skeleton, source))
+    payload = build_skeleton(skeleton, source)
+    id_ = writer.shared(b"SKEL", pack_skeleton(payload) if writer.short else payload)
     writer.last_skeleton = given, id_
     return id_
 

@@ -22,8 +22,8 @@ class Draft:
 
     ``paths`` tells what the file restores under each path: the SHA-256 of those bytes, or a
     function that finds it. With ``hold`` False what is written goes straight to ``sink``, so that
-    nothing can be taken back; that needs no memory and suits a file of one step. ``copies`` and
-    ``uncopied`` are those of ``Writer``.
+    nothing can be taken back; that needs no memory and suits a file of one step. ``copies``,
+    ``uncopied`` and ``short`` are those of ``Writer``.
     """
 
     def __init__(
@@ -36,6 +36,7 @@ class Draft:
         hold: bool = True,
         copies: bool = False,
         uncopied: Iterable[Copy] = (),
+        short: bool = False,
     ) -> None:
         self._sink, self._pending, self._hold = sink, io.BytesIO(), hold
         self.paths = dict(paths or {})
@@ -47,6 +48,7 @@ class Draft:
             offset=offset,
             copies=copies,
             uncopied=uncopied,
+            short=short,
         )
         self._commit()
 

@@ -28,6 +28,8 @@ from mcz.writing.names import check_metadata, name_skeleton
 from mcz.writing.tuning import write_tuned
 from mcz.writing.written import Written, written
 
+SHORT = 65536  # bytes of a source file whose skeleton and texts are a large part of what is written
+
 
 def write(
     motion: Motion,
@@ -101,7 +103,8 @@ def encode(
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
-        draft = Draft(stream, profile_of(archive), hold=verbatim, copies=copies)
+        short = path.stat().st_size <= SHORT
+        draft = Draft(stream, profile_of(archive), hold=verbatim, copies=copies, short=short)
         entry.write(draft, progress)
         refuse_inputs(target, entry.inputs)
         draft.finish()

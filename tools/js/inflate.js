@@ -7,6 +7,7 @@ const MAX_BITS = 15;
 const MAX_RATIO = 1032; // bytes that a byte of deflate can become
 const FIRST_BUFFER = 65536;
 const END_OF_BLOCK = 256;
+const NOTHING = new Uint8Array(0);
 
 const CODE_LENGTH_ORDER = [16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15];
 const REPEAT_BASE = [3, 3, 11]; // of the code length symbols 16, 17 and 18
@@ -69,7 +70,8 @@ function reversed(code, length) {
 }
 
 class Inflater {
-  constructor(data, size, what) {
+  constructor(data, size, what, past) {
+    this.past = past; // what distances may reach back to beyond the beginning
     this.data = data;
     this.size = size;
     this.what = what;
@@ -187,10 +189,13 @@ class Inflater {
       const code = this.symbol(distances);
       if (code > 29) this.refuse(`distance symbol ${code}`);
       const distance = DISTANCE_BASE[code] + this.bits(DISTANCE_EXTRA[code]);
-      if (distance > this.length) this.refuse("a distance beyond the beginning");
+      if (distance > this.length + this.past.length) this.refuse("a distance beyond the beginning");
       this.room(n);
       const { out, length } = this;
-      for (let to = length; to < length + n; to++) out[to] = out[to - distance];
+      for (let to = length; to < length + n; to++) {
+        const from = to - distance;
+        out[to] = from < 0 ? this.past[this.past.length + from] : out[from];
+      }
       this.length += n;
     }
   }
@@ -226,12 +231,13 @@ const FIXED_CODES = [
  * @param {Uint8Array} data the stream, nothing before or behind it
  * @param {number} size bytes that it MUST inflate to
  * @param {string} what named in messages
+ * @param {Uint8Array} past bytes that distances may reach back to, as if they came before
  * @returns {Uint8Array}
  * @throws {Refused}
  */
-export function inflate(data, size, what) {
+export function inflate(data, size, what, past = NOTHING) {
   if (size > MAX_RATIO * data.length) {
     throw new Refused(`${what}: ${size} bytes cannot come of ${data.length} bytes of deflate`);
   }
-  return new Inflater(data, size, what).run();
+  return new Inflater(data, size, what, past).run();
 }

@@ -17,6 +17,7 @@ const ANNEX_FILES = [
   "qbc_start.json",
   "wavelet_start.json",
   "window_start.json",
+  "words.bin",
 ];
 const USUAL_RATE = 120; // frames a second, where a clip does not say
 const AXES = ["x", "y", "z"];

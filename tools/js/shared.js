@@ -5,13 +5,16 @@ import { Refused } from "./errors.js";
 import { inflate } from "./inflate.js";
 import { within } from "./limits.js";
 import { Sha256 } from "./sha256.js";
+import { inflateAfterWords } from "./words.js";
 
 const STORED = 0;
 const RAW_DEFLATE = 1;
+const AFTER_WORDS = 2;
 
 /** Decodes the `data` of SRCE, ATTA and COPY. */
 export function decoded(encoding, data, size, what) {
   if (encoding === RAW_DEFLATE) return inflate(data, size, what);
+  if (encoding === AFTER_WORDS) return inflateAfterWords(data, size, what);
   if (encoding !== STORED) throw new Refused(`${what}: encoding ${encoding}`);
   if (data.length !== size) throw new Refused(`${what}: ${data.length} bytes, not ${size}`);
   return data;

@@ -3,8 +3,10 @@
 import { ByteReader, hex } from "./bytes.js";
 import { within } from "./limits.js";
 import { checkSourceFormat } from "./registry.js";
+import { inflateAfterWords } from "./words.js";
 
 const FLAG_INTRINSIC = 1;
+const FLAG_PACKED = 2;
 const FLAG_ADDS = 1;
 const FLAG_OFFSET = 2;
 const FLAG_AXIS = 4;
@@ -56,9 +58,11 @@ const ID_SIZE = 16;
  * @throws {Refused}
  */
 export function readSkeleton(payload, id, file) {
-  const reader = new ByteReader(payload, "SKEL");
-  const name = reader.text();
-  const intrinsic = (reader.flags(FLAG_INTRINSIC) & FLAG_INTRINSIC) !== 0;
+  const head = new ByteReader(payload, "SKEL");
+  const name = head.text();
+  const flags = head.flags(FLAG_INTRINSIC | FLAG_PACKED);
+  const intrinsic = (flags & FLAG_INTRINSIC) !== 0;
+  const reader = flags & FLAG_PACKED ? unpack(head, file.limits) : head;
   const unitCm = reader.optional(() => reader.f64());
   if (unitCm !== null && !(unitCm > 0 && unitCm < Infinity)) reader.refuse(`unit_cm is ${unitCm}`);
   const angleUnit = upTo(MAX_ANGLE_UNIT, reader, "angle_unit");
@@ -72,6 +76,13 @@ export function readSkeleton(payload, id, file) {
   reader.rest();
   const channels = joints.flatMap((joint) => joint.channels);
   return { id, name, intrinsic, unitCm, angleUnit, upAxis, base, source, joints, channels };
+}
+
+/** The fields behind the flags, packed. */
+function unpack(reader, limits) {
+  const size = reader.varint();
+  within(size, limits.templateBytes, "bytes of a skeleton"); // SKEL-09
+  return new ByteReader(inflateAfterWords(reader.rest(), size, "SKEL"), "SKEL");
 }
 
 function upTo(greatest, reader, field) {

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from mcz.codecs import CODECS
 from mcz.container import payloads
 from mcz.container.chunks import COPY, HEADER, REPEAT, SIGNATURE, parse_header
+from mcz.container.limits import BASE
+from mcz.container.packed import unpacked
 from mcz.container.packets import CHECK_SIZE, END, FRAME, NUMBERED, body_check
 from mcz.errors import MczError
 from mcz.formats import FORMATS
@@ -46,7 +48,8 @@ def formats_of(vector: Vector) -> list[str]:
     for kind, schema in ((b"CLIP", payloads.CLIP), (b"SKEL", payloads.SKEL)):
         for payload in _payloads(vector.data, kind):
             try:
-                fields = parse(schema, payload, "source")
+                plain = unpacked(payload, "source", BASE) if kind == b"SKEL" else payload
+                fields = parse(schema, plain, "source")
             except MczError:
                 continue
             found |= {names[s.format] for s in fields.source if s.format in names}

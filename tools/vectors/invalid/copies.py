@@ -134,7 +134,7 @@ def _bytes(shelf: Broken) -> None:
     cases = (
         ("no-bytes", "COPY", "A COPY without any byte.", b""),
         ("cut", "COPY", "A COPY that ends within its size.", good[:2]),
-        ("encoding", "COPY; Conventions", "An encoding of 2.", b"\2" + good[1:]),
+        ("encoding", "COPY; Conventions", "An encoding of 3.", b"\3" + good[1:]),
         ("size-more", "COPY", "A stated size of a byte more.", more),
         ("size-less", "COPY", "A stated size of a byte less.", less),
         ("stored-more", "COPY", "A byte behind stored copies.", stored + b"\0"),

@@ -21,6 +21,7 @@ from tools.vectors.build.edits import at, put
 from tools.vectors.build.files import Crafter, Vector, Whole, attached, file_of, finished, partial
 from tools.vectors.build.motions import HUNDREDTHS, dance, numbers
 from tools.vectors.build.source_files import BOTH, PLAIN, take
+from tools.vectors.build.words import after_words, packed
 
 MARK = "\ufeff"
 
@@ -36,6 +37,7 @@ def vectors() -> Iterable[Vector]:
     _unknown(shelf)
     _columns(shelf)
     _deflate(shelf)
+    _words(shelf)
     _frame_numbers(shelf)
     return shelf.vectors
 
@@ -278,3 +280,15 @@ def _frame_numbers(shelf: Whole) -> None:
 
 def _number_text(text: str) -> Any:
     return put(payloads.CLIP, "metadata.0.value", varint(len(text)) + text.encode())
+
+
+def _words(shelf: Whole) -> None:
+    motion = dance()
+    purpose = "The fields of a skeleton, packed: deflate after words."
+    shelf.hold(
+        "packed-skeleton", "SKEL; Conventions", purpose, file_of(motion, SKEL=packed), motion
+    )
+    motion = take(PLAIN, "plain")
+    data = file_of(motion, SRCE=after_words, SKEL=packed)
+    purpose = "A template that is deflated after words, and a packed skeleton."
+    shelf.hold("after-words", "SRCE; SKEL; Conventions", purpose, data, motion)

@@ -14,6 +14,7 @@ from tools.vectors.build.edits import Edit, plus, put, span
 from tools.vectors.build.files import Broken, Crafter, file_of, finished
 from tools.vectors.build.motions import puppet
 from tools.vectors.build.source_files import PLAIN, take
+from tools.vectors.build.words import beyond, packed, too_long
 
 INFINITE, NOT_A_NUMBER = float("inf"), float("nan")
 _SKELETON: dict[str, Any] = {
@@ -36,6 +37,7 @@ def add(shelf: Broken) -> None:
     _text(shelf)
     _many_joints(shelf)
     _infinite_unit(shelf)
+    _words(shelf)
 
 
 def _doubles(*values: float) -> bytes:
@@ -45,7 +47,7 @@ def _doubles(*values: float) -> bytes:
 def _skeletons(shelf: Broken) -> None:
     nan, many = _doubles(0, NOT_A_NUMBER, 0), varint(4097) + b"\0" * 5 * 4097
     cases = (
-        ("SKEL-flag", "A reserved flag of SKEL is set.", "flags", b"\3", ""),
+        ("SKEL-flag", "A reserved flag of SKEL is set.", "flags", b"\5", ""),
         ("JOINT-flag", "A reserved flag of a joint is set.", "joints.1.flags", b"\x0b", ""),
         ("parent-of-itself", "A joint is its own parent.", "joints.1.parent", b"\2", ""),
         ("parent-later", "A parent comes after its child.", "joints.1.parent", b"\3", ""),
@@ -138,7 +140,7 @@ def _templates(shelf: Broken) -> None:
         ),
         ("deflate-tail", "Conventions", "A byte follows the deflate stream.", plus(b"\0")),
         ("deflate-end", "Conventions", "The deflate stream has no end.", lambda data: data[:-1]),
-        ("encoding", "", "An encoding beyond the table.", field("encoding", b"\2")),
+        ("encoding", "", "An encoding beyond the table.", field("encoding", b"\3")),
         ("stored-size", "", "Stored, of another size than stated.", stored),
     )
     for name, heading, purpose, edit in cases:
@@ -221,3 +223,21 @@ def _infinite_unit(shelf: Broken) -> None:
     infinite = b"\1" + np.array([np.inf], "<f8").tobytes()
     edit = put(payloads.SKEL, "unit_cm", infinite)
     shelf.edited("unit-infinite", "SKEL", "An infinite length unit.", SKEL=edit)
+
+
+def _words(shelf: Broken) -> None:
+    spec = "SRCE; Conventions"
+    purpose = "A template: A distance reaches beyond the first of the words."
+    shelf.add("SRCE-words-beyond", spec, purpose, file_of(take(PLAIN, "plain"), SRCE=beyond))
+    cases: tuple[tuple[str, str, str, Edit], ...] = (
+        ("size", "Conventions", "One byte more than stated", _packed_of_less),
+        ("tail", "Conventions", "A byte follows the stream", lambda data: packed(data) + b"\0"),
+        ("limit", "Limits and profiles", "2^26 + 1 bytes in the base profile", too_long),
+    )
+    for name, heading, purpose, edit in cases:
+        text = f"Packed fields: {purpose}."
+        shelf.edited(f"packed-{name}", f"SKEL; {heading}", text, SKEL=edit)
+
+
+def _packed_of_less(payload: bytes) -> bytes:
+    return packed(payload, len(payload) - payload[0] - 3)

@@ -1,0 +1,65 @@
+"""What short files spare: deflate after words, and the fields of SKEL packed with it.
+
+SPEC.md, "Conventions" and "SKEL", is normative.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from mcz.annexes import annex_bytes
+from mcz.container import payloads
+from mcz.container.limits import Profile, check
+from mcz.errors import FormatError
+from mcz.schema import deflate, inflate, parse, read_varint, varint
+
+PACKED = 2  # bit 1 of the flags of SKEL
+
+
+@cache
+def words() -> bytes:
+    """The annex to which distances may reach back."""
+    return annex_bytes("words.bin")
+
+
+def smallest(data: bytes, *, short: bool) -> tuple[int, bytes]:
+    """The encoding of SRCE, ATTA and COPY and its bytes; ``short``: also after words."""
+    found = [(payloads.STORED, data), (payloads.DEFLATED, deflate(data))]
+    if short:
+        found.append((payloads.AFTER_WORDS, deflate(data, words=words())))
+    return min(found, key=lambda row: len(row[1]))
+
+
+def pack_skeleton(payload: bytes) -> bytes:
+    """The payload of a SKEL with its fields packed, where that is shorter."""
+    at = _flags_at(payload, "SKEL")
+    rest = payload[at + 1 :]
+    flags = bytes((payload[at] | PACKED,))
+    packed = payload[:at] + flags + varint(len(rest)) + deflate(rest, words=words())
+    return min(payload, packed, key=len)
+
+
+def unpacked(payload: bytes, where: str, profile: Profile) -> bytes:
+    """The payload of a SKEL without packing; one that was never packed as it is."""
+    at = _flags_at(payload, where)
+    if at >= len(payload) or not payload[at] & PACKED:
+        return payload
+    size, start = read_varint(payload, at + 1)
+    check(f"{where}: bytes", size, profile.text_bytes)  # SKEL-09
+    rest = inflate(payload[start:], size, where, words=words())
+    return payload[:at] + bytes((payload[at] & ~PACKED,)) + rest
+
+
+def parse_skel(payload: bytes, where: str, profile: Profile) -> Any:
+    """The fields of SKEL, packed or not."""
+    return parse(payloads.SKEL, unpacked(payload, where, profile), where, profile.counts)
+
+
+def _flags_at(payload: bytes, where: str) -> int:
+    """Where the flags are, behind the name; what is beyond the end ``parse`` will refuse."""
+    try:
+        length, at = read_varint(payload, 0)
+    except FormatError as error:
+        raise FormatError(f"{where}: name: {error}") from None
+    return at + length
