@@ -201,7 +201,7 @@ def inflate(data: bytes, size: int, where: str, *, words: bytes = b"") -> bytes:
     """
     if size > MAX_RATIO * (len(data) + 1):  # LIMIT-14
         raise LimitError(f"{where}: {size} bytes cannot come of {len(data)}")
-    inflater = zlib.decompressobj(-15, words)
+    inflater = zlib.decompressobj(-15, words)  # CONV-19
     try:
         out = inflater.decompress(data, size + 1)
     except zlib.error as error:

@@ -45,7 +45,7 @@ ALLOWED = {
     "coding": GROUND | {"annexes"},
     "transforms": GROUND,
     "codecs": MODEL | {"angles", "annexes", "kinematics", "coding", "transforms", "units"},
-    "container": MODEL,
+    "container": MODEL | {"annexes"},
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},
     "reading": JOINT,
