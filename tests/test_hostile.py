@@ -73,7 +73,14 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
         b":FULLY-SPECIFIED\n:DEGREES\n3\nroot 1 2 3 4 5 6\nknee 1.5e-014\n"
         b"4\nknee 2\nroot 1 2 3 4 5 -0\n9\nroot 1 2 3 4 5 6\n"
     )
-    return {"rich": rich(), "bvh": of_text(bvh), "amc": of_text(amc)}
+    indexed = io.BytesIO()  # short files have no INDX when they are encoded
+    mcz.write(mcz.read(bvh), indexed)
+    return {
+        "rich": rich(),
+        "bvh": of_text(bvh),
+        "amc": of_text(amc),
+        "indexed": indexed.getvalue(),
+    }
 
 
 @pytest.fixture(params=["rich", "bvh", "amc"])
@@ -162,7 +169,10 @@ def test_chunks_dropped_doubled_and_swapped(data: bytes) -> None:
             outcome(joined([*parts[: which - 1], here, before, *parts[which + 1 :]]))
 
 
-def test_flipped_bits_of_the_index(data: bytes) -> None:
+@pytest.mark.parametrize("name", ["rich", "indexed"])
+def test_flipped_bits_of_the_index(name: str, files: dict[str, bytes]) -> None:
+    data = files[name]
+
     def flip(byte: int, bit: int) -> Callable[[bytes], bytes]:
         return lambda content: flipped(content, byte % len(content), bit)
 
