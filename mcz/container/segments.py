@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from mcz.errors import ChecksumError, FormatError, TruncatedError
 from mcz.schema import MAX_COUNT, read_varint, varint
@@ -58,6 +58,11 @@ class StreamTable:
     size: int
     offsets: tuple[int, ...]
     lengths: tuple[int, ...]
+    _codec_start: int = field(init=False, repr=False, compare=False)  # asked for each stream
+
+    def __post_init__(self) -> None:
+        n_coded = self.counts.n_groups * self.counts.n_resolutions
+        object.__setattr__(self, "_codec_start", len(self.lengths) - n_coded)
 
     @property
     def payload_size(self) -> int:
@@ -75,14 +80,11 @@ class StreamTable:
     def mask(self, group: int) -> int | None:
         if not self.header.flags & MASKS:
             return None
-        return self._codec_start() - self.counts.n_groups + group  # DATA-03
+        return self._codec_start - self.counts.n_groups + group  # DATA-03
 
     def codec(self, resolution: int, group: int) -> int:
         """Index of the codec's stream; resolution 0 is the coarsest here, as stored."""
-        return self._codec_start() + resolution * self.counts.n_groups + group
-
-    def _codec_start(self) -> int:
-        return len(self.lengths) - self.counts.n_groups * self.counts.n_resolutions
+        return self._codec_start + resolution * self.counts.n_groups + group
 
 
 def build_segment(header: SegmentHeader, streams: Sequence[bytes]) -> bytes:

@@ -15,12 +15,16 @@ PIECE = 2**20  # bytes of a mask that are made at a time
 
 def canonical(values: NDArray[Any]) -> bytes:
     """The bytes that hashes and conformance compare: little-endian, row after row, one NaN."""
+    return _canonical(values).tobytes()
+
+
+def _canonical(values: NDArray[Any]) -> NDArray[Any]:
+    """The same as an array, ``values`` itself where it has these bytes."""
     if values.dtype == np.int64:
-        return values.astype("<i8").tobytes()  # CEND-03
-    missing = np.isnan(values)
-    if missing.any():
-        values = np.where(missing, math.nan, values)
-    return values.astype("<f8", copy=False).tobytes()  # CEND-03
+        return np.ascontiguousarray(values, "<i8")  # CEND-03
+    if values.size and np.isnan(values.min()):  # some are
+        values = np.where(np.isnan(values), math.nan, values)
+    return np.ascontiguousarray(values, "<f8")  # CEND-03
 
 
 def value_hash(values: NDArray[Any], mask: NDArray[np.bool_] | None) -> bytes:
@@ -44,7 +48,7 @@ class ValueDigest:
 
     def update(self, values: NDArray[Any], mask: NDArray[np.bool_] | None) -> None:
         """Add rows; ``mask`` None: all are valid."""
-        self._hash.update(canonical(values))
+        self._hash.update(_canonical(values).data)
         if mask is not None and not mask.all():
             self._masks.append(mask.astype("u1").tobytes())  # CEND-04
         elif self._masks and isinstance(self._masks[-1], int):

@@ -8,12 +8,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.jit import kernel
+from mcz.jit import kernel, truncated
 from mcz.numbers.ordinal_kernels import decimal, magnitude_of
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
+EXACT = 1 << 53  # up to which quotients of floats are right
 PRINTED = 1 << 62  # no ordinal: the decimal of such a product is to be printed
 
 
@@ -31,8 +32,8 @@ def fill(
             out[t] = 0
             continue
         before = abs(codes[t]) - 1
-        odd = 2 * (before // shifts) + 1  # LOSS-33
-        value = float(odd) * float(1 << before % shifts) * unit
+        q = truncated(float(before) / float(shifts)) if before < EXACT else before // shifts
+        value = float(2 * q + 1) * float(1 << before - q * shifts) * unit  # LOSS-33
         mantissa, power = decimal(value, power, digits, tens, powers)
         if mantissa == 0:
             out[t] = PRINTED

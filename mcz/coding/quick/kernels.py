@@ -85,19 +85,27 @@ def clamp(value: int, low: int, high: int) -> int:
 
 
 @inlined
-def window(words: Ints, i: int) -> int:
-    """At least 32 bits from bit ``i`` on."""
-    k = i >> 5 & WORD
-    return int(words[k] | words[k + 1] << 32) >> (i & 31)
+def eight_bytes(data: Bytes, at: int) -> int:
+    """The number of 64 bits that the bytes from ``at`` on are, the first one the greatest."""
+    k = at & WORD
+    high = int(data[k]) << 56 | int(data[k + 1]) << 48 | int(data[k + 2]) << 40
+    mid = int(data[k + 3]) << 32 | int(data[k + 4]) << 24 | int(data[k + 5]) << 16
+    return high | mid | int(data[k + 6]) << 8 | int(data[k + 7])
 
 
 @inlined
-def bits_at(words: Ints, i: int, n: int) -> int:
-    """``n`` bits, at most 63, of ``words`` of 32 bits from bit ``i`` on."""
-    if n > 32:
-        rest = window(words, i + 32) & ((1 << (n - 32)) - 1)
-        return window(words, i) & WORD | rest << 32
-    found: int = window(words, i) & ((1 << n) - 1)
+def window(data: Bytes, i: int) -> int:
+    """At least 56 bits from bit ``i`` on: ``data`` is a number whose last byte is the lowest."""
+    return eight_bytes(data, len(data) - 8 - (i >> 3)) >> (int(i) & 7)
+
+
+@inlined
+def bits_at(data: Bytes, i: int, n: int) -> int:
+    """``n`` bits, at most 63, from bit ``i`` on."""
+    if n > 56:
+        rest = window(data, i + 32) & ((1 << int(n - 32)) - 1)
+        return window(data, i) & WORD | rest << 32
+    found: int = window(data, i) & ((1 << int(n)) - 1)
     return found
 
 
@@ -165,29 +173,28 @@ def of_rank(rank: int, plan: Ints, powers: Ints) -> tuple[int, int, bool]:
 
 
 @inner
-def first_value(words: Ints, i: int, plan: Ints, powers: Ints) -> tuple[int, int, int, bool]:
+def first_value(data: Bytes, i: int, plan: Ints, powers: Ints) -> tuple[int, int, int, bool]:
     """Decode the first value of a channel: (next bit, value in fixed point, ordinal, all right)."""
-    n = bits_at(words, i, LENGTH_BITS)
+    n = bits_at(data, i, LENGTH_BITS)
     i += LENGTH_BITS
     rank = 0
     if n > MAX_LENGTH:  # there is no such rank
         return i, 0, 0, False
     if n:
-        raw = bits_at(words, i, n)
+        raw = bits_at(data, i, n)
         i += n
         rank = 1 << (n - 1) | raw >> 1  # FAST-13
         rank = -rank if raw & 1 else rank
     if plan[BASE]:
         value, ordinal, good = of_rank(rank, plan, powers)
         return i, value, ordinal, good
-    ordinal = rank << plan[DROP] | bits_at(words, i, plan[DROP])
+    ordinal = rank << plan[DROP] | bits_at(data, i, plan[DROP])
     return i + plan[DROP], rank, ordinal, -MAX_PLAIN <= rank < MAX_PLAIN  # FAST-11
 
 
 @inlined
 def next_value(
     data: Bytes,
-    words: Ints,
     tables: Tables,
     plan: Ints,
     track: Ints,
@@ -234,14 +241,15 @@ def next_value(
     frequency = tables.frequencies[context << SYMBOL_BITS | symbol]
     # FAST-08
     x = (frequency >> TABLE_BITS) * (x >> TABLE_BITS) + slot - (frequency & (TABLE - 1))
-    word = int(data[at & WORD]) | int(data[at + 1 & WORD]) << 8
+    place = at & WORD
+    word = int(data[place]) | int(data[place + 1]) << 8
     at = at + 2 if x < LEAST_STATE else at
     x = x << 16 | word if x < LEAST_STATE else x
     miss = symbol << k
     good = True
     if symbol >= DIRECT:
         if symbol == FAR:
-            far = bits_at(words, i, LENGTH_BITS)
+            far = bits_at(data, i, LENGTH_BITS)
             i += LENGTH_BITS
             good = far > 0  # FAST-15
             good = good and far + k <= MAX_LENGTH  # there is no such rank
@@ -251,7 +259,7 @@ def next_value(
             k += 2 + ((symbol - DIRECT) >> 2)
             miss = (4 + (symbol & 3)) << k
     if k or miss:
-        raw = bits_at(words, i, k + 1)
+        raw = bits_at(data, i, k + 1)
         i += k + 1
         negative = -(raw & 1)
         miss = ((miss | raw >> 1) ^ negative) - negative
@@ -271,7 +279,7 @@ def next_value(
     else:
         value = p + miss
         good = good and -MAX_PLAIN <= value < MAX_PLAIN  # FAST-11
-        ordinal = value << plan[DROP] | bits_at(words, i, plan[DROP])
+        ordinal = value << plan[DROP] | bits_at(data, i, plan[DROP])
         i += plan[DROP]
     # what is remembered
     f += ((abs(value - p) << 4) - f) >> 2  # FAST-14

@@ -225,16 +225,15 @@ def parse_streams(
     """
     own, read, _, _ = loops()
     data = _spared(streams)
-    words = np.ascontiguousarray(data[::-1]).view("<u4").astype(np.int64)
-    ends = SPARE + np.cumsum([len(stream) for stream in streams], dtype=np.int64)
+    bounds = np.cumsum([SPARE, *map(len, streams)], dtype=np.int64)
     firsts = np.cumsum([0, *sizes], dtype=np.int64)
+    given = read.Streams(data, bounds, firsts, channels.forms)
     plans = np.zeros((len(channels.forms), own.PLAN_SIZE), np.int64)
     rests = np.zeros((len(out), 0), np.int64)
-    given = data, words, SPARE, ends, firsts, channels.forms, plans, out
-    channel, fault = read.read_streams(*given, rests, tables())
+    channel, fault = read.read_streams(given, plans, read.Rows(out, rests), tables())
     if channel == read.NO_ROOM:
         rests = np.zeros(out.shape, np.int64)
-        channel, fault = read.read_streams(*given, rests, tables())
+        channel, fault = read.read_streams(given, plans, read.Rows(out, rests), tables())
     if fault >= 0:
         raise FormatError(f"fast: channel {channel} of those read: {FAULTS[fault]}")
     for n in np.flatnonzero((plans[:, own.KIND] == CODED) & (plans[:, own.UNIT] > 0)):
@@ -281,6 +280,6 @@ def renumbered(stream: bytes, channels: Channels, number_of: Callable[[int, int]
 
 
 def _spared(streams: Sequence[bytes]) -> NDArray[np.uint8]:
-    """The streams one behind the other, with zeros at both ends, in whole words."""
-    padding = bytes(SPARE - sum(map(len, streams)) % 4)
-    return np.frombuffer(bytearray(b"".join((bytes(SPARE), *streams, padding))), np.uint8)
+    """The streams one behind the other, with zeros at both ends."""
+    spare = bytes(SPARE)
+    return np.frombuffer(bytearray(b"".join((spare, *streams, spare))), np.uint8)
