@@ -32,7 +32,6 @@ if TYPE_CHECKING:
         TruncatedError,
         UnsupportedError,
     )
-    from mcz.kinematics import positions
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
     from mcz.live.concealment import LiveFrame
@@ -42,6 +41,16 @@ if TYPE_CHECKING:
     from mcz.live.writer import LiveWriter
     from mcz.metrics import Comparison, compare
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
+    from mcz.poses import (
+        Root,
+        accelerations,
+        point_names,
+        positions,
+        resample,
+        root,
+        rotations,
+        velocities,
+    )
     from mcz.reading.clip import Clip
     from mcz.reading.file import Attachment, File, open
     from mcz.reading.post_filtering import post_filter
@@ -86,7 +95,16 @@ _HOMES = {
     "mcz.kinematics.marker_motion": ("in_positions",),
     "mcz.live.strict_reader": ("live_frames",),
     "mcz.live.writer": ("LiveWriter",),
-    "mcz.kinematics": ("positions",),
+    "mcz.poses": (
+        "Root",
+        "accelerations",
+        "point_names",
+        "positions",
+        "resample",
+        "root",
+        "rotations",
+        "velocities",
+    ),
     "mcz.kinematics.contacts": ("Contact", "Contacts", "contacts"),
     "mcz.reading.report": ("Problem", "verify"),
     "mcz.metrics": ("Comparison", "compare"),
@@ -132,6 +150,7 @@ __all__ = [
     "Repair",
     "Replacement",
     "Report",
+    "Root",
     "Signal",
     "Skeleton",
     "SkeletonWarning",
@@ -140,6 +159,7 @@ __all__ = [
     "StreamSummary",
     "TruncatedError",
     "UnsupportedError",
+    "accelerations",
     "append",
     "compare",
     "contacts",
@@ -151,6 +171,7 @@ __all__ = [
     "live_frames",
     "open",
     "pack",
+    "point_names",
     "positions",
     "post_filter",
     "read",
@@ -158,9 +179,13 @@ __all__ = [
     "recording",
     "repair",
     "replace",
+    "resample",
+    "root",
+    "rotations",
     "stream_decode",
     "stream_encode",
     "unpack",
+    "velocities",
     "verify",
     "write",
 ]
@@ -175,4 +200,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME_OF])
+    return [*__all__, "__version__"]

@@ -194,8 +194,8 @@ class Signal:
         return np.where(self.mask, self.values, np.nan)
 
 
-def _positive(rate: Any, name: str) -> Fraction:
-    """A frame rate as a Fraction, the nearest one to a number of another kind."""
+def frame_rate_of(rate: Any, name: str) -> Fraction:
+    """A frame rate as a Fraction, the nearest one to a number of another kind; MotionError."""
     with suppress(TypeError, ValueError, OverflowError):  # no number, NaN, infinite
         exact = isinstance(rate, Fraction)
         value: Fraction = rate if exact else Fraction(float(rate)).limit_denominator(2**52)
@@ -238,7 +238,7 @@ class Motion:
         if len(counts) > 1:
             raise MotionError(f"motion {self.name!r}: signals of {sorted(counts)} frames")
         if self.frame_rate is not None:
-            object.__setattr__(self, "frame_rate", _positive(self.frame_rate, self.name))
+            object.__setattr__(self, "frame_rate", frame_rate_of(self.frame_rate, self.name))
         if self.frame_numbers is not None and len(self.frame_numbers) != self.n_frames:
             raise MotionError(f"motion {self.name!r}: {len(self.frame_numbers)} frame numbers")
 

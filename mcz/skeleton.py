@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -138,8 +139,12 @@ class Skeleton:
 
     def columns(self, joint: int) -> range:
         """The columns of joint ``joint``."""
-        start = sum(len(j.channels) for j in self.joints[:joint])  # SKEL-06
-        return range(start, start + len(self.joints[joint].channels))
+        starts = self.column_starts()
+        return range(starts[joint], starts[joint + 1])
+
+    def column_starts(self) -> list[int]:
+        """The first column of every joint, and the number of all."""
+        return [0, *accumulate(len(joint.channels) for joint in self.joints)]  # SKEL-06
 
     def addresses(self) -> list[str]:
         """The name of every joint, made unique: ``name#n`` from the second of a name on."""
@@ -166,6 +171,17 @@ class Skeleton:
         raise MotionError(f"no joint {joint!r} among {brief.among(self.addresses(), joint)}")
 
 
+Chosen = Sequence[int | str] | int | str
+Joints = Chosen | None  # None: all
+
+
+def joint_list(joints: Chosen) -> Sequence[int | str]:
+    """Joints as a sequence; a single one may be given by itself."""
+    return (joints,) if isinstance(joints, (int, np.integer, str)) else joints
+
+
 def joint_columns(skeleton: Skeleton, joints: Sequence[int | str]) -> list[int]:
     """The columns of the named joints, in the order given."""
-    return [c for joint in joints for c in skeleton.columns(skeleton.find(joint))]
+    starts = skeleton.column_starts()
+    numbers = map(skeleton.find, joints)
+    return [c for joint in numbers for c in range(starts[joint], starts[joint + 1])]

@@ -37,6 +37,7 @@ ALLOWED = {
     "kinematics": MODEL,
     "angles": MODEL,
     "metrics": MODEL | {"angles", "kinematics"},
+    "poses": MODEL | {"kinematics", "units"},
     "bjontegaard": GROUND,
     "joint_errors": MODEL | {"kinematics"},
     "units": MODEL,
@@ -48,7 +49,7 @@ ALLOWED = {
     "container": MODEL | {"annexes"},
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},
-    "reading": JOINT,
+    "reading": JOINT | {"poses"},
     "writing": JOINT | {"metrics", "reading"},
     "conversion": MODEL | {"kinematics", "formats", "reading"},
     "editing": JOINT | {"metrics", "reading", "writing"},
@@ -57,7 +58,7 @@ ALLOWED = {
     "cli": MODEL | {"units", "kinematics", "metrics", "joint_errors", "sample", "training"} | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
-    "": MODEL | {"kinematics", "metrics"} | DOORS,  # mcz/__init__.py
+    "": MODEL | {"kinematics", "metrics", "poses"} | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 

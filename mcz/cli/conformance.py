@@ -112,6 +112,8 @@ def respond(data: bytes, given: argparse.Namespace) -> Iterator[bytes]:
 
 
 def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
+    from mcz.reading.signal_info import read_segments
+
     for attachment in file.attachments.values():
         attachment.read()
     clips: Iterable[Clip] = file.clips.values()
@@ -127,7 +129,7 @@ def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
                 yield from _signal_arrays(clip, signal, given)
             except UnsupportedError as error:
                 lacking = lacking or error  # STRICT-05
-                clip.check_segments(signal)  # STRICT-05
+                read_segments(clip.container, signal)  # STRICT-05
     if lacking is not None:  # and nothing else is wrong, which would count for more
         raise lacking
 

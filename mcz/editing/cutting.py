@@ -20,9 +20,9 @@ from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, Segme
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
-from mcz.reading.joints import Chosen, Joints, joint_list
 from mcz.reading.signal_info import SignalInfo
 from mcz.schema import build
+from mcz.skeleton import Chosen, Joints, joint_list
 
 WITHOUT_SOURCE = "the source file was left out when joints were cut"
 WITHOUT_CHANNELS = "the channels of other joints were cut"

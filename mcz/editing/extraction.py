@@ -50,9 +50,9 @@ from mcz.editing.cutting import (
 from mcz.errors import ChecksumError, FormatError, MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.reading.file import File, open
-from mcz.reading.joints import Joints
 from mcz.reading.signal_reader import SignalReader
 from mcz.schema import build, parse
+from mcz.skeleton import Joints
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 

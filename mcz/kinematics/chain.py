@@ -166,16 +166,21 @@ class Chain:
         """Add to ``pose`` the joint that ``hang`` has hung there, turned by its channels."""
         arm, origin, axes = hung
         spins: list[Floats] = []
+        axes = self.turned_by(link, axes, columns, spins)
+        pose.arms.append(arm)
+        pose.origins.append(origin)
+        pose.axes.append(axes)
+        pose.spins.append(spins)
+
+    def turned_by(self, link: Link, axes: Floats, columns: Floats, spins: list[Floats]) -> Floats:
+        """``axes`` turned by the joint's channels; what each turns about is added to ``spins``."""
         for axis, column in link.turns:
             if axis == 3:
                 axes = self._quaternion(axes, columns[list(link.quaternion)], spins)
             else:
                 spins.append(axes[:, axis])
                 axes = turned(axes, axis, columns[column] * self.radians)
-        pose.arms.append(arm)
-        pose.origins.append(origin)
-        pose.axes.append(axes)
-        pose.spins.append(spins)
+        return axes
 
     def _arm(self, link: Link, columns: Floats) -> Floats:
         """From the parent's origin to the joint's own, lengthened by the parent, not yet scaled."""
@@ -240,7 +245,7 @@ class Chain:
 IDENTITY: Floats = np.eye(3)[:, :, None]
 
 
-class _Same:
+class Same:
     """A skeleton as a key: the very same object, for comparing thousands of joints takes long."""
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -250,16 +255,16 @@ class _Same:
         return id(self.skeleton)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and other.skeleton is self.skeleton
+        return isinstance(other, Same) and other.skeleton is self.skeleton
 
 
 def chain_of(skeleton: Skeleton) -> Chain:
     """``Chain(skeleton)``, prepared once where it is asked for block after block."""
-    return _chain_of(_Same(skeleton))
+    return _chain_of(Same(skeleton))
 
 
 @lru_cache(maxsize=4)
-def _chain_of(key: _Same) -> Chain:
+def _chain_of(key: Same) -> Chain:
     return Chain(key.skeleton)
 
 

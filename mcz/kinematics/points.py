@@ -52,7 +52,7 @@ def origins_of(skeleton: Skeleton, values: Floats) -> Floats:
     for rows, _, pose in chain_of(skeleton).poses(values):
         for joint, origin in enumerate(pose.origins):
             origins[rows, joint] = origin.T
-    _forget(origins)
+    forget(origins)
     return origins
 
 
@@ -101,7 +101,7 @@ class _Positions:
         markers: bool = False,
         shell_cm: float | None = None,
     ) -> None:
-        self._list = list(_points(skeleton))
+        self._list = list(listed_points(skeleton))
         self._distance = marker_distance(skeleton) if markers else 0.0
         self._firsts = dict(reversed(self._list)) if markers else {}  # earlier points replace later
         self._radius = 0.0 if shell_cm is None else shell_radius(skeleton, shell_cm)
@@ -127,8 +127,8 @@ class _Positions:
                 points[:, number] = point.T
             if first:
                 by_joint[:, joint] = (point[:, None] + self._distance * pose.axes[joint]).T
-        _forget(points)
-        _forget(markers)
+        forget(points)
+        forget(markers)
 
     def _place_shell(self, chain: Chain, rows: slice, pose: Pose) -> None:
         shell = self.shell[rows]
@@ -138,7 +138,7 @@ class _Positions:
         ):
             turned = axes if own is None else times(axes, own.T[:, :, None])  # W, as B = W C
             by_joint[:, joint] = (origin[:, None] + self._radius * turned).T
-        _forget(shell)
+        forget(shell)
 
 
 def marker_distance(skeleton: Skeleton) -> float:
@@ -167,7 +167,7 @@ def shell_radius(skeleton: Skeleton, radius_cm: float) -> float:
     return radius_cm / skeleton.unit_cm
 
 
-def _forget(points: Floats) -> None:
+def forget(points: Floats) -> None:
     """Make points NaN of which not every coordinate, in the last axis, is finite."""
     points[~np.isfinite(points).all(axis=-1)] = np.nan
 
@@ -197,7 +197,7 @@ def point_names(skeleton: Skeleton) -> tuple[str, ...]:
     """
     names = []
     addresses = skeleton.addresses()
-    for joint, tail in _points(skeleton):
+    for joint, tail in listed_points(skeleton):
         name = addresses[joint]
         if tail >= 0 and (skeleton.intrinsic or tail):
             name += " end" if tail == 0 else f" end {tail + 1}"
@@ -205,7 +205,7 @@ def point_names(skeleton: Skeleton) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _points(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
+def listed_points(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
     """The points in order, each as its joint and the number of its tail, -1 for the origin."""
     for index, joint in enumerate(skeleton.joints):
         if skeleton.intrinsic or not joint.tails:
@@ -217,7 +217,7 @@ def _points(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
 def points_of(skeleton: Skeleton) -> list[list[int]]:
     """The points of every joint, as numbers of its tails, -1 for its origin."""
     result: list[list[int]] = [[] for _ in skeleton.joints]
-    for joint, tail in _points(skeleton):
+    for joint, tail in listed_points(skeleton):
         result[joint].append(tail)
     return result
 
@@ -225,7 +225,7 @@ def points_of(skeleton: Skeleton) -> list[list[int]]:
 def first_points(skeleton: Skeleton) -> list[int]:
     """The first point of every joint, as its index among all points."""
     firsts: dict[int, int] = {}
-    for number, (joint, _) in enumerate(_points(skeleton)):
+    for number, (joint, _) in enumerate(listed_points(skeleton)):
         firsts.setdefault(joint, number)
     return [firsts[joint] for joint in range(skeleton.n_joints)]
 

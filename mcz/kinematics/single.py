@@ -6,7 +6,8 @@ import numpy as np
 
 from mcz.kinematics.chain import Chain, Floats
 from mcz.kinematics.points import marker_distance, points_and_markers_of, points_of, positions_of
-from mcz.kinematics.single_kernels import Joints, Points, position_points
+from mcz.kinematics.single_kernels import position_points
+from mcz.kinematics.tables import is_elaborate, tables_of
 from mcz.motion import Skeleton
 
 __all__ = ["FramePositions"]
@@ -32,7 +33,7 @@ class FramePositions:
             for tail in joint_tails
         ]
         self._firsts = [self._numbers.index(joint) for joint in range(skeleton.n_joints)]
-        self._tables = None if _is_elaborate(chain) else _tables(chain, self._numbers, tails)
+        self._tables = None if is_elaborate(chain) else tables_of(chain, self._numbers, tails)
 
     def __call__(self, values: Floats) -> Floats:
         if self._tables is None:
@@ -56,44 +57,3 @@ class FramePositions:
         else:
             found = positions_of(self._skeleton, values[None])[0]
         return found
-
-
-def _is_elaborate(chain: Chain) -> bool:
-    """Whether a joint has channels that do more than turn and move it, or one of them twice."""
-    return any(
-        link.quaternion
-        or link.scales
-        or link.lengths
-        or len({component for component, _ in link.moves}) < len(link.moves)
-        for link in chain.links
-    )
-
-
-def _tables(chain: Chain, points: list[int], tails: list[Floats]) -> tuple[Joints, Points]:
-    """What the compiled loop knows of a skeleton."""
-    links = chain.links
-    n_joints = len(links)
-    most = max((len(link.turns) for link in links), default=0)
-    moves = np.full((n_joints, 3), -1, np.int64)
-    turns = np.full((n_joints, max(1, most), 2), -1, np.int64)
-    changes, backs = (np.tile(np.eye(3), (n_joints, 1, 1)) for _ in range(2))
-    for joint, link in enumerate(links):
-        for component, column in link.moves:
-            moves[joint, component] = column
-        for turn, pair in enumerate(link.turns):
-            turns[joint, turn] = pair
-        if link.change is not None:
-            changes[joint] = link.change[:, :, 0]
-        if link.parent_back is not None:
-            backs[joint] = link.parent_back
-    joints = Joints(
-        np.array([link.parent for link in links], np.int64),
-        changes,
-        np.array([link.offset for link in links]).reshape(n_joints, 3),
-        backs,
-        np.array([link.replaces for link in links], np.int64),
-        moves,
-        turns,
-        float(chain.radians),
-    )
-    return joints, Points(np.array(points, np.int64), np.array(tails).reshape(len(points), 3))

@@ -1,7 +1,6 @@
-"""Compiled: the points of one frame at a time, of skeletons that only turn and move.
+"""Compiled: the poses of frames, one after the other, of skeletons that only turn and move.
 
-The steps are those of ``chain.py``, which is far quicker for many frames at once and slow for one.
-Imported on first use only.
+The steps are those of ``chain.py``, which knows every kind of channel. Imported on first use only.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.jit import kernel
+from mcz.jit import inner, kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -21,14 +20,16 @@ Ints = NDArray[np.int64]
 class Joints(NamedTuple):
     """A skeleton, an entry a joint.
 
-    ``changes`` and ``backs`` (n_joints, 3, 3), ``offsets`` (n_joints, 3), ``moves`` (n_joints, 3)
-    and ``turns`` (n_joints, most, 2), -1 where there is no column.
+    ``changes``, ``backs`` and ``owns`` (n_joints, 3, 3): C_parent^-1 C, C_parent^-1 and C;
+    ``offsets`` (n_joints, 3), ``moves`` (n_joints, 3) and ``turns`` (n_joints, most, 2), -1 where
+    there is no column.
     """
 
     parents: Ints
     changes: Floats
     offsets: Floats
     backs: Floats
+    owns: Floats
     replaces: Ints
     moves: Ints
     turns: Ints
@@ -50,46 +51,109 @@ def position_points(
 
     ``origins`` (n_joints, 3), ``axes`` (n_joints, 3, 3) with the axes as columns.
     """
-    parents, changes, offsets, backs, replaces, moves, turns, radians = joints
     arm = np.empty(3)
-    for joint in range(len(parents)):
+    for joint in range(len(joints.parents)):
+        _place(values, joints, joint, arm, origins, axes)
+    _mark(points, origins, axes, out)
+
+
+@kernel
+def place_frames(
+    values: Floats, joints: Joints, wanted: Ints, points: Points, out: Floats, kept: Floats
+) -> None:
+    """Write ``points`` of all frames to ``out`` (n_frames, n_points, 3), and axes to ``kept``.
+
+    ``values`` (n_frames, n_channels); ``wanted`` are the joints to place, parents before children.
+    ``kept`` (n_frames, n_joints, 3, 3), or (0, ...) where the axes are of no use.
+    """
+    n_joints = len(joints.parents)
+    arm, origins, axes = np.empty(3), np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))
+    for frame in range(len(values)):
+        for number in range(len(wanted)):
+            _place(values[frame], joints, wanted[number], arm, origins, axes)
+        _mark(points, origins, axes, out[frame])
+        if len(kept):
+            for joint in range(n_joints):
+                for i in range(3):
+                    for j in range(3):
+                        kept[frame, joint, i, j] = axes[joint, i, j]
+
+
+@kernel
+def turn_frames(values: Floats, joints: Joints, wanted: Ints, out: Floats) -> None:
+    """Write how each joint of ``wanted`` is turned from its parent, (n_frames, n_wanted, 3, 3).
+
+    These are C M C^-1, M the product of the joint's own turns: the identity in the rest pose.
+    """
+    own = np.empty((3, 3))
+    for frame in range(len(values)):
+        for number in range(len(wanted)):
+            joint = wanted[number]
+            for i in range(3):
+                for j in range(3):
+                    own[i, j] = joints.owns[joint, i, j]
+            _turn(values[frame], joints, joint, own)
+            for i in range(3):
+                for j in range(3):
+                    total = 0.0
+                    for k in range(3):
+                        total += own[i, k] * joints.owns[joint, j, k]
+                    out[frame, number, i, j] = total
+
+
+@inner
+def _place(
+    values: Floats, joints: Joints, joint: int, arm: Floats, origins: Floats, axes: Floats
+) -> None:
+    """The origin and the axes of a joint whose parent is placed; ``arm`` (3,) is scratch."""
+    for i in range(3):
+        column = joints.moves[joint, i]
+        moved = column >= 0
+        arm[i] = 0.0 if moved and joints.replaces[joint] else joints.offsets[joint, i]
+        if moved:
+            arm[i] += values[column]
+    parent, own = joints.parents[joint], axes[joint]
+    change = joints.changes[joint]
+    if parent < 0:
         for i in range(3):
-            column = moves[joint, i]
-            moved = column >= 0
-            arm[i] = 0.0 if moved and replaces[joint] else offsets[joint, i]
-            if moved:
-                arm[i] += values[column]
-        parent = parents[joint]
-        own = axes[joint]
-        if parent < 0:
-            for i in range(3):
-                origins[joint, i] = arm[i]
-                for j in range(3):
-                    own[i, j] = changes[joint, i, j]
-        else:
-            above, back = axes[parent], backs[joint]
-            for i in range(3):
-                total = origins[parent, i]
-                for j in range(3):
-                    along = back[j, 0] * arm[0] + back[j, 1] * arm[1] + back[j, 2] * arm[2]
-                    total += above[i, j] * along
-                    own[i, j] = (
-                        above[i, 0] * changes[joint, 0, j]
-                        + above[i, 1] * changes[joint, 1, j]
-                        + above[i, 2] * changes[joint, 2, j]
-                    )
-                origins[joint, i] = total
-        for turn in range(turns.shape[1]):
-            axis, column = turns[joint, turn]
-            if column < 0:
-                break
-            j, k = (axis + 1) % 3, (axis + 2) % 3
-            angle = values[column] * radians
-            cosine, sine = math.cos(angle), math.sin(angle)
-            for i in range(3):
-                before, after = own[i, j], own[i, k]
-                own[i, j] = before * cosine + after * sine
-                own[i, k] = after * cosine - before * sine
+            origins[joint, i] = arm[i]
+            for j in range(3):
+                own[i, j] = change[i, j]
+    else:
+        above, back = axes[parent], joints.backs[joint]
+        for i in range(3):
+            total = origins[parent, i]
+            for j in range(3):
+                along = back[j, 0] * arm[0] + back[j, 1] * arm[1] + back[j, 2] * arm[2]
+                total += above[i, j] * along
+                own[i, j] = (
+                    above[i, 0] * change[0, j]
+                    + above[i, 1] * change[1, j]
+                    + above[i, 2] * change[2, j]
+                )
+            origins[joint, i] = total
+    _turn(values, joints, joint, own)
+
+
+@inner
+def _turn(values: Floats, joints: Joints, joint: int, own: Floats) -> None:
+    """Turn the axes of a joint, (3, 3), by its channels."""
+    turns = joints.turns
+    for turn in range(turns.shape[1]):
+        axis, column = turns[joint, turn]
+        if column < 0:
+            break
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        angle = values[column] * joints.radians
+        cosine, sine = math.cos(angle), math.sin(angle)
+        for i in range(3):
+            before, after = own[i, j], own[i, k]
+            own[i, j] = before * cosine + after * sine
+            own[i, k] = after * cosine - before * sine
+
+
+@inner
+def _mark(points: Points, origins: Floats, axes: Floats, out: Floats) -> None:
     for point in range(len(points.joints)):
         joint = points.joints[point]
         for i in range(3):

@@ -26,7 +26,7 @@ from mcz.formats.c3d_recording import Recording
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
 from mcz.numbers.scaling import Scaling
 from mcz.reading.decimation import decimated, decimated_rows
-from mcz.reading.joints import Joints, joint_list
+from mcz.reading.posing import Posed
 from mcz.reading.preview import Preview, preview
 from mcz.reading.recording import index_of, read_recording, scaling_of
 from mcz.reading.signal_info import SignalInfo, groups_of, read_signal
@@ -34,9 +34,10 @@ from mcz.reading.signal_reader import SignalReader
 from mcz.reading.source_info import SourceInfo, of_no_file, read_source, sourced_skeleton
 from mcz.reading.views import ClipValues
 from mcz.schema import parse
+from mcz.skeleton import Joints, joint_list
 
 
-class Clip:
+class Clip(Posed):
     """One clip; nothing is decoded before it is asked for."""
 
     def __init__(self, container: Container, row: ClipRow) -> None:
@@ -285,11 +286,6 @@ class Clip:
                 f"clip {self.name!r}, signal {info.index}: value hash is {found.hex()}, "
                 f"stored is {hashes[info.index].hex()}"
             )
-
-    def check_segments(self, info: SignalInfo) -> None:
-        """Read the segments of a signal that cannot be decoded: their tables hold all the same."""
-        for row in info.rows:
-            self.container.streams(row, info.counts, None)
 
     def motion(
         self,

@@ -22,7 +22,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.layout import layout as layout
 from mcz.reading.recording_report import document_of
-from mcz.reading.signal_info import SignalInfo
+from mcz.reading.signal_info import SignalInfo, read_segments
 from mcz.reading.sizes import Sizes, clip_sizes, models_used
 from mcz.schema import parse
 
@@ -351,7 +351,7 @@ def _clip_errors(clip: Clip) -> Iterator[MczError]:
             sound = False
             yield error
             if isinstance(error, UnsupportedError):
-                yield from _error(clip.check_segments, signal)
+                yield from _error(read_segments, clip.container, signal)
     if sound and clip.source is not None:
         yield from _error(clip.source_bytes)
 

@@ -125,6 +125,12 @@ def read_signal(
     return info
 
 
+def read_segments(container: Container, info: SignalInfo) -> None:
+    """Read the segments of a signal that cannot be decoded: their tables hold all the same."""
+    for row in info.rows:
+        container.streams(row, info.counts, None)
+
+
 def _model(container: Container, before: int, id_: bytes) -> Model | None:
     """The model with this id, None where the file has none before this offset, that of the clip."""
     chunk = container.directory.shared.get((b"MODL", id_))

@@ -1,0 +1,23 @@
+"""Poses as arrays with names: where points are, how joints are turned, how fast, at which rate.
+
+One convention throughout: rotations are active and turn column vectors, a joint's local rotation
+is W_parent^-1 W (W: its rotation in the world), and in the rest pose every rotation is the
+identity. Everything takes a Motion or a Clip, of which only what is needed is decoded.
+"""
+
+from __future__ import annotations
+
+from mcz.poses.places import Root, accelerations, point_names, positions, root, velocities
+from mcz.poses.resampling import resample
+from mcz.poses.turns import rotations
+
+__all__ = [
+    "Root",
+    "accelerations",
+    "point_names",
+    "positions",
+    "resample",
+    "root",
+    "rotations",
+    "velocities",
+]

@@ -1,0 +1,114 @@
+"""What moves: a Motion, or a Clip of which only what is needed is decoded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError, OptionError
+from mcz.kinematics.chain import Floats
+from mcz.motion import Motion, Skeleton
+from mcz.skeleton import Joints, joint_columns, joint_list
+from mcz.units import unit_cm_of
+
+Frames = tuple[int, int] | slice | None
+
+
+class Decoded(Protocol):
+    """What a Clip has that is needed here."""
+
+    name: str
+    n_frames: int
+
+    @property
+    def skeleton(self) -> Skeleton: ...
+    @property
+    def frame_rate(self) -> Fraction | None: ...
+    @property
+    def signals(self) -> Sequence[Any]: ...
+    def read(
+        self, frames: tuple[int, int] | None = None, joints: Joints = None, resolution: int = 0
+    ) -> NDArray[Any]: ...
+
+
+Moving = Motion | Decoded
+
+
+def frame_range(moving: Moving, frames: Frames) -> tuple[int, int]:
+    """Frames a <= f < b, from a pair or a slice; raises OptionError where they are not there.
+
+    A slice counts as numpy's do: ends may be left out, negative or beyond.
+    """
+    if isinstance(frames, slice):
+        start, stop, step = frames.indices(moving.n_frames)
+        if step != 1:
+            raise OptionError(f"frames {frames}: neighbours only; take every n-th of the result")
+        return start, max(start, stop)
+    start, stop = frames if frames is not None else (0, moving.n_frames)
+    if not 0 <= start <= stop <= moving.n_frames:
+        raise OptionError(f"{moving.name!r} has frames 0 to {moving.n_frames}, not {start}:{stop}")
+    return start, stop
+
+
+def joint_numbers(skeleton: Skeleton, joints: Joints) -> list[int]:
+    """The indices of these joints, of all where None; raises MotionError."""
+    if joints is None:
+        return list(range(skeleton.n_joints))
+    return [skeleton.find(joint) for joint in joint_list(joints)]
+
+
+def values_of(moving: Moving, frames: tuple[int, int], joints: Sequence[int]) -> Floats:
+    """The channels of these joints, float64 (n_frames, n_channels), NaN where invalid.
+
+    Columns of other joints may hold anything. Raises MotionError where the motion's channels are
+    not those of its skeleton.
+    """
+    skeleton = moving.skeleton
+    if moving.signals[0].channels is not None:
+        raise MotionError(f"{moving.name!r}: its channels are not those of its skeleton")
+    if isinstance(moving, Motion):
+        cut = moving if frames == (0, moving.n_frames) else None
+        signal = moving.signals[0] if cut is not None else moving.signals[0].cut(*frames)
+        return np.asarray(signal.masked(), np.float64)
+    columns = joint_columns(skeleton, joints)
+    if len(columns) == skeleton.n_channels:
+        return np.asarray(moving.read(frames), np.float64)
+    values = np.zeros((frames[1] - frames[0], skeleton.n_channels))
+    if columns:
+        values[:, columns] = moving.read(frames, joints=joints)
+    return values
+
+
+def scale_to(skeleton: Skeleton, unit: str | None) -> float:
+    """How many of ``unit``, cm, m, mm ..., a length unit is; 1 where None.
+
+    Raises OptionError for another unit, and where the skeleton's is unknown.
+    """
+    if unit is None:
+        return 1.0
+    wanted = unit_cm_of(unit)
+    if skeleton.unit_cm is None:
+        raise OptionError(
+            f"skeleton {skeleton.name!r}: its length unit is unknown, so it cannot be turned into "
+            f"{unit}; leave unit= out, or say it when reading"
+        )
+    return skeleton.unit_cm / wanted
+
+
+def rate_of(moving: Moving) -> float:
+    """Frames a second; raises OptionError while unknown."""
+    if moving.frame_rate is None:
+        raise OptionError(f"{moving.name!r}: its frame rate is unknown; say it when reading")
+    return float(moving.frame_rate)
+
+
+def as_type(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
+    """``values`` as float64 or float32; raises OptionError for another type."""
+    wanted = np.dtype(dtype)
+    if wanted not in (np.float64, np.float32):
+        raise OptionError(f"dtype {wanted}: float64 or float32")
+    return values.astype(wanted, copy=False)

@@ -1,0 +1,208 @@
+"""Where things are, and how fast they move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.brief import among, brief
+from mcz.errors import MotionError, OptionError
+from mcz.kinematics import first_points
+from mcz.kinematics import point_names as names_of_points
+from mcz.kinematics.chain import Floats
+from mcz.kinematics.frames import frame_poses_of
+from mcz.motion import Skeleton
+from mcz.poses.changes import accelerations_of, velocities_of
+from mcz.poses.conversions import from_matrices
+from mcz.poses.moving import (
+    Frames,
+    Moving,
+    as_type,
+    frame_range,
+    joint_numbers,
+    rate_of,
+    scale_to,
+    values_of,
+)
+from mcz.skeleton import Joints, joint_list
+
+
+def point_names(moving: Moving | Skeleton, joints: Joints = None) -> tuple[str, ...]:
+    """The names of the points whose ``positions`` are given, in their order.
+
+    That is the name of the joint, with " end" where a point is an end site of a BVH. Of Acclaim a
+    joint's point is the end of its bone.
+    """
+    skeleton = moving if isinstance(moving, Skeleton) else moving.skeleton
+    names = names_of_points(skeleton)
+    return names if joints is None else tuple(names[p] for p in chosen_points(skeleton, joints))
+
+
+def chosen_points(skeleton: Skeleton, joints: Joints) -> list[int]:
+    """The points of these names, and the first point of each joint of these names or indices.
+
+    Raises MotionError where there is none.
+    """
+    names = names_of_points(skeleton)
+    if joints is None:
+        return list(range(len(names)))
+    firsts, points = first_points(skeleton), []
+    for wanted in joint_list(joints):
+        if isinstance(wanted, str) and wanted in names and wanted not in skeleton.addresses():
+            points.append(names.index(wanted))  # an end site
+            continue
+        try:
+            points.append(firsts[skeleton.find(wanted)])
+        except MotionError:
+            raise MotionError(f"no point {wanted!r} among {among(names, wanted)}") from None
+    return points
+
+
+def positions(
+    moving: Moving,
+    joints: Joints = None,
+    frames: Frames = None,
+    *,
+    unit: str | None = None,
+    dtype: Any = np.float64,
+) -> NDArray[Any]:
+    """Where the points of a Motion or Clip are in the world, (n_frames, n_points, 3).
+
+    ``joints`` by index or name, or points by the names of ``point_names``; None: all points, those
+    of ``point_names``. ``frames`` (a, b) or a slice. In length units of the skeleton, or in
+    ``unit``: "mm", "cm", "m", "in", "ft". A point that depends on an invalid value is NaN.
+    Raises OptionError, and MotionError where the skeleton has no kinematics: its angle unit is
+    unknown, or all of its channels are plain scalars.
+    """
+    scale = scale_to(moving.skeleton, unit)
+    found = _positions(moving, joints, frame_range(moving, frames))
+    return as_type(found if scale == 1.0 else found * scale, dtype)
+
+
+def _positions(moving: Moving, joints: Joints, span: tuple[int, int]) -> Floats:
+    points = chosen_points(moving.skeleton, joints)
+    poses = frame_poses_of(moving.skeleton)
+    needed = poses.above(poses.joints_of(points))
+    return poses.positions(values_of(moving, span, needed), points)
+
+
+def velocities(
+    moving: Moving,
+    joints: Joints = None,
+    frames: Frames = None,
+    *,
+    unit: str | None = None,
+    dtype: Any = np.float64,
+) -> NDArray[Any]:
+    """How fast the points move, (n_frames, n_points, 3), in length units (or ``unit``) a second.
+
+    Central differences, (p[t+1] - p[t-1]) / 2 x rate; at the ends of the clip and beside gaps
+    one-sided. A part of the frames has the numbers of the whole. Arguments and errors are those of
+    ``positions``; OptionError also where the frame rate is unknown.
+    """
+    rate = rate_of(moving)
+    found = _with_neighbours(moving, joints, frames, unit, 1)
+    return as_type(_cut(velocities_of(found.places, rate), found), dtype)
+
+
+def accelerations(
+    moving: Moving,
+    joints: Joints = None,
+    frames: Frames = None,
+    *,
+    unit: str | None = None,
+    dtype: Any = np.float64,
+) -> NDArray[Any]:
+    """How the velocity of the points changes, in length units (or ``unit``) a second squared.
+
+    (p[t+1] - 2 p[t] + p[t-1]) x rate^2; at an end or beside a gap that of the frame next to it.
+    Otherwise as ``velocities``.
+    """
+    rate = rate_of(moving)
+    found = _with_neighbours(moving, joints, frames, unit, 2)
+    return as_type(_cut(accelerations_of(found.places, rate), found), dtype)
+
+
+@dataclass(frozen=True, slots=True)
+class _Near:
+    """Places of some frames and of those around them; ``first`` and ``stop`` among ``places``."""
+
+    places: Floats
+    first: int
+    stop: int
+
+
+def _with_neighbours(
+    moving: Moving, joints: Joints, frames: Frames, unit: str | None, reach: int
+) -> _Near:
+    scale = scale_to(moving.skeleton, unit)
+    start, stop = frame_range(moving, frames)
+    low, high = max(0, start - reach), min(moving.n_frames, stop + reach)
+    places = _positions(moving, joints, (low, high)) * scale
+    return _Near(places, start - low, stop - low)
+
+
+def _cut(values: Floats, near: _Near) -> Floats:
+    return values[near.first : near.stop]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Root:
+    """Where the root is and how it is turned, frame by frame.
+
+    ``positions`` (n_frames, 3) in length units (or the unit that was asked for), ``rotations``
+    (n_frames, 4), quaternions in the world, w first, ``joint`` its name, ``up_axis`` "x", "y", "z",
+    or "" while unknown.
+    """
+
+    joint: str
+    positions: NDArray[Any]
+    rotations: NDArray[Any]
+    up_axis: str
+
+    __repr__ = brief
+
+    @property
+    def headings(self) -> NDArray[Any]:
+        """How far the root is turned about the axis that points up, (n_frames,), in radians.
+
+        0 in the rest pose, continuous over turns: the twist of the rotation. Raises OptionError
+        where nobody says what is up.
+        """
+        if not self.up_axis:
+            raise OptionError(f"root {self.joint!r}: the axis that points up is unknown (up=)")
+        twist = self.rotations[:, 1 + "xyz".index(self.up_axis)].astype(np.float64)
+        angles = 2.0 * np.arctan2(twist, self.rotations[:, 0].astype(np.float64))
+        known = np.isfinite(angles)
+        angles[known] = np.unwrap(angles[known])
+        return angles.astype(self.rotations.dtype)
+
+
+def root(
+    moving: Moving,
+    frames: Frames = None,
+    *,
+    joint: int | str | None = None,
+    unit: str | None = None,
+    dtype: Any = np.float64,
+) -> Root:
+    """Where the root joint itself is and how it is turned in the world: a ``Root``.
+
+    ``joint`` is another than the first. Raises as ``positions``, and MotionError where the skeleton
+    has no joint.
+    """
+    skeleton, span = moving.skeleton, frame_range(moving, frames)
+    scale = scale_to(skeleton, unit)
+    (number,) = joint_numbers(skeleton, 0 if joint is None else joint)
+    poses = frame_poses_of(skeleton)
+    values = values_of(moving, span, poses.above([number]))
+    turns = from_matrices(poses.world(values, [number]), "quat")
+    return Root(
+        skeleton.addresses()[number],
+        as_type(poses.origins(values, [number])[:, 0] * scale, dtype),
+        as_type(turns[:, 0], dtype),
+        skeleton.up_axis,
+    )

@@ -1,0 +1,107 @@
+"""What a Clip shows of its poses: the functions of ``mcz.poses``, of which it decodes a part."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz import poses
+from mcz.kinematics.contacts import RULE, ContactRule, Contacts
+from mcz.kinematics.contacts import contacts as contacts_of
+from mcz.poses.moving import Frames
+from mcz.skeleton import Joints, joint_list
+
+if TYPE_CHECKING:
+    from mcz.reading.clip import Clip
+
+
+class Posed:
+    """The part of a Clip that is about poses; ``mcz.poses`` has the conventions."""
+
+    @property
+    def _clip(self) -> Clip:
+        return cast("Clip", self)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The names of the joints, ``name#n`` where one repeats."""
+        return tuple(self._clip.skeleton.addresses())
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """The names of the points of ``positions``, in their order."""
+        return poses.point_names(self._clip)
+
+    def positions(
+        self,
+        joints: Joints = None,
+        frames: Frames = None,
+        *,
+        unit: str | None = None,
+        dtype: Any = np.float64,
+    ) -> NDArray[Any]:
+        """Where the points are, (n_frames, n_points, 3): see ``mcz.positions``."""
+        return poses.positions(self._clip, joints, frames, unit=unit, dtype=dtype)
+
+    def rotations(
+        self,
+        form: str = "quat",
+        *,
+        space: str = "local",
+        joints: Joints = None,
+        frames: Frames = None,
+        order: str = "XYZ",
+        degrees: bool = False,
+        dtype: Any = np.float64,
+    ) -> NDArray[Any]:
+        """How the joints are turned, (n_frames, n_joints, ...): see ``mcz.rotations``."""
+        return poses.rotations(
+            self._clip,
+            form,
+            space=space,
+            joints=joints,
+            frames=frames,
+            order=order,
+            degrees=degrees,
+            dtype=dtype,
+        )
+
+    def root(
+        self,
+        frames: Frames = None,
+        *,
+        joint: int | str | None = None,
+        unit: str | None = None,
+        dtype: Any = np.float64,
+    ) -> poses.Root:
+        """Where the root is and how it is turned: see ``mcz.root``."""
+        return poses.root(self._clip, frames, joint=joint, unit=unit, dtype=dtype)
+
+    def velocities(
+        self,
+        joints: Joints = None,
+        frames: Frames = None,
+        *,
+        unit: str | None = None,
+        dtype: Any = np.float64,
+    ) -> NDArray[Any]:
+        """How fast the points move, (n_frames, n_points, 3): see ``mcz.velocities``."""
+        return poses.velocities(self._clip, joints, frames, unit=unit, dtype=dtype)
+
+    def accelerations(
+        self,
+        joints: Joints = None,
+        frames: Frames = None,
+        *,
+        unit: str | None = None,
+        dtype: Any = np.float64,
+    ) -> NDArray[Any]:
+        """How velocities change, (n_frames, n_points, 3): see ``mcz.accelerations``."""
+        return poses.accelerations(self._clip, joints, frames, unit=unit, dtype=dtype)
+
+    def contacts(self, joints: Joints = None, rule: ContactRule = RULE) -> Contacts:
+        """In which frames feet stand, of the whole clip: see ``mcz.contacts``."""
+        feet = None if joints is None else joint_list(joints)
+        return contacts_of(self._clip.motion(), feet, rule)
