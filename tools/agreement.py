@@ -20,6 +20,7 @@ import numpy as np
 
 import mcz
 
+LARGE = 1e-6
 RATE = 47  # to which clips are resampled
 
 
@@ -28,6 +29,7 @@ class Worst:
     """The greatest difference of each kind."""
 
     found: dict[str, tuple[float, str, int, int]] = field(default_factory=dict)
+    far: dict[str, list[str]] = field(default_factory=dict)  # the files beyond LARGE
     unread: dict[str, int] = field(default_factory=dict)
 
     def note(self, what: str, ours: Any, theirs: Any, path: Path, scale: float = 1.0) -> None:
@@ -40,6 +42,8 @@ class Worst:
         apart = np.abs(ours - theirs)[known & np.isfinite(theirs)].max(initial=0.0) / scale
         if (known != np.isfinite(theirs)).any():
             apart = np.inf
+        if apart > LARGE:
+            self.far.setdefault(what, []).append(f"{path.name} {apart:.2g}")
         before, name, files, values = self.found.get(what, (-1.0, "", 0, 0))
         if apart > before:
             before, name = float(apart), path.name
@@ -51,6 +55,8 @@ class Worst:
     def show(self) -> None:
         for what, (apart, name, files, values) in sorted(self.found.items()):
             print(f"{what:44} {apart:9.2g}  {files:4} files {values:11,} values  ({name})")
+        for what, files_far in sorted(self.far.items()):
+            print(f"{what}, beyond {LARGE}: {', '.join(files_far)}")
         for what, count in sorted(self.unread.items()):
             print(f"{what}: {count}")
 

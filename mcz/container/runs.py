@@ -27,9 +27,10 @@ class Run(NamedTuple):
 
 
 class Runs:
-    """Runs by key, those that were used last: at most ``MOST_BYTES`` of a file."""
+    """Runs by key, those that were used last: at most ``most_bytes`` of a file."""
 
-    def __init__(self) -> None:
+    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
+        self._most = most_bytes
         self._runs: OrderedDict[Hashable, Run] = OrderedDict()
         self._size = 0
         self._lock = Lock()  # a file may be read by several threads
@@ -46,5 +47,5 @@ class Runs:
             if key not in self._runs:
                 self._runs[key] = run
                 self._size += run.n_bytes
-            while self._size > MOST_BYTES:
+            while self._size > self._most:
                 self._size -= self._runs.popitem(last=False)[1].n_bytes

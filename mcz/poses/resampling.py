@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import IDENTITY, Chain, Floats, Link, chain_of
 from mcz.kinematics.euler import euler_angles
-from mcz.motion import Motion, Signal, frame_rate_of
+from mcz.motion import Motion, Signal, Skeleton, frame_rate_of
 from mcz.poses.conversions import from_matrices, slerp
 
 MOST_VALUES = 2**31  # of what is made: a rate of 1e9 would be a mistake, not a wish
@@ -58,7 +59,9 @@ def resample(motion: Motion, rate: Fraction | float, *, drop_signals: bool = Fal
     if motion.signals[0].samples_per_frame > 1:
         raise MotionError(f"motion {motion.name!r}: several samples a frame")
     times = times_of(motion.n_frames, Fraction(motion.frame_rate), wanted, motion.signals[0])
-    values = _values(motion, times)
+    own = motion.signals[0].channels is not None
+    old = np.asarray(motion.values, np.float64)
+    values = resampled(None if own else motion.skeleton, old, times)
     mask = None
     if motion.signals[0].mask is not None:
         mask = ~np.isnan(values)
@@ -82,20 +85,32 @@ def times_of(n_frames: int, rate: Fraction, wanted: Fraction, signal: Signal) ->
     """
     if not n_frames:
         return Times(np.empty(0, np.int64), np.empty(0))
+    count = resampled_frames(n_frames, rate, wanted)
     step = rate / wanted
-    count = int((n_frames - 1) / step) + 1
     if count * max(1, signal.n_channels) > MOST_VALUES:
         raise OptionError(f"{n_frames} frames at {rate} a second make {count} at {wanted}")
-    places = [divmod(frame * step.numerator, step.denominator) for frame in range(count)]
+    return times_at(range(count), step)
+
+
+def resampled_frames(n_frames: int, rate: Fraction, wanted: Fraction) -> int:
+    """How many frames at ``wanted`` a second there are from the first of ``n_frames`` to the last."""
+    return int((n_frames - 1) * wanted / rate) + 1 if n_frames else 0
+
+
+def times_at(frames: Iterable[int], step: Fraction) -> Times:
+    """Where new frames lie among the old, each ``step`` old ones after the one before."""
+    places = [divmod(frame * step.numerator, step.denominator) for frame in frames]
     before = np.array([whole for whole, _ in places], np.int64)
     return Times(before, np.array([rest / step.denominator for _, rest in places]))
 
 
-def _values(motion: Motion, times: Times) -> Floats:
-    old = np.asarray(motion.values, np.float64)
+def resampled(skeleton: Skeleton | None, old: Floats, times: Times) -> Floats:
+    """``resample`` of the rows of ``old``; ``skeleton`` None where channels are of no joint."""
+    if not times.share.any():
+        return old[times.before]
     new = splines(old, times)
-    if motion.signals[0].channels is None and motion.skeleton.angle_unit:
-        chain = chain_of(motion.skeleton)
+    if skeleton is not None and skeleton.angle_unit:
+        chain = chain_of(skeleton)
         for link in chain.links:
             if link.turns:
                 _turn(chain, link, old, new, times)
@@ -128,15 +143,15 @@ def _turn(chain: Chain, link: Link, old: Floats, new: Floats, times: Times) -> N
     between = np.flatnonzero(times.share > 0)
     before, after = times.before[between], times.after[between]
     share = times.share[between]
-    columns = list(link.quaternion) or [column for _, column in link.turns]
     if link.quaternion and len(link.turns) == 1:
+        columns = np.array(link.quaternion, np.int64)
         turns = _matrices(chain, link, old)
         middle = slerp(turns[before], turns[after], share)
         quaternions = from_matrices(middle[:, None], "quat")[:, 0]
         near = (quaternions * old[np.ix_(before, columns)]).sum(axis=1)
         new[np.ix_(between, columns)] = np.where(near < 0, -1.0, 1.0)[:, None] * quaternions
         return
-    angles = [column for axis, column in link.turns if axis < 3]
+    angles = np.array([column for axis, column in link.turns if axis < 3], np.int64)
     full = 2 * np.pi / chain.radians
     first, last = old[np.ix_(before, angles)], old[np.ix_(after, angles)]
     way = last - first

@@ -273,19 +273,24 @@ class Clip(Posed):
         self, info: SignalInfo, values: NDArray[Any], mask: NDArray[np.bool_] | None
     ) -> None:
         """Raise ChecksumError where these are not the values and the mask of a whole signal."""
+        stored, found = self.value_hashes[info.index], value_hash(values, mask)
+        if found != stored:  # CEND-05
+            raise ChecksumError(
+                f"clip {self.name!r}, signal {info.index}: value hash is {found.hex()}, "
+                f"stored is {stored.hex()}"
+            )
+
+    @cached_property
+    def value_hashes(self) -> tuple[bytes, ...]:
+        """The SHA-256 of the values and the mask of every signal, as the file states them."""
         if self._cend is None:  # of a damaged file
             raise FormatError(f"clip {self.name!r} has no CEND")
-        hashes = self._cend.value_sha256
+        hashes = tuple(bytes(each) for each in self._cend.value_sha256)
         if len(hashes) != len(self.signals):  # CEND-02
             raise FormatError(
                 f"clip {self.name!r}: {len(hashes)} hashes of {len(self.signals)} signals"
             )
-        found = value_hash(values, mask)
-        if found != hashes[info.index]:  # CEND-05
-            raise ChecksumError(
-                f"clip {self.name!r}, signal {info.index}: value hash is {found.hex()}, "
-                f"stored is {hashes[info.index].hex()}"
-            )
+        return hashes
 
     def motion(
         self,

@@ -1,0 +1,12 @@
+"""Data sets: windows of many clips as arrays, for whoever trains or measures on them.
+
+``dataset`` finds the clips, ``fields`` says what arrays are made of them, ``features`` makes these
+of a part of a clip, ``caches`` keeps them, ``Dataset`` counts, cuts, shuffles and splits.
+"""
+
+from __future__ import annotations
+
+from mcz.datasets.collecting import dataset
+from mcz.datasets.dataset import Dataset, Window
+
+__all__ = ["Dataset", "Window", "dataset"]

@@ -1,0 +1,192 @@
+"""``dataset``: which clips there are, and whether they go together."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mcz.datasets.caches import to_size
+from mcz.datasets.dataset import Dataset, Settings
+from mcz.datasets.fields import chosen_fields, names_of
+from mcz.datasets.members import Member
+from mcz.datasets.sources import Recipe
+from mcz.errors import MczError, OptionError
+from mcz.motion import frame_rate_of
+from mcz.poses.resampling import resampled_frames
+from mcz.reading.clip import Clip
+from mcz.reading.file import File, open
+from mcz.skeleton import Joints
+
+Target = str | os.PathLike[str] | File
+Where = str | Callable[[Clip], bool]
+
+
+def dataset(
+    target: Target | Iterable[Target],
+    fields: str | Iterable[str] = "rot6d,positions,root",
+    *,
+    rate: Fraction | float | None = None,
+    window: int | None = None,
+    stride: int | None = None,
+    where: Where | None = None,
+    joints: Joints = None,
+    unit: str | None = None,
+    dtype: Any = "float32",
+    source_rate: Fraction | float | None = None,
+    cache: int | str = "64 MB",
+    folder: str | os.PathLike[str] | None = None,
+) -> Dataset:
+    """Windows of the clips of MCZ files, as arrays: a ``Dataset``.
+
+    ``target``: an archive, a folder (all ``.mcz`` below it, by name), an open File, or several.
+    ``fields``: names, with commas or as a list: channels, positions, velocities, accelerations,
+    root, rot6d, quat, rotvec, matrix, and the last four as world_rot6d and so on; ``docs`` has
+    their shapes. ``rate``: all are resampled to it, exactly where every n-th frame will do;
+    ``source_rate`` is that of clips that do not say theirs. ``window`` frames each, every
+    ``stride`` (as many, where None); None: whole clips. ``where`` chooses clips: an expression as
+    of ``File.find``, or a function of a Clip. ``joints`` and ``unit`` as of ``positions``.
+    ``cache``: bytes to keep in memory, or in ``folder``, across runs: "64 MB".
+
+    Clips too short for a window are listed in ``Dataset.skipped``. Raises OptionError where clips do
+    not go together: other joints, rates or units; MotionError and FormatError where one cannot be
+    used.
+    """
+    recipe = _recipe(fields, rate, joints, unit, dtype)
+    window, stride = _cut(window, stride)
+    given: dict[str, File] = {}
+    size = to_size(cache)
+    settings = Settings(recipe, window, stride, size, None if folder is None else Path(folder))
+    assumed = None if source_rate is None else frame_rate_of(source_rate, "source_rate")
+    agreement, members, skipped = _Agreement(recipe), [], []
+    for file, name in _files(target, given):
+        for clip in _chosen(file, where):
+            member = _member(clip, name, recipe, assumed)
+            agreement.check(clip, member)
+            short = window is not None and member.n_frames < window
+            (skipped if short or not member.n_frames else members).append(member)
+        if name not in given:
+            file.close()
+    if not members:
+        wanted = "" if window is None else f" of at least {window} frames"
+        raise OptionError(f"no clip{wanted} in what was given")
+    return Dataset(settings, members, given, skipped)
+
+
+def _recipe(
+    fields: str | Iterable[str],
+    rate: Fraction | float | None,
+    joints: Joints,
+    unit: str | None,
+    dtype: Any,
+) -> Recipe:
+    kind = np.dtype(dtype)
+    if kind not in (np.float16, np.float32, np.float64):
+        raise OptionError(f"dtype {kind}: float16, float32 or float64")
+    exact = None if rate is None else frame_rate_of(rate, "rate")
+    names = joints if joints is None or isinstance(joints, (str, int)) else tuple(joints)
+    return Recipe(chosen_fields(fields), exact, names, unit, kind)
+
+
+def _cut(window: int | None, stride: int | None) -> tuple[int | None, int]:
+    if window is not None and window < 1:
+        raise OptionError(f"window of {window} frames")
+    if stride is not None and (stride < 1 or window is None):
+        raise OptionError(f"stride of {stride} frames, of windows of {window}")
+    return window, stride or window or 1
+
+
+def _files(target: Target | Iterable[Target], given: dict[str, File]) -> Iterator[tuple[File, str]]:
+    """The files, each with what ``mcz.open`` takes for it; those that were open go to ``given``."""
+    several = isinstance(target, Iterable) and not isinstance(target, (str, os.PathLike, File))
+    for one in target if several else [target]:  # type: ignore[union-attr]
+        if isinstance(one, File):
+            given[one.name] = one
+            yield one, one.name
+            continue
+        path = os.fspath(one)  # type: ignore[arg-type]
+        paths = [path]
+        if Path(path).is_dir():
+            paths = sorted(str(found) for found in Path(path).rglob("*.mcz"))
+            if not paths:
+                raise OptionError(f"{path}: a folder without .mcz files (mcz pack makes one)")
+        for name in paths:
+            if Path(name).suffix.lower() in (".bvh", ".amc", ".asf", ".c3d"):
+                raise OptionError(
+                    f"{name}: a data set is made of .mcz files (mcz pack, mcz encode)"
+                )
+            yield open(name, threads=1), name
+
+
+def _chosen(file: File, where: Where | None) -> list[Clip]:
+    return list(file.clips.values()) if where is None else file.find(where)
+
+
+def _member(clip: Clip, target: str, recipe: Recipe, assumed: Fraction | None) -> Member:
+    own = clip.frame_rate or assumed
+    member = Member(target, clip.name, clip.n_frames, own, clip.n_frames)
+    if recipe.rate is None:
+        return member
+    if own is None:
+        raise OptionError(f"{member.label}: its frame rate is unknown; say it with source_rate=")
+    return replace(member, n_frames=resampled_frames(clip.n_frames, own, recipe.rate))
+
+
+class _Agreement:
+    """What all clips must have in common, as the first one has it."""
+
+    def __init__(self, recipe: Recipe) -> None:
+        self._recipe = recipe
+        self._first: tuple[Member, dict[str, Any]] | None = None
+        self._known: set[tuple[str, bytes, Fraction | None]] = set()
+
+    def check(self, clip: Clip, member: Member) -> None:
+        """Raises OptionError where ``clip`` differs from the first."""
+        key = member.target, clip.skeleton_id, member.source_rate
+        if key in self._known:
+            return
+        self._known.add(key)
+        found = self._facts(clip, member)
+        if self._first is None:
+            self._first = member, found
+            return
+        first, facts = self._first
+        for what, advice in ADVICE.items():
+            if facts[what] != found[what]:
+                raise OptionError(
+                    f"{member.label} has {_short(found[what])}, {first.label} has "
+                    f"{_short(facts[what])}: {what} differ; {advice}"
+                )
+
+    def _facts(self, clip: Clip, member: Member) -> dict[str, Any]:
+        recipe = self._recipe
+        try:
+            subject = recipe.subject(clip, member)
+        except MczError as error:
+            error.args = (f"{member.label}: {error}",)
+            raise
+        lengths = any(field.lengths for field in recipe.fields)
+        return {
+            "frame rates": None if recipe.rate else member.source_rate,
+            "length units": clip.skeleton.unit_cm if lengths and recipe.unit is None else None,
+            "joints": [names_of(field, subject) for field in recipe.fields],
+        }
+
+
+ADVICE = {
+    "frame rates": "give one to resample to with rate=",
+    "length units": "give one with unit=",
+    "joints": "choose those that all have with joints=, or clips with where=",
+}
+
+
+def _short(fact: Any) -> str:
+    if isinstance(fact, list):
+        names = [name for each in fact for name in each]
+        return f"{len(names)} names ({', '.join(names[:3])} ...)"
+    return "none" if fact is None else str(fact)

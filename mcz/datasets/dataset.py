@@ -1,0 +1,334 @@
+"""``Dataset``: windows of many clips by number, shuffled, in batches, in parts."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.brief import counted
+from mcz.datasets.caches import Arrays, Cache, FolderCache, MemoryCache
+from mcz.datasets.fields import names_of
+from mcz.datasets.members import Member
+from mcz.datasets.sources import BLOCK, Recipe, Sources
+from mcz.errors import OptionError
+from mcz.reading.file import File
+
+if TYPE_CHECKING:
+    from mcz.datasets.tensors import Tensors
+
+RUNS_SHARE = 4  # a quarter of the cache is for frames as they were decoded
+POOL_SHARE = 2  # a pool of windows that are shuffled has features of half of the rest
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Where a window of a data set comes from: frames start <= f < stop, at its rate."""
+
+    target: str
+    clip: str
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How a data set is cut, and what it may keep."""
+
+    recipe: Recipe
+    window: int | None
+    stride: int
+    cache_bytes: int
+    folder: Path | None
+
+
+class Dataset:
+    """Windows of clips: ``data[i]`` is a dict of arrays, one of each field, (window, ...).
+
+    Made by ``mcz.dataset``. ``len(data)`` windows, in the order of the clips and of their frames;
+    without a window whole clips. ``data[3:9]`` and ``data[[5, 1]]`` are batches: arrays
+    (n, window, ...). The arrays are the caller's own.
+
+    It can be pickled, and each process that a worker is opens the files anew: fork and spawn are
+    both safe. Threads may share it. Reading raises as ``mcz.open`` and ``Clip.read`` do.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        members: Sequence[Member],
+        given: Mapping[str, File],
+        skipped: Sequence[Member] = (),
+    ) -> None:
+        self._settings, self._given = settings, dict(given)
+        self.members, self.skipped = tuple(members), tuple(skipped)
+        counts = [self._count(member) for member in self.members]
+        self._ends = np.cumsum(counts, dtype=np.int64)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """What is not pickled: open files and what is kept of them."""
+        targets = {member.target for member in self.members}
+        self._sources = Sources(self._given, self._settings.cache_bytes // RUNS_SHARE, len(targets))
+        self._keys: dict[Member, str] = {}
+        folder, most = self._settings.folder, self._settings.cache_bytes
+        kept = most - most // RUNS_SHARE
+        self._cache: Cache = MemoryCache(kept) if folder is None else FolderCache(folder, most)
+
+    def __getstate__(self) -> dict[str, Any]:
+        made = ("_sources", "_cache", "_keys")
+        return {k: v for k, v in self.__dict__.items() if k not in made}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._prepare()
+
+    def _count(self, member: Member) -> int:
+        window = self._settings.window
+        if window is None:
+            return 1
+        return max(0, (member.n_frames - window) // self._settings.stride + 1)
+
+    def __repr__(self) -> str:
+        window = self._settings.window
+        what = "whole clips" if window is None else f"windows of {counted(window, 'frame')}"
+        clips = counted(len(self.members), "clip")
+        short = f", {len(self.skipped)} too short" if self.skipped else ""
+        return f"<Dataset: {len(self)} {what} of {clips}{short}: {', '.join(self.fields)}>"
+
+    def __len__(self) -> int:
+        return int(self._ends[-1]) if len(self._ends) else 0
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        return tuple(field.name for field in self._settings.recipe.fields)
+
+    @property
+    def whole_clips(self) -> bool:
+        """Whether an item is a whole clip, not a window."""
+        return self._settings.window is None
+
+    @property
+    def rate(self) -> Fraction | None:
+        """Frames a second, None where the clips do not say it."""
+        first = self.members[0].source_rate if self.members else None
+        return self._settings.recipe.rate or first
+
+    @property
+    def n_frames(self) -> int:
+        """Frames of all clips, at the rate of the data set."""
+        return sum(member.n_frames for member in self.members)
+
+    @property
+    def names(self) -> dict[str, tuple[str, ...]]:
+        """Of each field the names along the axis after the frames, () where it has none."""
+        subject = self._first_subject()
+        return {field.name: names_of(field, subject) for field in self._settings.recipe.fields}
+
+    @property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Of each field the shape of a frame."""
+        subject = self._first_subject()
+        return {field.name: field.shape(subject) for field in self._settings.recipe.fields}
+
+    def _first_subject(self) -> Any:
+        if not self.members:
+            raise OptionError("a data set of no clips")
+        member = self.members[0]
+        return self._settings.recipe.subject(self._sources.clip(member), member)
+
+    def window(self, index: int) -> Window:
+        """Which clip and frames window ``index`` is; raises IndexError."""
+        member, start, stop = self._place(index)
+        return Window(member.target, member.clip, start, stop)
+
+    def _place(self, index: int) -> tuple[Member, int, int]:
+        number = index + len(self) if index < 0 else index
+        if not 0 <= number < len(self):
+            raise IndexError(f"window {index} of {len(self)}")
+        which = int(np.searchsorted(self._ends, number, side="right"))
+        member = self.members[which]
+        if self._settings.window is None:
+            return member, 0, member.n_frames
+        before = int(self._ends[which - 1]) if which else 0
+        start = (number - before) * self._settings.stride
+        return member, start, start + self._settings.window
+
+    def __getitem__(self, index: Any) -> dict[str, NDArray[Any]]:
+        """One window, or a batch of those of a slice, a list or an array of numbers."""
+        if isinstance(index, (int, np.integer)):
+            return self._arrays(*self._place(int(index)))
+        if isinstance(index, slice):
+            index = range(*index.indices(len(self)))
+        return self._batch([int(each) for each in index])
+
+    def __iter__(self) -> Iterator[dict[str, NDArray[Any]]]:
+        return (self[index] for index in range(len(self)))
+
+    def _batch(self, numbers: Sequence[int]) -> dict[str, NDArray[Any]]:
+        if self._settings.window is None:
+            raise OptionError("whole clips differ in length and make no batch; give a window=")
+        shape = len(numbers), self._settings.window
+        shapes = self.shapes if not numbers else None
+        out: dict[str, NDArray[Any]] = {}
+        for row, number in enumerate(numbers):
+            for name, parts in self._parts(*self._place(number)).items():
+                if name not in out:
+                    out[name] = np.empty((*shape, *parts[0].shape[1:]), parts[0].dtype)
+                np.concatenate(parts, out=out[name][row])
+        if shapes is not None:
+            dtype = self._settings.recipe.dtype
+            return {name: np.empty((*shape, *rest), dtype) for name, rest in shapes.items()}
+        return out
+
+    def _arrays(self, member: Member, start: int, stop: int) -> dict[str, NDArray[Any]]:
+        parts = self._parts(member, start, stop)
+        return {name: np.concatenate(each) for name, each in parts.items()}
+
+    def _parts(self, member: Member, start: int, stop: int) -> dict[str, list[NDArray[Any]]]:
+        """The arrays of frames of a clip as parts of blocks, which nobody may change."""
+        parts: dict[str, list[NDArray[Any]]] = {name: [] for name in self.fields}
+        first = start // BLOCK
+        for number in range(first, max(first + 1, -(-stop // BLOCK))):
+            at = number * BLOCK
+            for name, array in self._block(member, number).items():
+                parts[name].append(array[max(start - at, 0) : stop - at])
+        return parts
+
+    def _block(self, member: Member, number: int) -> Arrays:
+        key = f"{self._key(member)}-{number}"
+        found = self._cache.get(key)
+        if found is None:
+            start = number * BLOCK
+            stop = min(start + BLOCK, member.n_frames)
+            found = self._sources.features(self._settings.recipe, member, start, stop)
+            self._cache.put(key, found)
+        return found
+
+    def _key(self, member: Member) -> str:
+        """What the features of a clip follow from: in a folder, whatever the file is called."""
+        key = self._keys.get(member)
+        if key is None:
+            recipe = self._settings.recipe
+            told = [self.fields, recipe.rate, member.source_rate, recipe.joints, recipe.unit]
+            text = repr([*told, recipe.dtype.str, BLOCK, VERSION]).encode()
+            if isinstance(self._cache, FolderCache):
+                clip = self._sources.clip(member)
+                text += clip.value_hashes[0] + clip.skeleton_id
+            else:
+                text += repr((member.target, member.clip)).encode()
+            key = self._keys[member] = hashlib.sha256(text).hexdigest()[:32]
+        return key
+
+    def order(self, seed: int) -> NDArray[np.int64]:
+        """All windows in an order that follows from ``seed`` and is quick to read.
+
+        Neighbouring windows are kept in runs, the runs are shuffled, then the windows of as many
+        runs as the cache holds. A data set that fits in the cache is shuffled as a whole.
+        """
+        random = np.random.default_rng(seed)
+        runs = self._runs()
+        random.shuffle(runs)
+        pools: list[list[NDArray[np.int64]]] = [[]]
+        held, most = 0, self._pool_frames()
+        for run, n_frames in runs:
+            if held + n_frames > most and pools[-1]:
+                pools.append([])
+                held = 0
+            pools[-1].append(run)
+            held += n_frames
+        shuffled = [random.permutation(np.concatenate(pool)) for pool in pools if pool]
+        return np.concatenate(shuffled) if shuffled else np.empty(0, np.int64)
+
+    def _runs(self) -> list[tuple[NDArray[np.int64], int]]:
+        """Windows in runs of some blocks of a clip, each with the frames that it needs."""
+        runs = []
+        for which, member in enumerate(self.members):
+            before = int(self._ends[which - 1]) if which else 0
+            numbers = np.arange(before, int(self._ends[which]))
+            each = max(1, RUN_BLOCKS * BLOCK // self._settings.stride)
+            for at in range(0, len(numbers), each):
+                part = numbers[at : at + each]
+                if self._settings.window is None:
+                    n_frames = member.n_frames
+                else:
+                    n_frames = (len(part) - 1) * self._settings.stride + self._settings.window
+                runs.append((part, n_frames + BLOCK))
+        return runs
+
+    def _pool_frames(self) -> int:
+        """How many frames the cache holds the features of, half of that where not all."""
+        if self._settings.folder is not None:
+            return 2**62
+        size = self._settings.recipe.dtype.itemsize
+        values = sum(int(np.prod(shape)) for shape in self.shapes.values()) if self.members else 1
+        kept = self._settings.cache_bytes - self._settings.cache_bytes // RUNS_SHARE
+        return kept // (size * max(1, values)) // POOL_SHARE
+
+    def shuffled(self, seed: int) -> Iterator[dict[str, NDArray[Any]]]:
+        """The windows in the ``order`` of a seed."""
+        return (self[int(index)] for index in self.order(seed))
+
+    def batches(
+        self, size: int, *, seed: int | None = None, drop_last: bool = False
+    ) -> Iterator[dict[str, NDArray[Any]]]:
+        """Batches of ``size`` windows, in the ``order`` of a seed or, None, as they come.
+
+        The last one is smaller where they do not come out even, unless ``drop_last``.
+        """
+        if size < 1:
+            raise OptionError(f"batches of {size} windows")
+        numbers = np.arange(len(self)) if seed is None else self.order(seed)
+        stop = len(self) - len(self) % size if drop_last else len(self)
+        return (self[numbers[at : at + size]] for at in range(0, stop, size))
+
+    def part(self, members: Sequence[Member]) -> Dataset:
+        """The same of some of its ``members`` alone."""
+        return Dataset(self._settings, members, self._given)
+
+    def split(
+        self,
+        parts: Mapping[str, float],
+        *,
+        by: str = "subject",
+        pattern: str | None = None,
+        seed: int = 0,
+    ) -> dict[str, Dataset]:
+        """Parts of which no two share a subject: ``split({"train": 0.8, "test": 0.2})``.
+
+        ``parts``: names and shares, which add up to 1; by their number of windows parts come as near
+        to these as whole subjects allow, each at least one. ``by``: a key of the clips' metadata,
+        or "clip", of which each stands for itself; ``pattern``: a regular expression whose first
+        group, found in the name of a clip, is its subject instead. The same ``seed`` splits the
+        same clips in the same way. Raises OptionError where a clip has none, and where there are
+        fewer subjects than parts.
+        """
+        from mcz.datasets.splitting import split
+
+        groups = split(self._labels(by, pattern), list(map(self._count, self.members)), parts, seed)
+        return {
+            name: self.part([self.members[number] for number in numbers])
+            for name, numbers in groups.items()
+        }
+
+    def _labels(self, by: str, pattern: str | None) -> list[str]:
+        from mcz.datasets.splitting import label_of
+
+        clips = (self._sources.clip(member) for member in self.members)
+        return [label_of(m, clip, by, pattern) for m, clip in zip(self.members, clips, strict=True)]
+
+    def torch(self) -> Tensors:
+        """As a ``torch.utils.data.Dataset`` of dicts of tensors; needs PyTorch (``mcz[torch]``)."""
+        from mcz.datasets.tensors import tensors
+
+        return tensors(self)
+
+
+RUN_BLOCKS = 4
+VERSION = 1  # of what features are: counted up where a kept one would be wrong

@@ -1,0 +1,203 @@
+"""What a data set makes of each frame: a name, a shape, and how it follows from the poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mcz.brief import nearest
+from mcz.errors import OptionError
+from mcz.kinematics.chain import Floats
+from mcz.kinematics.frames import FramePoses
+from mcz.motion import Skeleton
+from mcz.poses.changes import accelerations_of, velocities_of
+from mcz.poses.conversions import from_matrices
+from mcz.poses.moving import joint_numbers, scale_to
+from mcz.poses.places import chosen_points, point_names
+from mcz.skeleton import Joints, joint_columns
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """A skeleton as the fields of a data set look at it.
+
+    ``joints`` and ``points`` are those that were chosen, by index; ``scale`` times a length unit is
+    the unit that is wanted; ``rate`` in frames a second, 0 while unknown.
+    """
+
+    skeleton: Skeleton
+    poses: FramePoses | None  # None: no field needs them
+    joints: tuple[int, ...]
+    points: tuple[int, ...]
+    scale: float
+    rate: float
+
+    @property
+    def columns(self) -> list[int]:
+        return joint_columns(self.skeleton, self.joints)
+
+    @property
+    def kinematics(self) -> FramePoses:
+        assert self.poses is not None
+        return self.poses
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One array of a window.
+
+    ``shape`` is what follows (n_frames, ...); ``names`` what its first such axis is of: "joints",
+    "points", "channels" or "". ``make`` takes the values of all channels, (n_frames, n_channels).
+    ``reach``: how many neighbours on either side it looks at; ``needs``: the joints whose channels
+    matter. ``lengths``: it is in length units, to be scaled.
+    """
+
+    name: str
+    names: str
+    shape: Callable[[Subject], tuple[int, ...]]
+    make: Callable[[Subject, Floats], Floats]
+    needs: Callable[[Subject], Iterable[int]]
+    reach: int = 0
+    posed: bool = True
+    lengths: bool = False
+
+
+def _above_points(subject: Subject) -> list[int]:
+    poses = subject.kinematics
+    return poses.above(poses.joints_of(subject.points))
+
+
+def _positions(subject: Subject, values: Floats) -> Floats:
+    return subject.kinematics.positions(values, subject.points) * subject.scale
+
+
+def _root(subject: Subject, values: Floats) -> Floats:
+    return subject.kinematics.origins(values, [0])[:, 0] * subject.scale
+
+
+def _velocities(subject: Subject, values: Floats) -> Floats:
+    return velocities_of(_positions(subject, values), subject.rate)
+
+
+def _accelerations(subject: Subject, values: Floats) -> Floats:
+    return accelerations_of(_positions(subject, values), subject.rate)
+
+
+def _n_points(subject: Subject) -> tuple[int, ...]:
+    return len(subject.points), 3
+
+
+def _turned(name: str, form: str, tail: tuple[int, ...], world: bool) -> Field:
+    """A field of rotations of the chosen joints."""
+
+    def make(subject: Subject, values: Floats) -> Floats:
+        poses = subject.kinematics
+        turns = (poses.world if world else poses.local)(values, subject.joints)
+        return from_matrices(turns, form)
+
+    return Field(
+        name,
+        "joints",
+        lambda subject: (len(subject.joints), *tail),
+        make,
+        (lambda subject: subject.kinematics.above(subject.joints))
+        if world
+        else (lambda subject: subject.joints),
+    )
+
+
+_FORMS = {
+    "rot6d": ("6d", (6,)),
+    "quat": ("quat", (4,)),
+    "rotvec": ("rotvec", (3,)),
+    "matrix": ("matrix", (3, 3)),
+}
+_FIELDS = [
+    Field(
+        "channels",
+        "channels",
+        lambda subject: (len(subject.columns),),
+        lambda subject, values: values[:, subject.columns],
+        lambda subject: subject.joints,
+        posed=False,
+    ),
+    Field("positions", "points", _n_points, _positions, _above_points, lengths=True),
+    Field("velocities", "points", _n_points, _velocities, _above_points, 1, lengths=True),
+    Field("accelerations", "points", _n_points, _accelerations, _above_points, 2, lengths=True),
+    Field("root", "", lambda _: (3,), _root, lambda _: (0,), lengths=True),
+    *(_turned(name, *form, world=False) for name, form in _FORMS.items()),
+    *(_turned(f"world_{name}", *form, world=True) for name, form in _FORMS.items()),
+]
+FIELDS = {field.name: field for field in _FIELDS}
+
+
+def chosen_fields(names: str | Iterable[str]) -> tuple[Field, ...]:
+    """The fields of these names, a list or a text with commas; raises OptionError."""
+    listed = [n.strip() for n in names.split(",")] if isinstance(names, str) else list(names)
+    if not listed or len(set(listed)) != len(listed):
+        raise OptionError(f"fields {names!r}: each once, and at least one")
+    for name in listed:
+        if name not in FIELDS:
+            near = nearest(str(name), FIELDS)
+            hint = f"; did you mean {near}?" if near else ""
+            raise OptionError(f"field {name!r} is not one of {', '.join(FIELDS)}{hint}")
+    return tuple(FIELDS[name] for name in listed)
+
+
+def subject_of(
+    skeleton: Skeleton,
+    fields: Iterable[Field],
+    joints: Joints,
+    unit: str | None,
+    rate: float,
+) -> Subject:
+    """``skeleton`` as these fields look at it; raises MotionError and OptionError."""
+    from mcz.kinematics.frames import frame_poses_of
+
+    posed = any(field.posed for field in fields)
+    lengths = any(field.lengths for field in fields)
+    if not rate and any(field.reach for field in fields):
+        raise OptionError("velocities and accelerations need a frame rate (source_rate=)")
+    return Subject(
+        skeleton,
+        frame_poses_of(skeleton) if posed else None,
+        tuple(joint_numbers(skeleton, joints)),
+        tuple(chosen_points(skeleton, joints)) if lengths else (),
+        scale_to(skeleton, unit) if lengths else 1.0,
+        rate,
+    )
+
+
+def names_of(field: Field, subject: Subject) -> tuple[str, ...]:
+    """What the first axis after the frames is of, () where it has no names."""
+    skeleton = subject.skeleton
+    if field.names == "points":
+        names = point_names(skeleton)
+        return tuple(names[point] for point in subject.points)
+    addresses = skeleton.addresses()
+    if field.names == "joints":
+        return tuple(addresses[joint] for joint in subject.joints)
+    if field.names == "channels":
+        return tuple(
+            f"{addresses[joint]}.{channel.label}"
+            for joint in subject.joints
+            for channel in skeleton.joints[joint].channels
+        )
+    return ()
+
+
+def features_of(
+    fields: Iterable[Field], subject: Subject, values: Floats, margins: tuple[int, int], dtype: Any
+) -> dict[str, np.ndarray[Any, Any]]:
+    """The arrays of frames, of whose ``values`` there are ``margins`` more before and after."""
+    first, last = margins
+    found = {}
+    for field in fields:
+        low, high = max(0, first - field.reach), max(0, last - field.reach)
+        made = field.make(subject, values[low : len(values) - high])
+        stop = len(made) - (last - high)
+        found[field.name] = np.ascontiguousarray(made[first - low : stop], dtype)
+    return found

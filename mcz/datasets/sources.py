@@ -1,0 +1,118 @@
+"""The open files of a data set, a few at a time, and the features of parts of their clips."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from mcz.container.runs import Runs
+from mcz.datasets.caches import Arrays
+from mcz.datasets.fields import Field, Subject, features_of, subject_of
+from mcz.datasets.members import Member
+from mcz.kinematics.chain import Floats
+from mcz.poses.moving import values_of
+from mcz.poses.resampling import Times, resampled, times_at
+from mcz.reading.clip import Clip
+from mcz.reading.file import File, open
+from mcz.skeleton import Joints
+
+MOST_OPEN = 64  # files at once: systems allow 256 and more
+MOST_SUBJECTS = 512
+BLOCK = 128  # frames whose features are made and kept together
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """What is made of every frame: the arguments of ``mcz.dataset`` that say it."""
+
+    fields: tuple[Field, ...]
+    rate: Fraction | None
+    joints: Joints
+    unit: str | None
+    dtype: np.dtype[Any]
+
+    @property
+    def reach(self) -> int:
+        return max(field.reach for field in self.fields)
+
+    def subject(self, clip: Clip, member: Member) -> Subject:
+        rate = self.rate or member.source_rate
+        return subject_of(clip.skeleton, self.fields, self.joints, self.unit, float(rate or 0))
+
+    def step(self, member: Member) -> Fraction:
+        """How many frames of the clip one of the data set is."""
+        if self.rate is None or member.source_rate is None:
+            return Fraction(1)
+        return member.source_rate / self.rate
+
+
+class Sources:
+    """Files by target, opened when they are needed; ``given`` are open already and stay so.
+
+    ``runs_bytes`` bounds what all of them keep of decoded frames. Threads may share it.
+    """
+
+    def __init__(self, given: Mapping[str, File], runs_bytes: int, n_targets: int) -> None:
+        self._given = dict(given)
+        self._runs_bytes = runs_bytes // max(1, min(n_targets, MOST_OPEN))
+        self._open: OrderedDict[str, File] = OrderedDict()
+        self._subjects: OrderedDict[tuple[str, bytes], Subject] = OrderedDict()
+        self._lock = Lock()
+        for file in self._given.values():
+            file.container.runs = Runs(self._runs_bytes)
+
+    def clip(self, member: Member) -> Clip:
+        """Raises as ``mcz.open`` does, and OptionError where the clip is gone."""
+        with self._lock:
+            file = self._given.get(member.target) or self._open.get(member.target)
+            if file is None:
+                file = open(member.target, threads=1)
+                file.container.runs = Runs(self._runs_bytes)
+                self._open[member.target] = file
+                while len(self._open) > MOST_OPEN:
+                    self._open.popitem(last=False)[1].close()
+            elif member.target in self._open:
+                self._open.move_to_end(member.target)
+        return file.clips.get(member.clip) or file.only_clip(member.clip)
+
+    def features(self, recipe: Recipe, member: Member, start: int, stop: int) -> Arrays:
+        """The arrays of frames start <= f < stop, as the data set counts them."""
+        clip = self.clip(member)
+        subject = self._subject(recipe, clip, member)
+        low, high = max(0, start - recipe.reach), min(member.n_frames, stop + recipe.reach)
+        values = _values(recipe, subject, clip, member, low, high)
+        margins = start - low, high - stop
+        return features_of(recipe.fields, subject, values, margins, recipe.dtype)
+
+    def _subject(self, recipe: Recipe, clip: Clip, member: Member) -> Subject:
+        """Prepared once for each skeleton."""
+        key = member.target, clip.skeleton_id
+        with self._lock:
+            found = self._subjects.get(key)
+            if found is None:
+                found = self._subjects[key] = recipe.subject(clip, member)
+                if len(self._subjects) > MOST_SUBJECTS:
+                    self._subjects.popitem(last=False)
+            return found
+
+
+def _values(
+    recipe: Recipe, subject: Subject, clip: Clip, member: Member, low: int, high: int
+) -> Floats:
+    """All channels of frames low <= f < high at the rate of the data set."""
+    needed = sorted({joint for field in recipe.fields for joint in field.needs(subject)})
+    step = recipe.step(member)
+    if step == 1:
+        return values_of(clip, (low, high), needed)
+    times = times_at(range(low, high), step)
+    first, last = int(times.before[0]), int(times.after[-1]) + 1
+    if times.share.any():  # splines look at one more on either side
+        first, last = max(0, first - 1), min(member.n_source, last + 1)
+    old = values_of(clip, (first, last), needed)
+    return resampled(clip.skeleton, old, Times(times.before - first, times.share))

@@ -1,0 +1,37 @@
+"""``torch.utils.data.Dataset`` over a ``Dataset``; imports PyTorch."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch.utils import data
+
+from mcz.datasets.dataset import Dataset
+
+
+class TorchDataset(data.Dataset[dict[str, torch.Tensor]]):
+    """A map-style data set; a DataLoader's workers open the files each for itself.
+
+    ``sampler(seed)`` gives indices in the ``order`` that is quick to read: for
+    ``DataLoader(..., sampler=...)`` in place of ``shuffle=True``.
+    """
+
+    def __init__(self, dataset: Dataset) -> None:
+        self.dataset = dataset
+
+    def __len__(self) -> int:
+        return len(self.dataset)
+
+    def __getitem__(self, index: int) -> dict[str, torch.Tensor]:
+        return {name: torch.from_numpy(array) for name, array in self.dataset[index].items()}
+
+    def __getitems__(self, indices: list[int]) -> list[dict[str, torch.Tensor]]:
+        """A DataLoader's batch, made at once."""
+        if self.dataset.whole_clips:
+            return [self[index] for index in indices]
+        batch: dict[str, Any] = {n: torch.from_numpy(a) for n, a in self.dataset[indices].items()}
+        return [{name: array[row] for name, array in batch.items()} for row in range(len(indices))]
+
+    def sampler(self, seed: int) -> list[int]:
+        return [int(index) for index in self.dataset.order(seed)]
