@@ -55,7 +55,9 @@ ALLOWED = {
     "editing": JOINT | {"metrics", "reading", "writing"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
-    "cli": MODEL | {"units", "kinematics", "metrics", "joint_errors", "sample", "training"} | DOORS,
+    "cli": MODEL
+    | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "training"}
+    | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
     "": MODEL | {"kinematics", "metrics"} | DOORS,  # mcz/__init__.py
