@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mcz.conversion import Fit, convert, from_positions
+    from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack, unpack
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
     from mcz.editing.outcomes import Outcome, Report
@@ -63,6 +64,7 @@ if TYPE_CHECKING:
 __version__ = "0.9.0"
 
 _HOMES = {
+    "mcz.datasets": ("Dataset", "Window", "dataset"),
     "mcz.editing.archive": ("append", "pack", "unpack"),
     "mcz.editing.outcomes": ("Outcome", "Report"),
     "mcz.reading.clip": ("Clip",),
@@ -125,6 +127,7 @@ __all__ = [
     "Contact",
     "ContactWarning",
     "Contacts",
+    "Dataset",
     "Event",
     "Exceptions",
     "ExistsError",
@@ -159,11 +162,13 @@ __all__ = [
     "StreamSummary",
     "TruncatedError",
     "UnsupportedError",
+    "Window",
     "accelerations",
     "append",
     "compare",
     "contacts",
     "convert",
+    "dataset",
     "encode",
     "extract",
     "from_positions",

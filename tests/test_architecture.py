@@ -43,22 +43,26 @@ ALLOWED = {
     "units": MODEL,
     "threads": {"errors"},
     "annexes": set(),
+    "queries": {"brief", "errors"},
     "coding": GROUND | {"annexes"},
     "transforms": GROUND,
     "codecs": MODEL | {"angles", "annexes", "kinematics", "coding", "transforms", "units"},
     "container": MODEL | {"annexes"},
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},
-    "reading": JOINT | {"poses"},
+    "reading": JOINT | {"poses", "queries"},
+    "datasets": JOINT | {"poses", "reading"},
     "writing": JOINT | {"metrics", "reading"},
     "conversion": MODEL | {"kinematics", "formats", "reading"},
     "editing": JOINT | {"metrics", "reading", "writing"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
-    "cli": MODEL | {"units", "kinematics", "metrics", "joint_errors", "sample", "training"} | DOORS,
+    "cli": MODEL
+    | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "training"}
+    | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
-    "": MODEL | {"kinematics", "metrics", "poses"} | DOORS,  # mcz/__init__.py
+    "": MODEL | {"kinematics", "metrics", "poses", "datasets"} | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 

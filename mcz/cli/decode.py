@@ -27,6 +27,7 @@ from mcz.cli.options import (
     salvage_option,
     threads_option,
     up_option,
+    where_option,
 )
 from mcz.cli.parts import Filtered, Part, Preview
 from mcz.cli.suffixes import CONVERSIONS, TARGETS, check_kept, suffix_of, target_of
@@ -77,6 +78,7 @@ class _Wanted(NamedTuple):
     multiple=True,
     help="Which clip; needed where there are several, and may be repeated.",
 )
+@where_option
 @click.option(
     "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B, counted from 0."
 )
@@ -146,6 +148,7 @@ def command(
     file: str,
     output: str | None,
     names: tuple[str, ...],
+    where: str | None,
     salvage: bool,
     unverified: bool,
     max_decoded: int | None,
@@ -167,7 +170,7 @@ def command(
     outputs: list[Output] = []
     fits: dict[str, Fit] = {}
     with opened(file, salvage=salvage, max_decoded=max_decoded, unverified=unverified) as held:
-        for clip in _chosen(held, output, names):
+        for clip in _chosen(held, output, names, where):
             found, fit = _of_clip(held, clip, _as_named(clip, output, wanted, salvage))
             outputs += [part for part in found if part not in outputs]  # an ASF that clips share
             if fit is not None:
@@ -185,11 +188,16 @@ def command(
     return damage_of(file, facts["damage"])
 
 
-def _chosen(held: File, output: str | None, names: tuple[str, ...]) -> list[Clip]:
-    """The clips of these names, the only one without a name, or none where the file has none."""
-    if not held.clips:
+def _chosen(
+    held: File, output: str | None, names: tuple[str, ...], where: str | None
+) -> list[Clip]:
+    """The clips that are asked for, or the only one; none where the file has none."""
+    if where is not None:
+        clips = held.chosen(names or None, where)
+    elif not held.clips:
         return []
-    clips = held.clips_called(names) if names else [held.only_clip(None)]
+    else:
+        clips = held.clips_called(names) if names else [held.only_clip(None)]
     check_count(output, len(clips))
     return clips
 

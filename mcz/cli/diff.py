@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
@@ -25,7 +25,7 @@ from mcz.cli.common import (
     to_rate,
 )
 from mcz.cli.diff_lines import lines_of
-from mcz.cli.options import UNITS, decoded_option, json_option, up_option
+from mcz.cli.options import UNITS, decoded_option, json_option, up_option, where_option
 from mcz.errors import MczError
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     multiple=True,
     help="Which clip of an .mcz; may be repeated. Default: the only one, or all that both have.",
 )
+@where_option
 @click.option(
     "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B of both, from 0."
 )
@@ -96,6 +97,7 @@ def command(
     a: str,
     b: str,
     names: tuple[str, ...],
+    where: str | None,
     frames: Cut,
     max_decoded: int | None,
     as_json: bool,
@@ -105,19 +107,21 @@ def command(
 
     Errors of channels, and of positions in length units and cm, SPEC.md's "Metrics"; how far feet
     slide that stand in A; compression ratios of an .mcz. The exit code is 0 whenever the two could
-    be compared, however much they differ.
+    be compared, however much they differ. --where is asked of the clips of A, or of B where A is no
+    .mcz.
     """
     wanted = _Wanted(frames=frames, **options)
     if (a, b) == ("-", "-"):
         raise Failure("only one of A and B can be standard input", Exit.USAGE)
     with ExitStack() as stack:
         left, right = (_Side(path, stack, wanted, max_decoded) for path in (a, b))
-        pairs = list(_pairs(left, right, names))
+        asked = names if where is None else _taken(left, right, names, where)
+        pairs = list(_pairs(left, right, asked))
         documents = [_compared(left, right, *pair, wanted) for pair in pairs]
     only = {
         f"only_in_{key}": sorted(set(own.clips) - set(other.clips))
         for key, own, other in (("a", left, right), ("b", right, left))
-        if _by_name(left, right) and not names
+        if _by_name(left, right) and not asked
     }
     if as_json:
         print_json({"a": a, "b": b, "clips": documents, **only})
@@ -230,6 +234,28 @@ def _by_name(left: _Side, right: _Side) -> bool:
     return bool(left.file and right.file) and max(len(left.clips), len(right.clips)) > 1
 
 
+def _taken(left: _Side, right: _Side, names: tuple[str, ...], where: str) -> tuple[str, ...]:
+    """The names of the clips that ``where`` takes, none where each side is one clip."""
+    side = left if left.file is not None else right
+    if side.file is None:
+        raise Failure("--where chooses among the clips of an .mcz", Exit.USAGE)
+    clips = side.file.chosen(names or None, where)
+    if names:
+        return tuple(name for name in names if side.file[name] in clips)
+    if left.file is not None and right.file is not None:
+        return _common(left, right, [clip.name for clip in clips]) if _by_name(left, right) else ()
+    return tuple(clip.name for clip in clips)
+
+
+def _common(left: _Side, right: _Side, names: Sequence[str]) -> tuple[str, ...]:
+    """Those of ``names`` that clips of both have; raises Failure where there is none."""
+    held = set(left.clips) & set(right.clips)
+    both = tuple(name for name in names if name in held)
+    if not both:
+        raise Failure(f"{left.path} and {right.path} have no clip in common", Exit.USAGE)
+    return both
+
+
 def _pairs(
     left: _Side, right: _Side, names: tuple[str, ...]
 ) -> Iterator[tuple[str | None, str | None]]:
@@ -238,10 +264,7 @@ def _pairs(
         for name in names:
             yield name, name
     elif _by_name(left, right):
-        both = [name for name in left.clips if name in set(right.clips)]
-        if not both:
-            raise Failure(f"{left.path} and {right.path} have no clip in common", Exit.USAGE)
-        for name in both:
+        for name in _common(left, right, left.clips):
             yield name, name
     else:
         yield None, None

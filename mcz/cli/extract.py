@@ -27,6 +27,7 @@ from mcz.cli.options import (
     force_option,
     json_option,
     salvage_option,
+    where_option,
 )
 from mcz.cli.progress import Progress
 
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     "another small error. Default: such joints are refused.",
 )
 @clips_option
+@where_option
 @salvage_option
 @copies_option("where IN.mcz has some")
 @decoded_option
@@ -70,6 +72,7 @@ def command(
     frames: tuple[int, int | None] | None,
     recode: bool,
     clips: tuple[str, ...],
+    where: str | None,
     salvage: bool,
     copies: bool | None,
     max_decoded: int | None,
@@ -96,6 +99,7 @@ def command(
             joints=None if joints is None else [joint.strip() for joint in joints.split(",")],
             frames=frames,
             clip=clips or None,
+            where=where,
             salvage=salvage,
             force=force,
             max_decoded=max_decoded,

@@ -30,6 +30,7 @@ from mcz.cli.options import (
     json_option,
     salvage_option,
     version_option,
+    where_option,
 )
 from mcz.cli.recording import recording_lines
 from mcz.cli.repeats import Once
@@ -59,6 +60,7 @@ RATIOS = (
     help="Check everything; name the offset and SPEC.md's heading of each fault.",
 )
 @clips_option
+@where_option
 @salvage_option
 @click.option(
     "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of an AMC."
@@ -70,6 +72,7 @@ def command(
     show_layout: bool,
     check: bool,
     clips: tuple[str, ...],
+    where: str | None,
     salvage: bool,
     skeleton: str | None,
     max_decoded: int | None,
@@ -81,18 +84,21 @@ def command(
     from mcz.reading import report, source_report
 
     if source_report.is_source(file) and not (show_layout or check):
+        if where is not None:
+            raise Failure("--where chooses among the clips of an .mcz", Exit.USAGE)
         return _of_source(file, skeleton, as_json)
     if skeleton is not None:
         raise Failure("--skeleton is the ASF of an AMC", Exit.USAGE)
-    if clips and (show_layout or check):
-        raise Failure("--layout and --validate are of the whole file, without --clip", Exit.USAGE)
+    if (clips or where is not None) and (show_layout or check):
+        text = "--layout and --validate are of the whole file, without --clip and --where"
+        raise Failure(text, Exit.USAGE)
     if check:
         return _validate(file, max_decoded, as_json)
     with opened(file, salvage=salvage, max_decoded=max_decoded) as held:
         if show_layout:
             parts = report.layout(held)
         else:
-            document = report.info(held, clips or None)
+            document = report.info(held, clips or None, where)
         damage = list(held.damage)
     if show_layout:
         _print_layout(parts, as_json)

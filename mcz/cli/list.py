@@ -5,17 +5,21 @@ from __future__ import annotations
 import click
 
 from mcz.cli.common import Exit, damage_of, echo, opened, print_json, table
-from mcz.cli.options import json_option, salvage_option
+from mcz.cli.options import json_option, salvage_option, where_option
 
 ALIAS = ("name", "of", "target")
 
 
 @click.command(short_help="Names of clips, from the index alone.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@where_option
 @salvage_option
 @json_option
-def command(file: str, salvage: bool, as_json: bool) -> Exit:
-    """List the clips and attachments of FILE.mcz; only its index is read."""
+def command(file: str, where: str | None, salvage: bool, as_json: bool) -> Exit:
+    """List the clips and attachments of FILE.mcz; only its index is read.
+
+    With --where the clips alone that it takes, and as much is read as it asks for.
+    """
     with opened(file, salvage=salvage) as held:
         clips = [
             {
@@ -26,10 +30,12 @@ def command(file: str, salvage: bool, as_json: bool) -> Exit:
                 "frame_rate": None if clip.frame_rate is None else float(clip.frame_rate),
                 "skeleton": clip.skeleton_id.hex(),
             }
-            for clip in held.clips.values()
+            for clip in held.chosen(where=where)
         ]
-        attachments = [{"name": a.name, "bytes": a.size} for a in held.attachments.values()]
-        aliases = [(name, *held.alias_of(name)) for name in sorted(held.aliases)]
+        others = held.attachments.values() if where is None else ()
+        attachments = [{"name": a.name, "bytes": a.size} for a in others]
+        names = sorted(held.aliases) if where is None else ()
+        aliases = [(name, *held.alias_of(name)) for name in names]
         damage = list(held.damage)
     if as_json:
         document = {

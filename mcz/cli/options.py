@@ -98,6 +98,24 @@ clips_option = click.option(
     help="This clip alone; may be repeated. Default: all.",
 )
 
+
+def _to_query(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """Callback of a query: refuse what is none before a file is opened; raises OptionError."""
+    if value is not None:
+        from mcz.queries import Query
+
+        Query(value)
+    return value
+
+
+where_option = click.option(
+    "--where",
+    metavar="QUERY",
+    callback=_to_query,
+    help="The clips alone that it takes, such as \"subject == '05' and n_frames > 500\"; with "
+    "--clip those that are both. docs/queries.md has all of it.",
+)
+
 token_option = click.option(
     "--token",
     metavar="TEXT",

@@ -13,6 +13,7 @@ from mcz.cli.options import (
     json_option,
     salvage_option,
     threads_option,
+    where_option,
 )
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
@@ -22,6 +23,7 @@ from mcz.cli.progress import Progress
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @clips_option
+@where_option
 @salvage_option
 @click.option(
     "--names",
@@ -39,6 +41,7 @@ def command(
     file: str,
     folder: str,
     clips: tuple[str, ...],
+    where: str | None,
     names: str,
     salvage: bool,
     max_decoded: int | None,
@@ -47,9 +50,9 @@ def command(
 ) -> Exit:
     """Write every source file and attachment of FILE.mcz below DIR, under the path it had.
 
-    With --clip those of the clips alone, with their skeletons. No link that lies in DIR is
-    followed, and no file replaces another of FILE.mcz. With --salvage those of a damaged file that
-    are whole are written; each is checked as in a sound one.
+    With --clip or --where those of the clips alone, with their skeletons. No link that lies in DIR
+    is followed, and no file replaces another of FILE.mcz. With --salvage those of a damaged file
+    that are whole are written; each is checked as in a sound one.
     """
     import mcz
 
@@ -59,6 +62,7 @@ def command(
             file,
             folder,
             clips=clips or None,
+            where=where,
             salvage=salvage,
             force=force,
             names=names,

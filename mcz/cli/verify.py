@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mcz.cli.common import Exit, Failure, about, echo, existing, opened, print_json, say
-from mcz.cli.options import decoded_option, json_option, threads_option
+from mcz.cli.options import decoded_option, json_option, threads_option, where_option
 from mcz.cli.progress import Progress
 from mcz.errors import FormatError, LimitError, UnsupportedError
 
@@ -25,16 +25,22 @@ if TYPE_CHECKING:
     type=click.Path(readable=False),
     help="Compare with this source file, too.",
 )
+@where_option
 @decoded_option
 @threads_option
 @json_option
-def command(file: str, source: str | None, max_decoded: int | None, as_json: bool) -> Exit:
-    """Check every checksum, decode everything, restore every source and compare its SHA-256."""
+def command(
+    file: str, source: str | None, where: str | None, max_decoded: int | None, as_json: bool
+) -> Exit:
+    """Check every checksum, decode everything, restore every source and compare its SHA-256.
+
+    With --where every checksum of the file, and all that is said of the clips that it takes.
+    """
     if source is not None:
         existing(source)
     try:
         with opened(file, max_decoded=max_decoded) as held, Progress() as progress:
-            rows = list(_parts(held, progress))
+            rows = list(_parts(held, where, progress))
             if source is not None:
                 rows.append(_compare(held, source))
     except Failure as failure:
@@ -58,13 +64,14 @@ def is_unsound(failure: Failure) -> bool:
     return isinstance(cause, FormatError) and not isinstance(cause, UnsupportedError | LimitError)
 
 
-def _parts(held: File, progress: Progress) -> Iterator[dict[str, Any]]:
+def _parts(held: File, where: str | None, progress: Progress) -> Iterator[dict[str, Any]]:
     from mcz.reading import report
 
-    total = 1 + len(held.clips) + len(held.attachments)
+    clips = None if where is None else held.chosen(where=where)
+    total = 1 + len(held.clips if clips is None else clips) + len(held.attachments)
     problems = report.structure_problems(held)
     yield _row("structure", "", [problem.message for problem in problems])
-    for done, (kind, name, found) in enumerate(report.part_problems(held)):
+    for done, (kind, name, found) in enumerate(report.part_problems(held, clips)):
         progress(min(done, total), total, name)
         yield _row(kind, name, [problem.message for problem in found])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -20,11 +20,11 @@ from mcz.errors import MczError, OptionError
 from mcz.motion import frame_rate_of
 from mcz.poses.resampling import resampled_frames
 from mcz.reading.clip import Clip
+from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.skeleton import Joints
 
 Target = str | os.PathLike[str] | File
-Where = str | Callable[[Clip], bool]
 
 
 def dataset(
@@ -53,9 +53,9 @@ def dataset(
     of ``File.find``, or a function of a Clip. ``joints`` and ``unit`` as of ``positions``.
     ``cache``: bytes to keep in memory, or in ``folder``, across runs: "64 MB".
 
-    Clips too short for a window are listed in ``Dataset.skipped``. Raises OptionError where clips do
-    not go together: other joints, rates or units; MotionError and FormatError where one cannot be
-    used.
+    Clips too short for a window are listed in ``Dataset.skipped``. Raises OptionError where clips
+    do not go together: other joints, rates or units; MotionError and FormatError where one cannot
+    be used.
     """
     recipe = _recipe(fields, rate, joints, unit, dtype)
     window, stride = _cut(window, stride)
@@ -67,9 +67,11 @@ def dataset(
     for file, name in _files(target, given):
         for clip in _chosen(file, where):
             member = _member(clip, name, recipe, assumed)
+            if member.n_frames < (window or 1):
+                skipped.append(member)
+                continue
             agreement.check(clip, member)
-            short = window is not None and member.n_frames < window
-            (skipped if short or not member.n_frames else members).append(member)
+            members.append(member)
         if name not in given:
             file.close()
     if not members:
@@ -106,8 +108,9 @@ def _files(target: Target | Iterable[Target], given: dict[str, File]) -> Iterato
     several = isinstance(target, Iterable) and not isinstance(target, (str, os.PathLike, File))
     for one in target if several else [target]:  # type: ignore[union-attr]
         if isinstance(one, File):
-            given[one.name] = one
-            yield one, one.name
+            name = one.name if one.name not in given else f"{one.name} ({len(given) + 1})"
+            given[name] = one
+            yield one, name
             continue
         path = os.fspath(one)  # type: ignore[arg-type]
         paths = [path]
@@ -117,9 +120,7 @@ def _files(target: Target | Iterable[Target], given: dict[str, File]) -> Iterato
                 raise OptionError(f"{path}: a folder without .mcz files (mcz pack makes one)")
         for name in paths:
             if Path(name).suffix.lower() in (".bvh", ".amc", ".asf", ".c3d"):
-                raise OptionError(
-                    f"{name}: a data set is made of .mcz files (mcz pack, mcz encode)"
-                )
+                raise OptionError(f"{name}: a data set is made of .mcz files; mcz pack makes one")
             yield open(name, threads=1), name
 
 

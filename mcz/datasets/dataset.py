@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from mcz.brief import counted
 from mcz.datasets.caches import Arrays, Cache, FolderCache, MemoryCache
-from mcz.datasets.fields import names_of
+from mcz.datasets.fields import FIELDS, names_of
 from mcz.datasets.members import Member
 from mcz.datasets.sources import BLOCK, Recipe, Sources
 from mcz.errors import OptionError
+from mcz.poses.conversions import continuous
 from mcz.reading.file import File
 
 if TYPE_CHECKING:
@@ -182,6 +183,7 @@ class Dataset:
                 if name not in out:
                     out[name] = np.empty((*shape, *parts[0].shape[1:]), parts[0].dtype)
                 np.concatenate(parts, out=out[name][row])
+                self._finish(name, out[name][row])
         if shapes is not None:
             dtype = self._settings.recipe.dtype
             return {name: np.empty((*shape, *rest), dtype) for name, rest in shapes.items()}
@@ -189,7 +191,15 @@ class Dataset:
 
     def _arrays(self, member: Member, start: int, stop: int) -> dict[str, NDArray[Any]]:
         parts = self._parts(member, start, stop)
-        return {name: np.concatenate(each) for name, each in parts.items()}
+        arrays = {name: np.concatenate(each) for name, each in parts.items()}
+        for name, array in arrays.items():
+            self._finish(name, array)
+        return arrays
+
+    def _finish(self, name: str, array: NDArray[Any]) -> None:
+        """Give quaternions the signs that keep them together, whichever blocks they are from."""
+        if FIELDS[name].signed:
+            array[:] = continuous(array)
 
     def _parts(self, member: Member, start: int, stop: int) -> dict[str, list[NDArray[Any]]]:
         """The arrays of frames of a clip as parts of blocks, which nobody may change."""
@@ -302,9 +312,9 @@ class Dataset:
     ) -> dict[str, Dataset]:
         """Parts of which no two share a subject: ``split({"train": 0.8, "test": 0.2})``.
 
-        ``parts``: names and shares, which add up to 1; by their number of windows parts come as near
-        to these as whole subjects allow, each at least one. ``by``: a key of the clips' metadata,
-        or "clip", of which each stands for itself; ``pattern``: a regular expression whose first
+        ``parts``: names and shares, which add up to 1; by their number of windows parts come as
+        near to these as whole subjects allow, each at least one. ``by``: a key of the clips'
+        metadata, or "clip", of which each stands for itself; ``pattern``: a regular expression whose first
         group, found in the name of a clip, is its subject instead. The same ``seed`` splits the
         same clips in the same way. Raises OptionError where a clip has none, and where there are
         fewer subjects than parts.

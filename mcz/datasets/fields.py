@@ -52,7 +52,8 @@ class Field:
     ``shape`` is what follows (n_frames, ...); ``names`` what its first such axis is of: "joints",
     "points", "channels" or "". ``make`` takes the values of all channels, (n_frames, n_channels).
     ``reach``: how many neighbours on either side it looks at; ``needs``: the joints whose channels
-    matter. ``lengths``: it is in length units, to be scaled.
+    matter. ``lengths``: it is in length units, to be scaled. ``signed``:
+    quaternions, whose signs follow from a whole window.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Field:
     reach: int = 0
     posed: bool = True
     lengths: bool = False
+    signed: bool = False
 
 
 def _above_points(subject: Subject) -> list[int]:
@@ -106,6 +108,7 @@ def _turned(name: str, form: str, tail: tuple[int, ...], world: bool) -> Field:
         (lambda subject: subject.kinematics.above(subject.joints))
         if world
         else (lambda subject: subject.joints),
+        signed=form == "quat",
     )
 
 

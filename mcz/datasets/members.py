@@ -10,8 +10,8 @@ from fractions import Fraction
 class Member:
     """One clip of a data set.
 
-    ``target`` is what ``mcz.open`` takes, ``n_source`` its frames at ``source_rate`` frames a second
-    (None: unknown), ``n_frames`` those of the data set, at the rate of the data set.
+    ``target`` is what ``mcz.open`` takes, ``n_source`` its frames at ``source_rate`` frames a
+    second (None: unknown), ``n_frames`` those of the data set, at the rate of the data set.
     """
 
     target: str

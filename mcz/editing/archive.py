@@ -21,6 +21,7 @@ from mcz.editing.safe_names import Folder, PortableNames, notes_on
 from mcz.errors import AccessError, ExistsError, FormatError, MczError, OptionError, SourceError
 from mcz.formats import FORMATS
 from mcz.reading.clip import Clip
+from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.source_files import read_bytes
 from mcz.threads import limited
@@ -270,6 +271,7 @@ def unpack(
     directory: str | os.PathLike[str],
     *,
     clips: Sequence[str] | None = None,
+    where: Where | None = None,
     salvage: bool = False,
     force: bool = False,
     names: str = "stored",
@@ -279,11 +281,11 @@ def unpack(
 ) -> Report:
     """Write every source file and attachment of an MCZ file below ``directory``.
 
-    ``clips``: of these clips alone, and of their skeletons. Each file appears under its name only
-    when it is whole and its hash is right. No symbolic link
-    below ``directory`` is followed. Clips without a source are reported as skipped. With
-    ``salvage`` the file may be damaged: what is whole is written, the rest is reported as damaged.
-    ``max_decoded`` and ``threads`` are those of ``mcz.open``.
+    ``clips``: of these clips alone, and of their skeletons; ``where``: of those that it takes, see
+    ``File.find``. Each file appears under its name only when it is whole and its hash is right. No
+    symbolic link below ``directory`` is followed. Clips without a source are reported as skipped.
+    With ``salvage`` the file may be damaged: what is whole is written, the rest is reported as
+    damaged. ``max_decoded`` and ``threads`` are those of ``mcz.open``.
 
     ``names`` decides about names that some system cannot hold, or not beside another: "stored"
     writes them as they are, and refuses what this system or disk cannot hold; "portable" gives
@@ -296,8 +298,8 @@ def unpack(
     with open(target, salvage=salvage, max_decoded=max_decoded, threads=threads) as opened:
         file = File(opened.container.strictly())
         report.damage += opened.damage
-        wanted = list(file.clips.values()) if clips is None else file.clips_called(clips)
-        jobs = list(named_files(file) if clips is None else _files_of(file, wanted))
+        wanted, whole = file.chosen(clips, where), clips is None and where is None
+        jobs = list(named_files(file) if whole else _files_of(file, wanted))
         renamed, written, notes = PortableNames(), set[str](), notes_on(name for name, _ in jobs)
         for done, (name, restore) in enumerate(jobs):
             try:

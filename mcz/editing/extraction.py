@@ -14,15 +14,7 @@ from typing import Any, BinaryIO
 
 from mcz.brief import brief
 from mcz.container import payloads
-from mcz.container.chunks import (
-    COPY,
-    FOOT,
-    SAFE_TO_COPY,
-    SIGNATURE,
-    Chunk,
-    is_foot_at,
-    read_chunk,
-)
+from mcz.container.chunks import COPY, FOOT, SAFE_TO_COPY, SIGNATURE, Chunk, is_foot_at, read_chunk
 from mcz.container.directory import ClipRow
 from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
@@ -49,6 +41,7 @@ from mcz.editing.cutting import (
 )
 from mcz.errors import ChecksumError, FormatError, MotionError, OptionError
 from mcz.formats import FORMATS
+from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.signal_reader import SignalReader
 from mcz.schema import build, parse
@@ -96,6 +89,7 @@ def extract(
     joints: Joints = None,
     frames: tuple[int, int | None] | None = None,
     clip: str | Sequence[str] | None = None,
+    where: Where | None = None,
     salvage: bool = False,
     force: bool = False,
     max_decoded: int | None = None,
@@ -108,6 +102,7 @@ def extract(
     ``resolution``: the number of finest resolutions to leave out. ``joints``: those whose channels
     are kept; all joints stay in the skeleton. ``frames``: a <= f < b, b None for the end.
     ``clip``: take out this clip, or these, alone; otherwise all are cut, and attachments kept.
+    ``where``: take out those alone that it takes, see ``File.find``.
     ``salvage``: the file may be damaged, but not in what is taken out.
     ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
     ``copies``: as ``mcz.write`` has it; None: where ``source`` has some.
@@ -116,12 +111,13 @@ def extract(
     Raises OptionError or MotionError for what cannot be cut so, and where the target is the source;
     FormatError for bad bytes; nothing is left under the target's name then.
     """
-    if not resolution and joints is None and frames is None and clip is None:
+    alone = clip is not None or where is not None
+    if not resolution and joints is None and frames is None and not alone:
         raise OptionError("nothing to extract: give a resolution, joints, frames or a clip")
     with open(source, salvage=salvage, max_decoded=max_decoded) as opened:
         file = File(opened.container.strictly())
         names = [clip] if isinstance(clip, str) else clip
-        clips = list(file.clips.values()) if names is None else file.clips_called(names)
+        clips = file.chosen(names, where)
         if not clips:
             raise OptionError(f"{file.name} has no clip to extract from")
         cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]
@@ -130,7 +126,7 @@ def extract(
                 check_anew(cut.clip)
         with replacing(target, force=force, inputs=(source,)) as stream:
             copier = Copier(file, stream, progress, copies)
-            return copier.run(cuts, alone=names is not None)
+            return copier.run(cuts, alone=alone)
 
 
 class Copier:

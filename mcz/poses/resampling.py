@@ -93,7 +93,7 @@ def times_of(n_frames: int, rate: Fraction, wanted: Fraction, signal: Signal) ->
 
 
 def resampled_frames(n_frames: int, rate: Fraction, wanted: Fraction) -> int:
-    """How many frames at ``wanted`` a second there are from the first of ``n_frames`` to the last."""
+    """How many frames there are at ``wanted`` a second, from the first to at most the last."""
     return int((n_frames - 1) * wanted / rate) + 1 if n_frames else 0
 
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from types import TracebackType
 from typing import Any
@@ -28,8 +28,9 @@ from mcz.errors import (
 from mcz.formats import FORMATS
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
+from mcz.reading.fields import Where, taken
 from mcz.reading.lost_skeletons import restore_skeletons
-from mcz.reading.names import clip_called, listed
+from mcz.reading.names import clip_called, clips_meant, listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
 from mcz.threads import checked
@@ -53,6 +54,8 @@ class Attachment:
 class File:
     """An open MCZ file: its clips, skeletons and attachments by name, nothing decoded yet.
 
+    It iterates over its clips in file order; ``file[name]`` and ``name in file`` find a clip as
+    ``only_clip`` does.
     Threads may share it, and processes after a fork. A File and what is taken from it, opened by
     path, URL or from bytes, can be pickled: what is unpickled opens the same file anew.
     """
@@ -74,6 +77,28 @@ class File:
     def __repr__(self) -> str:
         held = f"{counted(len(self.clips), 'clip')}, {counted(len(self.attachments), 'attachment')}"
         return f"<File {shown(self.name)}: {held}, {self.size} bytes>"
+
+    def __iter__(self) -> Iterator[Clip]:
+        return iter(self.clips.values())
+
+    def __len__(self) -> int:
+        return len(self.clips)
+
+    def __bool__(self) -> bool:
+        """True: a file without clips is a file, too."""
+        return True
+
+    def __getitem__(self, name: str) -> Clip:
+        """The clip that ``name`` means; raises OptionError, never KeyError."""
+        if not isinstance(name, str):
+            raise OptionError(f"{self.name}: {name!r} is not the name of a clip")
+        return self.only_clip(name)
+
+    def __contains__(self, thing: object) -> bool:
+        """Whether ``thing`` is a clip of this file, or a name that means one."""
+        if isinstance(thing, str):
+            return len(clips_meant(self.clips, self.aliases, thing)) == 1
+        return isinstance(thing, Clip) and self.clips.get(thing.name) is thing
 
     def __enter__(self) -> File:
         return self
@@ -183,6 +208,29 @@ class File:
         """The clips of these names, each once, in this order; raises as ``only_clip`` does."""
         found = {clip.name: clip for clip in map(self.only_clip, names)}
         return list(found.values())
+
+    def find(self, where: Where) -> list[Clip]:
+        """The clips that ``where`` takes, in file order, which may be none.
+
+        ``where`` is a query, "subject == '05' and n_frames > 500" (docs/queries.md), or a function
+        of a Clip. Raises OptionError for a text that is no query, and for a name in it that is
+        neither a field nor a metadata key of any clip.
+        """
+        return taken(self, where, self.clips.values())
+
+    def chosen(self, names: Iterable[str] | None = None, where: Where | None = None) -> list[Clip]:
+        """The clips of these names that ``where`` takes; None: all.
+
+        Raises OptionError as ``only_clip`` and ``find`` do, and where ``where`` takes none.
+        """
+        clips = list(self) if names is None else self.clips_called(names)
+        if where is None:
+            return clips
+        found = taken(clips, where, self.clips.values())
+        if not found:
+            said = shown(where) if isinstance(where, str) else "what is asked for"
+            raise OptionError(f"{self.name}: none of {counted(len(clips), 'clip')} matches {said}")
+        return found
 
     def skeleton_ids(self, clips: Iterable[Clip]) -> set[bytes]:
         """The ids of the skeletons of these clips, and of those that they are derived from."""

@@ -18,15 +18,23 @@ Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
 
 def clip_called(clips: Mapping[str, Clip], aliases: Aliases, name: str) -> str:
     """The name of the clip that ``name`` means; see ``File.only_clip``. Raises OptionError."""
+    found = clips_meant(clips, aliases, name)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise OptionError(f"{name!r} may be {listed(found)}; choose one")
+    raise OptionError(f"no clip {name!r}; {_suggestion(clips, name)}")
+
+
+def clips_meant(clips: Mapping[str, Clip], aliases: Aliases, name: str) -> list[str]:
+    """The names of the clips that ``name`` may mean, sorted."""
     if name in clips:
-        return name
+        return [name]
     for names in _ways(clips, aliases):
         found = sorted({clip for known, clip in names if known == name})
-        if len(found) == 1:
-            return found[0]
         if found:
-            raise OptionError(f"{name!r} may be {listed(found)}; choose one")
-    raise OptionError(f"no clip {name!r}; {_suggestion(clips, name)}")
+            return found
+    return []
 
 
 def _ways(clips: Mapping[str, Clip], aliases: Aliases) -> Iterator[Named]:

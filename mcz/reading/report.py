@@ -19,6 +19,7 @@ from mcz.container.segments import GROUP_NOTES
 from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
+from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.layout import layout as layout
 from mcz.reading.recording_report import document_of
@@ -38,13 +39,15 @@ class Problem:
     __repr__ = brief
 
 
-def info(file: File, names: Sequence[str] | None = None) -> dict[str, Any]:
+def info(
+    file: File, names: Sequence[str] | None = None, where: Where | None = None
+) -> dict[str, Any]:
     """The document that ``mcz info --json`` prints; its keys are stable.
 
-    ``names``: of these clips alone, and of their skeletons; raises OptionError for one not there.
+    ``names``, ``where``: of these clips alone, and of their skeletons, see ``File.chosen``.
     """
-    container, whole = file.container, names is None
-    chosen = list(file.clips.values()) if names is None else file.clips_called(names)
+    container, whole = file.container, names is None and where is None
+    chosen = file.chosen(names, where)
     clips = [_clip_info(file, clip) for clip in chosen]
     shared = container.directory.shared
     ids = {id_ for _, id_ in shared} if whole else file.skeleton_ids(chosen)
@@ -292,18 +295,23 @@ def verify(
         return validate(file)
 
 
-def part_problems(file: File) -> Iterator[tuple[str, str, list[Problem]]]:
-    """Kind, name and faults of every skeleton, clip and attachment, one after the other."""
+def part_problems(
+    file: File, clips: Sequence[Clip] | None = None
+) -> Iterator[tuple[str, str, list[Problem]]]:
+    """Kind, name and faults of every skeleton, clip and attachment, one after the other.
+
+    ``clips``: of these alone, and of their skeletons.
+    """
     problems: list[Problem] = []
-    for id_, skeleton in _guarded(problems, file):
+    for id_, skeleton in _guarded(problems, file, clips):
         found: list[Problem] = []
         _check(found, file, id_)
         yield "skeleton", skeleton.name or id_.hex(), found
     if problems:
         yield "skeletons", "", problems
-    for clip in file.clips.values():
+    for clip in file if clips is None else clips:
         yield "clip", clip.name, clip_problems(file, clip)
-    for attachment in file.attachments.values():
+    for attachment in file.attachments.values() if clips is None else ():
         found = []
         try:
             attachment.read()
@@ -313,9 +321,12 @@ def part_problems(file: File) -> Iterator[tuple[str, str, list[Problem]]]:
         yield "attachment", attachment.name, found
 
 
-def _guarded(problems: list[Problem], file: File) -> list[tuple[bytes, Skeleton]]:
+def _guarded(
+    problems: list[Problem], file: File, clips: Sequence[Clip] | None
+) -> list[tuple[bytes, Skeleton]]:
     try:
-        return file.skeletons
+        ids = None if clips is None else file.skeleton_ids(clips)
+        return [(id_, found) for id_, found in file.skeletons if ids is None or id_ in ids]
     except MczError as error:
         problems.append(Problem(0, "SKEL", str(error)))
         return []

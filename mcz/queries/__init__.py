@@ -1,0 +1,10 @@
+"""Which clips are wanted, said in one line of text: ``subject == '05' and n_frames > 500``.
+
+docs/queries.md is normative: grammar, and what a comparison of two values is. Nothing here knows
+clips or files; whoever asks gives a function that looks a name up.
+"""
+
+from mcz.queries.query import Query
+from mcz.queries.values import Lookup, Value
+
+__all__ = ["Lookup", "Query", "Value"]

@@ -1,0 +1,123 @@
+"""What a query may ask of a clip: its fields by name, and its metadata. See docs/queries.md.
+
+A field costs no more than it must: the first of the table are in the index of the file, the others
+read the CLIP or the skeleton of the clip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable
+from functools import partial
+
+from mcz.codecs import by_id
+from mcz.container.chunks import FRAMING
+from mcz.container.directory import ClipRow
+from mcz.errors import OptionError, UnsupportedError
+from mcz.formats import format_by_id
+from mcz.queries import Query, Value
+from mcz.reading.clip import Clip
+from mcz.reading.sizes import packet_framing
+
+Where = str | Query | Callable[[Clip], bool]
+Getter = Callable[[Clip], Value]
+METADATA = "metadata."  # before a key, where a field has the same name
+
+
+def taken(clips: Iterable[Clip], where: Where, of: Collection[Clip]) -> list[Clip]:
+    """Those of ``clips`` that ``where`` takes; ``of`` are all clips of their file.
+
+    Raises OptionError for a text that is no query, and for a name in it that no clip knows.
+    """
+    if isinstance(where, str):
+        where = Query(where)
+    if isinstance(where, Query):
+        where = _matcher(where, of)
+    elif not callable(where):
+        raise OptionError(f"where is {where!r}, neither a text nor a function of a clip")
+    return [clip for clip in clips if where(clip)]
+
+
+def _matcher(query: Query, clips: Collection[Clip]) -> Callable[[Clip], bool]:
+    getters = {name: _getter(query, name, clips) for name in query.names if clips}
+
+    def matches(clip: Clip) -> bool:
+        return query.matches(lambda name: getters[name](clip))
+
+    return matches
+
+
+def _getter(query: Query, name: str, clips: Collection[Clip]) -> Getter:
+    """What gives the value of a name: the field, or the metadata key of any clip."""
+    if name in FIELDS:
+        return FIELDS[name]
+    key = name.removeprefix(METADATA)
+    if not any(key in clip.metadata for clip in clips):
+        keys = {key for clip in clips for key in clip.metadata}
+        raise query.unknown(name, [*FIELDS, *keys] if key == name else [METADATA + k for k in keys])
+    return partial(_metadata, key)
+
+
+def _metadata(key: str, clip: Clip) -> Value:
+    return clip.metadata.get(key)
+
+
+def _frame_rate(clip: Clip) -> Value:
+    rate = clip.frame_rate
+    return None if rate is None else float(rate)
+
+
+def _duration(clip: Clip) -> Value:
+    """Seconds: frames over frames a second."""
+    rate = clip.frame_rate
+    return None if rate is None else float(clip.n_frames / rate)
+
+
+def _lossless(clip: Clip) -> Value:
+    """Whether every signal's codec is; missing where one is not known."""
+    try:
+        return all(by_id(s.codec, s.codec_version).lossless for s in _row(clip).signals)
+    except UnsupportedError:
+        return None
+
+
+def _bytes(clip: Clip) -> Value:
+    """The clip's own chunks, CLIP, DATA, CEND and QUAL; not its skeleton nor its template."""
+    row = _row(clip)
+    chunks = [row.clip, *(chunk for chunk in row.ancillary if chunk.type == b"QUAL")]
+    chunks += [row.cend] if row.cend else []
+    closed = FRAMING * sum(not segment.packet for segment in row.segments)
+    coded = sum(segment.size for segment in row.segments) + packet_framing(row.segments)
+    return sum(chunk.size for chunk in chunks) + closed + coded
+
+
+def _row(clip: Clip) -> ClipRow:
+    return clip.container.directory.clips[clip.name]
+
+
+def _source(clip: Clip) -> Value:
+    source = clip._fields.source
+    return source[0].path or None if source else None
+
+
+def _format(clip: Clip) -> Value:
+    """The usual suffix of the source's format, without the dot."""
+    source = clip._fields.source
+    return format_by_id(source[0].format).suffixes[0][1:] if source else None
+
+
+FIELDS: dict[str, Getter] = {
+    "name": lambda clip: clip.name,
+    "n_frames": lambda clip: clip.n_frames,
+    "frame_rate": _frame_rate,
+    "duration": _duration,
+    "n_channels": lambda clip: clip.n_channels,
+    "codec": lambda clip: clip.codec,
+    "lossless": _lossless,
+    "bytes": _bytes,
+    "source": _source,
+    "format": _format,
+    "skeleton": lambda clip: clip.skeleton.name or None,
+    "n_joints": lambda clip: clip.skeleton.n_joints,
+    "unit_cm": lambda clip: clip.skeleton.unit_cm,
+    "up_axis": lambda clip: clip.skeleton.up_axis or None,
+}
