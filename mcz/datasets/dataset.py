@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,9 @@ from mcz.errors import OptionError
 from mcz.poses.conversions import continuous
 from mcz.reading.file import File
 
-if TYPE_CHECKING:
-    from mcz.datasets.tensors import Tensors
-
 RUNS_SHARE = 4  # a quarter of the cache is for frames as they were decoded
+RUN_BLOCKS = 4  # of windows that stay together until a pool is shuffled
+VERSION = 1  # of what features are: counted up where a kept one would be wrong
 POOL_SHARE = 2  # a pool of windows that are shuffled has features of half of the rest
 
 
@@ -314,10 +313,10 @@ class Dataset:
 
         ``parts``: names and shares, which add up to 1; by their number of windows parts come as
         near to these as whole subjects allow, each at least one. ``by``: a key of the clips'
-        metadata, or "clip", of which each stands for itself; ``pattern``: a regular expression whose first
-        group, found in the name of a clip, is its subject instead. The same ``seed`` splits the
-        same clips in the same way. Raises OptionError where a clip has none, and where there are
-        fewer subjects than parts.
+        metadata, or "clip", of which each stands for itself; ``pattern``: a regular expression
+        whose first group, found in the name of a clip, is its subject instead. The same ``seed``
+        splits the same clips in the same way. Raises OptionError where a clip has none, and where
+        there are fewer subjects than parts.
         """
         from mcz.datasets.splitting import split
 
@@ -333,12 +332,15 @@ class Dataset:
         clips = (self._sources.clip(member) for member in self.members)
         return [label_of(m, clip, by, pattern) for m, clip in zip(self.members, clips, strict=True)]
 
-    def torch(self) -> Tensors:
-        """As a ``torch.utils.data.Dataset`` of dicts of tensors; needs PyTorch (``mcz[torch]``)."""
-        from mcz.datasets.tensors import tensors
+    def torch(self) -> Any:
+        """As a ``torch.utils.data.Dataset``, an item a dict of tensors, (window, ...).
 
-        return tensors(self)
-
-
-RUN_BLOCKS = 4
-VERSION = 1  # of what features are: counted up where a kept one would be wrong
+        Raises OptionError where PyTorch is not installed (``mcz[torch]``).
+        """
+        try:
+            from mcz.datasets.torch_dataset import TorchDataset
+        except ImportError as error:
+            raise OptionError(
+                f"PyTorch is not installed (pip install 'mcz[torch]'): {error}"
+            ) from None
+        return TorchDataset(self)

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch.utils import data
 
-from mcz.datasets.dataset import Dataset
+
+class Windows(Protocol):
+    """What a ``Dataset`` has that is needed here."""
+
+    @property
+    def whole_clips(self) -> bool: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, index: Any) -> dict[str, NDArray[Any]]: ...
+    def order(self, seed: int) -> NDArray[np.int64]: ...
 
 
 class TorchDataset(data.Dataset[dict[str, torch.Tensor]]):
@@ -17,7 +27,7 @@ class TorchDataset(data.Dataset[dict[str, torch.Tensor]]):
     ``DataLoader(..., sampler=...)`` in place of ``shuffle=True``.
     """
 
-    def __init__(self, dataset: Dataset) -> None:
+    def __init__(self, dataset: Windows) -> None:
         self.dataset = dataset
 
     def __len__(self) -> int:

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz import poses
 from mcz.kinematics.contacts import RULE, ContactRule, Contacts
 from mcz.kinematics.contacts import contacts as contacts_of
-from mcz.poses.moving import Frames
+from mcz.poses import places, turns
+from mcz.poses.moving import Decoded, Frames
 from mcz.skeleton import Joints, joint_list
-
-if TYPE_CHECKING:
-    from mcz.reading.clip import Clip
 
 
 class Posed:
     """The part of a Clip that is about poses; ``mcz.poses`` has the conventions."""
 
     @property
-    def _clip(self) -> Clip:
-        return cast("Clip", self)
+    def _clip(self) -> Decoded:
+        return cast(Decoded, self)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -32,7 +29,7 @@ class Posed:
     @property
     def point_names(self) -> tuple[str, ...]:
         """The names of the points of ``positions``, in their order."""
-        return poses.point_names(self._clip)
+        return places.point_names(self._clip)
 
     def positions(
         self,
@@ -43,7 +40,7 @@ class Posed:
         dtype: Any = np.float64,
     ) -> NDArray[Any]:
         """Where the points are, (n_frames, n_points, 3): see ``mcz.positions``."""
-        return poses.positions(self._clip, joints, frames, unit=unit, dtype=dtype)
+        return places.positions(self._clip, joints, frames, unit=unit, dtype=dtype)
 
     def rotations(
         self,
@@ -57,7 +54,7 @@ class Posed:
         dtype: Any = np.float64,
     ) -> NDArray[Any]:
         """How the joints are turned, (n_frames, n_joints, ...): see ``mcz.rotations``."""
-        return poses.rotations(
+        return turns.rotations(
             self._clip,
             form,
             space=space,
@@ -75,9 +72,9 @@ class Posed:
         joint: int | str | None = None,
         unit: str | None = None,
         dtype: Any = np.float64,
-    ) -> poses.Root:
+    ) -> places.Root:
         """Where the root is and how it is turned: see ``mcz.root``."""
-        return poses.root(self._clip, frames, joint=joint, unit=unit, dtype=dtype)
+        return places.root(self._clip, frames, joint=joint, unit=unit, dtype=dtype)
 
     def velocities(
         self,
@@ -88,7 +85,7 @@ class Posed:
         dtype: Any = np.float64,
     ) -> NDArray[Any]:
         """How fast the points move, (n_frames, n_points, 3): see ``mcz.velocities``."""
-        return poses.velocities(self._clip, joints, frames, unit=unit, dtype=dtype)
+        return places.velocities(self._clip, joints, frames, unit=unit, dtype=dtype)
 
     def accelerations(
         self,
@@ -99,9 +96,9 @@ class Posed:
         dtype: Any = np.float64,
     ) -> NDArray[Any]:
         """How velocities change, (n_frames, n_points, 3): see ``mcz.accelerations``."""
-        return poses.accelerations(self._clip, joints, frames, unit=unit, dtype=dtype)
+        return places.accelerations(self._clip, joints, frames, unit=unit, dtype=dtype)
 
     def contacts(self, joints: Joints = None, rule: ContactRule = RULE) -> Contacts:
         """In which frames feet stand, of the whole clip: see ``mcz.contacts``."""
         feet = None if joints is None else joint_list(joints)
-        return contacts_of(self._clip.motion(), feet, rule)
+        return contacts_of(cast(Any, self).motion(), feet, rule)
