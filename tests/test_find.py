@@ -19,7 +19,7 @@ from mcz.errors import FormatError, OptionError
 from mcz.queries import Query
 from mcz.reading.fields import FIELDS
 from mcz.reading.file import File
-from mcz.reading.report import info
+from mcz.reading.report import info, part_problems
 from mcz.writing.clip_writer import write_clip
 from tests import live_codec
 from tests.motions import skeleton, smooth
@@ -276,6 +276,20 @@ def test_clip_and_where_are_both(call: Call, archive: Path) -> None:
     assert [clip["name"] for clip in json.loads(out)["clips"]] == ["05_02"]
     code, _, err = call("info", archive, "--clip", "05_01", *where)
     assert code == 2 and "none of 1 clip matches 'n_frames > 30'" in err
+
+
+def test_verify_what_is_damaged_and_what_is_not(archive: Path) -> None:
+    data = bytearray(archive.read_bytes())
+    with mcz.open(archive) as file:
+        data[file.container.directory.clips["16_01"].segments[0].offset + 5] ^= 1
+    (problem,) = mcz.verify(bytes(data), where="subject == 5")
+    assert problem.heading == "DATA"  # every checksum of the file is compared
+    with mcz.open(bytes(data)) as file:
+        found = list(part_problems(file, file.find("subject == 5")))
+        assert found == [("skeleton", "puppet", []), ("clip", "05_01", []), ("clip", "05_02", [])]
+        assert ["16_01"] == [name for _, name, wrong in part_problems(file) if wrong]
+    with pytest.raises(OptionError, match="none of 4 clips"):
+        mcz.verify(archive, where="n_frames > 100")
 
 
 def test_verify_some(call: Call, archive: Path, packed: Path) -> None:
