@@ -189,7 +189,7 @@ def test_an_error_shows_where() -> None:
         Query(text)
     assert str(caught.value) == (
         "where: column 30: '=>' means nothing here, write >= "
-        "(...= '05' and n_frames --> => 500 or name like ...)"
+        "(...ct == '05' and n_frames --> => 500 or name like '*wa...)"
     )
 
 

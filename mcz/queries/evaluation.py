@@ -17,7 +17,7 @@ from mcz.queries.values import Lookup, Value, compared
 Test = Callable[[Lookup], bool | None]  # None: unknown
 
 
-def test_of(node: Node) -> Test:
+def truth_of(node: Node) -> Test:
     """What tells whether ``node`` holds of what a lookup says."""
     match node:
         case Compare(left, sign, right):
@@ -30,11 +30,11 @@ def test_of(node: Node) -> Test:
         case Missing(Name(name)):
             return lambda lookup: lookup(name) is None
         case Not(part):
-            return _opposite(test_of(part))
+            return _opposite(truth_of(part))
         case And(parts):
-            return _all_of([test_of(part) for part in parts])
+            return _all_of([truth_of(part) for part in parts])
         case Or(parts):
-            return _any_of([test_of(part) for part in parts])
+            return _any_of([truth_of(part) for part in parts])
 
 
 def _value_of(operand: Operand) -> Callable[[Lookup], Value]:

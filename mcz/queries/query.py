@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 from mcz.brief import among, nearest, shown
 from mcz.errors import OptionError
-from mcz.queries.evaluation import test_of
+from mcz.queries.evaluation import truth_of
 from mcz.queries.parser import parse
 from mcz.queries.tokens import fault, tokens
 from mcz.queries.tree import names_in, printed
@@ -22,7 +22,7 @@ class Query:
     def __init__(self, text: str) -> None:
         self.text = text
         self.tree = parse(text)
-        self._test = test_of(self.tree)
+        self._test = truth_of(self.tree)
 
     def __reduce__(self) -> tuple[type[Query], tuple[str]]:
         return Query, (self.text,)

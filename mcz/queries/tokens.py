@@ -11,7 +11,7 @@ from mcz.errors import OptionError
 from mcz.queries.values import LONGEST_NUMBER, NUMBER, as_number
 
 LONGEST = 4096  # characters of a query
-AROUND = 20  # characters that an error shows on each side
+AROUND = 24  # characters that an error shows on each side
 WORDS = frozenset("and or not in like is missing true false".split())
 # What other languages write, and what is written here.
 FOREIGN = {"=": "==", "<>": "!=", "=>": ">=", "=<": "<=", "&&": "and", "||": "or", "!": "not"}

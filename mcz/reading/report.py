@@ -255,10 +255,13 @@ def _count(notes: bytes) -> int:
 HEADINGS = tuple("HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL REPT COPY INDX".split())
 
 
-def validate(file: File) -> list[Problem]:
-    """Every fault of the file, once: structure, checksums, values, sources, index."""
+def validate(file: File, clips: Sequence[Clip] | None = None) -> list[Problem]:
+    """Every fault of the file, once: structure, checksums, values, sources, index.
+
+    ``clips``: values and sources of these alone.
+    """
     problems = structure_problems(file)
-    for _, _, found in part_problems(file):
+    for _, _, found in part_problems(file, clips):
         problems += found
     first: dict[str, Problem] = {}
     for problem in problems:  # a chunk that is damaged hurts all that need it
@@ -284,15 +287,19 @@ def _heading(file: File, offset: int) -> str:
 
 
 def verify(
-    target: Any, max_decoded: int | None = None, threads: int | None = None
+    target: Any,
+    max_decoded: int | None = None,
+    threads: int | None = None,
+    where: Where | None = None,
 ) -> list[Problem]:
     """Check every checksum of a file, decode everything, restore every source.
 
     Returns the faults, none for a sound file; raises FormatError where it cannot even be opened.
-    ``max_decoded`` and ``threads`` are those of ``mcz.open``.
+    ``max_decoded`` and ``threads`` are those of ``mcz.open``. ``where``: check every checksum, but
+    decode and restore only the clips that it takes, see ``File.find``; OptionError for none.
     """
     with open(target, max_decoded=max_decoded, threads=threads) as file:
-        return validate(file)
+        return validate(file, None if where is None else file.chosen(where=where))
 
 
 def part_problems(
