@@ -51,13 +51,14 @@ ALLOWED = {
     "reading": JOINT,
     "writing": JOINT | {"metrics", "reading"},
     "conversion": MODEL | {"kinematics", "formats", "reading"},
+    "retargeting": MODEL | {"kinematics"},
     "editing": JOINT | {"metrics", "reading", "writing"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL | {"units", "kinematics", "metrics", "joint_errors", "sample", "training"} | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
-    "": MODEL | {"kinematics", "metrics"} | DOORS,  # mcz/__init__.py
+    "": MODEL | {"kinematics", "metrics", "retargeting"} | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 

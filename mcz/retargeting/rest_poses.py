@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from mcz.brief import among
+from mcz.errors import OptionError
 from mcz.kinematics.chain import IDENTITY, Floats
 from mcz.kinematics.rest import rest_positions
 from mcz.motion import Skeleton
@@ -14,28 +16,49 @@ from mcz.retargeting.matching import nearest_above
 SHORT = 1e-9  # of the longest bone: no direction
 
 
-def rest_turns(target: Skeleton, source: Skeleton, pairs: Mapping[int, int]) -> dict[int, Floats]:
-    """Of each joint of ``pairs`` the least turn of its bone to the direction of the source's.
+def rest_turns(
+    target: Skeleton, source: Skeleton, pairs: Mapping[int, int], alike: Iterable[str]
+) -> dict[int, Floats]:
+    """Of each joint of ``pairs``, and of -1, what turns its bone to the direction of the source's.
 
-    Rotation matrices (3, 3, 1). The bone of a joint leads to the one joint of ``pairs`` that hangs
-    on it, or along its first tail. Where several hang on it, it does not turn; where there is no
-    bone, it turns as the joint above does.
+    Rotation matrices (3, 3, 1): for joints named in ``alike`` the least turn that does it, for
+    others that of the joint above, for -1 none. The bone of a joint leads to the one joint of
+    ``pairs`` that hangs on it or, where none does, along its first tail.
+
+    Raises OptionError for a joint that is not in ``pairs``, and for one without such a bone.
     """
+    named = _numbers(target, pairs, alike)
     ours, theirs = rest_positions(target), rest_positions(source)
     above = {joint: nearest_above(target, joint, pairs) for joint in pairs}
     result: dict[int, Floats] = {-1: IDENTITY}
     for joint, other in pairs.items():
-        below = [child for child in pairs if above[child] == joint]
-        if len(below) > 1:
-            result[joint] = IDENTITY
+        result[joint] = result[above[joint]]
+        if joint not in named:
             continue
+        below = [child for child in pairs if above[child] == joint]
         if below:
             bones = ours[below[0]] - ours[joint], theirs[pairs[below[0]]] - theirs[other]
         else:
             bones = _tail(target, joint), _tail(source, other)
-        turn = _least_turn(*bones)
-        result[joint] = result[above[joint]] if turn is None else turn[:, :, None]
+        turn = None if len(below) > 1 else _least_turn(*bones)
+        if turn is None:
+            how = "several bones" if len(below) > 1 else "no bone"
+            raise OptionError(
+                f"retarget: match_rest: joint {target.joint_names[joint]!r} has {how} to match"
+            )
+        result[joint] = turn[:, :, None]
     return result
+
+
+def _numbers(target: Skeleton, pairs: Mapping[int, int], alike: Iterable[str]) -> set[int]:
+    names = {target.joint_names[joint]: joint for joint in pairs}
+    for name in alike:
+        if name not in names:
+            raise OptionError(
+                f"retarget: match_rest: no joint {name!r} of the skeleton stands for one of the "
+                f"motion, but {among(list(names), name)}"
+            )
+    return {names[name] for name in alike}
 
 
 def _tail(skeleton: Skeleton, joint: int) -> Floats:

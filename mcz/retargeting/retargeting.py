@@ -8,7 +8,7 @@ as they can, and joints below make up for it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -23,13 +23,7 @@ from mcz.retargeting.matching import matched, nearest_above
 from mcz.retargeting.rest_poses import rest_turns
 from mcz.retargeting.sizes import size_ratio
 from mcz.retargeting.travel import Travel
-from mcz.retargeting.turns import (
-    back,
-    finite,
-    local_turns,
-    relative,
-    set_local_turns,
-)
+from mcz.retargeting.turns import back, finite, local_turns, relative, set_local_turns
 
 
 def retarget(
@@ -38,7 +32,7 @@ def retarget(
     joint_map: Mapping[str, str] | None = None,
     *,
     scale: float | None = None,
-    match_rest: bool = False,
+    match_rest: Collection[str] = (),
 ) -> Motion:
     """``motion`` on ``skeleton``: its joints turn as the same joints of the motion do.
 
@@ -46,8 +40,8 @@ def retarget(
     gives them; joints that it leaves out stay at rest, or are left out. None: the same names.
 
     Turns are turns from rest. Where the rest poses are unlike, one with arms down and one with
-    arms out, so are the poses; ``match_rest=True`` turns the bones of ``skeleton`` so that they
-    point as those of the motion.
+    arms out, so are the poses. ``match_rest`` names joints of ``skeleton`` whose bones are to point
+    as those of the motion do, such as upper arms and forearms; joints below them turn along.
 
     The root's way is scaled by ``scale``, in length units of ``skeleton`` per length unit of the
     motion. None: by the length of the legs, from hip to foot, or of all bones where no foot has
@@ -57,8 +51,9 @@ def retarget(
     Values are on a grid of 6 decimals. Frame rate, frame numbers, name, metadata and further
     signals are kept; there is no source.
 
-    Raises OptionError for joints that are not there, for two that stand for one, for up axes that
-    differ, for a scale that is not above 0, and where no joint could follow the root's way.
+    Raises OptionError for joints that are not there, for two that stand for one, for one of
+    ``match_rest`` without a bone, for up axes that differ, for a scale that is not above 0, and
+    where no joint could follow the root's way.
     Raises MotionError where one of the skeletons has no kinematics or markers alone.
     """
     check_channels(motion)
@@ -79,7 +74,7 @@ def _check(source: Skeleton, target: Skeleton) -> None:
     for skeleton in (source, target):
         if point_set(skeleton) == "markers":
             raise MotionError(
-                f"skeleton {skeleton.name!r}: markers turn no bones, so there is nothing to retarget"
+                f"retarget: skeleton {skeleton.name!r} has markers alone, which turn no bones"
             )
     if source.up_axis and target.up_axis and source.up_axis != target.up_axis:
         raise OptionError(
@@ -97,17 +92,13 @@ class _Retargeted:
         pairs: Mapping[int, int],
         values: Floats,
         scale: float,
-        match_rest: bool,
+        match_rest: Collection[str],
     ) -> None:
         self.target, self.pairs = target, pairs
         self.theirs, self.ours = Chain(source), Chain(target)
         columns = np.ascontiguousarray(values.T)
         self.turns = {k: local_turns(self.theirs, k, columns) for k in range(source.n_joints)}
-        self.rest = (
-            rest_turns(target, source, pairs)
-            if match_rest
-            else dict.fromkeys((-1, *pairs), IDENTITY)
-        )
+        self.rest = rest_turns(target, source, pairs, match_rest)
         self.columns = Targets(target, markers=False).neutral(len(values))
         self.travel = Travel(source, target, pairs, scale, values, origins_of(source, values))
 

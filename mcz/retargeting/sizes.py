@@ -8,49 +8,50 @@ import numpy as np
 
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.feet import is_foot
+from mcz.kinematics.rest import rest_positions
 from mcz.motion import Skeleton
 
 
 def size_ratio(ours: Skeleton, theirs: Skeleton, pairs: Mapping[int, int]) -> float:
-    """The length of our legs in those of theirs, each in its own length unit.
+    """How high we stand for each length unit that they do, each in its own length units.
 
-    ``pairs`` has joints of theirs by joints of ours. A leg reaches from the hip down to the first
-    joint that is a part of a foot by its name. Where there are no legs, or legs of no length, it is
-    that of all bones between joints of ``pairs``; 1 where there is none.
+    ``pairs`` has joints of theirs by joints of ours. Heights are from the feet up to the joint
+    where the legs part, as ``_height`` says; a foot is the first joint of a leg that is a part of
+    a foot by its name, in either skeleton. Where there is none, or it has no height, the length of
+    all bones between joints of ``pairs`` counts; 1 where there is none of these, too.
     """
-    feet = [
-        (one, other)
+    feet = {
+        one: other
         for one, other in pairs.items()
         if is_foot(ours.joints[one].name) or is_foot(theirs.joints[other].name)
-    ]
-    legs = [pair for pair in feet if not _hangs_on(ours, pair[0], {one for one, _ in feet})]
-    lengths = (
-        sum(_leg(ours, one) for one, _ in legs),
-        sum(_leg(theirs, other) for _, other in legs),
-    )
-    if not all(lengths):
-        lengths = (_bones(ours, pairs), _bones(theirs, pairs.values()))
-    return lengths[0] / lengths[1] if all(lengths) else 1.0
+    }
+    first = [one for one in feet if not feet.keys() & set(_line(ours, one)[:-1])]
+    heights = _height(ours, first), _height(theirs, [feet[one] for one in first])
+    if min(heights) <= 0:
+        heights = _bones(ours, pairs), _bones(theirs, pairs.values())
+    return heights[0] / heights[1] if all(heights) else 1.0
 
 
-def _hangs_on(skeleton: Skeleton, joint: int, others: set[int]) -> bool:
-    parent = skeleton.joints[joint].parent
-    while parent >= 0:
-        if parent in others:
-            return True
-        parent = skeleton.joints[parent].parent
-    return False
+def _height(skeleton: Skeleton, feet: list[int]) -> float:
+    """The height of the joint where the legs part above the feet, with legs straight.
 
-
-def _leg(skeleton: Skeleton, foot: int) -> float:
-    """The length of the bones from the hip to a joint, without the one that leads to the hip."""
-    lengths = _lengths(skeleton)
-    line = []
-    while skeleton.joints[foot].parent >= 0:
-        line.append(float(lengths[foot]))
-        foot = skeleton.joints[foot].parent
-    bones = [length for length in line if length > 0]
-    return sum(bones[:-1]) if len(bones) > 1 else sum(bones)
+    Up is away from the feet in the rest pose. A leg begins below the first bone that has a length;
+    of that bone counts how far it leads down. The mean of all legs; 0 where there is none.
+    """
+    if not feet:
+        return 0.0
+    lines = [_line(skeleton, foot) for foot in feet]
+    shared = [joint for joint in lines[0][:-1] if all(joint in line for line in lines)]
+    fork = shared[-1] if shared else lines[0][0]
+    rest, lengths = rest_positions(skeleton), _lengths(skeleton)
+    down = np.sum([rest[foot] - rest[fork] for foot in feet], axis=0)
+    down /= np.linalg.norm(down) or 1.0
+    heights = []
+    for line in lines:
+        bones = [joint for joint in line[line.index(fork) + 1 :] if lengths[joint] > 0]
+        leg = sum(float(lengths[joint]) for joint in bones[1:])
+        heights.append(leg + float((rest[bones[0]] - rest[fork]) @ down) if bones else 0.0)
+    return sum(heights) / len(heights)
 
 
 def _bones(skeleton: Skeleton, joints: Iterable[int]) -> float:
@@ -58,14 +59,19 @@ def _bones(skeleton: Skeleton, joints: Iterable[int]) -> float:
     chosen = set(joints)
     lengths, total = _lengths(skeleton), 0.0
     for joint in chosen:
-        line = []
-        while joint >= 0:
-            line.append(float(lengths[joint]))
-            joint = skeleton.joints[joint].parent
-            if joint in chosen:
-                total += sum(line)
-                break
+        *above, _ = _line(skeleton, joint)
+        begun = [number for number, other in enumerate(above) if other in chosen]
+        if begun:
+            total += float(lengths[[*above[begun[-1] + 1 :], joint]].sum())
     return total
+
+
+def _line(skeleton: Skeleton, joint: int) -> list[int]:
+    """The joints from a root down to ``joint``."""
+    line = [joint]
+    while (parent := skeleton.joints[line[-1]].parent) >= 0:
+        line.append(parent)
+    return line[::-1]
 
 
 def _lengths(skeleton: Skeleton) -> Floats:

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcz.errors import OptionError
+from mcz.kinematics import reach
 from mcz.kinematics.chain import Floats, along
 from mcz.kinematics.rest import rest_positions
 from mcz.motion import POSITION_KINDS, Skeleton
 from mcz.retargeting.edited import moves
 from mcz.retargeting.matching import nearest_above
 from mcz.retargeting.turns import back
+
+ROUNDING = 1e-9  # of the skeleton's reach: no way at all
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +49,8 @@ class Travel:
             elif moves(self.target.joints[joint].channels):
                 step = self.scale * self._step(other)
                 ways[joint] = along(back(rest[above]), step)
+        for joint, way in ways.items():
+            self._check(joint, way)
         for joint in range(self.target.n_joints):
             self._write(joint, ways.get(joint), columns)
 
@@ -67,9 +72,22 @@ class Travel:
             )
         return carrier
 
+    def _check(self, joint: int, way: Floats) -> None:
+        """Raise OptionError where a joint has to go where no position channel leads."""
+        kinds = {channel.kind for channel in self.target.joints[joint].channels}
+        least = ROUNDING * reach(self.target)
+        for kind, track in zip(POSITION_KINDS, way, strict=True):
+            if kind not in kinds and (np.abs(track) > least).any():
+                raise OptionError(
+                    f"retarget: joint {self.target.joint_names[joint]!r} of the skeleton has no "
+                    f"channel {kind}, along which the motion moves it"
+                )
+
     def _way(self, joint: int, other: int) -> Floats:
         """Where ``joint`` goes from where it is at rest, (3, F): all above it is at rest."""
-        return self.scale * self.origins[:, other].T - rest_positions(self.target)[joint][:, None]
+        rest = rest_positions(self.target)[joint]
+        way: Floats = self.scale * self.origins[:, other].T - rest[:, None]
+        return way
 
     def _step(self, other: int) -> Floats:
         """What position channels of the source's joint add to its offset, (3, F)."""
