@@ -26,9 +26,10 @@ def select(
     are kept as they are. What is returned has no source.
 
     What is left out may be anything that no kept joint hangs on. A joint above a kept one may be
-    left out where it has no channels that move it: its offset is added to that of the kept one.
-    Any other is refused, unless ``allow_translation``: then the kept one gets position channels
-    and three rotation channels in place of its own, computed, on a grid of 6 decimals.
+    left out where it has no channels that move it, or never leaves rest in this motion: its offset
+    is added to that of the kept one. Any other is refused, unless ``allow_translation``: then the
+    kept one gets position channels and three rotation channels in place of its own, computed, on a
+    grid of 6 decimals.
 
     Raises OptionError for a joint that is not there, for none at all, and, naming it, for one in
     between that cannot be left out; MotionError where the channels are not those of the skeleton.
@@ -37,7 +38,7 @@ def select(
     skeleton = motion.skeleton
     kept = _kept(skeleton, joints)
     above = _parents(skeleton, kept)
-    moved = {joint: name for joint in kept if (name := _obstacle(skeleton, joint, above[joint]))}
+    moved = {joint: name for joint in kept if (name := _obstacle(motion, joint, above[joint]))}
     if moved and not allow_translation:
         joint, name = next(iter(moved.items()))
         raise OptionError(
@@ -91,14 +92,27 @@ def _between(skeleton: Skeleton, joint: int, above: int) -> list[int]:
     return between
 
 
-def _obstacle(skeleton: Skeleton, joint: int, above: int) -> str:
+def _obstacle(motion: Motion, joint: int, above: int) -> str:
     """The name of a joint that keeps those between from being left out, "" where none does."""
+    skeleton = motion.skeleton
     between = _between(skeleton, joint, above)
-    moving = [k for k in between if any(channel.kind for channel in skeleton.joints[k].channels)]
+    moving = [k for k in between if not _rests(motion, k)]
     if between and above >= 0:  # it would stretch the whole of the longer bone
         kinds = {channel.kind for channel in skeleton.joints[above].channels}
         moving += [above] * bool(kinds & set(SCALING))
     return skeleton.joint_names[moving[0]] if moving else ""
+
+
+def _rests(motion: Motion, index: int) -> bool:
+    """Whether the joint has no channels that move it, or all are at rest in every frame."""
+    joint, values = motion.skeleton.joints[index], motion.values
+    for channel, column in zip(joint.channels, motion.skeleton.columns(index), strict=True):
+        rest = 1.0 if channel.kind in (*SCALING, "qw") else 0.0
+        if channel.kind in POSITION_KINDS and not joint.adds_to_offset:
+            rest = joint.offset[POSITION_KINDS.index(channel.kind)]
+        if channel.kind and not (values[:, column] == rest).all():
+            return False
+    return True
 
 
 def _folded(skeleton: Skeleton, index: int, above: int) -> Joint:
