@@ -35,14 +35,15 @@ def size_ratio(ours: Skeleton, theirs: Skeleton, pairs: Mapping[int, int]) -> fl
 def _height(skeleton: Skeleton, feet: list[int]) -> float:
     """The height of the joint where the legs part above the feet, with legs straight.
 
-    Up is away from the feet in the rest pose. A leg begins below the first bone that has a length;
-    of that bone counts how far it leads down. The mean of all legs; 0 where there is none.
+    Up is away from the feet in the rest pose; one leg alone parts at its root. A leg begins below
+    the first bone that has a length; of that bone counts how far it leads down. The mean of all
+    legs; 0 where there is none.
     """
     if not feet:
         return 0.0
     lines = [_line(skeleton, foot) for foot in feet]
-    shared = [joint for joint in lines[0][:-1] if all(joint in line for line in lines)]
-    fork = shared[-1] if shared else lines[0][0]
+    shared = [joint for joint in lines[0] if all(joint in line for line in lines[1:])]
+    fork = shared[-1] if shared and len(lines) > 1 else lines[0][0]
     rest, lengths = rest_positions(skeleton), _lengths(skeleton)
     down = np.sum([rest[foot] - rest[fork] for foot in feet], axis=0)
     down /= np.linalg.norm(down) or 1.0

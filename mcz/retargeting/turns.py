@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.kinematics.chain import IDENTITY, Chain, Floats, Pose, times
+from mcz.kinematics.euler import ORDERS
 from mcz.kinematics.nearest_turns import set_turns
+from mcz.kinematics.polished_turns import polish_turns
 
 
 def local_turns(chain: Chain, joint: int, columns: Floats) -> Floats:
@@ -39,6 +41,8 @@ def set_local_turns(chain: Chain, joint: int, wanted: Floats, columns: Floats) -
     if own is not None:
         turn = times(times(own.T[:, :, None], turn), own[:, :, None])
     set_turns(link, turn, columns, chain.radians)
+    if len(link.turns) > 1 and "".join("xyzq"[axis] for axis, _ in link.turns) not in ORDERS:
+        polish_turns(link, turn, columns, chain.radians)
     own_columns = [column for axis, column in link.turns if axis < 3] + list(link.quaternion)
     made = local_turns(chain, joint, columns)
     for column in own_columns:
