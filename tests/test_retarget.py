@@ -371,7 +371,7 @@ def test_a_real_clip_on_the_skeleton_of_its_own_conversion(data: Path) -> None:
 @pytest.mark.real
 def test_real_clips_on_other_people(data: Path) -> None:
     """Turns as they were, bones as they are, feet about as high as theirs were in proportion."""
-    for clip, person in (("02_01", "16"), ("07_05", "135"), ("16_01", "02"), ("86_01", "13")):
+    for clip, person in (("02_01", "16"), ("07_05", "135"), ("16_01", "02")):
         motion = mcz.read(data / f"cmu/amc/{clip}.amc")
         target = mcz.read_skeleton(data / f"cmu/asf/{person}.asf")
         made = mcz.retarget(motion, target)

@@ -16,6 +16,7 @@ from mcz.errors import MotionError, OptionError
 from mcz.kinematics import origins_of, shell_points_of
 from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
+from mcz.numbers.scaling import Scaling
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.motions import POSITIONS, ROTATIONS, smooth
 from tests.skeletons import skeletons, values_for
@@ -157,6 +158,18 @@ def test_grids_masks_and_texts_are_those_of_the_columns() -> None:
     assert found.exceptions.texts == (b"-0", b"1e-15")
     assert found.grid_changes == ((10, 6, binary),)
     assert found.grids == motion.signals[0].grids[:7]
+
+
+def test_columns_keep_what_their_numbers_mean() -> None:
+    words = np.arange(12, dtype=np.int64).reshape(4, 3)
+    scaling = Scaling(np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.25, 2.0]))
+    channels = tuple(Channel("", name) for name in "abc")
+    signal = Signal(words, channels=channels, ordinals=words).in_units(scaling)
+    found = signal.of_columns([2, 0])
+    assert np.array_equal(found.values, signal.values[:, [2, 0]])
+    assert np.array_equal(found.as_stored().values, words[:, [2, 0]])
+    assert found.ordinals is not None and np.array_equal(found.ordinals, words[:, [2, 0]])
+    assert [channel.name for channel in found.channels or ()] == ["c", "a"]
 
 
 def test_a_joint_that_rests_may_be_left_out_between() -> None:
