@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     )
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
+    from mcz.kinematics.rest import rest_positions
     from mcz.live.concealment import LiveFrame
     from mcz.live.generators import LiveReader, stream_decode, stream_encode
     from mcz.live.reader_with_losses import StreamSummary
@@ -59,6 +60,11 @@ if TYPE_CHECKING:
     from mcz.reading.recording import Event, ForcePlatform, Recording, recording
     from mcz.reading.report import Problem, verify
     from mcz.reading.source_files import read_skeleton
+    from mcz.retargeting.joint_maps import joint_map
+    from mcz.retargeting.mirroring import mirror
+    from mcz.retargeting.renaming import rename
+    from mcz.retargeting.retargeting import retarget
+    from mcz.retargeting.selection import select
     from mcz.writing.file import encode, write
 
 __version__ = "0.9.0"
@@ -112,6 +118,12 @@ _HOMES = {
     "mcz.metrics": ("Comparison", "compare"),
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
     "mcz.reading.source_files": ("read_skeleton",),
+    "mcz.kinematics.rest": ("rest_positions",),
+    "mcz.retargeting.joint_maps": ("joint_map",),
+    "mcz.retargeting.mirroring": ("mirror",),
+    "mcz.retargeting.renaming": ("rename",),
+    "mcz.retargeting.retargeting": ("retarget",),
+    "mcz.retargeting.selection": ("select",),
     "mcz.live.generators": ("LiveReader", "stream_decode", "stream_encode"),
     "mcz.live.reader_with_losses": ("StreamSummary",),
 }
@@ -173,7 +185,9 @@ __all__ = [
     "extract",
     "from_positions",
     "in_positions",
+    "joint_map",
     "live_frames",
+    "mirror",
     "open",
     "pack",
     "point_names",
@@ -182,11 +196,15 @@ __all__ = [
     "read",
     "read_skeleton",
     "recording",
+    "rename",
     "repair",
     "replace",
     "resample",
+    "rest_positions",
+    "retarget",
     "root",
     "rotations",
+    "select",
     "stream_decode",
     "stream_encode",
     "unpack",

@@ -5,7 +5,7 @@ Nothing here reads or writes files. SPEC.md, "CLIP", has the stored form.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -146,6 +146,34 @@ class Signal:
             grid_changes=tuple(changes),
             ordinals=None if self.ordinals is None else self.ordinals[first:last],
             stored=self.stored[first:last],
+        )
+
+    def of_columns(self, columns: Sequence[int]) -> Signal:
+        """These columns alone, in the order given, each once, with their grids and their masks."""
+        chosen = np.array(columns, np.int64)
+        at = np.full(self.n_channels, -1, np.int64)
+        at[chosen] = np.arange(len(chosen))
+        given = self.channels
+        scaling = self.scaling
+        if scaling is not None:
+            scaling = replace(
+                scaling, offsets=scaling.offsets[chosen], scales=scaling.scales[chosen]
+            )
+        return replace(
+            self,
+            values=np.ascontiguousarray(self.values[:, chosen]),
+            grids=tuple(self.grids[column] for column in chosen),
+            mask=None if self.mask is None else np.ascontiguousarray(self.mask[:, chosen]),
+            exceptions=self.exceptions.moved(at),
+            grid_changes=tuple(
+                (row, int(at[column]), grid)
+                for row, column, grid in self.grid_changes
+                if at[column] >= 0
+            ),
+            channels=None if given is None else tuple(given[column] for column in chosen),
+            ordinals=None if self.ordinals is None else self.ordinals[:, chosen],
+            scaling=scaling,
+            stored=np.ascontiguousarray(self.stored[:, chosen]),
         )
 
     def in_units(self, scaling: Scaling | None) -> Signal:

@@ -135,7 +135,30 @@ class Skeleton:
 
     @property
     def parents(self) -> NDArray[np.int64]:
+        """The index of every joint's parent, int64 (n_joints,), -1 of a root."""
         return np.array([joint.parent for joint in self.joints], dtype=np.int64)
+
+    @property
+    def offsets(self) -> NDArray[np.float64]:
+        """From the parent's origin to each joint's own, float64 (n_joints, 3), in length units.
+
+        They lie along axes that turn with the parent and are those of the world in the rest pose.
+        """
+        return np.array([joint.offset for joint in self.joints], np.float64).reshape(-1, 3)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The name of every joint, made unique as ``addresses`` does."""
+        return tuple(self.addresses())
+
+    @property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        """Of every joint the joints whose parent it is, in joint order."""
+        below: list[list[int]] = [[] for _ in self.joints]
+        for index, joint in enumerate(self.joints):
+            if joint.parent >= 0:
+                below[joint.parent].append(index)
+        return tuple(map(tuple, below))
 
     def columns(self, joint: int) -> range:
         """The columns of joint ``joint``."""

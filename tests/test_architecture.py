@@ -54,6 +54,7 @@ ALLOWED = {
     "datasets": JOINT | {"poses", "reading"},
     "writing": JOINT | {"metrics", "reading"},
     "conversion": MODEL | {"kinematics", "formats", "reading"},
+    "retargeting": MODEL | {"kinematics"},
     "editing": JOINT | {"metrics", "reading", "writing"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
@@ -62,7 +63,9 @@ ALLOWED = {
     | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
-    "": MODEL | {"kinematics", "metrics", "poses", "datasets"} | DOORS,  # mcz/__init__.py
+    "": MODEL
+    | {"kinematics", "metrics", "poses", "datasets", "retargeting"}
+    | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 

@@ -18,10 +18,8 @@ from mcz.motion import (
     POSITION_KINDS,
     ROTATION_KINDS,
     Channel,
-    Exceptions,
     Joint,
     Motion,
-    Signal,
     Vector,
 )
 
@@ -37,7 +35,7 @@ def to_amc(motion: Motion) -> Motion:
     bones = _Bones(motion)
     joints = tuple(bones.joints)
     converted = replace(skeleton, joints=joints, intrinsic=False, base=None, source=None)
-    signal = _permuted(motion.signals[0], np.array(bones.columns, dtype=np.int64))
+    signal = motion.signals[0].of_columns(bones.columns)
     return replace(motion, skeleton=converted, signals=(signal,))
 
 
@@ -152,27 +150,3 @@ def _root_offset(joint: Joint) -> Vector:
         for kind, part in zip(POSITION_KINDS, joint.offset, strict=True)
     )
     return x, y, z
-
-
-def _permuted(signal: Signal, columns: Ints) -> Signal:
-    """The signal with its columns in another order, some left out."""
-    at = np.full(max(1, signal.n_channels), -1, np.int64)
-    at[columns] = np.arange(len(columns))
-    old = signal.exceptions
-    moved = at[old.channels]
-    order = np.lexsort((moved, old.rows))
-    order = order[moved[order] >= 0]
-    exceptions = Exceptions(old.rows[order], moved[order], tuple(old.texts[k] for k in order))
-    return replace(
-        signal,
-        values=np.ascontiguousarray(signal.values[:, columns]),
-        grids=tuple(signal.grids[column] for column in columns),
-        mask=None if signal.mask is None else np.ascontiguousarray(signal.mask[:, columns]),
-        exceptions=exceptions,
-        grid_changes=tuple(
-            (row, int(at[column]), grid)
-            for row, column, grid in signal.grid_changes
-            if at[column] >= 0
-        ),
-        ordinals=None,
-    )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mcz.datasets.caches import to_size
-from mcz.datasets.dataset import Dataset, Settings
+from mcz.datasets.windows import Dataset, Settings
 from mcz.datasets.fields import chosen_fields, names_of
 from mcz.datasets.members import Member
 from mcz.datasets.sources import Recipe

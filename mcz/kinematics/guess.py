@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mcz.kinematics.chain import Floats, Link, Pose, times, turned
-from mcz.kinematics.euler import ORDERS, euler_angles
+from mcz.kinematics.chain import Floats, Link, Pose, times
+from mcz.kinematics.nearest_turns import set_turns
 from mcz.kinematics.targets import Targets
 
 FARTHER = 0.01  # the weight of what hangs on the next turning joint, where that is asked at all
@@ -20,8 +20,6 @@ LINE = 1e-3  # second singular value, of the first: below it all lie on one line
 FAR_LINE = 0.3  # the same where other joints may have bent what hangs there
 TO_REST = 1e-6  # the weight of staying at rest, for what nothing else decides
 LINE_TO_REST = 1e-2  # the same for what lies on a line
-STARTS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
-SWEEPS = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +151,7 @@ class Guess:
         local = times(np.swapaxes(axes, 0, 1), moment)
         size = np.sqrt((local * local).sum(axis=(0, 1)))
         local = local + np.eye(3)[:, :, None] * (held.to_rest * size + (size == 0))
-        _turn(link, local, columns, self.chain.radians)
+        set_turns(link, local, columns, self.chain.radians)
         _hold(link, size > 0, columns)
 
     def _moment(
@@ -220,111 +218,6 @@ class Guess:
                 _hold_column(columns[column], there)
             done.add(component)
         return self.chain.hang(pose, link, columns)
-
-
-def _turn(link: Link, moment: Floats, columns: Floats, radians: float) -> None:
-    """Set the angles of the joint for the greatest trace of R' ``moment``, (3, 3, F)."""
-    order = "".join("xyzq"[axis] for axis, _ in link.turns)
-    if order == "q":
-        columns[list(link.quaternion)] = _quaternion(_kabsch(moment))
-    elif order in ORDERS:
-        angles = small(euler_angles(_kabsch(moment), order))
-        for k, (_, column) in enumerate(link.turns):
-            columns[column] = angles[:, k] / radians
-    else:
-        turns = [(axis, column) for axis, column in link.turns if axis < 3]
-        angles = _angle_by_angle([axis for axis, _ in turns], moment)
-        for (_, column), angle in zip(turns, angles, strict=True):
-            columns[column] = angle / radians
-
-
-def _kabsch(moment: Floats) -> Floats:
-    """The rotations R with the greatest trace of R' ``moment``, (3, 3, F)."""
-    left, _, right = np.linalg.svd(np.moveaxis(moment, 2, 0))
-    turn = np.linalg.det(left) * np.linalg.det(right)
-    left[:, :, 2] *= turn[:, None]
-    result: Floats = np.ascontiguousarray(np.moveaxis(left @ right, 0, 2))
-    return result
-
-
-def small(angles: Floats) -> Floats:
-    """The same rotations by angles (n_frames, 3) nearer to zero on the whole, just as continuous.
-
-    Three angles (a, b, c) about different axes turn as (a + pi, pi - b, c + pi) do.
-    """
-    both = [centered(angles), centered(angles * [1, -1, 1] + np.pi)]
-    return min(both, key=lambda angles: float((angles * angles).sum()))
-
-
-def centered(angles: Floats) -> Floats:
-    """Angles, (n_frames, n), less whole turns: their means are within half a turn of zero."""
-    if not len(angles):
-        return angles
-    result: Floats = angles - 2 * np.pi * np.rint(angles.mean(axis=0) / (2 * np.pi))
-    return result
-
-
-def _quaternion(turns: Floats) -> Floats:
-    """The quaternions (w, x, y, z), (4, F), of rotation matrices."""
-    # The greatest of the four candidates is never small.
-    t = turns
-    squares = np.stack(
-        [
-            1 + t[0, 0] + t[1, 1] + t[2, 2],
-            1 + t[0, 0] - t[1, 1] - t[2, 2],
-            1 - t[0, 0] + t[1, 1] - t[2, 2],
-            1 - t[0, 0] - t[1, 1] + t[2, 2],
-        ]
-    )
-    wx, wy, wz = t[2, 1] - t[1, 2], t[0, 2] - t[2, 0], t[1, 0] - t[0, 1]
-    xy, xz, yz = t[1, 0] + t[0, 1], t[0, 2] + t[2, 0], t[2, 1] + t[1, 2]
-    rows = np.array(
-        [
-            [squares[0], wx, wy, wz],
-            [wx, squares[1], xy, xz],
-            [wy, xy, squares[2], yz],
-            [wz, xz, yz, squares[3]],
-        ]
-    )
-    best = squares.argmax(axis=0)
-    parts = rows[best, :, np.arange(t.shape[2])].T
-    parts = parts / np.sqrt((parts * parts).sum(axis=0))
-    signs = np.where((parts[:, 1:] * parts[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
-    signs = np.cumprod(np.concatenate([np.where(parts[0, :1] < 0, -1.0, 1.0), signs]))
-    result: Floats = parts * signs
-    return result
-
-
-def _angle_by_angle(axes: list[int], moment: Floats) -> Floats:
-    """Angles (n, F) about turned axes, first to last, for the greatest trace of R' ``moment``.
-
-    The best of several starts; each angle in turn is set to the best for the others as they are.
-    """
-    n_frames = moment.shape[2]
-    best = np.zeros((len(axes), n_frames))
-    most = np.full(n_frames, -np.inf)
-    for start in STARTS if len(axes) > 1 else (0.0,):
-        angles = np.zeros((len(axes), n_frames))
-        angles[-1:] = start
-        for _ in range(SWEEPS if len(axes) > 1 else 1):
-            for k, axis in enumerate(axes):
-                between = moment
-                for before in range(k):  # T1' moment, then T2' T1' moment
-                    between = _turned_left(between, axes[before], -angles[before])
-                for after in range(len(axes) - 1, k, -1):
-                    between = turned(between, axes[after], -angles[after])
-                i, j = (axis + 1) % 3, (axis + 2) % 3
-                sine, cosine = between[j, i] - between[i, j], between[i, i] + between[j, j]
-                angles[k] = np.arctan2(sine, cosine)
-                trace = np.hypot(sine, cosine) + between[axis, axis]
-        better = trace > most * (1 + 1e-9) + 1e-300
-        best, most = np.where(better, angles, best), np.where(better, trace, most)
-    return np.asarray(np.unwrap(best, axis=1))
-
-
-def _turned_left(matrix: Floats, axis: int, angle: Floats) -> Floats:
-    """R ``matrix``, R the rotation by ``angle`` about the axis."""
-    return np.swapaxes(turned(np.swapaxes(matrix, 0, 1), axis, -angle), 0, 1)
 
 
 def _hold(link: Link, known: Floats, columns: Floats) -> None:

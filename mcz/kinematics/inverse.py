@@ -20,7 +20,8 @@ from mcz.errors import MotionError
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.descent import refine
 from mcz.kinematics.euler import ORDERS, nearest
-from mcz.kinematics.guess import Guess, centered, small
+from mcz.kinematics.guess import Guess
+from mcz.kinematics.nearest_turns import centered, small
 from mcz.kinematics.targets import Targets
 from mcz.motion import Skeleton
 

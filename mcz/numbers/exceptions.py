@@ -27,3 +27,13 @@ class Exceptions:
 
     def __len__(self) -> int:
         return len(self.texts)
+
+    def moved(self, columns: NDArray[np.int64]) -> Exceptions:
+        """The same where channel k has become ``columns[k]``; those of -1 are left out."""
+        if not len(self):
+            return self
+        channels = columns[self.channels]
+        order = np.lexsort((channels, self.rows))
+        order = order[channels[order] >= 0]
+        texts = tuple(self.texts[k] for k in order.tolist())
+        return Exceptions(self.rows[order], channels[order], texts)

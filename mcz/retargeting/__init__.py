@@ -1,0 +1,1 @@
+"""Joints renamed, chosen, mirrored; a motion on another skeleton; joints of the usual skeletons."""

@@ -1,0 +1,51 @@
+"""What all tools here do alike: a motion whose channels are its joints' in, and another out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError
+from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Channel, Motion, Signal, Skeleton
+from mcz.numbers import Grid, GridKind
+
+Floats = NDArray[np.float64]
+
+COMPUTED = Grid(GridKind.FIXED, 6)  # as of conversions: a millionth is far below noise
+TURNING = (*ROTATION_KINDS, "qw", "qx", "qy", "qz")
+
+
+def turns(channels: tuple[Channel, ...]) -> bool:
+    """Whether one of the channels turns its joint."""
+    return any(channel.kind in TURNING for channel in channels)
+
+
+def moves(channels: tuple[Channel, ...]) -> bool:
+    """Whether one of the channels moves its joint."""
+    return any(channel.kind in POSITION_KINDS for channel in channels)
+
+
+def check_channels(motion: Motion) -> None:
+    """Raise MotionError where the motion's channels are not those of its joints."""
+    if motion.signals[0].channels is not None:
+        raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
+
+
+def edited(motion: Motion, skeleton: Skeleton, signal: Signal) -> Motion:
+    """``motion`` of another skeleton and signal, without the source file that it no longer is."""
+    return replace(motion, skeleton=skeleton, signals=(signal, *motion.signals[1:]), source=None)
+
+
+def computed(motion: Motion, values: Floats) -> Signal:
+    """The motion signal of ``values`` (n_rows, n_channels) that were computed; NaN is invalid."""
+    valid = np.isfinite(values)
+    first = motion.signals[0]
+    return Signal(
+        np.where(valid, values, 0.0),
+        (COMPUTED,) * values.shape[1],
+        first.name,
+        first.samples_per_frame,
+        None if valid.all() else valid,
+    )
