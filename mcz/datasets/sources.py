@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from threading import Lock
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 
@@ -64,6 +65,7 @@ class Sources:
         self._open: OrderedDict[str, File] = OrderedDict()
         self._subjects: OrderedDict[tuple[str, bytes], Subject] = OrderedDict()
         self._lock = Lock()
+        self.close = finalize(self, _close, self._open)
         for file in self._given.values():
             file.container.runs = Runs(self._runs_bytes)
 
@@ -100,6 +102,11 @@ class Sources:
                 if len(self._subjects) > MOST_SUBJECTS:
                     self._subjects.popitem(last=False)
             return found
+
+
+def _close(files: OrderedDict[str, File]) -> None:
+    while files:
+        files.popitem()[1].close()
 
 
 def _values(
