@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from mcz.datasets.caches import to_size
-from mcz.datasets.windows import Dataset, Settings
 from mcz.datasets.fields import chosen_fields, names_of
 from mcz.datasets.members import Member
 from mcz.datasets.sources import Recipe
+from mcz.datasets.windows import Dataset, Settings
 from mcz.errors import MczError, OptionError
 from mcz.motion import frame_rate_of
 from mcz.poses.resampling import resampled_frames
@@ -65,15 +66,14 @@ def dataset(
     assumed = None if source_rate is None else frame_rate_of(source_rate, "source_rate")
     agreement, members, skipped = _Agreement(recipe), [], []
     for file, name in _files(target, given):
-        for clip in _chosen(file, where):
-            member = _member(clip, name, recipe, assumed)
-            if member.n_frames < (window or 1):
-                skipped.append(member)
-                continue
-            agreement.check(clip, member)
-            members.append(member)
-        if name not in given:
-            file.close()
+        with nullcontext() if name in given else file:
+            for clip in _chosen(file, where):
+                member = _member(clip, name, recipe, assumed)
+                if member.n_frames < (window or 1):
+                    skipped.append(member)
+                    continue
+                agreement.check(clip, member)
+                members.append(member)
     if not members:
         wanted = "" if window is None else f" of at least {window} frames"
         raise OptionError(f"no clip{wanted} in what was given")

@@ -66,6 +66,14 @@ class Field:
     lengths: bool = False
     signed: bool = False
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return field_called, (self.name,)
+
+
+def field_called(name: str) -> Field:
+    """The field of that name; raises KeyError."""
+    return FIELDS[name]
+
 
 def _above_points(subject: Subject) -> list[int]:
     poses = subject.kinematics
