@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 from mcz.datasets.caches import to_size
 from mcz.datasets.fields import chosen_fields, names_of
 from mcz.datasets.members import Member
-from mcz.datasets.sources import Recipe
+from mcz.datasets.sources import MOST_OPEN, Recipe
 from mcz.datasets.windows import Dataset, Settings
 from mcz.errors import MczError, OptionError
 from mcz.motion import frame_rate_of
@@ -64,9 +64,15 @@ def dataset(
     size = to_size(cache)
     settings = Settings(recipe, window, stride, size, None if folder is None else Path(folder))
     assumed = None if source_rate is None else frame_rate_of(source_rate, "source_rate")
-    agreement, members, skipped = _Agreement(recipe), [], []
-    for file, name in _files(target, given):
-        with nullcontext() if name in given else file:
+    agreement = _Agreement(recipe)
+    members: list[Member] = []
+    skipped: list[Member] = []
+    with ExitStack() as stack:
+        opened: dict[str, File] = {}
+        for file, name in _files(target, given):
+            if name not in given:
+                stack.enter_context(file)
+                opened[name] = file
             for clip in _chosen(file, where):
                 member = _member(clip, name, recipe, assumed)
                 if member.n_frames < (window or 1):
@@ -74,10 +80,15 @@ def dataset(
                     continue
                 agreement.check(clip, member)
                 members.append(member)
-    if not members:
-        wanted = "" if window is None else f" of at least {window} frames"
-        raise OptionError(f"no clip{wanted} in what was given")
-    return Dataset(settings, members, given, skipped)
+            if len(opened) > MOST_OPEN:
+                opened.pop(name).close()
+        if not members:
+            wanted = "" if window is None else f" of at least {window} frames"
+            raise OptionError(f"no clip{wanted} in what was given")
+        stack.pop_all()
+    made = Dataset(settings, members, given, skipped)
+    made.adopt(opened)
+    return made
 
 
 def _recipe(

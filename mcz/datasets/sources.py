@@ -63,7 +63,7 @@ class Sources:
         self._given = dict(given)
         self._runs_bytes = runs_bytes // max(1, min(n_targets, MOST_OPEN))
         self._open: OrderedDict[str, File] = OrderedDict()
-        self._subjects: OrderedDict[tuple[str, bytes], Subject] = OrderedDict()
+        self._subjects: OrderedDict[tuple[bytes, Fraction | None], Subject] = OrderedDict()
         self._lock = Lock()
         self.close = finalize(self, _close, self._open)
         for file in self._given.values():
@@ -75,13 +75,22 @@ class Sources:
             file = self._given.get(member.target) or self._open.get(member.target)
             if file is None:
                 file = open(member.target, threads=1)
-                file.container.runs = Runs(self._runs_bytes)
-                self._open[member.target] = file
-                while len(self._open) > MOST_OPEN:
-                    self._open.popitem(last=False)[1].close()
+                self._keep(member.target, file)
             elif member.target in self._open:
                 self._open.move_to_end(member.target)
         return file.clips.get(member.clip) or file.only_clip(member.clip)
+
+    def adopt(self, files: Mapping[str, File]) -> None:
+        """Take files that are open, as if they had been opened here."""
+        with self._lock:
+            for target, file in files.items():
+                self._keep(target, file)
+
+    def _keep(self, target: str, file: File) -> None:
+        file.container.runs = Runs(self._runs_bytes)
+        self._open[target] = file
+        while len(self._open) > MOST_OPEN:
+            self._open.popitem(last=False)[1].close()
 
     def features(self, recipe: Recipe, member: Member, start: int, stop: int) -> Arrays:
         """The arrays of frames start <= f < stop, as the data set counts them."""
@@ -94,7 +103,7 @@ class Sources:
 
     def _subject(self, recipe: Recipe, clip: Clip, member: Member) -> Subject:
         """Prepared once for each skeleton."""
-        key = member.target, clip.skeleton_id
+        key = clip.skeleton_id, member.source_rate  # the id is the hash of the skeleton
         with self._lock:
             found = self._subjects.get(key)
             if found is None:

@@ -22,9 +22,8 @@ from mcz.poses.conversions import continuous
 from mcz.reading.file import File
 
 RUNS_SHARE = 4  # a quarter of the cache is for frames as they were decoded
-RUN_BLOCKS = 4  # of windows that stay together until a pool is shuffled
+RUN_BLOCKS = 6  # of windows that stay together until a pool is shuffled
 VERSION = 1  # of what features are: counted up where a kept one would be wrong
-POOL_SHARE = 2  # a pool of windows that are shuffled has features of half of the rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +79,15 @@ class Dataset:
         folder, most = self._settings.folder, self._settings.cache_bytes
         kept = most - most // RUNS_SHARE
         self._cache: Cache = MemoryCache(kept) if folder is None else FolderCache(folder, most)
+
+    def adopt(self, files: Mapping[str, File]) -> None:
+        """Read from these files, by target, which are open, and close them with the rest."""
+        self._sources.adopt(files)
+
+    def close(self) -> None:
+        """Close the files that the data set has opened; they are opened anew when needed."""
+        self._sources.close()
+        self._prepare()
 
     def __getstate__(self) -> dict[str, Any]:
         made = ("_sources", "_cache", "_keys")
@@ -272,13 +280,13 @@ class Dataset:
         return runs
 
     def _pool_frames(self) -> int:
-        """How many frames the cache holds the features of, half of that where not all."""
+        """How many frames the cache holds the features of."""
         if self._settings.folder is not None:
             return 2**62
         size = self._settings.recipe.dtype.itemsize
         values = sum(int(np.prod(shape)) for shape in self.shapes.values()) if self.members else 1
         kept = self._settings.cache_bytes - self._settings.cache_bytes // RUNS_SHARE
-        return kept // (size * max(1, values)) // POOL_SHARE
+        return kept // (size * max(1, values))
 
     def shuffled(self, seed: int) -> Iterator[dict[str, NDArray[Any]]]:
         """The windows in the ``order`` of a seed."""

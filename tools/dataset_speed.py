@@ -1,0 +1,218 @@
+"""How many windows a second a data set gives, beside array files of the same numbers.
+
+    python tools/dataset_speed.py FOLDER [--copies N] [--windows N]
+
+FOLDER has BVH or AMC files of one skeleton (by names). They are packed N times over with the
+default codec, and written as .npy (memory-mapped), .npz (compressed, a clip a file), HDF5 (gzip)
+and Zarr (its default), the last two in chunks of 64 frames, each with float64 channels and with
+float32 features. Windows of 64 frames, on one core unless it says workers; cold is a new data set,
+warm the second time round. Needs h5py and zarr; without PyTorch no workers are measured.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import mcz
+
+WINDOW = 64
+FIELDS = "rot6d,positions,root"
+
+
+def packed(folder: Path, target: Path, copies: int) -> None:
+    """One archive a copy: the same bytes under other names would be found as duplicates."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mcz.pack(folder, target / "0.mcz")
+    for copy in range(1, copies):
+        (target / f"{copy}.mcz").write_bytes((target / "0.mcz").read_bytes())
+
+
+def windows_a_second(
+    get: Callable[[int], Any], numbers: np.ndarray[Any, Any], seconds: float = 20
+) -> float:
+    start = time.perf_counter()
+    done = 0
+    for number in numbers:
+        get(int(number))
+        done += 1
+        if time.perf_counter() - start > seconds:
+            break
+    return done / (time.perf_counter() - start)
+
+
+def decoded(count: list[int]) -> Callable[[], None]:
+    """Count the frames that are decoded, from now on; returns what stops it."""
+    from mcz.reading.signal_reader import SignalReader
+
+    whole = SignalReader._decode
+
+    def counting(self: Any, spans: Any, start: int, stop: int) -> Any:
+        count[0] += stop - start
+        return whole(self, spans, start, stop)
+
+    SignalReader._decode = counting  # type: ignore[method-assign]
+
+    def stop() -> None:
+        SignalReader._decode = whole  # type: ignore[method-assign]
+
+    return stop
+
+
+def say(what: str, rate: float, size: int = 0, more: str = "") -> None:
+    print(f"{what:52} {rate:9,.0f}/s {size / 1e6:10,.1f} MB  {more}", flush=True)
+
+
+def of_mcz(folder: Path, n_windows: int) -> None:
+    size = sum(path.stat().st_size for path in folder.glob("*.mcz"))
+    for fields in (FIELDS, "channels"):
+        arguments: dict[str, Any] = {"window": WINDOW, "stride": WINDOW, "dtype": "float32"}
+        data = mcz.dataset(folder, fields, **arguments)
+        n_bytes = data.n_frames * data._first_subject().skeleton.n_channels * 8
+        print(f"{data!r}: {n_bytes / 1e6:,.0f} MB decoded")
+        random = np.random.default_rng(1)
+        orders = {
+            "in sequence": np.arange(len(data)),
+            "order(seed)": data.order(1),
+            "at random": random.integers(0, len(data), n_windows),
+        }
+        for name, numbers in orders.items():
+            data = mcz.dataset(folder, fields, **arguments)
+            count = [0]
+            stop = decoded(count)
+            numbers = numbers[:n_windows]
+            rate = windows_a_second(data.__getitem__, numbers)
+            stop()
+            each = count[0] / min(len(numbers), max(1, n_windows))
+            say(f"mcz, {fields}, cold, {name}, cache 64 MB", rate, size, f"{each:.0f} decoded")
+        few = random.integers(0, min(len(data), 500), n_windows)
+        windows_a_second(data.__getitem__, few)
+        say(f"mcz, {fields}, warm, at random", windows_a_second(data.__getitem__, few), size)
+        try:
+            from torch.utils.data import DataLoader
+        except ImportError:
+            continue
+        for workers in (0, 1, 2):
+            data = mcz.dataset(folder, fields, **arguments)
+            tensors = data.torch()
+            loader = DataLoader(
+                tensors, batch_size=64, sampler=tensors.sampler(2)[:n_windows], num_workers=workers
+            )
+            start, seen = time.perf_counter(), 0
+            for batch in loader:
+                seen += len(next(iter(batch.values())))
+            rate = seen / (time.perf_counter() - start)
+            say(f"mcz, {fields}, cold, order(seed), {workers} workers", rate, size)
+
+
+def of_arrays(source: Path, folder: Path, n_windows: int) -> None:
+    """One copy of the clips as arrays, read at random, warm: the second time round."""
+    import h5py
+    import zarr
+
+    for fields in ("channels", FIELDS):
+        dtype = "float64" if fields == "channels" else "float32"
+        data = mcz.dataset(source, fields, dtype=dtype)
+        clips = [data[index] for index in range(len(data))]
+        names = list(clips[0])
+        ends = [len(clip[names[0]]) - WINDOW for clip in clips]
+        random = np.random.default_rng(1)
+        places = [
+            (int(c), int(random.integers(0, ends[c] + 1)))
+            for c in random.integers(0, len(clips), n_windows)
+            if ends[c] >= 0
+        ]
+        sizes: dict[str, int] = {}
+        readers: dict[str, Callable[[int, int], Any]] = {}
+        for number, clip in enumerate(clips):
+            for name in names:
+                np.save(folder / f"{fields[:4]}{number}{name}.npy", clip[name])
+            np.savez_compressed(folder / f"{fields[:4]}{number}.npz", **clip)
+        mapped = [
+            {n: np.load(folder / f"{fields[:4]}{number}{n}.npy", mmap_mode="r") for n in names}
+            for number in range(len(clips))
+        ]
+        readers["npy, memory-mapped"] = lambda c, a: {
+            n: np.array(mapped[c][n][a : a + WINDOW]) for n in names
+        }
+        sizes["npy, memory-mapped"] = sum(
+            p.stat().st_size for p in folder.glob(f"{fields[:4]}*.npy")
+        )
+
+        def from_npz(c: int, a: int) -> Any:
+            with np.load(folder / f"{fields[:4]}{c}.npz") as file:
+                return {n: file[n][a : a + WINDOW] for n in names}
+
+        readers["npz, compressed"] = from_npz
+        sizes["npz, compressed"] = sum(p.stat().st_size for p in folder.glob(f"{fields[:4]}*.npz"))
+        path = folder / f"{fields[:4]}.h5"
+        with h5py.File(path, "w") as file:
+            for number, clip in enumerate(clips):
+                for name in names:
+                    chunks = (min(WINDOW, len(clip[name])), *clip[name].shape[1:])
+                    file.create_dataset(
+                        f"{number}/{name}", data=clip[name], chunks=chunks, compression="gzip"
+                    )
+        opened = h5py.File(path)
+        readers["HDF5, gzip"] = lambda c, a: {n: opened[f"{c}/{n}"][a : a + WINDOW] for n in names}
+        sizes["HDF5, gzip"] = path.stat().st_size
+        root = zarr.open_group(folder / f"{fields[:4]}.zarr", mode="w")
+        for number, clip in enumerate(clips):
+            for name in names:
+                chunks = (min(WINDOW, len(clip[name])), *clip[name].shape[1:])
+                root.create_array(
+                    f"c{number}-{name}",
+                    shape=clip[name].shape,
+                    chunks=chunks,
+                    dtype=clip[name].dtype,
+                )[:] = clip[name]
+        arrays = [{n: root[f"c{number}-{n}"] for n in names} for number in range(len(clips))]
+        readers["Zarr"] = lambda c, a: {n: arrays[c][n][a : a + WINDOW] for n in names}
+        sizes["Zarr"] = sum(
+            p.stat().st_size for p in (folder / f"{fields[:4]}.zarr").rglob("*") if p.is_file()
+        )
+        for name, reader in readers.items():
+            get = lambda number: reader(*places[number])  # noqa: B023, E731
+            numbers = np.arange(len(places))[: 200 if "npz" in name else len(places)]
+            windows_a_second(get, numbers, 5)
+            say(
+                f"{name}, {fields}, warm, at random", windows_a_second(get, numbers, 5), sizes[name]
+            )
+        windows = mcz.dataset(source, fields, window=WINDOW, stride=1, dtype=dtype, cache="4 GB")
+        firsts = np.concatenate([[0], windows._ends])
+        numbers = np.array([firsts[c] + a for c, a in places])
+        size = sum(path.stat().st_size for path in source.glob("*.mcz"))
+        windows_a_second(windows.__getitem__, numbers, 60)
+        rate = windows_a_second(windows.__getitem__, numbers, 5)
+        say(f"mcz, {fields}, warm, at random, all cached", rate, size)
+        opened.close()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--copies", type=int, default=1)
+    parser.add_argument("--windows", type=int, default=5000)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        for part in ("one", "many", "arrays"):
+            (Path(name) / part).mkdir()
+        packed(given.folder, Path(name) / "one", 1)
+        of_arrays(Path(name) / "one", Path(name) / "arrays", given.windows)
+        for copy in range(given.copies):
+            data = (Path(name) / "one" / "0.mcz").read_bytes()
+            (Path(name) / "many" / f"{copy}.mcz").write_bytes(data)
+        of_mcz(Path(name) / "many", given.windows)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
