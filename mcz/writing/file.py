@@ -55,6 +55,8 @@ def write(
     small; MotionError also for a key of the metadata that SPEC.md does not register, unless it is
     private (``x-...``).
     """
+    if not isinstance(motion, Motion):
+        raise OptionError(f"a motion is written to a target, not {type(motion).__name__}")
     check_metadata(motion.metadata, motion.name)
     with limited(threads), replacing(target, force=force, inputs=params.values()) as stream:
         writer = Writer(stream, profile=profile_of(archive), copies=copies)

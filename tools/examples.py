@@ -1,0 +1,43 @@
+"""The Python of README and the manual as modules, and whether mypy --strict likes them.
+
+    python tools/examples.py
+
+The blocks of a page make one module, for they share their names.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+# Examples may leave a value unused, take what is not there for granted, and say no types.
+ALLOWED = ("no-untyped-def", "no-untyped-call", "type-arg")
+
+
+def module_of(page: Path) -> str:
+    """Lines where they stand in the page, those of other blocks and of prose empty."""
+    lines, inside = [], False
+    for line in page.read_text("utf-8").splitlines():
+        fence = line.startswith("```")
+        lines.append(line if inside and not fence else "")
+        inside = line == "```python" if fence else inside
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    with tempfile.TemporaryDirectory() as folder:
+        for page in PAGES:
+            (Path(folder) / f"{page.stem.replace('-', '_').lower()}_md.py").write_text(
+                module_of(page), "utf-8"
+            )
+        options = [f"--disable-error-code={code}" for code in ALLOWED]
+        command = [sys.executable, "-m", "mypy", "--strict", "--config-file", "pyproject.toml"]
+        return subprocess.run([*command, *options, folder], cwd=ROOT, check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())
