@@ -73,7 +73,7 @@ def say(what: str, rate: float, size: int = 0, more: str = "") -> None:
 
 
 def of_mcz(folder: Path, n_windows: int) -> None:
-    size = sum(path.stat().st_size for path in folder.glob("*.mcz"))
+    size = size_of(folder)
     for fields in (FIELDS, "channels"):
         arguments: dict[str, Any] = {"window": WINDOW, "stride": WINDOW, "dtype": "float32"}
         data = mcz.dataset(folder, fields, **arguments)
@@ -114,87 +114,99 @@ def of_mcz(folder: Path, n_windows: int) -> None:
             say(f"mcz, {fields}, cold, order(seed), {workers} workers", rate, size)
 
 
-def of_arrays(source: Path, folder: Path, n_windows: int) -> None:
-    """One copy of the clips as arrays, read at random, warm: the second time round."""
+Clips = list[dict[str, np.ndarray[Any, Any]]]
+Reader = Callable[[int, int], Any]  # of a clip, WINDOW frames from one on
+
+
+def as_npy(clips: Clips, folder: Path) -> Reader:
+    for number, clip in enumerate(clips):
+        for name, array in clip.items():
+            np.save(folder / f"{number}-{name}.npy", array)
+    mapped = [
+        {name: np.load(folder / f"{number}-{name}.npy", mmap_mode="r") for name in clip}
+        for number, clip in enumerate(clips)
+    ]
+    return lambda c, a: {name: np.array(array[a : a + WINDOW]) for name, array in mapped[c].items()}
+
+
+def as_npz(clips: Clips, folder: Path) -> Reader:
+    for number, clip in enumerate(clips):
+        np.savez_compressed(folder / f"{number}.npz", **clip)
+
+    def read(c: int, a: int) -> Any:
+        with np.load(folder / f"{c}.npz") as file:
+            return {name: file[name][a : a + WINDOW] for name in file}
+
+    return read
+
+
+def as_hdf5(clips: Clips, folder: Path) -> Reader:
     import h5py
+
+    with h5py.File(folder / "clips.h5", "w") as file:
+        for number, clip in enumerate(clips):
+            for name, array in clip.items():
+                chunks = (min(WINDOW, len(array)), *array.shape[1:])
+                file.create_dataset(
+                    f"{number}/{name}", data=array, chunks=chunks, compression="gzip"
+                )
+    opened = h5py.File(folder / "clips.h5")
+    return lambda c, a: {name: array[a : a + WINDOW] for name, array in opened[str(c)].items()}
+
+
+def as_zarr(clips: Clips, folder: Path) -> Reader:
     import zarr
 
+    root = zarr.open_group(folder / "clips.zarr", mode="w")
+    arrays: list[dict[str, Any]] = []
+    for number, clip in enumerate(clips):
+        arrays.append({})
+        for name, array in clip.items():
+            chunks = (min(WINDOW, len(array)), *array.shape[1:])
+            made = root.create_array(
+                f"{number}-{name}", shape=array.shape, chunks=chunks, dtype=array.dtype
+            )
+            made[:] = array
+            arrays[-1][name] = made
+    return lambda c, a: {name: array[a : a + WINDOW] for name, array in arrays[c].items()}
+
+
+PEERS = {"npy, memory-mapped": as_npy, "npz": as_npz, "HDF5, gzip": as_hdf5, "Zarr": as_zarr}
+
+
+def of_arrays(source: Path, folder: Path, n_windows: int) -> None:
+    """One copy of the clips as arrays, read at random, warm: the second time round."""
     for fields in ("channels", FIELDS):
         dtype = "float64" if fields == "channels" else "float32"
-        data = mcz.dataset(source, fields, dtype=dtype)
-        clips = [data[index] for index in range(len(data))]
-        names = list(clips[0])
-        ends = [len(clip[names[0]]) - WINDOW for clip in clips]
+        clips = list(mcz.dataset(source, fields, dtype=dtype))
+        starts = [len(next(iter(clip.values()))) - WINDOW + 1 for clip in clips]
         random = np.random.default_rng(1)
-        places = [
-            (int(c), int(random.integers(0, ends[c] + 1)))
-            for c in random.integers(0, len(clips), n_windows)
-            if ends[c] >= 0
-        ]
-        sizes: dict[str, int] = {}
-        readers: dict[str, Callable[[int, int], Any]] = {}
-        for number, clip in enumerate(clips):
-            for name in names:
-                np.save(folder / f"{fields[:4]}{number}{name}.npy", clip[name])
-            np.savez_compressed(folder / f"{fields[:4]}{number}.npz", **clip)
-        mapped = [
-            {n: np.load(folder / f"{fields[:4]}{number}{n}.npy", mmap_mode="r") for n in names}
-            for number in range(len(clips))
-        ]
-        readers["npy, memory-mapped"] = lambda c, a: {
-            n: np.array(mapped[c][n][a : a + WINDOW]) for n in names
-        }
-        sizes["npy, memory-mapped"] = sum(
-            p.stat().st_size for p in folder.glob(f"{fields[:4]}*.npy")
-        )
-
-        def from_npz(c: int, a: int) -> Any:
-            with np.load(folder / f"{fields[:4]}{c}.npz") as file:
-                return {n: file[n][a : a + WINDOW] for n in names}
-
-        readers["npz, compressed"] = from_npz
-        sizes["npz, compressed"] = sum(p.stat().st_size for p in folder.glob(f"{fields[:4]}*.npz"))
-        path = folder / f"{fields[:4]}.h5"
-        with h5py.File(path, "w") as file:
-            for number, clip in enumerate(clips):
-                for name in names:
-                    chunks = (min(WINDOW, len(clip[name])), *clip[name].shape[1:])
-                    file.create_dataset(
-                        f"{number}/{name}", data=clip[name], chunks=chunks, compression="gzip"
-                    )
-        opened = h5py.File(path)
-        readers["HDF5, gzip"] = lambda c, a: {n: opened[f"{c}/{n}"][a : a + WINDOW] for n in names}
-        sizes["HDF5, gzip"] = path.stat().st_size
-        root = zarr.open_group(folder / f"{fields[:4]}.zarr", mode="w")
-        for number, clip in enumerate(clips):
-            for name in names:
-                chunks = (min(WINDOW, len(clip[name])), *clip[name].shape[1:])
-                root.create_array(
-                    f"c{number}-{name}",
-                    shape=clip[name].shape,
-                    chunks=chunks,
-                    dtype=clip[name].dtype,
-                )[:] = clip[name]
-        arrays = [{n: root[f"c{number}-{n}"] for n in names} for number in range(len(clips))]
-        readers["Zarr"] = lambda c, a: {n: arrays[c][n][a : a + WINDOW] for n in names}
-        sizes["Zarr"] = sum(
-            p.stat().st_size for p in (folder / f"{fields[:4]}.zarr").rglob("*") if p.is_file()
-        )
-        for name, reader in readers.items():
-            get = lambda number: reader(*places[number])  # noqa: B023, E731
-            numbers = np.arange(len(places))[: 200 if "npz" in name else len(places)]
-            windows_a_second(get, numbers, 5)
-            say(
-                f"{name}, {fields}, warm, at random", windows_a_second(get, numbers, 5), sizes[name]
-            )
+        chosen = [int(c) for c in random.integers(0, len(clips), n_windows) if starts[c] > 0]
+        places = [(c, int(random.integers(0, starts[c]))) for c in chosen]
+        for number, (name, make) in enumerate(PEERS.items()):
+            own = folder / f"{fields[:4]}{number}"
+            own.mkdir()
+            read_from(name, fields, make(clips, own), places, size_of(own))
         windows = mcz.dataset(source, fields, window=WINDOW, stride=1, dtype=dtype, cache="4 GB")
-        firsts = np.concatenate([[0], windows._ends])
-        numbers = np.array([firsts[c] + a for c, a in places])
-        size = sum(path.stat().st_size for path in source.glob("*.mcz"))
-        windows_a_second(windows.__getitem__, numbers, 60)
-        rate = windows_a_second(windows.__getitem__, numbers, 5)
-        say(f"mcz, {fields}, warm, at random, all cached", rate, size)
-        opened.close()
+        firsts = np.cumsum([0, *(max(0, start) for start in starts)])
+
+        def read(c: int, a: int, data: mcz.Dataset = windows, at: Any = firsts) -> Any:
+            return data[int(at[c]) + a]
+
+        read_from("mcz, all cached", fields, read, places, size_of(source))
+
+
+def read_from(
+    name: str, fields: str, read: Reader, places: list[tuple[int, int]], size: int
+) -> None:
+    numbers = np.arange(200 if name == "npz" else len(places))  # npz inflates all for each
+    windows_a_second(lambda number: read(*places[number]), numbers)
+    rate = windows_a_second(lambda number: read(*places[number]), numbers, 5)
+    say(f"{name}, {fields}, warm, at random", rate, size)
+
+
+def size_of(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
 
 
 def main() -> None:
