@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from mcz.conversion import Fit, convert, from_positions
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack, unpack
+    from mcz.editing.exporting import export
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
     from mcz.editing.outcomes import Outcome, Report
     from mcz.editing.repair import Repair, repair
@@ -65,11 +66,16 @@ if TYPE_CHECKING:
     from mcz.retargeting.renaming import rename
     from mcz.retargeting.retargeting import retarget
     from mcz.retargeting.selection import select
+    from mcz.tables import to_pandas, to_xarray
     from mcz.writing.file import encode, write
+    from mcz.writing.npz import to_npz
 
 __version__ = "0.9.0"
 
 _HOMES = {
+    "mcz.editing.exporting": ("export",),
+    "mcz.tables": ("to_pandas", "to_xarray"),
+    "mcz.writing.npz": ("to_npz",),
     "mcz.datasets": ("Dataset", "Window", "dataset"),
     "mcz.editing.archive": ("append", "pack", "unpack"),
     "mcz.editing.outcomes": ("Outcome", "Report"),
@@ -182,6 +188,7 @@ __all__ = [
     "convert",
     "dataset",
     "encode",
+    "export",
     "extract",
     "from_positions",
     "in_positions",
@@ -207,6 +214,9 @@ __all__ = [
     "select",
     "stream_decode",
     "stream_encode",
+    "to_npz",
+    "to_pandas",
+    "to_xarray",
     "unpack",
     "velocities",
     "verify",

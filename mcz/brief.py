@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
@@ -9,6 +10,7 @@ from typing import Any
 
 WIDEST = 60  # characters of a name
 MOST_LISTED = 40  # names in a message
+ODD = re.compile(r"[^ -~]")  # what is looked at more closely; all else is plain
 NEAR = 0.6  # of 1, how alike a suggested name is
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, WIDEST, 160
@@ -22,6 +24,23 @@ def shown(name: str) -> str:
     ("'walk'", 60)
     """
     return _SHORT.repr_str(str(name), 1)
+
+
+def printable(text: str, kept: str = "") -> str:
+    r"""``text`` with characters escaped that are not seen, such as controls, but for ``kept``.
+
+    These are control characters (C0, C1), those that turn the direction of text, line ends of all
+    sorts and blanks but the usual one.
+
+    >>> print(printable("a\x1b[2Jb"), printable("a\u202eb"), printable("V\xe4sa"))
+    a\x1b[2Jb a\u202eb Väsa
+    """
+
+    def escaped(match: re.Match[str]) -> str:
+        letter = match[0]
+        return letter if letter.isprintable() or letter in kept else ascii(letter)[1:-1]
+
+    return ODD.sub(escaped, text)
 
 
 def counted(number: int, word: str) -> str:

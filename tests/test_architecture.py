@@ -50,21 +50,22 @@ ALLOWED = {
     "container": MODEL | {"annexes"},
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},
-    "reading": JOINT | {"poses", "queries"},
+    "tables": MODEL | {"kinematics", "poses"},
+    "reading": JOINT | {"poses", "queries", "tables"},
     "datasets": JOINT | {"poses", "reading"},
-    "writing": JOINT | {"metrics", "reading"},
+    "writing": JOINT | {"metrics", "reading", "tables"},
     "conversion": MODEL | {"kinematics", "formats", "reading"},
     "retargeting": MODEL | {"kinematics"},
-    "editing": JOINT | {"metrics", "reading", "writing"},
+    "editing": JOINT | {"metrics", "reading", "writing", "conversion", "tables"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
-    | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "training"}
+    | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
     | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
     "": MODEL
-    | {"kinematics", "metrics", "poses", "datasets", "retargeting"}
+    | {"kinematics", "metrics", "poses", "datasets", "retargeting", "tables"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -341,7 +342,7 @@ def _converted(
 
 
 def _export(clip: Clip, target: str, part: Part, wanted: _Wanted) -> Output:
-    from mcz.cli.export import EXPORTS, channel_names, channel_units
+    from mcz.tables.files import EXPORTS, channel_names, channel_units
 
     joints = wanted.joints
     chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]
@@ -355,7 +356,10 @@ def _export(clip: Clip, target: str, part: Part, wanted: _Wanted) -> Output:
     if chosen is not None and channels is None:  # else the table says why there are no joints
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
-    return target, f"{_stem(clip)}.{target}", EXPORTS[target](part.table(chosen, names))
+    table = part.table(chosen, names)
+    if target == "npz" and chosen is None and channels is None and not wanted.preview:
+        table = replace(table, motion=part.motion())
+    return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
 
 
 def _stem(clip: Clip | Motion) -> str:

@@ -1,95 +1,71 @@
-"""CSV and NPZ: the two exports of ``mcz decode --to``; docs/scripts.md describes them."""
+"""``mcz export``: every clip of an .mcz file in another format."""
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+import click
 
-from mcz.cli.terminal import printable
-from mcz.motion import Channel, Skeleton
+from mcz.cli.common import Exit, about, existing, to_rate
+from mcz.cli.options import (
+    UNITS,
+    clips_option,
+    decoded_option,
+    force_option,
+    json_option,
+    threads_option,
+    where_option,
+)
+from mcz.cli.outcomes import conclude
+from mcz.cli.progress import Progress
+from mcz.cli.suffixes import TARGETS
 
 
-@dataclass(frozen=True, slots=True)
-class Table:
-    """Some channels of some frames.
+@click.command(short_help="Every clip as another format: NPZ, CSV, BVH, AMC, C3D.")
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.argument("folder", metavar="DIR", type=click.Path(readable=False))
+@click.option("--to", "target", type=click.Choice(TARGETS), required=True, help="The format.")
+@clips_option
+@where_option
+@click.option(
+    "--rate", metavar="R", callback=to_rate, help="Frames a second of clips that do not say it."
+)
+@click.option("--unit", type=click.Choice(UNITS), help="Length unit of clips that say none.")
+@decoded_option
+@force_option
+@threads_option
+@json_option
+def command(
+    file: str,
+    folder: str,
+    target: str,
+    clips: tuple[str, ...],
+    where: str | None,
+    rate: Fraction | None,
+    unit: str | None,
+    max_decoded: int | None,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    """Write every clip of FILE.mcz below DIR under its name, as numbers or as another format.
 
-    ``values`` is float64 (n_frames, n_channels) in source units; ``mask`` (bool, same shape) is
-    True where a value is valid; ``frame_numbers`` (int64) are the source's own.
+    What a format cannot hold fails with the reason, and the other clips are written all the same.
+    With an AMC comes its ASF. mcz unpack gives the original files.
     """
+    import mcz
 
-    names: list[str]
-    values: NDArray[np.float64]
-    mask: NDArray[np.bool_]
-    frame_numbers: NDArray[np.int64]
-    frame_rate: Fraction | None
-    units: Sequence[str] = ()  # of the columns, "" where unknown; none: those of the skeleton
-
-
-def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> list[str]:
-    """``joint.channel`` of every column; ``joint#n`` where a joint's name repeats.
-
-    Of a signal with ``own`` channels their names, or ``channel-n`` where one has none.
-    """
-    if own is not None:
-        return [channel.label or f"channel-{n}" for n, channel in enumerate(own)]
-    return [
-        f"{address}.{channel.label}"
-        for address, joint in zip(skeleton.addresses(), skeleton.joints, strict=True)
-        for channel in joint.channels
-    ]
-
-
-def channel_units(skeleton: Skeleton, own: Sequence[Channel] | None) -> list[str]:
-    """The unit of every column, "" where the channel does not say it."""
-    return [channel.unit for channel in (skeleton.channels if own is None else own)]
-
-
-def to_csv(table: Table) -> bytes:
-    """UTF-8 text: a header row, then a row a frame; an invalid value is an empty cell.
-
-    Units follow the names, in brackets. What would steer a terminal is escaped in both, as text it
-    is often printed on one. Values are the shortest decimals that read back as the same binary64.
-    """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    units = table.units or [""] * len(table.names)
-    heads = [f"{n} [{u}]" if u else n for n, u in zip(table.names, units, strict=True)]
-    writer.writerow(["frame", *map(printable, heads)])
-    rows = zip(
-        table.frame_numbers.tolist(), table.values.tolist(), table.mask.tolist(), strict=True
-    )
-    for number, values, valid in rows:
-        cells = [repr(v) if ok else "" for v, ok in zip(values, valid, strict=True)]
-        writer.writerow([number, *cells])
-    return text.getvalue().encode("utf-8", "surrogateescape")
-
-
-def to_npz(table: Table) -> bytes:
-    """A NumPy archive of values, mask, frame_numbers, frame_rate, names and, where they are known,
-    units; without pickles."""
-    rate = table.frame_rate
-    more: dict[str, Any] = {"units": np.array(table.units, np.str_)} if table.units else {}
-    buffer = io.BytesIO()
-    np.savez_compressed(
-        buffer,
-        values=table.values,
-        mask=table.mask,
-        frame_numbers=table.frame_numbers,
-        frame_rate=np.float64(np.nan if rate is None else float(rate)),
-        frame_rate_fraction=np.array(
-            [0, 1] if rate is None else [rate.numerator, rate.denominator], np.int64
-        ),
-        names=np.array(table.names, dtype=np.str_),
-        **more,
-    )
-    return buffer.getvalue()
-
-
-EXPORTS: dict[str, Callable[[Table], bytes]] = {"csv": to_csv, "npz": to_npz}
+    existing(file)
+    with about(file), Progress() as progress:
+        report = mcz.export(
+            file,
+            folder,
+            target,
+            clips=clips or None,
+            where=where,
+            rate=rate,
+            unit=unit,
+            force=force,
+            max_decoded=max_decoded,
+            progress=progress,
+        )
+    return conclude(report, folder, as_json)

@@ -20,6 +20,7 @@ COMMANDS = (
     "pack",
     "append",
     "unpack",
+    "export",
     "list",
     "extract",
     "replace",

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from mcz.cli.export import Table
     from mcz.motion import Motion
     from mcz.reading.clip import Clip
+    from mcz.tables.files import Table
 
 Masked = tuple[NDArray[Any], NDArray[np.bool_] | None]
 
@@ -58,8 +58,8 @@ class Part:
         names: list[str],
         units: Sequence[str] = (),
     ) -> Table:
-        from mcz.cli.export import Table
         from mcz.reading.decimation import decimated_rows
+        from mcz.tables.files import Table
 
         clip = self.clip
         mask = np.ones(values.shape, np.bool_) if mask is None else mask
@@ -108,7 +108,7 @@ class Preview(Part):
         return preview_motion(self.clip)
 
     def table(self, joints: Sequence[int | str] | None, names: list[str]) -> Table:
-        from mcz.cli.export import Table
+        from mcz.tables.files import Table
 
         found = self.clip.previewed(joints)
         numbers, rate = self.clip.frame_numbers[found.frames], self.clip.frame_rate

@@ -125,7 +125,7 @@ def command(
 
 def read_values(path: str, clip: Clip, joint: str) -> Any:
     """The columns of the joint in a table, NaN where it says invalid; raises Failure."""
-    from mcz.cli.export import channel_names
+    from mcz.tables.files import channel_names
 
     is_npz = Path(path).suffix.lower() == ".npz"
     all_names = channel_names(clip.skeleton, clip.signals[0].channels)

@@ -161,7 +161,7 @@ def _csv(cells: list[str]) -> bytes:
 
 
 def _print_all(reader: LiveReader, printer: _Text | _Binary) -> None:
-    from mcz.cli.export import channel_names
+    from mcz.tables.files import channel_names
 
     output = binary_output() if isinstance(printer, _Binary) else text_output()
     clip: LiveClip | None = None

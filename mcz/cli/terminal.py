@@ -14,27 +14,11 @@ from typing import Any, BinaryIO
 
 import click
 
+from mcz.brief import ODD
+from mcz.brief import printable as printable
 from mcz.errors import AccessError, OptionError
 
-ODD = re.compile(r"[^ -~]")  # what is looked at more closely; all else is plain
 ENCODING, KEPT = "utf-8", "surrogateescape"  # of text that is printed as bytes
-
-
-def printable(text: str, kept: str = "") -> str:
-    r"""``text`` with characters escaped that are not seen, such as controls, but for ``kept``.
-
-    These are control characters (C0, C1), those that turn the direction of text, line ends of all
-    sorts and blanks but the usual one.
-
-    >>> print(printable("a\x1b[2Jb"), printable("a\u202eb"), printable("V\xe4sa"))
-    a\x1b[2Jb a\u202eb Väsa
-    """
-
-    def escaped(match: re.Match[str]) -> str:
-        letter = match[0]
-        return letter if letter.isprintable() or letter in kept else ascii(letter)[1:-1]
-
-    return ODD.sub(escaped, text)
 
 
 def echo(*lines: str) -> None:

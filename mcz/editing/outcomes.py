@@ -13,8 +13,9 @@ class Outcome:
     """What became of one file, and why where that is not plain.
 
     ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
-    "present" (the target has it already), "restored", "skipped", "exists" (it may not be replaced)
-    or "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage "damaged".
+    "present" (the target has it already), "restored", "written", "skipped", "exists" (it may not be
+    replaced) or "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage
+    "damaged".
     ``notes`` are what was noticed about one that was taken: its reader's, and whose skeleton it
     got.
     """

@@ -31,6 +31,7 @@ class FramePoses:
             np.zeros(3) if tail < 0 else self.chain.links[joint].tails[tail]
             for joint, tail in self._points
         ]
+        self._tails = np.array(tails).reshape(len(tails), 3)
         self._tables: tuple[Joints, Points] | None = None
         if not is_elaborate(self.chain):
             self._tables = tables_of(self.chain, [joint for joint, _ in self._points], tails)
@@ -47,6 +48,15 @@ class FramePoses:
     def joints_of(self, points: Sequence[int]) -> list[int]:
         """The joints that the points are fastened to."""
         return [self._points[point][0] for point in points]
+
+    def tails(self) -> Floats:
+        """From each point's joint to it in the rest pose, in the world's axes, (n_points, 3)."""
+        tails = self._tails.copy()
+        for point, (joint, _) in enumerate(self._points):
+            own = self.chain.turned[joint]
+            if own is not None:
+                tails[point] = own @ tails[point]
+        return tails
 
     def positions(self, values: Floats, points: Sequence[int]) -> Floats:
         """Where the points are, (n_frames, n_points, 3) in length units."""

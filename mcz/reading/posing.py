@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 
 from mcz.kinematics.contacts import RULE, ContactRule, Contacts
 from mcz.kinematics.contacts import contacts as contacts_of
+from mcz.motion import Motion
 from mcz.poses import places, turns
 from mcz.poses.moving import Decoded, Frames
 from mcz.skeleton import Joints, joint_list
+from mcz.tables.frames import to_pandas
+from mcz.tables.labelled import to_xarray
 
 
 class Posed:
@@ -20,6 +23,10 @@ class Posed:
     @property
     def _clip(self) -> Decoded:
         return cast(Decoded, self)
+
+    @property
+    def _whole(self) -> Motion:
+        return cast(Motion, cast(Any, self).motion())
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -98,7 +105,24 @@ class Posed:
         """How velocities change, (n_frames, n_points, 3): see ``mcz.accelerations``."""
         return places.accelerations(self._clip, joints, frames, unit=unit, dtype=dtype)
 
+    def to_xarray(
+        self, *, form: str = "quat", unit: str | None = None, dtype: Any = np.float64
+    ) -> Any:
+        """The whole clip as an ``xarray.Dataset``: see ``mcz.to_xarray``."""
+        return to_xarray(self._whole, form=form, unit=unit, dtype=dtype)
+
+    def to_pandas(
+        self,
+        what: str = "positions",
+        *,
+        joints: Joints = None,
+        unit: str | None = None,
+        flat: bool = False,
+    ) -> Any:
+        """A table of the whole clip as a ``pandas.DataFrame``: see ``mcz.to_pandas``."""
+        return to_pandas(self._whole, what, joints=joints, unit=unit, flat=flat)
+
     def contacts(self, joints: Joints = None, rule: ContactRule = RULE) -> Contacts:
         """In which frames feet stand, of the whole clip: see ``mcz.contacts``."""
         feet = None if joints is None else joint_list(joints)
-        return contacts_of(cast(Any, self).motion(), feet, rule)
+        return contacts_of(self._whole, feet, rule)

@@ -1,0 +1,97 @@
+"""``export``: every clip of a file in another format, a file a clip."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from fractions import Fraction
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from mcz.conversion import TARGETS, converted_files
+from mcz.editing.archive import safe_path
+from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.safe_names import Folder
+from mcz.errors import ExistsError, FormatError, MczError, OptionError
+from mcz.motion import Motion
+from mcz.reading.clip import Clip
+from mcz.reading.fields import Where
+from mcz.reading.file import open
+from mcz.reading.source_files import with_facts
+from mcz.tables.files import EXPORTS, table_of
+from mcz.writing.atomic import replacing
+
+Progress = Callable[[int, int, str], None]
+FORMS = (*EXPORTS, *TARGETS)
+
+
+def export(
+    target: Any,
+    directory: str | os.PathLike[str],
+    to: str,
+    *,
+    clips: Sequence[str] | None = None,
+    where: Where | None = None,
+    rate: Fraction | float | None = None,
+    unit: str | None = None,
+    force: bool = False,
+    max_decoded: int | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Report:
+    """Write every clip of an MCZ file below ``directory`` as "npz", "csv", "bvh", "amc" or "c3d".
+
+    A clip "day1/walk" becomes "day1/walk.npz"; with an AMC comes its ASF. ``clips`` and ``where``:
+    of these alone, as in ``unpack``. ``rate`` and ``unit`` are those of clips that do not say them.
+    A clip that the format cannot hold, or whose file is there and not ``force``, is reported as
+    failed and the others are written. Files appear when they are whole; no link below ``directory``
+    is followed. Raises OptionError and what ``mcz.open`` raises.
+    """
+    if to not in FORMS:
+        raise OptionError(f"to {to!r}: one of {', '.join(FORMS)}")
+    folder, report, written = Folder(Path(directory)), Report(), set[str]()
+    with open(target, max_decoded=max_decoded, threads=threads) as file:
+        chosen = file.chosen(clips, where)
+        for done, clip in enumerate(chosen):
+            try:
+                for name, data in _files(clip, to, rate, unit):
+                    if name in written:
+                        raise FormatError(f"another clip becomes {name}, too")
+                    path = folder.place(str(safe_path(name)), force=force)
+                    with replacing(path, force=force, inputs=(target,)) as stream:
+                        stream.write(data)
+                    written.add(name)
+                    folder.note(name, path)
+                    report.outcomes.append(Outcome(name, "written", len(data)))
+            except (MczError, OSError) as error:
+                result = "exists" if isinstance(error, ExistsError) else "failed"
+                report.outcomes.append(Outcome(clip.name, result, 0, f"{clip.name}: {error}"))
+            if progress is not None:
+                progress(done + 1, len(chosen), clip.name)
+    return report
+
+
+def _files(
+    clip: Clip, to: str, rate: Fraction | float | None, unit: str | None
+) -> Iterator[tuple[str, bytes]]:
+    """The files that a clip becomes, by name: an ASF before the AMC that needs it."""
+    motion = _told(clip, rate, unit)
+    if to in EXPORTS:
+        yield _named(clip, to), EXPORTS[to](table_of(motion))
+        return
+    files = converted_files(motion, to, None, True)
+    for suffix in sorted(files, reverse=True):
+        yield _named(clip, suffix), files[suffix]
+
+
+def _told(clip: Clip, rate: Fraction | float | None, unit: str | None) -> Motion:
+    """The motion of a clip, with what it does not say itself."""
+    motion = clip.motion()
+    wanted = rate if motion.frame_rate is None else None
+    return with_facts(motion, wanted, unit if motion.skeleton.unit_cm is None else None)
+
+
+def _named(clip: Clip, suffix: str) -> str:
+    """The clip's name with the suffix, that of its source file left out."""
+    path = PurePosixPath(clip.name)
+    return clip.name if path.suffix == f".{suffix}" else f"{clip.name}.{suffix}"

@@ -1,0 +1,116 @@
+"""Tables of numbers as files, CSV and NPZ; docs/tables.md describes them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.brief import printable
+from mcz.motion import Channel, Motion, Skeleton
+from mcz.tables.arrays import pose_arrays
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Some channels of some frames.
+
+    ``values`` is float64 (n_frames, n_channels) in source units; ``mask`` (bool, same shape) is
+    True where a value is valid; ``frame_numbers`` (int64) are the source's own.
+    """
+
+    names: list[str]
+    values: NDArray[np.float64]
+    mask: NDArray[np.bool_]
+    frame_numbers: NDArray[np.int64]
+    frame_rate: Fraction | None
+    units: Sequence[str] = ()  # of the columns, "" where unknown; none: those of the skeleton
+    motion: Motion | None = None  # whose channels these are, all of them
+
+
+def table_of(motion: Motion) -> Table:
+    """The channels of the motion signal, with all that an NPZ says of its poses beside."""
+    signal = motion.signals[0]
+    mask = np.ones(signal.values.shape, np.bool_) if signal.mask is None else signal.mask
+    numbers = motion.frame_numbers
+    if numbers is None:
+        numbers = np.arange(1, motion.n_frames + 1)
+    return Table(
+        channel_names(motion.skeleton, signal.channels),
+        np.asarray(signal.values, np.float64),
+        mask,
+        np.repeat(numbers, signal.samples_per_frame),
+        motion.frame_rate,
+        motion=motion,
+    )
+
+
+def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> list[str]:
+    """``joint.channel`` of every column; ``joint#n`` where a joint's name repeats.
+
+    Of a signal with ``own`` channels their names, or ``channel-n`` where one has none.
+    """
+    if own is not None:
+        return [channel.label or f"channel-{n}" for n, channel in enumerate(own)]
+    return [
+        f"{address}.{channel.label}"
+        for address, joint in zip(skeleton.addresses(), skeleton.joints, strict=True)
+        for channel in joint.channels
+    ]
+
+
+def channel_units(skeleton: Skeleton, own: Sequence[Channel] | None) -> list[str]:
+    """The unit of every column, "" where the channel does not say it."""
+    return [channel.unit for channel in (skeleton.channels if own is None else own)]
+
+
+def to_csv(table: Table) -> bytes:
+    """UTF-8 text: a header row, then a row a frame; an invalid value is an empty cell.
+
+    Units follow the names, in brackets. What would steer a terminal is escaped in both, as text it
+    is often printed on one. Values are the shortest decimals that read back as the same binary64.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    units = table.units or [""] * len(table.names)
+    heads = [f"{n} [{u}]" if u else n for n, u in zip(table.names, units, strict=True)]
+    writer.writerow(["frame", *map(printable, heads)])
+    rows = zip(
+        table.frame_numbers.tolist(), table.values.tolist(), table.mask.tolist(), strict=True
+    )
+    for number, values, valid in rows:
+        cells = [repr(v) if ok else "" for v, ok in zip(values, valid, strict=True)]
+        writer.writerow([number, *cells])
+    return text.getvalue().encode("utf-8", "surrogateescape")
+
+
+def to_npz(table: Table) -> bytes:
+    """A NumPy archive of values, mask, frame_numbers, frame_rate, names and, where they are known,
+    units; of a whole motion with its skeleton and poses (``pose_arrays``), too. No pickles."""
+    rate = table.frame_rate
+    more: dict[str, Any] = {"units": np.array(table.units, np.str_)} if table.units else {}
+    if table.motion is not None:
+        more |= pose_arrays(table.motion)
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        values=table.values,
+        mask=table.mask,
+        frame_numbers=table.frame_numbers,
+        frame_rate=np.float64(np.nan if rate is None else float(rate)),
+        frame_rate_fraction=np.array(
+            [0, 1] if rate is None else [rate.numerator, rate.denominator], np.int64
+        ),
+        names=np.array(table.names, dtype=np.str_),
+        **more,
+    )
+    return buffer.getvalue()
+
+
+EXPORTS: dict[str, Callable[[Table], bytes]] = {"csv": to_csv, "npz": to_npz}

@@ -1,0 +1,111 @@
+"""``to_xarray``: a motion as an ``xarray.Dataset``, every axis with its names and units."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mcz.errors import MotionError, OptionError
+from mcz.motion import Motion, Signal
+from mcz.poses import point_names, positions, rotations
+from mcz.tables.files import channel_names, channel_units
+
+COMPONENTS = {
+    "quat": ("rotation", ["w", "x", "y", "z"]),
+    "rotvec": ("rotation", ["x", "y", "z"]),
+    "6d": ("rotation", ["xx", "yx", "zx", "xy", "yy", "zy"]),
+    "euler": ("rotation", ["X", "Y", "Z"]),
+}
+
+
+def imported(name: str, extra: str) -> Any:
+    """The module of an extra; raises OptionError where it is not installed."""
+    from importlib import import_module
+
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise OptionError(f"{name} is not installed (pip install 'mcz[{extra}]')") from error
+
+
+def to_xarray(
+    motion: Motion, *, form: str = "quat", unit: str | None = None, dtype: Any = np.float64
+) -> Any:
+    """A motion as an ``xarray.Dataset``; needs xarray (``mcz[xarray]``).
+
+    ``positions`` (time, point, axis) in length units or ``unit``; ``rotations`` (time, joint,
+    rotation), local, as ``form``: quat, rotvec, 6d or euler (XYZ); ``channels`` (time, channel),
+    the numbers of the file. Each other signal stands under its name (time_NAME, channel_NAME).
+    ``time`` is in seconds from the first frame, in frames while the rate is unknown; ``frame`` has
+    the source's frame numbers. Facts are in ``attrs``; what is invalid is NaN. Without kinematics
+    there are channels alone. Raises OptionError.
+    """
+    if form not in COMPONENTS:
+        raise OptionError(f"rotations as {form!r}: one of {', '.join(COMPONENTS)}")
+    xarray = imported("xarray", "xarray")
+    skeleton, main = motion.skeleton, motion.signals[0]
+    numbers = motion.frame_numbers
+    variables: dict[str, Any] = {
+        "channels": (("time", "channel"), np.asarray(main.masked(), dtype), {}),
+    }
+    coordinates: dict[str, Any] = {
+        "time": ("time", *_times(motion, main)),
+        "frame": ("time", _frames(motion) if numbers is None else numbers),
+        "channel": channel_names(skeleton, main.channels),
+    }
+    try:
+        lengths = {"units": unit or _unit(skeleton.unit_cm), "long_name": "positions in the world"}
+        places = positions(motion, unit=unit, dtype=dtype)
+        variables["positions"] = (("time", "point", "axis"), places, lengths)
+        coordinates |= {"point": list(point_names(skeleton)), "axis": ["x", "y", "z"]}
+        axis, names = COMPONENTS[form]
+        turns = rotations(motion, form, dtype=dtype)
+        about = {"form": form, "space": "local", "convention": "active, identity in the rest pose"}
+        variables["rotations"] = (("time", "joint", axis), turns, about)
+        coordinates |= {"joint": list(skeleton.joint_names), axis: names}
+        coordinates["parent"] = ("joint", skeleton.parents)
+    except MotionError:
+        variables.pop("positions", None)
+    for signal in motion.signals[1:]:
+        _add_signal(motion, signal, variables, coordinates)
+    return xarray.Dataset(variables, coordinates, _facts(motion))
+
+
+def _add_signal(
+    motion: Motion, signal: Signal, variables: dict[str, Any], coordinates: dict[str, Any]
+) -> None:
+    name, axis, channel = signal.name, f"time_{signal.name}", f"channel_{signal.name}"
+    variables[name] = ((axis, channel), signal.masked(), {})
+    coordinates[axis] = (axis, *_times(motion, signal))
+    coordinates[channel] = channel_names(motion.skeleton, signal.channels)
+    coordinates[f"unit_{name}"] = (channel, channel_units(motion.skeleton, signal.channels))
+
+
+def _times(motion: Motion, signal: Signal) -> tuple[Any, dict[str, str]]:
+    """When each row was, from the first frame on, and in which unit."""
+    rows = np.arange(signal.n_rows) / signal.samples_per_frame
+    if motion.frame_rate is None:
+        return rows, {"units": "frames"}
+    return rows / float(motion.frame_rate), {"units": "s"}
+
+
+def _frames(motion: Motion) -> Any:
+    return np.arange(1, motion.n_frames + 1)
+
+
+def _unit(unit_cm: float | None) -> str:
+    return "unknown" if unit_cm is None else f"{unit_cm:.17g} cm"
+
+
+def _facts(motion: Motion) -> dict[str, Any]:
+    """Texts and numbers alone, which every store of xarray keeps."""
+    skeleton, rate = motion.skeleton, motion.frame_rate
+    facts: dict[str, Any] = {"name": motion.name, "up_axis": skeleton.up_axis or "unknown"}
+    if rate is not None:
+        facts |= {"frame_rate": float(rate), "frame_rate_exact": str(rate)}
+    if skeleton.unit_cm is not None:
+        facts["unit_cm"] = skeleton.unit_cm
+    if motion.source is not None and motion.source.path:
+        facts["source"] = motion.source.path
+    return facts | {f"metadata_{key}": value for key, value in motion.metadata.items()}
