@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,14 @@ def _check_sizes(motion: Motion) -> None:
         )
 
 
-def from_positions(motion: Motion, base: Skeleton) -> tuple[Motion, Fit]:
+class Solved(NamedTuple):
+    """A motion that was fitted to positions, and how well it fits."""
+
+    motion: Motion
+    fit: Fit
+
+
+def from_positions(motion: Motion, base: Skeleton) -> Solved:
     """Markers as a motion of the skeleton ``base``, whose points they are, and how well they fit.
 
     The markers are the points of ``base`` in order, with its virtual markers after them or
@@ -116,7 +124,7 @@ def from_positions(motion: Motion, base: Skeleton) -> tuple[Motion, Fit]:
         metadata=without_note(motion),
         source=None,
     )
-    return solved, _fit(base, values, seen, virtual, first.samples_per_frame)
+    return Solved(solved, _fit(base, values, seen, virtual, first.samples_per_frame))
 
 
 def _fit(

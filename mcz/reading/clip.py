@@ -32,7 +32,7 @@ from mcz.reading.recording import index_of, read_recording, scaling_of
 from mcz.reading.signal_info import SignalInfo, groups_of, read_signal
 from mcz.reading.signal_reader import SignalReader
 from mcz.reading.source_info import SourceInfo, of_no_file, read_source, sourced_skeleton
-from mcz.reading.views import ClipValues
+from mcz.reading.views import ClipValues, FrameValues, Masked
 from mcz.schema import parse
 from mcz.skeleton import Joints, joint_list
 
@@ -200,7 +200,7 @@ class Clip(Posed):
         resolution: int = 0,
         *,
         signal: int | str = 0,
-    ) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+    ) -> Masked:
         """The numbers as they are stored, those beneath the mask and analog words too; the mask."""
         info = self._info(self.find_signal(signal))
         start, stop = self.checked_range(frames)
@@ -213,7 +213,7 @@ class Clip(Posed):
             mask = mask[:, columns] if mask is not None else None
         if (start, stop) == (0, self.n_frames) and joints is None and resolution == 0:
             self._check_whole(info, values, mask)
-        return values, mask
+        return Masked(values, mask)
 
     def _check_whole(
         self, info: SignalInfo, values: NDArray[Any], mask: NDArray[np.bool_] | None
@@ -362,7 +362,7 @@ class Clip(Posed):
             return source
         return of_no_file(source)
 
-    def preview(self, joints: Joints = None) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    def preview(self, joints: Joints = None) -> FrameValues:
         """What can be read without decoding the rest: frames, counted from 0, and their values.
 
         The values, of shape (frames, channels of the joints), are those that ``read`` gives for
@@ -370,7 +370,7 @@ class Clip(Posed):
         they are its coarsest resolution. Raises OptionError where there is no such thing.
         """
         found = self.previewed(joints)
-        return found.frames, found.masked()
+        return FrameValues(found.frames, found.masked())
 
     def previewed(self, joints: Joints = None) -> Preview:
         """``preview`` with the mask apart, and how far its frames lie from each other."""

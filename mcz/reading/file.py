@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 from mcz.brief import counted, shown
 from mcz.container import payloads
@@ -34,6 +34,20 @@ from mcz.reading.names import clip_called, clips_meant, listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
 from mcz.threads import checked
+
+
+class StoredSkeleton(NamedTuple):
+    """A skeleton of a file, and its id, by which clips name it."""
+
+    id: bytes
+    skeleton: Skeleton
+
+
+class AliasTarget(NamedTuple):
+    """What an alias is another name of: "clip", "skeleton" or "attachment", and which."""
+
+    kind: str
+    name: str
 
 
 class Attachment:
@@ -128,16 +142,16 @@ class File:
         """Further names of a clip, skeleton or attachment: name -> (of, target)."""
         return self.container.directory.aliases
 
-    def alias_of(self, name: str) -> tuple[str, str]:
+    def alias_of(self, name: str) -> AliasTarget:
         """What ``name`` is another name of: "clip", "skeleton" or "attachment", and which.
 
         That is its name, of a skeleton its id in hex, for its own file is what the name restores.
         """
         of, target = self.aliases[name]
         if of == payloads.OF_SKELETON:
-            return "skeleton", target.hex()
+            return AliasTarget("skeleton", target.hex())
         kind = "clip" if of == payloads.OF_CLIP else "attachment"
-        return kind, target.decode("utf-8", "replace")
+        return AliasTarget(kind, target.decode("utf-8", "replace"))
 
     @property
     def damage(self) -> list[str]:
@@ -160,10 +174,10 @@ class File:
         }
 
     @cached_property
-    def skeletons(self) -> list[tuple[bytes, Skeleton]]:
+    def skeletons(self) -> list[StoredSkeleton]:
         """The skeletons with their ids, in file order."""
         ids = [id_ for kind, id_ in self.container.directory.shared if kind == b"SKEL"]
-        return [(id_, self.skeleton(id_)) for id_ in ids]
+        return [StoredSkeleton(id_, self.skeleton(id_)) for id_ in ids]
 
     def skeleton(self, id_: bytes, *, with_source: bool = False) -> Skeleton:
         """The skeleton with this id; ``with_source`` also reads the template of its own file."""

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+
+class Masked(NamedTuple):
+    """Numbers as they are stored, and which of them are valid (bool, same shape; None: all)."""
+
+    values: NDArray[Any]
+    mask: NDArray[np.bool_] | None
+
+
+class FrameValues(NamedTuple):
+    """Some frames, ascending and counted from 0, (n,), and a row of values for each."""
+
+    frames: NDArray[np.int64]
+    values: NDArray[Any]
 
 
 class Readable(Protocol):
