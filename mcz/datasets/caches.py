@@ -8,6 +8,7 @@ import zlib
 from collections import OrderedDict
 from collections.abc import Mapping
 from contextlib import suppress
+from decimal import Decimal
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -31,8 +32,8 @@ def to_size(text: int | str) -> int:
     words = str(text).strip()
     number = words.rstrip("ABDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz ")
     unit = words[len(number) :].strip().upper()
-    with suppress(ValueError, OverflowError):
-        size = float(number) * UNITS.get(unit, np.nan)
+    with suppress(ArithmeticError, KeyError):
+        size = Decimal(number) * UNITS[unit]
         if 0 <= size < 2**62:
             return int(size)
     raise OptionError(f"a cache of {text!r}: bytes, or a text such as '64 MB'")

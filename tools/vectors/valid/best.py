@@ -125,6 +125,11 @@ def _methods(shelf: Streams) -> None:
     motion = panel([[0.5] * 9, wave(9), [0.25] * 9, wave(9)], (HUNDREDTHS,) * 4, (4,))
     heads = [Constant(), Coded(), Constant(), Copy(0, 1)]
     shelf.code("constants-between", "Constants and copies have no links.", motion, heads)
+    columns = [[0.5] * 120, wave(120, 1), wave(120, 1), wave(120, 2), wave(120, 3)]
+    motion = panel(columns, (HUNDREDTHS,) * 5, (5,))
+    heads = [Constant(), Coded(), Copy(0, 1), Coded(), Coded()]
+    purpose = "Coded channels are counted without constants and copies: when weights are solved."
+    shelf.code("constants-before", purpose, motion, heads)
     purpose = "Constants alone, in a stream of codec 1."
     shelf.code("constants", purpose, panel([[0.5] * 4], (HUNDREDTHS,)), [Constant()])
 
@@ -193,6 +198,11 @@ def _classes(shelf: Streams) -> None:
     single = [float(np.float32(v)) for v in tiny if abs(v) < 1e38]
     purpose = "The same on a grid of 24 binary digits."
     shelf.code("class-small-binary32", purpose, column(single * 3, SINGLE), [Coded(scale=90)])
+    for name, grid, drop in (("32", SINGLE, 5), ("64", Grid(GridKind.BINARY64), 40)):
+        even = [float(round(64 * v)) / 64 for v in wave(80)]
+        purpose = f"A grid of binary{name}, whose numbers end in {drop} zeros at least."
+        heads = [Coded(form=88 if name == "32" else 117, drop=drop)]
+        shelf.code(f"class-drop-binary{name}", purpose, column(even, grid), heads)
     jumps = [1.0, 123456.0, 1.5, 999999.0, -1.25, 1e9, 2.0, -1e12, 1.0]
     purpose = "Numbers of far more units than were expected: multiples of powers of ten."
     shelf.code("class-jumps", purpose, column(jumps, SIX), [Coded(scale=0, from_last=0)])
