@@ -195,6 +195,7 @@ def test_parts_share_no_subject(archive: Path) -> None:
     subjects = [{m.clip[:2] for m in parts[name].members} for name in ("train", "test")]
     assert subjects[0] | subjects[1] == {"00", "01", "02"} and not subjects[0] & subjects[1]
     assert sum(map(len, parts.values())) == len(data)
+    assert {id(part._cache) for part in parts.values()} == {id(data._cache)}
     again = data.split({"train": 0.7, "test": 0.3}, pattern=r"^(\d\d)_", seed=4)
     assert [p.members for p in again.values()] == [p.members for p in parts.values()]
     by_clip = data.split({"a": 0.25, "b": 0.25, "c": 0.25, "d": 0.25}, by="clip")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from fractions import Fraction
 from threading import Lock
@@ -65,7 +66,11 @@ class Sources:
         self._open: OrderedDict[str, File] = OrderedDict()
         self._subjects: OrderedDict[tuple[bytes, Fraction | None], Subject] = OrderedDict()
         self._lock = Lock()
-        self.close = finalize(self, _close, self._open)
+        # Where files take turns in being open, none is closed while another thread reads it.
+        self._turns: AbstractContextManager[Any] = (
+            Lock() if n_targets > MOST_OPEN else nullcontext()
+        )
+        finalize(self, _close, self._open)
         for file in self._given.values():
             file.container.runs = Runs(self._runs_bytes)
 
@@ -79,6 +84,11 @@ class Sources:
             elif member.target in self._open:
                 self._open.move_to_end(member.target)
         return file.clips.get(member.clip) or file.only_clip(member.clip)
+
+    def close(self) -> None:
+        """Close what was opened here; it is opened anew when it is needed."""
+        with self._lock:
+            _close(self._open)
 
     def adopt(self, files: Mapping[str, File]) -> None:
         """Take files that are open, as if they had been opened here."""
@@ -94,6 +104,10 @@ class Sources:
 
     def features(self, recipe: Recipe, member: Member, start: int, stop: int) -> Arrays:
         """The arrays of frames start <= f < stop, as the data set counts them."""
+        with self._turns:
+            return self._features(recipe, member, start, stop)
+
+    def _features(self, recipe: Recipe, member: Member, start: int, stop: int) -> Arrays:
         clip = self.clip(member)
         subject = self._subject(recipe, clip, member)
         low, high = max(0, start - recipe.reach), min(member.n_frames, stop + recipe.reach)

@@ -87,7 +87,6 @@ class Dataset:
     def close(self) -> None:
         """Close the files that the data set has opened; they are opened anew when needed."""
         self._sources.close()
-        self._prepare()
 
     def __getstate__(self) -> dict[str, Any]:
         made = ("_sources", "_cache", "_keys")
@@ -306,8 +305,10 @@ class Dataset:
         return (self[numbers[at : at + size]] for at in range(0, stop, size))
 
     def part(self, members: Sequence[Member]) -> Dataset:
-        """The same of some of its ``members`` alone."""
-        return Dataset(self._settings, members, self._given)
+        """The same of some of its ``members`` alone; files and cache are shared."""
+        made = Dataset(self._settings, members, self._given)
+        made._sources, made._cache = self._sources, self._cache
+        return made
 
     def split(
         self,
