@@ -302,6 +302,7 @@ TWICE = [
     ("verify", "a.mcz", "--source", "x", "--source", "y"),
     ("unpack", "a.mcz", "x", "--force", "--force"),
     ("list", "a.mcz", "--json", "--json"),
+    ("export", "a.mcz", "x", "--to", "npz", "--to", "csv"),
     ("repair", "a.mcz", "-o", "b.mcz", "--output", "c.mcz"),
     ("codecs", "--json", "--json"),
     ("sample", "x", "--force", "--force"),

@@ -60,6 +60,7 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
         "pack": [[str(file.parent), f"{out}.mcz"]],
         "append": [[odd, str(file)]],
         "unpack": [[str(file), str(out)]],
+        "export": [[str(file), str(out), "--to", to] for to in ("npz", "amc")],
         "list": [[str(file)]],
         "extract": [[str(file), f"{out}.mcz"], [str(file), f"{out}2.mcz", "--joints", STEERING]],
         "replace": [[str(file), f"{out}.mcz", "--joint", STEERING, "--values", str(file)]],
