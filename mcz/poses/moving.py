@@ -71,9 +71,7 @@ def values_of(moving: Moving, frames: tuple[int, int], joints: Sequence[int]) ->
     if moving.signals[0].channels is not None:
         raise MotionError(f"{moving.name!r}: its channels are not those of its skeleton")
     if isinstance(moving, Motion):
-        cut = moving if frames == (0, moving.n_frames) else None
-        signal = moving.signals[0] if cut is not None else moving.signals[0].cut(*frames)
-        return np.asarray(signal.masked(), np.float64)
+        return np.asarray(moving.signals[0].cut(*frames).masked(), np.float64)
     columns = joint_columns(skeleton, joints)
     if len(columns) == skeleton.n_channels:
         return np.asarray(moving.read(frames), np.float64)
