@@ -49,3 +49,16 @@ class Runs:
                 self._size += run.n_bytes
             while self._size > self._most:
                 self._size -= self._runs.popitem(last=False)[1].n_bytes
+
+
+class SharedRuns(Runs):
+    """The runs of one file in a store that several files share."""
+
+    def __init__(self, store: Runs, owner: Hashable) -> None:
+        self._store, self._owner = store, owner
+
+    def get(self, key: Hashable) -> Run | None:
+        return self._store.get((self._owner, key))
+
+    def put(self, key: Hashable, run: Run) -> None:
+        self._store.put((self._owner, key), run)

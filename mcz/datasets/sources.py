@@ -13,7 +13,7 @@ from weakref import finalize
 
 import numpy as np
 
-from mcz.container.runs import Runs
+from mcz.container.runs import Runs, SharedRuns
 from mcz.datasets.caches import Arrays
 from mcz.datasets.fields import Field, Subject, features_of, subject_of
 from mcz.datasets.members import Member
@@ -62,7 +62,7 @@ class Sources:
 
     def __init__(self, given: Mapping[str, File], runs_bytes: int, n_targets: int) -> None:
         self._given = dict(given)
-        self._runs_bytes = runs_bytes // max(1, min(n_targets, MOST_OPEN))
+        self._runs = Runs(runs_bytes)
         self._open: OrderedDict[str, File] = OrderedDict()
         self._subjects: OrderedDict[tuple[bytes, Fraction | None], Subject] = OrderedDict()
         self._lock = Lock()
@@ -71,8 +71,8 @@ class Sources:
             Lock() if n_targets > MOST_OPEN else nullcontext()
         )
         finalize(self, _close, self._open)
-        for file in self._given.values():
-            file.container.runs = Runs(self._runs_bytes)
+        for target, file in self._given.items():
+            file.container.runs = SharedRuns(self._runs, target)
 
     def clip(self, member: Member) -> Clip:
         """Raises as ``mcz.open`` does, and OptionError where the clip is gone."""
@@ -97,7 +97,7 @@ class Sources:
                 self._keep(target, file)
 
     def _keep(self, target: str, file: File) -> None:
-        file.container.runs = Runs(self._runs_bytes)
+        file.container.runs = SharedRuns(self._runs, target)
         self._open[target] = file
         while len(self._open) > MOST_OPEN:
             self._open.popitem(last=False)[1].close()
