@@ -306,6 +306,11 @@ def test_tensors(archive: Path) -> None:
         numbers = order[4 * number : 4 * number + 4]
         for name, array in data[numbers].items():
             assert torch.equal(batch[name], torch.from_numpy(array))
+    batches = tensors.batch_sampler(4, 3, workers=2)
+    assert sorted(index for batch in batches for index in batch) == list(range(len(data)))
+    loader = DataLoader(tensors, batch_sampler=batches, num_workers=2)
+    for numbers, batch in zip(batches, loader, strict=True):
+        assert torch.equal(batch["root"], torch.from_numpy(data[numbers]["root"]))
     assert torch.equal(tensors[0]["root"], torch.from_numpy(data[0]["root"]))
     clips = mcz.dataset(archive, "root").torch()
     assert len(clips) == 4 and clips[3]["root"].shape == (513, 3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,13 +19,14 @@ class Windows(Protocol):
     def __len__(self) -> int: ...
     def __getitem__(self, index: Any) -> dict[str, NDArray[Any]]: ...
     def order(self, seed: int) -> NDArray[np.int64]: ...
+    def pools(self, seed: int) -> list[NDArray[np.int64]]: ...
 
 
 class TorchDataset(data.Dataset[dict[str, torch.Tensor]]):
     """A map-style data set; a DataLoader's workers open the files each for itself.
 
-    ``sampler(seed)`` gives indices in the ``order`` that is quick to read: for
-    ``DataLoader(..., sampler=...)`` in place of ``shuffle=True``.
+    ``sampler`` and ``batch_sampler`` give indices in the ``order`` that is quick to read, in place
+    of a DataLoader's ``shuffle=True``.
     """
 
     def __init__(self, dataset: Windows) -> None:
@@ -44,4 +46,21 @@ class TorchDataset(data.Dataset[dict[str, torch.Tensor]]):
         return [{name: array[row] for name, array in batch.items()} for row in range(len(indices))]
 
     def sampler(self, seed: int) -> list[int]:
+        """All indices, for a DataLoader of at most one worker."""
         return [int(index) for index in self.dataset.order(seed)]
+
+    def batch_sampler(self, size: int, seed: int, workers: int = 1) -> list[list[int]]:
+        """Batches of ``size`` indices, for ``DataLoader(batch_sampler=..., num_workers=workers)``.
+
+        A DataLoader gives its workers a batch each in turn. Here each gets batches of parts of the
+        data set of its own, so that no two decode the same.
+        """
+        pools = self.dataset.pools(seed)
+        if len(pools) < workers:
+            pools = np.array_split(self.dataset.order(seed), workers)
+        batches: list[list[list[int]]] = []
+        for worker in range(workers):
+            own = np.concatenate(pools[worker::workers]).tolist()
+            batches.append([own[at : at + size] for at in range(0, len(own), size)])
+        turns = itertools.zip_longest(*batches)
+        return [batch for turn in turns for batch in turn if batch]

@@ -248,6 +248,11 @@ class Dataset:
         Neighbouring windows are kept in runs, the runs are shuffled, then the windows of as many
         runs as the cache holds. A data set that fits in the cache is shuffled as a whole.
         """
+        pools = self.pools(seed)
+        return np.concatenate(pools) if pools else np.empty(0, np.int64)
+
+    def pools(self, seed: int) -> list[NDArray[np.int64]]:
+        """The ``order`` of a seed in the parts that are shuffled each for itself."""
         random = np.random.default_rng(seed)
         runs = self._runs()
         random.shuffle(runs)
@@ -259,8 +264,7 @@ class Dataset:
                 held = 0
             pools[-1].append(run)
             held += n_frames
-        shuffled = [random.permutation(np.concatenate(pool)) for pool in pools if pool]
-        return np.concatenate(shuffled) if shuffled else np.empty(0, np.int64)
+        return [random.permutation(np.concatenate(pool)) for pool in pools if pool]
 
     def _runs(self) -> list[tuple[NDArray[np.int64], int]]:
         """Windows in runs of some blocks of a clip, each with the frames that it needs."""
@@ -279,13 +283,18 @@ class Dataset:
         return runs
 
     def _pool_frames(self) -> int:
-        """How many frames the cache holds the features of."""
-        if self._settings.folder is not None:
+        """How many frames the cache holds, as features and as they were decoded."""
+        if self._settings.folder is not None or not self.members:
             return 2**62
         size = self._settings.recipe.dtype.itemsize
-        values = sum(int(np.prod(shape)) for shape in self.shapes.values()) if self.members else 1
-        kept = self._settings.cache_bytes - self._settings.cache_bytes // RUNS_SHARE
-        return kept // (size * max(1, values))
+        values = sum(int(np.prod(shape)) for shape in self.shapes.values())
+        decoded = self._settings.cache_bytes // RUNS_SHARE
+        kept = (self._settings.cache_bytes - decoded) // (size * max(1, values))
+        if self.n_frames <= kept:
+            return 2**62
+        n_channels = self._first_subject().skeleton.n_channels
+        # Segments reach beyond the ends of a run: two thirds of what is decoded is of use.
+        return min(kept, decoded // (8 * max(1, n_channels)) * 2 // 3)
 
     def shuffled(self, seed: int) -> Iterator[dict[str, NDArray[Any]]]:
         """The windows in the ``order`` of a seed."""
