@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mcz.brief import counted
 from mcz.datasets.caches import Arrays, Cache, FolderCache, MemoryCache
-from mcz.datasets.fields import FIELDS, names_of
+from mcz.datasets.fields import FIELDS, Subject, names_of
 from mcz.datasets.members import Member
 from mcz.datasets.sources import BLOCK, Recipe, Sources
 from mcz.errors import OptionError
@@ -144,7 +144,7 @@ class Dataset:
         subject = self._first_subject()
         return {field.name: field.shape(subject) for field in self._settings.recipe.fields}
 
-    def _first_subject(self) -> Any:
+    def _first_subject(self) -> Subject:
         if not self.members:
             raise OptionError("a data set of no clips")
         member = self.members[0]
@@ -294,7 +294,7 @@ class Dataset:
             return 2**62
         n_channels = self._first_subject().skeleton.n_channels
         # Segments reach beyond the ends of a run: two thirds of what is decoded is of use.
-        return min(kept, decoded // (8 * max(1, n_channels)) * 2 // 3)
+        return min(kept, int(decoded // (8 * max(1, n_channels))) * 2 // 3)
 
     def shuffled(self, seed: int) -> Iterator[dict[str, NDArray[Any]]]:
         """The windows in the ``order`` of a seed."""
