@@ -276,6 +276,18 @@ def test_one_more_party(samples: Path) -> None:
     )
 
 
+@given(skeletons(), st.data())
+def test_unknown_values_lose_what_depends_on_them(skeleton: Skeleton, data: st.DataObject) -> None:
+    values = values_for(skeleton)
+    cell = data.draw(st.integers(0, 6)), data.draw(st.integers(0, skeleton.n_channels - 1))
+    values[cell] = np.nan
+    motion = Motion(skeleton, (Signal(values),))
+    found = mcz.positions(motion)
+    np.testing.assert_array_equal(
+        np.isnan(found), np.isnan(positions_of(skeleton, values)), strict=True
+    )
+
+
 def test_what_is_invalid_is_nan_in_every_form() -> None:
     motion = smooth(4)
     mask = np.ones((4, 10), bool)

@@ -159,5 +159,6 @@ def _mark(points: Points, origins: Floats, axes: Floats, out: Floats) -> None:
         for i in range(3):
             total = origins[joint, i]
             for j in range(3):
-                total += axes[joint, i, j] * points.tails[point, j]
+                if points.tails[point, j] != 0.0:  # else unknown axes do not matter
+                    total += axes[joint, i, j] * points.tails[point, j]
             out[point, i] = total
