@@ -288,6 +288,16 @@ def test_unknown_values_lose_what_depends_on_them(skeleton: Skeleton, data: st.D
     )
 
 
+def test_a_joint_that_turns_unknown_stays_where_it_is() -> None:
+    motion = smooth(3)  # which only turns and moves: compiled
+    values = motion.values.copy()
+    values[1, 7] = values[2, 9] = np.nan  # of the spine, of the knee
+    found = mcz.positions(motion.with_values(values))
+    lost = np.isnan(found).all(axis=2)
+    assert [mcz.point_names(motion)[n] for n in np.flatnonzero(lost[1])] == ["spine end", "fixed"]
+    assert not lost[[0, 2]].any()
+
+
 def test_what_is_invalid_is_nan_in_every_form() -> None:
     motion = smooth(4)
     mask = np.ones((4, 10), bool)
