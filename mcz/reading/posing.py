@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.kinematics.contacts import RULE, ContactRule, Contacts
-from mcz.kinematics.contacts import contacts as contacts_of
-from mcz.motion import Motion
-from mcz.poses import places, turns
-from mcz.poses.moving import Decoded, Frames
 from mcz.skeleton import Joints, joint_list
-from mcz.tables.frames import to_pandas
-from mcz.tables.labelled import to_xarray
+
+if TYPE_CHECKING:
+    from mcz.kinematics.contacts import ContactRule, Contacts
+    from mcz.motion import Motion
+    from mcz.poses import Root
+    from mcz.poses.moving import Decoded, Frames
 
 
 class Posed:
-    """The part of a Clip that is about poses; ``mcz.poses`` has the conventions."""
+    """What a Clip has of ``mcz.poses``, which has the conventions and is imported on use."""
 
     @property
     def _clip(self) -> Decoded:
-        return cast(Decoded, self)
+        return cast("Decoded", self)
 
     @property
     def _whole(self) -> Motion:
-        return cast(Motion, cast(Any, self).motion())
+        return cast("Motion", cast(Any, self).motion())
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -36,6 +35,8 @@ class Posed:
     @property
     def point_names(self) -> tuple[str, ...]:
         """The names of the points of ``positions``, in their order."""
+        from mcz.poses import places
+
         return places.point_names(self._clip)
 
     def positions(
@@ -47,6 +48,8 @@ class Posed:
         dtype: Any = np.float64,
     ) -> NDArray[Any]:
         """Where the points are, (n_frames, n_points, 3): see ``mcz.positions``."""
+        from mcz.poses import places
+
         return places.positions(self._clip, joints, frames, unit=unit, dtype=dtype)
 
     def rotations(
@@ -61,6 +64,8 @@ class Posed:
         dtype: Any = np.float64,
     ) -> NDArray[Any]:
         """How the joints are turned, (n_frames, n_joints, ...): see ``mcz.rotations``."""
+        from mcz.poses import turns
+
         return turns.rotations(
             self._clip,
             form,
@@ -79,8 +84,10 @@ class Posed:
         joint: int | str | None = None,
         unit: str | None = None,
         dtype: Any = np.float64,
-    ) -> places.Root:
+    ) -> Root:
         """Where the root is and how it is turned: see ``mcz.root``."""
+        from mcz.poses import places
+
         return places.root(self._clip, frames, joint=joint, unit=unit, dtype=dtype)
 
     def velocities(
@@ -92,6 +99,8 @@ class Posed:
         dtype: Any = np.float64,
     ) -> NDArray[Any]:
         """How fast the points move, (n_frames, n_points, 3): see ``mcz.velocities``."""
+        from mcz.poses import places
+
         return places.velocities(self._clip, joints, frames, unit=unit, dtype=dtype)
 
     def accelerations(
@@ -103,12 +112,16 @@ class Posed:
         dtype: Any = np.float64,
     ) -> NDArray[Any]:
         """How velocities change, (n_frames, n_points, 3): see ``mcz.accelerations``."""
+        from mcz.poses import places
+
         return places.accelerations(self._clip, joints, frames, unit=unit, dtype=dtype)
 
     def to_xarray(
         self, *, form: str = "quat", unit: str | None = None, dtype: Any = np.float64
     ) -> Any:
         """The whole clip as an ``xarray.Dataset``: see ``mcz.to_xarray``."""
+        from mcz.tables.labelled import to_xarray
+
         return to_xarray(self._whole, form=form, unit=unit, dtype=dtype)
 
     def to_pandas(
@@ -120,9 +133,13 @@ class Posed:
         flat: bool = False,
     ) -> Any:
         """A table of the whole clip as a ``pandas.DataFrame``: see ``mcz.to_pandas``."""
+        from mcz.tables.frames import to_pandas
+
         return to_pandas(self._whole, what, joints=joints, unit=unit, flat=flat)
 
-    def contacts(self, joints: Joints = None, rule: ContactRule = RULE) -> Contacts:
+    def contacts(self, joints: Joints = None, rule: ContactRule | None = None) -> Contacts:
         """In which frames feet stand, of the whole clip: see ``mcz.contacts``."""
+        from mcz.kinematics.contacts import RULE, contacts
+
         feet = None if joints is None else joint_list(joints)
-        return contacts_of(self._whole, feet, rule)
+        return contacts(self._whole, feet, rule or RULE)
