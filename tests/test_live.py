@@ -562,7 +562,8 @@ def test_by_the_index_a_numbered_frame_is_in_its_place() -> None:
 
 
 def test_the_index_must_say_what_the_packet_says() -> None:
-    from mcz.container.directory import ClipRow, build_index
+    from mcz.container.directory import ClipRow
+    from mcz.container.index import build_index
 
     data = live(frames(5))
     with mcz.open(data) as file:

@@ -28,7 +28,7 @@ from tools import spec_trace
 MODULES = (
     "mcz.container.payloads",
     "mcz.container.copies",
-    "mcz.container.directory",
+    "mcz.container.index",
     "mcz.codecs.wavelet.shared",
     "mcz.codecs.curves.qbc",
     "mcz.codecs.pca.pca",

@@ -1,39 +1,17 @@
-"""What a file holds and where: built by the writer, by a scan, or from INDX.
-
-SPEC.md, "INDX", is normative.
-"""
+"""What a file holds and where: built by the writer, by a scan, or from INDX (``index.py``)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from mcz.container import payloads
-from mcz.container.chunks import HEADER, Chunk, build_chunk
-from mcz.container.limits import PROFILES, Profile, check
-from mcz.container.packets import FRAME, NUMBERED, SEGMENT, SHORT
-from mcz.container.segments import FRESH, SegmentHeader
+from mcz.container.chunks import HEADER, Chunk
+from mcz.container.limits import PROFILES, Profile
+from mcz.container.segments import SegmentHeader
 from mcz.errors import FormatError, UnsupportedError
-from mcz.schema import MAX_COUNT, build, deflate, inflate, parse, read_varint, varint
-
-# Set in the indexed flags of a segment that is a packet of an open DATA, by the packet's kind.
-PACKETS = {SEGMENT: 128, FRAME: 64, NUMBERED: 32}
-
-# Each segment in the "segments" field of an indexed clip: (name, type, meaning).
-INDEXED_SEGMENT_FIELDS = (
-    ("gap", "varint", "bytes from the end of CLIP, or of the payload before, to this payload"),
-    ("size", "varint", "bytes of the payload"),
-    ("signal", "varint", "index of the signal"),
-    ("n_frames", "varint", "frames"),
-    ("lead", "varint", "as in DATA"),
-    ("tail", "varint", "as in DATA"),
-    (
-        "flags",
-        "varint",
-        "as in DATA; more where it is a packet: 128 of kind 1, 64 of kind 2, 32 of 3",
-    ),
-)
+from mcz.schema import MAX_COUNT, parse
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,21 +54,24 @@ class SignalRow:
 
 def signal_rows(clip: Any, where: str) -> tuple[SignalRow, ...]:
     """What the index says of the signals, from the fields of CLIP; raises FormatError."""
-    return tuple(_signal_row(fields, clip, where) for fields in clip.signals)
+    return tuple(_signal_row(signal, clip, where) for signal in clip.signals)
 
 
-def _signal_row(fields: Any, clip: Any, where: str) -> SignalRow:
-    cut = fields.skip, fields.spare
+def _signal_row(signal: Any, clip: Any, where: str) -> SignalRow:
+    cut = signal.skip, signal.spare
     if clip.flags & payloads.OPEN_CLIP and any(cut):  # CLIP-19
         raise FormatError(f"{where}: n_frames is open, but a signal has skip and spare {cut}")
     if sum(cut) + clip.n_frames > MAX_COUNT:  # CLIP-20
         raise FormatError(f"{where}: skip and spare {cut} of {clip.n_frames} frames")
-    n_channels = sum(run.n_channels for run in fields.grids)
-    codec = fields.codec, fields.codec_version
-    return SignalRow(n_channels, fields.samples_per_frame, *codec, *cut)
+    n_channels = sum(run.n_channels for run in signal.grids)
+    codec = signal.codec, signal.codec_version
+    return SignalRow(n_channels, signal.samples_per_frame, *codec, *cut)
 
 
-@dataclass(slots=True)
+Packed = tuple[bytes, int, int]  # fields segments, cend_gap, cend_length of an indexed clip
+
+
+@dataclass(slots=True, eq=False)
 class ClipRow:
     """A clip as a listing shows it; its CLIP and CEND say more."""
 
@@ -106,6 +87,19 @@ class ClipRow:
     ancillary: list[Chunk] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
 
+    @property
+    def packed(self) -> Packed | None:
+        """What an index says of segments and CEND, where they were not unpacked yet."""
+        return None
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the two say the same, one of them perhaps packed."""
+        if not isinstance(other, ClipRow):
+            return NotImplemented
+        return all(getattr(self, f.name) == getattr(other, f.name) for f in fields(ClipRow))
+
+    __hash__ = None  # type: ignore[assignment]  # it changes
+
     def frames_found(self, stops: Sequence[int]) -> int:
         """The frames that it shows without CEND: up to the last segment of each signal."""
         found = 0
@@ -113,6 +107,52 @@ class ClipRow:
             most = self.n_frames if row.skip or row.spare else stop  # those after are spare
             found = max(found, min(stop - row.skip, most))
         return found
+
+
+class PackedClipRow(ClipRow):
+    """That of an index: ``segments`` and ``cend`` stay packed until they are asked for.
+
+    Both raise FormatError where the index is wrong.
+    """
+
+    __slots__ = ("_cend", "_packed", "_segments", "_unpack")
+
+    def keep_packed(
+        self,
+        packed: Packed,
+        unpack: Callable[[ClipRow, Packed], tuple[list[SegmentRow], Chunk]],
+    ) -> None:
+        """Let segments and CEND be what ``unpack`` makes of ``packed`` when they are asked for."""
+        self._packed: Packed | None = packed
+        self._unpack = unpack
+
+    @property
+    def packed(self) -> Packed | None:
+        return self._packed
+
+    def _unpacked(self) -> None:
+        if self._packed is not None:
+            self._segments, self._cend = self._unpack(self, self._packed)
+            self._packed = None
+
+    @property  # type: ignore[override]
+    def segments(self) -> list[SegmentRow]:
+        self._unpacked()
+        return self._segments
+
+    @segments.setter
+    def segments(self, segments: list[SegmentRow]) -> None:
+        self._segments, self._packed = segments, None
+
+    @property  # type: ignore[override]
+    def cend(self) -> Chunk | None:
+        self._unpacked()
+        return self._cend
+
+    @cend.setter
+    def cend(self, chunk: Chunk | None) -> None:
+        self._unpacked()
+        self._cend = chunk
 
 
 @dataclass(slots=True)
@@ -160,138 +200,3 @@ class Found:
     ends: dict[int, int] = field(default_factory=dict)  # of open DATA chunks, by their offsets
     # What salvage could not take in: its offset, and the chunk where its header is sound.
     broken: list[tuple[int, Chunk | None]] = field(default_factory=list)
-
-
-def build_index(directory: Directory) -> bytes:
-    """The whole INDX chunk."""
-    content = build(payloads.INDEX, _index_fields(directory), "INDX")
-    fields = {"size": len(content), "data": deflate(content)}
-    return build_chunk(b"INDX", build(payloads.INDX, fields, "INDX"))
-
-
-def _index_fields(directory: Directory) -> dict[str, Any]:
-    return {
-        "head": directory.head,
-        "shared": [
-            {"type": kind, "id": id_, **_place(chunk)}
-            for (kind, id_), chunk in directory.shared.items()
-        ],
-        "attachments": [
-            {"name": a.name, "size": a.size, "parts": [_place(part) for part in a.parts]}
-            for a in directory.attachments.values()
-        ],
-        "aliases": [
-            {"name": name, "of": of, "target": target}
-            for name, (of, target) in directory.aliases.items()
-        ],
-        "clips": [_clip_fields(clip) for clip in directory.clips.values()],
-        "extension": b"",
-    }
-
-
-def _place(chunk: Chunk) -> dict[str, int | None]:
-    return {"offset": chunk.offset, "length": chunk.length}
-
-
-def _clip_fields(clip: ClipRow) -> dict[str, Any]:
-    if clip.cend is None:
-        raise FormatError(f"clip {clip.name!r} has no CEND and cannot be indexed")
-    segments, end = bytearray(), clip.clip.offset + clip.clip.size
-    for row in clip.segments:
-        header = row.header
-        fields = (row.offset - end, row.size, header.signal, header.n_frames)
-        flags = header.flags | PACKETS.get(row.packet, 0)
-        segments += b"".join(map(varint, (*fields, header.lead, header.tail, flags)))
-        end = row.stop
-    return {
-        "name": clip.name,
-        "skeleton": clip.skeleton,
-        "n_frames": clip.n_frames,
-        "rate_numerator": clip.rate_numerator,
-        "rate_denominator": clip.rate_denominator,
-        "signals": [
-            {
-                "n_channels": s.n_channels,
-                "samples_per_frame": s.samples_per_frame,
-                "skip": s.skip,
-                "spare": s.spare,
-                "codec": s.codec,
-                "codec_version": s.codec_version,
-            }
-            for s in clip.signals
-        ],
-        **_place(clip.clip),
-        "segments": bytes(segments),
-        "cend_gap": clip.cend.offset - end,
-        "cend_length": clip.cend.length,
-        "ancillary": [{"type": chunk.type, **_place(chunk)} for chunk in clip.ancillary],
-    }
-
-
-def parse_index(payload: bytes, limit: int) -> Directory:
-    """The Directory in the payload of an INDX; ``limit`` bounds its inflated size."""
-    outer = parse(payloads.INDX, payload, "INDX")
-    check("INDX: inflated size", outer.size, limit)
-    fields = parse(payloads.INDEX, inflate(outer.data, outer.size, "INDX"), "INDX")
-    directory = Directory(head=fields.head)
-    for row in fields.shared:
-        key = row.type, row.id
-        if key in directory.shared:
-            raise FormatError(f"INDX: two entries of {row.type!r} have the id {row.id.hex()}")
-        directory.shared[key] = Chunk(row.type, 0, row.offset, row.length)
-    for row in fields.attachments:
-        parts = [Chunk(b"ATTA", 0, part.offset, part.length) for part in row.parts]
-        if not parts:
-            raise FormatError(f"INDX: attachment {row.name!r} has no part")
-        _add(directory.attachments, row.name, AttachmentRow(row.name, row.size, parts))
-    for row in fields.aliases:
-        _add(directory.aliases, row.name, (row.of, row.target))
-    for row in fields.clips:
-        _add(directory.clips, row.name, _parse_clip(row))
-    return directory
-
-
-def _add(table: dict[str, Any], name: str, row: Any) -> None:
-    if name in table:
-        raise FormatError(f"INDX: two entries are named {name!r}")
-    table[name] = row
-
-
-def _parse_clip(row: Any) -> ClipRow:
-    clip = Chunk(b"CLIP", 0, row.offset, row.length)
-    signals = tuple(
-        SignalRow(s.n_channels, s.samples_per_frame, s.codec, s.codec_version, s.skip, s.spare)
-        for s in row.signals
-    )
-    if not signals:
-        raise FormatError(f"INDX: clip {row.name!r} has no signal")
-    # INDX-01
-    segments = list(_parse_segments(row.segments, clip.offset + clip.size, len(signals), row.name))
-    end = segments[-1].stop if segments else clip.offset + clip.size
-    cend = Chunk(b"CEND", 0, end + row.cend_gap, row.cend_length)
-    rate = row.rate_numerator, row.rate_denominator
-    ancillary = [Chunk(a.type, 1, a.offset, a.length) for a in row.ancillary]
-    return ClipRow(
-        row.name, row.skeleton, row.n_frames, *rate, signals, clip, segments, cend, ancillary
-    )
-
-
-def _parse_segments(data: bytes, end: int, n_signals: int, name: str) -> Iterable[SegmentRow]:
-    at, first = 0, [0] * n_signals
-    while at < len(data):
-        fields = []
-        for _ in INDEXED_SEGMENT_FIELDS:
-            value, at = read_varint(data, at)
-            fields.append(value)
-        gap, size, signal, n_frames, lead, tail, flags = fields
-        if signal >= n_signals:
-            raise FormatError(f"INDX: clip {name!r} has a segment of signal {signal}")
-        kind = next((kind for kind, bit in PACKETS.items() if flags & bit), 0)
-        header = SegmentHeader(
-            signal, first[signal], n_frames, lead, tail, flags & ~PACKETS.get(kind, 0)
-        )
-        if kind in SHORT and header != SegmentHeader(0, first[0], 1, flags=header.flags & FRESH):
-            raise FormatError(f"INDX: clip {name!r} has {header} as a packet of kind {kind}")
-        yield SegmentRow(end + gap, size, header, kind)
-        first[signal] += n_frames
-        end += gap + size

@@ -33,9 +33,9 @@ from mcz.container.directory import (
     Directory,
     SegmentRow,
     parse_head,
-    parse_index,
     signal_rows,
 )
+from mcz.container.index import parse_index
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
 from mcz.container.overlay import Overlay
 from mcz.container.packed import parse_skel

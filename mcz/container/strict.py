@@ -11,7 +11,8 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
-from mcz.container.directory import ClipRow, Directory, parse_index
+from mcz.container.directory import ClipRow, Directory
+from mcz.container.index import parse_index
 from mcz.container.limits import Profile, check
 from mcz.container.packed import parse_skel, words
 from mcz.container.skeletons import parse_skeleton

@@ -30,8 +30,8 @@ from mcz.container.directory import (
     Directory,
     SegmentRow,
     SignalRow,
-    build_index,
 )
+from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
 from mcz.container.packed import smallest
 from mcz.container.packets import (

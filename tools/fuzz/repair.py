@@ -28,7 +28,8 @@ from mcz.container.chunks import (
     is_foot_at,
     read_chunk,
 )
-from mcz.container.directory import Directory, build_index
+from mcz.container.directory import Directory
+from mcz.container.index import build_index
 from mcz.container.limits import ARCHIVE
 from mcz.container.packets import (
     END,

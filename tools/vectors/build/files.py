@@ -28,7 +28,8 @@ from mcz.container.chunks import (
     build_foot,
     parse_header,
 )
-from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow, build_index
+from mcz.container.directory import AttachmentRow, ClipRow, SegmentRow
+from mcz.container.index import build_index
 from mcz.container.limits import BASE, Profile
 from mcz.container.packets import (
     CHECK_SIZE,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
-from mcz.container.directory import PACKETS
+from mcz.container.index import PACKETS
 from mcz.container.packets import (
     END,
     FRAME,
