@@ -135,7 +135,7 @@ class PackedClipRow(ClipRow):
             self._segments, self._cend = self._unpack(self, self._packed)
             self._packed = None
 
-    @property  # type: ignore[override]
+    @property
     def segments(self) -> list[SegmentRow]:
         self._unpacked()
         return self._segments
@@ -144,13 +144,13 @@ class PackedClipRow(ClipRow):
     def segments(self, segments: list[SegmentRow]) -> None:
         self._segments, self._packed = segments, None
 
-    @property  # type: ignore[override]
+    @property
     def cend(self) -> Chunk | None:
         self._unpacked()
         return self._cend
 
     @cend.setter
-    def cend(self, chunk: Chunk | None) -> None:
+    def cend(self, chunk: Any) -> None:
         self._unpacked()
         self._cend = chunk
 

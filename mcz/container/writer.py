@@ -270,6 +270,20 @@ class Writer:
         self.directory.clips[clip.name] = clip
         self._clip = None
 
+    def start_of(self, name: str, payload: bytes) -> Chunk:
+        """Write the CLIP of a clip whose chunks are carried over next, up to ``add_clip``."""
+        self._between_clips("CLIP")
+        self._new_name(name, self.directory.clips)
+        return self.chunk(b"CLIP", payload)
+
+    def raw(self, data: bytes) -> None:
+        """Write a part of an open DATA that another file holds."""
+        self._write(data)
+
+    def add_clip(self, row: ClipRow) -> None:
+        """Take in a clip whose chunks, CEND among them, were carried over just now."""
+        self.directory.clips[row.name] = row
+
     def finish(self, *, index: bool = True) -> None:
         """Write the copies that are wanted, INDX, unless told otherwise, and FOOT."""
         self._between_clips("FOOT")

@@ -15,7 +15,7 @@ class Outcome:
     ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
     "present" (the target has it already), "restored", "written", "skipped", "exists" (it may not be
     replaced) or "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage
-    "damaged".
+    "damaged"; of what is carried over "copied", "renamed", "moved" or "deleted".
     ``notes`` are what was noticed about one that was taken: its reader's, and whose skeleton it
     got.
     """
@@ -33,12 +33,14 @@ class Outcome:
 class Report:
     """The outcomes of a command over many files.
 
-    ``damage`` is what salvage found wrong, ``size`` that of the MCZ file, once it is written.
+    ``damage`` is what salvage found wrong, ``size`` that of the MCZ file, once it is written,
+    ``left_out`` what may not be carried over to it from another one.
     """
 
     outcomes: list[Outcome] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
     size: int | None = None
+    left_out: list[str] = field(default_factory=list)
 
     __repr__ = brief
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable
 from functools import partial
 
+from mcz.brief import among
 from mcz.codecs import by_id
 from mcz.container.chunks import FRAMING
 from mcz.container.directory import ClipRow
@@ -47,14 +48,36 @@ def _matcher(query: Query, clips: Collection[Clip]) -> Callable[[Clip], bool]:
 
 
 def _getter(query: Query, name: str, clips: Collection[Clip]) -> Getter:
-    """What gives the value of a name: the field, or the metadata key of any clip."""
+    """What gives the value of a name in a query: the field, or the metadata key of any clip."""
+    found = _known(name, clips)
+    if found is None:
+        raise query.unknown(name, _names(name, clips))
+    return found
+
+
+def getter_of(name: str, clips: Collection[Clip]) -> Getter:
+    """What gives the value of a field, or of a metadata key that any of ``clips`` has.
+
+    Raises OptionError for a name that is neither.
+    """
+    found = _known(name, clips)
+    if found is None:
+        said = among(sorted(_names(name, clips)), name)
+        raise OptionError(f"{name!r} is neither a field nor a metadata key; known are {said}")
+    return found
+
+
+def _known(name: str, clips: Collection[Clip]) -> Getter | None:
     if name in FIELDS:
         return FIELDS[name]
     key = name.removeprefix(METADATA)
-    if not any(key in clip.metadata for clip in clips):
-        keys = {key for clip in clips for key in clip.metadata}
-        raise query.unknown(name, [*FIELDS, *keys] if key == name else [METADATA + k for k in keys])
-    return partial(_metadata, key)
+    return partial(_metadata, key) if any(key in clip.metadata for clip in clips) else None
+
+
+def _names(name: str, clips: Collection[Clip]) -> list[str]:
+    """The names that ``name`` may have been meant to be."""
+    keys = {key for clip in clips for key in clip.metadata}
+    return [METADATA + key for key in keys] if name.startswith(METADATA) else [*FIELDS, *keys]
 
 
 def _metadata(key: str, clip: Clip) -> Value:

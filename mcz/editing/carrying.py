@@ -1,0 +1,213 @@
+"""Chunks of an open file carried over to another one as they are: nothing is coded anew.
+
+What is shared is named by its hash, so that it needs no new number and is written once. SPEC.md,
+"Chunks" and "Grammar", are normative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.chunks import (
+    COPY,
+    FOOT,
+    SAFE_TO_COPY,
+    SIGNATURE,
+    Chunk,
+    is_foot_at,
+    read_chunk,
+)
+from mcz.container.clip_head import clip_head
+from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
+from mcz.container.index import packed_segments, parse_segments
+from mcz.container.packed import parse_skel
+from mcz.container.packets import read_packets
+from mcz.container.reader import Container
+from mcz.container.source import Forward
+from mcz.container.writer import Writer, payload_id
+from mcz.errors import ChecksumError, FormatError
+from mcz.schema import build, parse
+
+BLOCK = 1 << 20  # bytes of an open DATA that are copied at once
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What is said otherwise of a clip that is carried over; None: as it was.
+
+    ``name`` of the clip, ``path`` of its source, ``rate`` in frames a second.
+    """
+
+    name: str | None = None
+    path: str | None = None
+    rate: Fraction | None = None
+
+
+SAME = Change()
+
+
+class Carrier:
+    """Carries chunks of ``container`` over to ``writer``; ``left_out`` says which may not be.
+
+    Every checksum is compared on the way; raises FormatError where one is wrong.
+    """
+
+    def __init__(self, container: Container, writer: Writer) -> None:
+        self.container, self.writer = container, writer
+        self.left_out: list[str] = []
+
+    def stored(self, kind: bytes, id_: bytes) -> bytes:
+        """The payload of the SKEL, MODL or SRCE with this id, its hash checked."""
+        chunk = self.container.directory.shared.get((kind, id_))
+        if chunk is None:
+            raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
+        payload = self.container.payload(chunk)
+        if payload_id(payload) != id_:
+            raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
+        return payload
+
+    def shared(self, kind: bytes, id_: bytes) -> None:
+        """Carry a MODL or SRCE over, unless it is there."""
+        if (kind, id_) not in self.writer.directory.shared:
+            self.writer.shared(kind, self.stored(kind, id_))
+
+    def skeleton(self, id_: bytes) -> None:
+        """Carry a SKEL over after its bases and their templates, unless it is there."""
+        chain: list[bytes] = []
+        wanted: bytes | None = id_
+        while wanted and (b"SKEL", wanted) not in self.writer.directory.shared:
+            payload = self.stored(b"SKEL", wanted)
+            fields = parse_skel(payload, "SKEL", self.container.profile)
+            for source in fields.source:
+                self.shared(b"SRCE", bytes(source.template))
+            chain.append(payload)
+            wanted = bytes(fields.base[0]) if fields.base else None
+        for payload in reversed(chain):
+            self.writer.shared(b"SKEL", payload)
+
+    def attachment(self, name: str, as_name: str | None = None) -> None:
+        """Carry an attached file over, perhaps under another name."""
+        row = self.container.directory.attachments[name]
+        parts = [self.container.payload(part) for part in row.parts]
+        if as_name not in (None, name):
+            parts = [_renamed(part, as_name) for part in parts]
+        self.writer.attachment_parts(as_name or name, row.size, parts)
+
+    def before_clips(self) -> None:
+        """Carry over the ancillary chunks before the first clip, to which they do not belong."""
+        source, at = self.container.source, len(SIGNATURE)
+        clips = self.container.directory.clips.values()
+        end = min((row.clip.offset for row in clips), default=at)
+        while at < end:
+            if is_foot_at(source, at):
+                at += FOOT.size
+                continue
+            chunk = read_chunk(source, at)
+            if chunk.flags:
+                self.ancillary(chunk)
+            at += chunk.size
+
+    def ancillary(self, chunk: Chunk) -> bool:
+        """Carry an ancillary chunk over where that is safe; return whether it was."""
+        if chunk.flags & SAFE_TO_COPY:  # CHUNK-13, CHUNK-14
+            self.writer.chunk(chunk.type, self.container.payload(chunk), chunk.flags)
+            return True
+        if chunk.type != COPY:  # those are made anew where they are wanted
+            self.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
+        return False
+
+    def clip(self, name: str, change: Change = SAME) -> None:
+        """Carry a clip over: its skeleton and template, CLIP to CEND, and what belongs to it."""
+        row = self.container.directory.clips[name]
+        payload = self.container.payload(row.clip)
+        head = clip_head(payload, row.clip.label)
+        if head.name != name or head.skeleton != row.skeleton:
+            raise FormatError(f"{row.clip.label}: clip {head.name!r}, the index says {name!r}")
+        if head.template:
+            self.shared(b"SRCE", head.template)
+        self.skeleton(row.skeleton)
+        if change != SAME:
+            payload = _changed(payload, row.clip.label, change)
+        rate = change.rate
+        new = PackedClipRow(
+            change.name or name,
+            row.skeleton,
+            row.n_frames,
+            row.rate_numerator if rate is None else rate.numerator,
+            row.rate_denominator if rate is None else rate.denominator,
+            row.signals,
+            self.writer.start_of(change.name or name, payload),
+        )
+        self._body(row, new)
+        self.writer.add_clip(new)
+        for chunk in row.ancillary:
+            found = read_chunk(self.container.source, chunk.offset)
+            if found.type != chunk.type:
+                raise FormatError(f"{found.label} is {chunk.label} in the index")
+            if self.ancillary(found):
+                last = Chunk(found.type, found.flags, self.writer.offset - found.size, found.length)
+                new.ancillary.append(last)
+
+    def _body(self, row: ClipRow, new: PackedClipRow) -> None:
+        """What lies between CLIP and CEND, and CEND; ``new`` learns where."""
+        packed, cend = row.packed, row.cend
+        if cend is None:
+            raise FormatError(f"clip {row.name!r} has no CEND")
+        source, at = self.container.source, row.clip.offset + row.clip.size
+        moved: list[tuple[int, int]] = []  # from where on how many bytes less lie before
+        less = 0
+        while at <= cend.offset:
+            chunk = read_chunk(source, at)
+            if chunk.length is None:
+                at = self._open_data(chunk)
+                continue
+            at += chunk.size
+            if not chunk.flags:
+                self.writer.chunk(chunk.type, self.container.payload(chunk))
+            elif not self.ancillary(chunk):
+                less += chunk.size
+                moved.append((at, less))
+        if at != cend.offset + cend.size:
+            raise FormatError(f"clip {row.name!r}: {cend.label} is not where the index says")
+        if not moved:
+            new.keep_packed(packed or packed_segments(row), parse_segments)
+            return
+        shift = new.clip.offset + new.clip.size - (row.clip.offset + row.clip.size)
+        new.segments = [_moved(segment, shift, moved) for segment in row.segments]
+        new.cend = replace(cend, offset=cend.offset + shift - less)
+
+    def _open_data(self, chunk: Chunk) -> int:
+        """Carry an open DATA over, packets and all; return where it ends."""
+        read = Forward(self.container.source, chunk.payload_offset)
+        for _ in read_packets(read, self.container.profile.packet_bytes):
+            pass
+        for at in range(chunk.offset, read.at, BLOCK):
+            self.writer.raw(self.container.source.read(at, min(BLOCK, read.at - at)))
+        return read.at
+
+
+def _moved(segment: SegmentRow, shift: int, moved: list[tuple[int, int]]) -> SegmentRow:
+    less = max((size for start, size in moved if segment.offset >= start), default=0)
+    return replace(segment, offset=segment.offset + shift - less)
+
+
+def _renamed(part: bytes, name: str | None) -> bytes:
+    fields = parse(payloads.ATTA, part, "ATTA")
+    return build(payloads.ATTA, dict(fields) | {"name": name}, "ATTA")
+
+
+def _changed(payload: bytes, where: str, change: Change) -> bytes:
+    """The CLIP ``payload`` with what ``change`` says."""
+    fields: dict[str, Any] = dict(parse(payloads.CLIP, payload, where))
+    if change.name is not None:
+        fields["name"] = change.name
+    if change.path is not None and fields["source"]:
+        fields["source"] = [dict(fields["source"][0]) | {"path": change.path}]
+    if change.rate is not None:
+        fields["rate_numerator"] = change.rate.numerator
+        fields["rate_denominator"] = change.rate.denominator
+        fields["flags"] &= ~payloads.ROUNDED_RATE
+    return build(payloads.CLIP, fields, where)

@@ -1,0 +1,185 @@
+"""What of a file goes into a new one, and the writing of that: chunks are carried over, not coded.
+
+``carrying.py`` carries, this module plans. The old file keeps its name until the new one is whole
+and was walked from end to end.
+"""
+
+from __future__ import annotations
+
+import builtins
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mcz.container import payloads
+from mcz.container.clip_head import clip_head
+from mcz.container.limits import BASE, Profile
+from mcz.container.locks import lock
+from mcz.container.reader import Container
+from mcz.container.scan import scan
+from mcz.container.source import ByteSource
+from mcz.container.writer import Writer
+from mcz.editing.carrying import SAME, Carrier, Change
+from mcz.errors import AccessError, OptionError
+from mcz.reading.file import File, open
+from mcz.reading.sizes import models_used
+from mcz.schema import parse
+from mcz.writing.atomic import replacing
+
+Shared = tuple[bytes, bytes]  # type and id of a SKEL, MODL or SRCE
+Step = Callable[[str], None]  # is told the name of each clip that was carried over
+
+
+@dataclass(slots=True)
+class Plan:
+    """What of a file goes into a new one: names, and what they are from now on.
+
+    ``clips`` are in their new order. ``shared`` goes along, needed by a clip or not.
+    """
+
+    clips: dict[str, Change] = field(default_factory=dict)
+    attachments: dict[str, str] = field(default_factory=dict)
+    aliases: dict[str, str] = field(default_factory=dict)
+    shared: list[Shared] = field(default_factory=list)
+
+
+def whole(file: File) -> Plan:
+    """All of a file, as it is."""
+    return Plan(
+        dict.fromkeys(file.clips, SAME),
+        {name: name for name in file.attachments},
+        {name: name for name in file.aliases},
+        list(file.container.directory.shared),
+    )
+
+
+def used_by(file: File, names: Iterable[str]) -> set[Shared]:
+    """The skeletons with their bases, the templates and the models that these clips need."""
+    container, used = file.container, set[Shared]()
+    has_models = any(kind == b"MODL" for kind, _ in container.directory.shared)
+    for name in names:
+        row = container.directory.clips[name]
+        template = clip_head(container.payload(row.clip), row.clip.label).template
+        if template:
+            used.add((b"SRCE", template))
+        if (b"SKEL", row.skeleton) not in used:
+            used |= used_by_skeleton(container, row.skeleton)
+        for signal in file.clips[name].signals if has_models else ():
+            used |= {(b"MODL", id_) for id_ in models_used(signal)}
+    return used
+
+
+def used_by_skeleton(container: Container, id_: bytes) -> set[Shared]:
+    """A skeleton, its bases, and the templates of their own files."""
+    found: set[Shared] = set()
+    wanted: bytes | None = id_
+    while wanted and (b"SKEL", wanted) not in found:
+        fields = container.skeleton_fields(wanted)
+        found.add((b"SKEL", wanted))
+        found |= {(b"SRCE", bytes(source.template)) for source in fields.source}
+        wanted = bytes(fields.base[0]) if fields.base else None
+    return found
+
+
+def carry(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
+    """Write what ``plan`` says of ``file``; return what may not be carried over."""
+    carrier = Carrier(file.container, writer)
+    carrier.before_clips()
+    for kind, id_ in plan.shared:
+        if kind == b"SKEL":
+            carrier.skeleton(id_)
+        else:
+            carrier.shared(kind, id_)
+    for name, as_name in plan.attachments.items():
+        carrier.attachment(name, as_name)
+    for name, change in plan.clips.items():
+        carrier.clip(name, change)
+        step(name)
+    for alias, as_name in plan.aliases.items():
+        writer.alias(as_name, *_target(file, plan, alias))
+    return carrier.left_out
+
+
+def _target(file: File, plan: Plan, alias: str) -> tuple[int, bytes]:
+    """What an alias stands for, by the name that this has from now on."""
+    of, target = file.aliases[alias]
+    name = target.decode("utf-8", "replace")
+    if of == payloads.OF_CLIP:  # one that was left out has the same name where it is already
+        return of, (plan.clips.get(name, SAME).name or name).encode()
+    if of == payloads.OF_ATTACHMENT:
+        return of, plan.attachments.get(name, name).encode()
+    return of, target
+
+
+def source_path(file: File, name: str) -> str:
+    """The path of the source of a clip; "" where it has none, or that has none."""
+    row = file.container.directory.clips[name]
+    return clip_head(file.container.payload(row.clip), row.clip.label).path
+
+
+def writer_like(stream: Any, files: Iterable[File]) -> Writer:
+    """A Writer of a new file that has what the first of ``files`` has, and holds what all hold."""
+    files = list(files)
+    head = parse(payloads.HEAD, files[0].container.directory.head, "HEAD")
+    profiles: list[Profile] = [file.container.profile for file in files]
+    return Writer(
+        stream,
+        profile=next((profile for profile in profiles if profile is not BASE), BASE),
+        head_extension=bytes(head.extension),
+        copies=any(file.container.copies() for file in files),
+    )
+
+
+def check_written(stream: Any, size: int) -> None:
+    """Walk the new file, whose every rule must hold; raises FormatError."""
+    stream.flush()
+    scan(ByteSource(stream, size=size), whole=True)
+
+
+@contextmanager
+def source_of(target: Any, output: Any) -> Iterator[File]:
+    """The file to be rewritten; where it is to take its own place, nobody appends meanwhile.
+
+    Raises AccessError where another process is appending to it.
+    """
+    if output is not None:
+        with open(target) as file:
+            yield file
+        return
+    if not isinstance(target, (str, os.PathLike)) or "://" in str(target):
+        raise OptionError(
+            f"{target}: only a file on disk can be rewritten in place; name an output"
+        )
+    try:
+        stream = builtins.open(target, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below
+    except (OSError, ValueError) as error:
+        raise AccessError(f"{target}: {getattr(error, 'strerror', None) or error}") from None
+    with stream:
+        if not lock(stream):
+            raise AccessError(f"{target}: another process is appending to it")
+        with open(target) as file:
+            yield file
+
+
+def rewrite(target: Any, output: Any, force: bool, file: File, plan: Plan, step: Step) -> Written:
+    """Write what ``plan`` says of ``file`` in its own place, or to ``output``."""
+    inputs = () if output is None else (target,)
+    path = Path(target) if output is None else output
+    with replacing(path, force=force or output is None, inputs=inputs) as stream:
+        writer = writer_like(stream, [file])
+        left_out = carry(file, writer, plan, step)
+        writer.finish()
+        if getattr(stream, "seekable", bool)():
+            check_written(stream, writer.offset)
+    return Written(writer.offset, left_out)
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The size of a new file, and what may not be carried over to it."""
+
+    size: int
+    left_out: list[str]
