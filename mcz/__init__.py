@@ -12,12 +12,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mcz.conversion import Fit, convert, from_positions
     from mcz.datasets import Dataset, Window, dataset
-    from mcz.editing.archive import append, pack, unpack
+    from mcz.editing.archive import append, pack
+    from mcz.editing.arranging import delete_clips, rename_clips, reorder_clips, split
     from mcz.editing.exporting import export
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
+    from mcz.editing.merging import merge
     from mcz.editing.outcomes import Outcome, Report
     from mcz.editing.repair import Repair, repair
     from mcz.editing.replacing import Replacement, replace
+    from mcz.editing.unpacking import unpack
     from mcz.errors import (
         AccessError,
         ChecksumError,
@@ -77,7 +80,10 @@ _HOMES = {
     "mcz.tables": ("to_pandas", "to_xarray"),
     "mcz.writing.npz": ("to_npz",),
     "mcz.datasets": ("Dataset", "Window", "dataset"),
-    "mcz.editing.archive": ("append", "pack", "unpack"),
+    "mcz.editing.archive": ("append", "pack"),
+    "mcz.editing.unpacking": ("unpack",),
+    "mcz.editing.arranging": ("delete_clips", "rename_clips", "reorder_clips", "split"),
+    "mcz.editing.merging": ("merge",),
     "mcz.editing.outcomes": ("Outcome", "Report"),
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
@@ -187,6 +193,7 @@ __all__ = [
     "contacts",
     "convert",
     "dataset",
+    "delete_clips",
     "encode",
     "export",
     "extract",
@@ -194,6 +201,7 @@ __all__ = [
     "in_positions",
     "joint_map",
     "live_frames",
+    "merge",
     "mirror",
     "open",
     "pack",
@@ -204,6 +212,8 @@ __all__ = [
     "read_skeleton",
     "recording",
     "rename",
+    "rename_clips",
+    "reorder_clips",
     "repair",
     "replace",
     "resample",
@@ -212,6 +222,7 @@ __all__ = [
     "root",
     "rotations",
     "select",
+    "split",
     "stream_decode",
     "stream_encode",
     "to_npz",

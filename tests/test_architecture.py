@@ -56,7 +56,7 @@ ALLOWED = {
     "writing": JOINT | {"metrics", "reading", "tables"},
     "conversion": MODEL | {"kinematics", "formats", "reading"},
     "retargeting": MODEL | {"kinematics"},
-    "editing": JOINT | {"metrics", "reading", "writing", "conversion", "tables"},
+    "editing": JOINT | {"metrics", "queries", "reading", "writing", "conversion", "tables"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL

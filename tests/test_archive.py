@@ -17,7 +17,7 @@ import mcz
 from mcz.container import payloads
 from mcz.container.chunks import FOOT
 from mcz.container.writer import Writer
-from mcz.editing.archive import safe_path
+from mcz.editing.unpacking import safe_path
 from mcz.motion import joint_columns
 from mcz.sample import write_samples
 

@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 
 import mcz
-from mcz.editing import archive as archive_module
-from mcz.editing import safe_names
-from mcz.editing.archive import NAMES
+from mcz.editing import safe_names, unpacking
 from mcz.editing.safe_names import PortableNames, fault_of, folded, notes_on
+from mcz.editing.unpacking import NAMES
 from mcz.errors import OptionError
 
 
@@ -60,7 +59,7 @@ def test_unpack_leaves_its_folder_with_no_names(
 ) -> None:
     archive = packed(tmp_path, "note.txt")
     for name in ("../out.txt", "/out.txt", "a/../../out.txt"):
-        monkeypatch.setattr(archive_module, "named_files", lambda file, of=name: [(of, bytes)])
+        monkeypatch.setattr(unpacking, "named_files", lambda file, of=name: [(of, bytes)])
         report = mcz.unpack(archive, tmp_path / names, names=names)
         assert [o.result for o in report.outcomes] == ["failed"]
         assert "not relative and plain" in report.outcomes[0].message

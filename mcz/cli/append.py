@@ -1,4 +1,4 @@
-"""``mcz append``: more source files into an .mcz file."""
+"""``mcz append``: more files, folders or archives into an .mcz file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, existing
+from mcz.cli.common import Exit, Failure, about, existing, say
 from mcz.cli.options import copies_option, encoding_options, json_option, threads_option
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
@@ -35,6 +35,14 @@ from mcz.cli.progress import Progress
 @click.option(
     "--force", is_flag=True, help="Of a file that was cut short drop what is whole at its end."
 )
+@click.option(
+    "--rename", is_flag=True, help="Of an .mcz put what has a name that is taken below its own."
+)
+@click.option(
+    "--skip-identical",
+    is_flag=True,
+    help="Of an .mcz leave out what is the same here under the same name.",
+)
 @copies_option("where the file has some")
 @encoding_options
 @threads_option
@@ -46,11 +54,15 @@ def command(
     root: str | None,
     salvage: bool,
     force: bool,
+    rename: bool,
+    skip_identical: bool,
     copies: bool | None,
     as_json: bool,
     **options: Any,
 ) -> Exit:
     """Append SRC... to FILE.mcz; when one of them cannot be added, none is.
+
+    SRC is a motion file, a folder of such files, or an .mcz, of which all is carried over as it is.
 
     What the file held stays readable at every moment, even if the computer stops in between. After
     that, the next append takes the file up from its last end; whole clips behind it are named, and
@@ -72,10 +84,14 @@ def command(
             root=root,
             salvage=salvage,
             force=force,
+            rename=rename,
+            skip_identical=skip_identical,
             copies=copies,
             progress=progress,
             **_known(options),
         )
+    for text in report.left_out:
+        say(f"left out: {text}")
     return conclude(report, target, as_json)
 
 

@@ -175,7 +175,7 @@ def _part(clip: str, signal: str, array: str, values: NDArray[Any]) -> Part:
 
 def _sources(file: File) -> Iterator[Part]:
     """Every file that is held under a name: of clips, attached, and further names."""
-    from mcz.editing.archive import named_files
+    from mcz.editing.unpacking import named_files
 
     lacking: UnsupportedError | None = None
     for path, restore in named_files(file):

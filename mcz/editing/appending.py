@@ -6,13 +6,13 @@ SPEC.md, "FOOT", says what follows the FOOT of a file that grew.
 from __future__ import annotations
 
 import builtins
-import io
 import os
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 from mcz.container import payloads
 from mcz.container.chunks import FOOT, SIGNATURE, Chunk, read_payload
@@ -28,6 +28,9 @@ from mcz.errors import (
     UnsupportedError,
 )
 from mcz.schema import parse
+
+IN_MEMORY = 1 << 26  # bytes of an addition; of a longer one a file beside the target holds them
+BLOCK = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +72,10 @@ def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
             raise AccessError(f"{path}: another process is appending to it")
         container, tail = _whole_part(stream, path, salvage, force)
         end = container.directory.end  # the writer moves it
-        added = io.BytesIO()
-        yield Growth(container, added, tail)
-        _check_place(stream, path)
-        _write(stream, end, added.getbuffer())
+        with tempfile.SpooledTemporaryFile(IN_MEMORY, dir=str(path.parent)) as added:
+            yield Growth(container, cast(BinaryIO, added), tail)
+            _check_place(stream, path)
+            _write(stream, end, cast(BinaryIO, added))
 
 
 def _check_place(stream: BinaryIO, path: Path) -> None:
@@ -85,13 +88,15 @@ def _check_place(stream: BinaryIO, path: Path) -> None:
         raise AccessError(f"{path}: it was replaced by another file while its addition was coded")
 
 
-def _write(stream: BinaryIO, end: int, data: memoryview) -> None:
-    """Put ``data`` at ``end``; where that fails the file ends there, as whole as it was."""
+def _write(stream: BinaryIO, end: int, added: BinaryIO) -> None:
+    """Put what was ``added`` at ``end``; where that fails the file ends there, whole as it was."""
     try:
         stream.seek(end)
-        at = 0
-        while at < len(data):
-            at += stream.write(data[at:])
+        added.seek(0)
+        while block := memoryview(added.read(BLOCK)):
+            at = 0
+            while at < len(block):
+                at += stream.write(block[at:])
         stream.truncate()
         os.fsync(stream.fileno())
     except BaseException:

@@ -39,7 +39,7 @@ from mcz.writing.names import check_name
 FOLDER = "folder"  # split by the first part of the names
 
 
-def delete(
+def delete_clips(
     target: Any,
     names: str | Iterable[str] = (),
     *,
@@ -145,7 +145,7 @@ def _lost_aliases(file: File, gone: Plan, plan: Plan) -> list[tuple[str, str]]:
     return [(name, "the file of a skeleton that no other clip has") for name in others]
 
 
-def rename(
+def rename_clips(
     target: Any,
     names: Mapping[str, str],
     *,
@@ -158,7 +158,7 @@ def rename(
     ``names``: from the old ones to the new. A clip's source, whose path was the clip's name and a
     suffix, follows it, so that ``unpack`` gives it under the new name; so do what is said of it
     and its aliases, which keep their own names. Names may be swapped. ``output`` and ``force`` are
-    those of ``delete``. Raises OptionError for a name that is not there, and for one that is
+    those of ``delete_clips``. Raises OptionError for a name that is not there, and for one that is
     taken.
     """
     with source_of(target, output) as file:
@@ -209,7 +209,7 @@ def paths_of(file: File, plan: Plan) -> list[str]:
     return paths + [change.path or path for change, path in found if path]
 
 
-def reorder(
+def reorder_clips(
     target: Any,
     names: Sequence[str] = (),
     *,
@@ -223,7 +223,7 @@ def reorder(
     Those called ``names`` come first, in this order; the others follow in the order that they had
     or, with ``by``, sorted by a field or metadata key ("-n_frames": descending), those without it
     last. Names are sorted as people do: "take2" before "take10". ``output`` and ``force`` are
-    those of ``delete``.
+    those of ``delete_clips``.
     """
     if isinstance(names, str):
         names = [names]

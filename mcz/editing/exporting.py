@@ -9,9 +9,9 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from mcz.conversion import TARGETS, converted_files
-from mcz.editing.archive import safe_path
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder
+from mcz.editing.unpacking import safe_path
 from mcz.errors import ExistsError, FormatError, MczError, OptionError
 from mcz.motion import Motion
 from mcz.reading.clip import Clip

@@ -34,6 +34,7 @@ from mcz.reading.names import listed
 from mcz.schema import parse
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
+from mcz.writing.draft import Draft
 
 CLIP, ATTACHMENT, ALIAS = "clip", "attachment", "alias"
 
@@ -91,6 +92,40 @@ def carried(
         found = carry(file, writer, plan, step)
         left_out += [f"{file.name}: {text}" for text in found]
     return left_out
+
+
+def add_files(
+    sources: Sequence[str | os.PathLike[str]],
+    before: File,
+    draft: Draft,
+    rename: bool,
+    skip_identical: bool,
+    progress: Progress | None,
+) -> Report:
+    """Carry what MCZ files hold over to ``draft``, which adds to the file ``before``.
+
+    Raises as ``merge`` does.
+    """
+    directory, report = draft.writer.directory, Report()
+    contents = {(kind, name): content for kind, name, content in _things(before)}
+    names = [(CLIP, name) for name in directory.clips]
+    names += [(ATTACHMENT, name) for name in directory.attachments]
+    names += [(ALIAS, name) for name in directory.aliases]
+    # Content that was written just now is like no other: it cannot be read yet.
+    held = Held({key: contents.get(key, object) for key in names}, set(draft.paths))
+    with ExitStack() as stack:
+        files = [stack.enter_context(open(source)) for source in sources]
+        options = {"rename": rename, "skip_identical": skip_identical}
+        plans = [(file, joined(file, held, report, **options)) for file in files]
+        _refuse_double(held)
+
+        def kept(done: int, total: int, name: str) -> None:
+            draft.keep()
+            if progress is not None:
+                progress(done, total, name)
+
+        report.left_out += carried(plans, draft.writer, kept)
+    return report
 
 
 @dataclass(slots=True)

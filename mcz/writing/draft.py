@@ -71,6 +71,10 @@ class Draft:
             raise
         self._commit()
 
+    def keep(self) -> None:
+        """Keep what was written since the last step."""
+        self._commit()
+
     def holds(self, path: str, digest: bytes) -> bool:
         """Whether the file restores these bytes as ``path``; raises where it restores others."""
         if path not in self.paths:

@@ -1,0 +1,53 @@
+"""``mcz delete``: clips out of an .mcz, and every byte of them."""
+
+from __future__ import annotations
+
+import click
+
+from mcz.cli.arranged import conclude, output_option
+from mcz.cli.common import Exit, Failure, about, existing
+from mcz.cli.options import force_option, json_option, where_option
+from mcz.cli.progress import Progress
+
+
+@click.command(short_help="Clips out of an .mcz, and every byte of them.")
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.argument("names", metavar="[NAME]...", nargs=-1)
+@where_option
+@click.option(
+    "--aliases", is_flag=True, help="Delete further names of the same content, too, not refuse."
+)
+@output_option
+@force_option
+@json_option
+def command(
+    file: str,
+    names: tuple[str, ...],
+    where: str | None,
+    aliases: bool,
+    output: str | None,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    """Take clips, attachments or aliases out of FILE.mcz, and what only they needed.
+
+    Their bytes are in no part of the new file: neither their skeletons, templates and models nor
+    what was said of them, unless another clip has the same. Other copies of FILE.mcz, and what the
+    disk or a backup keeps of the old one, are not touched.
+    """
+    import mcz
+
+    existing(file)
+    if not names and where is None:
+        raise Failure("name what to delete, or say --where", Exit.USAGE)
+    with about(file), Progress() as progress:
+        report = mcz.delete_clips(
+            file,
+            names,
+            where=where,
+            aliases=aliases,
+            output=output,
+            force=force,
+            progress=progress,
+        )
+    return conclude(report, output or file, as_json, told=("deleted",))

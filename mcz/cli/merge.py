@@ -1,0 +1,54 @@
+"""``mcz merge``: several .mcz files in one."""
+
+from __future__ import annotations
+
+import click
+
+from mcz.cli.arranged import conclude
+from mcz.cli.common import Exit, about, existing
+from mcz.cli.options import force_option, json_option
+from mcz.cli.progress import Progress
+
+
+@click.command(short_help="Several .mcz in one, nothing coded anew.")
+@click.argument(
+    "sources", metavar="IN.mcz...", nargs=-1, required=True, type=click.Path(readable=False)
+)
+@click.option("-o", "--output", metavar="OUT.mcz", required=True, help="The file to write.")
+@click.option(
+    "--rename",
+    is_flag=True,
+    help="Put what has a name that is taken below the name of its file: day2/walk.",
+)
+@click.option(
+    "--skip-identical", is_flag=True, help="Take what is the same under one name in two files once."
+)
+@force_option
+@json_option
+def command(
+    sources: tuple[str, ...],
+    output: str,
+    rename: bool,
+    skip_identical: bool,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    """Put all that the files hold into OUT.mcz; chunks are copied, what they share once.
+
+    A name that two of them have is refused, unless --rename or --skip-identical says what becomes
+    of it.
+    """
+    import mcz
+
+    for source in sources:
+        existing(source)
+    with about(output, *sources), Progress() as progress:
+        report = mcz.merge(
+            sources,
+            output,
+            rename=rename,
+            skip_identical=skip_identical,
+            force=force,
+            progress=progress,
+        )
+    return conclude(report, output, as_json, told=("renamed",))

@@ -1,0 +1,95 @@
+"""The files below a folder, as they are packed: which, in which order, under which names."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from mcz.editing.outcomes import Outcome
+from mcz.errors import AccessError, OptionError
+from mcz.formats import FORMATS
+
+
+def files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
+    """The files below ``root`` but for an earlier ``target``, and what else there is, in order."""
+    own = Path(target).resolve() if isinstance(target, (str, os.PathLike)) else None
+    if own is not None and own.suffix.lower() != ".mcz":
+        own = None  # a file to be packed, which may not be replaced
+    files: list[Path] = []
+    others: list[Outcome] = []
+
+    def say(path: Path, result: str, text: str) -> None:
+        others.append(Outcome(path.relative_to(root).as_posix(), result, 0, text))
+
+    def unreadable(error: OSError) -> None:
+        if Path(error.filename) == root:
+            raise AccessError(f"{root}: {error.strerror or error}") from None
+        say(Path(error.filename), "failed", f"{error.filename}: {error.strerror or error}")
+
+    for folder, folders, names in os.walk(root, onerror=unreadable):
+        for path in (Path(folder, name) for name in (*folders, *names)):
+            if path.is_symlink():
+                say(path, "skipped", "a symbolic link; only files are packed")
+            elif path.is_file():
+                if path.resolve() != own:
+                    files.append(path)
+            elif not path.is_dir():
+                say(path, "skipped", "neither a file nor a folder")
+
+    def key(name: str) -> bytes:
+        return os.fsencode(name)
+
+    files.sort(key=lambda path: key(path.relative_to(root).as_posix()))
+    return files, others
+
+
+def motion_files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    """The files of source formats, and the others."""
+    known = {suffix for source_format in FORMATS.values() for suffix in source_format.suffixes}
+    motions = [path for path in paths if path.suffix.lower() in known]
+    return motions, [path for path in paths if path.suffix.lower() not in known]
+
+
+def left_out(path: Path, root: Path) -> Outcome:
+    name = path.relative_to(root).as_posix()
+    return Outcome(name, "skipped", size_of(path), "no motion file; --keep-all keeps it")
+
+
+def size_of(path: Path) -> int:
+    with suppress(OSError, ValueError):
+        return path.stat().st_size
+    return 0
+
+
+def sources_named(
+    sources: Sequence[str | os.PathLike[str]],
+    root: str | os.PathLike[str] | None,
+    target: Any,
+) -> tuple[list[tuple[Path, str]], list[Outcome]]:
+    """The files that ``sources`` name, each with its name in an archive; and what is left out.
+
+    A folder stands for the motion files below it, under their paths relative to it. ``root``: all
+    names are relative to that; raises OptionError for a file that does not lie below.
+    """
+    found: list[tuple[Path, str]] = []
+    skipped: list[Outcome] = []
+    for source in map(Path, sources):
+        if not source.is_dir():
+            found.append((source, source.name if root is None else _relative(source, root)))
+            continue
+        paths, others = files_below(source, target)
+        paths, left = motion_files(paths)
+        skipped += [*others, *(left_out(path, source) for path in left)]
+        base = source if root is None else root
+        found += [(path, _relative(path, base)) for path in paths]
+    return found, skipped
+
+
+def _relative(path: Path, root: str | os.PathLike[str]) -> str:
+    try:
+        return path.resolve().relative_to(Path(root).resolve()).as_posix()
+    except ValueError:
+        raise OptionError(f"{path} does not lie below {root}") from None
