@@ -34,7 +34,7 @@ from mcz.container.source import ByteSource
 from mcz.errors import ChecksumError, FormatError, LimitError, TruncatedError, UnsupportedError
 from mcz.schema import read_varint
 
-BLOCK = 4 * 1024 * 1024  # bytes that are read at a time
+BLOCK = 2 * 1024 * 1024  # bytes that are read at a time; a packet has at most 1 MiB
 PEEK = 64  # enough for the fields of a segment before its table
 MOST_FRAMING = 1 + 8 + 8 + 2 * CHECK_SIZE  # bytes of a packet around its body
 SHARED = (b"SKEL", b"MODL", b"SRCE")
