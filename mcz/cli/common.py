@@ -251,8 +251,7 @@ def about(path: str, *others: str) -> Iterator[None]:
     except (MczError, OSError) as error:
         text = reason(error)
         named = text if any(name in text for name in (path, *others)) else f"{path}: {text}"
-        kind = type(error).__name__
-        raise Failure(named, code_of(error), path=path, kind=kind) from error
+        raise Failure(named, code_of(error), path=path, kind=type(error).__name__) from error
     except MemoryError as error:
         raise Failure(f"{path}: {OUT_OF_MEMORY}", path=path, kind="MemoryError") from error
 

@@ -10,6 +10,7 @@ from mcz.cli.common import Exit, Failure, about, check_new, given, write_output
 from mcz.cli.terminal import json_text
 
 if TYPE_CHECKING:
+    from mcz.bags import BagCheck
     from mcz.reading.file import File
 
 SUFFIXES = (".txt", ".json")
@@ -29,7 +30,7 @@ class Filed:
             refuse_inputs(path, inputs)
         check_new(self.path, force)
         self.date = _now() if date is None else None if date == NONE else date
-        self._facts: dict[str, Any] = {}
+        self._facts: dict[str, Any] = {}  # of the file that was taken last
 
     def take(self, held: File) -> None:
         """Keep what the report says of an open file."""
@@ -62,8 +63,50 @@ class Filed:
         from mcz.reading.verification import text_lines
 
         document = self.document(rows, quick=quick, where=where)
+        self._write(document, text_lines(document))
+
+    def write_bag(
+        self,
+        found: BagCheck,
+        verified: bool,
+        files: Sequence[dict[str, Any]],
+        documents: Sequence[dict[str, Any]],
+    ) -> None:
+        """Write the report of a bag: of itself, then the ``documents`` of the archives in it.
+
+        ``files``: what is said of each archive, those that could not be read too.
+        """
+        from mcz import __version__
+        from mcz.reading.verification import bag_lines, text_lines
+
+        unread = [
+            f"{row['file']}: {problem}"
+            for row in files
+            for part in row["parts"]
+            if part["kind"] == "file"
+            for problem in part["problems"]
+        ]
+        document = {
+            "verified": verified,
+            "bag": str(found.folder),
+            "tool": f"mcz {__version__}",
+            "date": self.date,
+            "bagit_version": found.version,
+            "algorithms": found.algorithms,
+            "info": dict(found.info),
+            "payload_files": len(found.files),
+            "payload_bytes": found.n_bytes,
+            "problems": [*found.problems, *unread],
+            "files": list(documents),
+        }
+        lines = bag_lines(document)
+        for held in documents:
+            lines += ["", *text_lines(held)]
+        self._write(document, lines)
+
+    def _write(self, document: Any, lines: Sequence[str]) -> None:
         as_text = self.path.suffix.lower() == ".txt"
-        text = "\n".join(text_lines(document)) if as_text else json_text(document)
+        text = "\n".join(lines) if as_text else json_text(document)
         write_output(self.path, f"{text}\n".encode("utf-8", "backslashreplace"), self.force)
 
 

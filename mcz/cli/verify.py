@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, echo, existing, given, opened, print_json, say
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    echo,
+    existing,
+    given,
+    opened,
+    plural,
+    print_json,
+    say,
+)
 from mcz.cli.filed import Filed
 from mcz.cli.options import decoded_option, force_option, json_option, threads_option, where_option
 from mcz.cli.progress import Progress
@@ -19,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Prove that sources come back identical.")
-@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.argument("file", metavar="FILE.mcz|BAG", type=click.Path(readable=False))
 @click.option(
     "--source",
     metavar="SRC",
@@ -55,7 +66,8 @@ def command(
     """Check every checksum, decode everything, restore every source and compare its SHA-256.
 
     With --where every checksum of the file, and all that is said of the clips that it takes. With
-    --quick every checksum and the index; it says that nothing was decoded.
+    --quick every checksum and the index; it says that nothing was decoded. Of a BAG, a folder that
+    mcz bag or another tool has made (BagIt), each file against the manifests, then each .mcz in it.
     """
     if quick and (where is not None or source is not None):
         raise Failure("--quick decodes nothing: it takes no --where and no --source", Exit.USAGE)
@@ -63,8 +75,12 @@ def command(
         raise Failure("--date is that of the --report", Exit.USAGE)
     if source is not None:
         existing(source)
+    if Path(file).is_dir() and (where is not None or source is not None):
+        raise Failure("--where and --source are of one file, not of a bag", Exit.USAGE)
     counts = ""
     filed = None if report is None else Filed(report, date, force, inputs=(file,))
+    if Path(file).is_dir():
+        return _bag(file, quick, max_decoded, filed, as_json)
     if quick:
         rows, counts = _quickly(file, filed)
     else:
@@ -74,14 +90,68 @@ def command(
         filed.write(rows, quick=quick, where=where)
     if as_json:
         print_json({"verified": not failed, "mode": "quick" if quick else "full", "parts": rows})
-    elif not failed and quick:
-        echo(f"{file}: checksums right, {counts}; values and sources were not checked")
     elif not failed:
-        echo(f"{file}: verified, {', '.join(_counts(rows))}")
+        echo(_praise(file, rows, counts))
+    _say_problems(file, failed)
+    return Exit.NOT_VERIFIED if failed else Exit.FINE
+
+
+def _praise(file: str, rows: list[dict[str, Any]], counts: str) -> str:
+    """One line about a sound file; ``counts``: of a quick check."""
+    if counts:
+        return f"{file}: checksums right, {counts}; values and sources were not checked"
+    return f"{file}: verified, {', '.join(_counts(rows))}"
+
+
+def _say_problems(file: str, failed: list[dict[str, Any]]) -> None:
     for row in failed:
         for problem in row["problems"]:
             say(f"{file}: {row['kind']} {row['name']}: {problem}".replace(" :", ":"))
-    return Exit.NOT_VERIFIED if failed else Exit.FINE
+
+
+def _bag(
+    folder: str, quick: bool, max_decoded: int | None, filed: Filed | None, as_json: bool
+) -> Exit:
+    """Check a bag, and each archive in it."""
+    from mcz.bags import check_bag, is_bag
+
+    if not is_bag(folder):
+        text = f"{folder}: a folder and no bag: it has no bagit.txt"
+        raise Failure(text, path=folder, kind="AccessError")
+    with about(folder), Progress() as progress:
+        found = check_bag(folder, progress)
+    fine, documents, files = not found.problems, [], []
+    for name in found.files:
+        if not name.lower().endswith(".mcz"):
+            continue
+        path, counts = str(Path(folder) / name), ""
+        try:
+            if quick:
+                rows, counts = _quickly(path, filed)
+            else:
+                rows = _fully(path, None, None, max_decoded, filed)
+            if filed is not None:
+                documents.append(filed.document(rows, quick=quick, where=None))
+        except Failure as failure:  # the others are checked all the same
+            rows = [_row("file", "", [str(failure).removeprefix(f"{path}: ")])]
+        failed = [row for row in rows if row["problems"]]
+        files.append({"file": name, "verified": not failed, "parts": rows})
+        fine = fine and not failed
+        if not failed and not as_json:
+            echo(_praise(path, rows, counts))
+        _say_problems(path, failed)
+    if filed is not None:
+        filed.write_bag(found, fine, files, documents)
+    if as_json:
+        mode = "quick" if quick else "full"
+        document = {"verified": fine, "mode": mode, "problems": found.problems, "files": files}
+        print_json(document)
+    elif not found.problems:
+        count = plural(len(found.files), "file")
+        echo(f"{folder}: a valid bag, {count}, {found.n_bytes:,} bytes")
+    for problem in found.problems:
+        say(f"{folder}: {problem}")
+    return Exit.FINE if fine else Exit.NOT_VERIFIED
 
 
 def _fully(

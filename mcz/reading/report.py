@@ -20,7 +20,8 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.layout import layout as layout
-from mcz.reading.quick_check import Problem, heading, quick_check
+from mcz.reading.quick_check import Problem as Problem
+from mcz.reading.quick_check import heading, quick_check
 from mcz.reading.recording_report import document_of
 from mcz.reading.signal_info import SignalInfo, read_segments
 from mcz.reading.sizes import Sizes, clip_sizes, models_used

@@ -203,6 +203,24 @@ def text_lines(document: Mapping[str, Any]) -> list[str]:
     return [printable(line) for line in lines]
 
 
+def bag_lines(document: Mapping[str, Any]) -> list[str]:
+    """The report of a bag as text, without those of the archives in it."""
+    verdict = "VERIFIED" if document["verified"] else "NOT VERIFIED"
+    lines = [f"Verification of the bag {document['bag']}: {verdict}", ""]
+    lines.append(_fact("checked by", document["tool"]))
+    if document["date"]:
+        lines.append(_fact("date", document["date"]))
+    version, algorithms = document["bagit_version"], ", ".join(document["algorithms"])
+    lines.append(_fact("checked", f"each file against the manifests: {algorithms}"))
+    lines.append(_fact("format", f"BagIt {version}"))
+    count = counted(document["payload_files"], "file")
+    lines.append(_fact("payload", f"{count}, {document['payload_bytes']:,} bytes"))
+    lines += [_fact(name, value) for name, value in document["info"].items()]
+    lines += ["", f"Problems: {len(document['problems']) or 'none'}"]
+    lines += [f"  {text}" for text in document["problems"]]
+    return [printable(line) for line in lines]
+
+
 def _fact(name: str, text: str) -> str:
     return f"{name:<12} {text}"
 
