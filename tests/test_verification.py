@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from fractions import Fraction
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import mcz
 from conformance.manifest import VECTORS, load
@@ -182,6 +184,16 @@ def test_a_file_that_grows_is_checked_up_to_its_end(packed: Path, tmp_path: Path
             grows = source.grows()
         if grows:  # not every system can tell
             assert mcz.verify(path, quick=True) == []
+
+
+@given(st.sampled_from([archive(), live()]), st.data())
+def test_damage_of_any_sort_is_a_problem(data: bytes, draw: st.DataObject) -> None:
+    """Bytes cut out and put in: never another exception, never a file that passes."""
+    at = draw.draw(st.integers(0, len(data)))
+    stop = draw.draw(st.integers(at, len(data)))
+    bad = data[:at] + draw.draw(st.binary(max_size=40)) + data[stop:]
+    with suppress(UnsupportedError):
+        assert bool(mcz.verify(bad, quick=True)) == (bad != data)
 
 
 def test_quick_takes_no_part(packed: Path, call: Call) -> None:

@@ -216,8 +216,12 @@ class _Walk:
             self.index = chunk
 
     def _heed(self, segment: memoryview) -> None:
-        """Learn from a segment which frame of signal 0 is due after it."""
-        header, _ = parse_segment(bytes(segment[:PEEK]))
+        """Learn from a segment which frame of signal 0 is due after it, where it says so."""
+        try:
+            header, _ = parse_segment(bytes(segment[:PEEK]))
+        except FormatError:  # within a sound checksum, which is for a full check
+            self.due = None
+            return
         if header.signal == 0:
             self.due = header.stop
 
@@ -249,29 +253,35 @@ class _Walk:
         """
         number, body = read_varint(block, pos + 1)
         length, body = read_varint(block, body)
-        first, where = block[pos], f"packet at {start + pos}"
-        if int.from_bytes(block[body : body + 2], "little") != zlib.crc32(block[pos:body]) & 0xFFFF:
-            raise ChecksumError(f"head_check of the {where} is wrong")  # PACK-03
+        first, size = block[pos], len(block)
+        if body + CHECK_SIZE > size:
+            raise TruncatedError(f"the file ends at {start + size}, in the packet at {start + pos}")
+        stored = block[body] | block[body + 1] << 8
+        if stored != zlib.crc32(block[pos:body]) & 0xFFFF:  # PACK-03
+            raise ChecksumError(f"head_check of the packet at {start + pos} is wrong")
         kind = first & 0x0F
         if number != sequence or kind > NUMBERED or first & 0x70:  # PACK-02, PACK-08, PACK-09
-            raise FormatError(f"{where}: kind {first:#04x}, number {number}, {sequence} is due")
-        check(where, length, self.profile.packet_bytes)  # LIMIT-08
+            what = f"kind {first:#04x}, number {number}, {sequence} is due"
+            raise FormatError(f"packet at {start + pos}: {what}")
+        if length > self.profile.packet_bytes:  # LIMIT-08
+            check(f"packet at {start + pos}", length, self.profile.packet_bytes)
         body += CHECK_SIZE
         stop = body + length + CHECK_SIZE
-        if stop > len(block):
-            raise TruncatedError(f"the file ends at {start + len(block)}, in the {where}")
-        self._check_body(start + pos, block[body : stop - CHECK_SIZE], block[stop - 2 : stop], kind)
+        if stop > size:
+            raise TruncatedError(f"the file ends at {start + size}, in the packet at {start + pos}")
+        stored = block[stop - 2] | block[stop - 1] << 8
+        self._check_body(start + pos, block[body : stop - CHECK_SIZE], stored, kind)
         if kind != END:
             self.places.clips[-1].segment(start + body, length, kind)
         return stop, kind == END
 
-    def _check_body(self, at: int, body: memoryview, stored: memoryview, kind: int) -> None:
+    def _check_body(self, at: int, body: memoryview, stored: int, kind: int) -> None:
         """Check the body of the packet at ``at``, as far as the frame that it needs is known."""
         known = kind != NUMBERED or self.due is not None
         computed = zlib.crc32(body)
         if kind == NUMBERED and self.due is not None:
             computed = zlib.crc32(self.due.to_bytes(8, "little"), computed)
-        sound = stored[0] | stored[1] << 8 == computed & 0xFFFF
+        sound = stored == computed & 0xFFFF
         if known and not sound:  # PACK-04, PACK-06, PACK-15
             self._fault(at, f"body_check of the packet at {at} is wrong")
         if kind == SEGMENT:
