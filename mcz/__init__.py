@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from mcz.bags import BagCheck, bag, check_bag
     from mcz.conversion import Fit, convert, from_positions
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
 __version__ = "0.9.0"
 
 _HOMES = {
+    "mcz.bags": ("BagCheck", "bag", "check_bag"),
     "mcz.editing.exporting": ("export",),
     "mcz.tables": ("to_pandas", "to_xarray"),
     "mcz.writing.npz": ("to_npz",),
@@ -144,6 +146,7 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "AccessError",
     "Attachment",
+    "BagCheck",
     "Channel",
     "ChecksumError",
     "Clip",
@@ -189,6 +192,8 @@ __all__ = [
     "Window",
     "accelerations",
     "append",
+    "bag",
+    "check_bag",
     "compare",
     "contacts",
     "convert",

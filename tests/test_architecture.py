@@ -52,6 +52,7 @@ ALLOWED = {
     "sample": MODEL | {"formats"},
     "tables": MODEL | {"kinematics", "poses"},
     "reading": JOINT | {"poses", "queries", "tables"},
+    "bags": GROUND | {"reading"},
     "datasets": JOINT | {"poses", "reading"},
     "writing": JOINT | {"metrics", "reading", "tables"},
     "conversion": MODEL | {"kinematics", "formats", "reading"},
@@ -61,11 +62,12 @@ ALLOWED = {
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
+    | {"bags"}
     | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
     "": MODEL
-    | {"kinematics", "metrics", "poses", "datasets", "retargeting", "tables"}
+    | {"bags", "kinematics", "metrics", "poses", "datasets", "retargeting", "tables"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it

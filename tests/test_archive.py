@@ -20,6 +20,7 @@ from mcz.container.writer import Writer
 from mcz.editing.unpacking import safe_path
 from mcz.motion import joint_columns
 from mcz.sample import write_samples
+from tests.web_server import Server, served
 
 
 @pytest.fixture(scope="module")
@@ -234,7 +235,18 @@ def test_remote_archive_costs_few_requests(samples: Path) -> None:
     writer.finish()
     with fsspec.open("memory://archive.mcz", "wb") as stream:
         stream.write(out.getvalue())
-    with mcz.open("memory://archive.mcz") as file:
+    server = Server(out.getvalue())
+    with served(server):
+        for address in ("memory://archive.mcz", server.address):
+            a_part_costs_little(address, motion)
+    assert len(server.asked) <= 4
+    assert server.n_sent <= 300_000
+    assert server.n_connections == 1
+
+
+def a_part_costs_little(address: str, motion: mcz.Motion) -> None:
+    """Requests and bytes for 100 frames of two joints of one clip of 2,500."""
+    with mcz.open(address) as file:
         source = file.container.source
         assert len(file.clips) == 2500
         clip = file.clips["071/take 1223"]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from threading import Thread
+import io
+import os
+import ssl
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from http.server import BaseHTTPRequestHandler
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,83 +16,58 @@ import pytest
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
+from mcz.container import http, http_connections
 from mcz.errors import AccessError
 from tests.motions import smooth
+from tests.web_server import Answering, Server, ranged, served
 
 
-@dataclass
-class Server:
-    """Gives ``data`` in ranges; ``wrong`` answers in its place from request ``after`` on."""
-
-    data: bytes
-    address: str = ""
-    wrong: Callable[[BaseHTTPRequestHandler, bytes, int, int], None] | None = None
-    after: int = 0
-    asked: list[str] = field(default_factory=list)
-
-    def answer(self, handler: BaseHTTPRequestHandler) -> None:
-        self.asked.append(handler.headers.get("Range", ""))
-        first, _, last = self.asked[-1].removeprefix("bytes=").partition("-")
-        start, stop = int(first), min(int(last) + 1, len(self.data))
-        if self.wrong is not None and len(self.asked) > self.after:
-            self.wrong(handler, self.data, start, stop)
-        else:
-            ranged(handler, self.data, start, stop)
-
-
-def ranged(
-    handler: BaseHTTPRequestHandler,
-    data: bytes,
-    start: int,
-    stop: int,
-    said: str = "",
-    body: bytes | None = None,
-    tag: str = "1",
-) -> None:
-    part = data[start:stop] if body is None else body
-    handler.send_response(206)
-    handler.send_header("Content-Range", said or f"bytes {start}-{stop - 1}/{len(data)}")
-    handler.send_header("Content-Length", str(stop - start))
-    handler.send_header("ETag", tag)
-    handler.end_headers()
-    handler.wfile.write(part)
+@pytest.fixture(scope="module")
+def data() -> bytes:
+    out = io.BytesIO()
+    mcz.write(smooth(2000), out, "raw")
+    return out.getvalue()
 
 
 @pytest.fixture
-def server() -> Iterator[Server]:
-    import io
-
-    out = io.BytesIO()
-    mcz.write(smooth(2000), out, "raw")
-    found = Server(out.getvalue())
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            found.answer(self)
-
-        def log_message(self, format: str, *args: object) -> None:
-            pass
-
-    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as listening:
-        found.address = f"http://127.0.0.1:{listening.server_address[1]}/a.mcz"
-        thread = Thread(target=listening.serve_forever, args=(0.01,), daemon=True)
-        thread.start()
+def server(data: bytes, waited: list[float]) -> Iterator[Server]:
+    found = Server(data)
+    with served(found):
         yield found
-        listening.shutdown()
-        thread.join()
 
 
-def test_a_part_is_read_in_few_requests(server: Server) -> None:
+@pytest.fixture
+def waited(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The seconds that a reader would have waited between attempts."""
+    found: list[float] = []
+    monkeypatch.setattr(http_connections, "sleep", found.append)
+    return found
+
+
+@pytest.mark.parametrize("knows_ends", [True, False])
+def test_a_part_is_read_in_few_requests(
+    server: Server, knows_ends: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On one connection; servers that give no ranges at the end cost one more."""
+    monkeypatch.setattr(http, "TAIL", 1000)
+    server.knows_ends = knows_ends
     with mcz.open(server.address) as file:
         assert file.size == len(server.data)
         values = file.only_clip().read(frames=(10, 20))
         requests = len(server.asked)
     with mcz.open(server.data) as here:
         np.testing.assert_array_equal(values, here.only_clip().read(frames=(10, 20)))
-    assert requests <= 6
+    assert requests <= 5 + (not knows_ends)
+    assert server.n_connections == 1 + (not knows_ends)  # an error closes it
 
 
-def status(code: int) -> Callable[[BaseHTTPRequestHandler, bytes, int, int], None]:
+def test_a_small_file_is_one_request(server: Server) -> None:
+    with mcz.open(server.address) as file:
+        file.only_clip().read()
+        assert file.container.source.n_requests >= len(server.asked) == 1
+
+
+def status(code: int) -> Answering:
     return lambda handler, *_: handler.send_error(code)
 
 
@@ -120,10 +98,11 @@ def silent(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) 
 
 def no_http(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
     handler.wfile.write(b"\x00\x01 no http at all\r\n\r\n")
+    handler.close_connection = True
 
 
 def other_file(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
-    ranged(handler, data, start, stop, tag="2")
+    ranged(handler, data, start, stop, tag='"2"')
 
 
 def longer_file(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
@@ -133,6 +112,7 @@ def longer_file(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: 
 def endless(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
     handler.send_response(302)
     handler.send_header("Location", "/again")
+    handler.send_header("Content-Length", "0")
     handler.end_headers()
 
 
@@ -156,7 +136,10 @@ LATER = {"was replaced while it was read": other_file, "replaced while": longer_
     ("said", "after"),
     [(said, after) for said in (*FAILURES, *LATER) for after in range(said in LATER, 3)],
 )
-def test_each_failure_is_an_access_error(server: Server, said: str, after: int) -> None:
+def test_each_failure_is_an_access_error(
+    server: Server, said: str, after: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(http, "TAIL", 1000)  # else the first request brings the whole file
     server.wrong, server.after = {**FAILURES, **LATER}[said], after
     with pytest.raises(AccessError, match=said) as found:  # noqa: SIM117
         with mcz.open(server.address) as file:
@@ -210,3 +193,256 @@ def test_errors_of_any_file_system_are_access_errors(
     monkeypatch.setattr(*((type(memory), "_open") if when == "open" else (of, "read")), fails)
     with pytest.raises(AccessError, match=r"memory://odd.mcz: token expired"):
         mcz.open("memory://odd.mcz")
+
+
+# A file that changes -------------------------------------------------------------
+
+
+def saying(tag: str = "", **more: str) -> Answering:
+    """A sound answer that says this of the file."""
+    named = {name.replace("_", "-"): value for name, value in more.items()}
+    return lambda handler, data, start, stop: ranged(
+        handler, data, start, stop, tag=tag, more=named
+    )
+
+
+OLD, NEW = "Mon, 23 Nov 2026 10:00:00 GMT", "Mon, 23 Nov 2026 10:00:01 GMT"
+IDENTITIES = {
+    "strong": (saying('"a"'), saying('"b"'), {"If-Match": '"a"'}),
+    "weak": (saying('W/"a"'), saying('W/"b"'), {}),
+    "tag-goes": (saying('"a"'), saying(), {"If-Match": '"a"'}),
+    "date": (
+        saying(Last_Modified=OLD),
+        saying(Last_Modified=NEW),
+        {"If-Unmodified-Since": OLD},
+    ),
+    "412": (saying('"a"'), lambda handler, *_: handler.send_error(412), {"If-Match": '"a"'}),
+    "shorter": (saying(), lambda handler, *_: handler.send_error(416), {}),
+}
+
+
+@pytest.mark.parametrize("name", IDENTITIES)
+def test_a_change_between_requests_is_noticed(
+    server: Server, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, after, conditions = IDENTITIES[name]
+    monkeypatch.setattr(http, "TAIL", 1000)
+    server.wrong = before
+    with mcz.open(server.address) as file:
+        clip = file.only_clip()
+        clip.read((0, 10))
+        server.wrong = after
+        with pytest.raises(AccessError, match="was replaced while it was read"):
+            clip.read((1500, 1510))
+    sent = server.headers[-1]
+    named = {"If-Match", "If-Unmodified-Since"}
+    assert {key: sent[key] for key in sent if key in named} == conditions
+
+
+# Tried again ---------------------------------------------------------------------
+
+
+def failing(times: int, wrong: Answering) -> Answering:
+    """So many answers are wrong, and all others sound."""
+    left = [times]
+
+    def answer(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
+        left[0] -= 1
+        (wrong if left[0] >= 0 else ranged)(handler, data, start, stop)
+
+    return answer
+
+
+def busy(code: int, after: str = "") -> Answering:
+    def answer(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
+        handler.send_response(code)
+        handler.send_header("Content-Length", "4")
+        if after:
+            handler.send_header("Retry-After", after)
+        handler.end_headers()
+        handler.wfile.write(b"busy")
+
+    return answer
+
+
+@pytest.mark.parametrize(
+    "wrong", [busy(429), busy(502), busy(503), busy(504), short, silent], ids=str
+)
+def test_what_may_pass_is_tried_three_times(
+    server: Server, waited: list[float], wrong: Answering
+) -> None:
+    server.wrong = failing(2, wrong)
+    with mcz.open(server.address) as file:
+        assert file.size == len(server.data)
+    assert len(server.asked) == 3
+    assert waited == [0.5, 1.0]
+    server.wrong = failing(3, wrong)
+    with pytest.raises(AccessError, match="tried 3 times"):
+        mcz.open(server.address)
+
+
+@pytest.mark.parametrize("wrong", [status(500), status(404), whole, moved, nonsense])
+def test_what_will_not_pass_is_tried_once(
+    server: Server, waited: list[float], wrong: Answering
+) -> None:
+    server.wrong = wrong
+    with pytest.raises(AccessError) as found:
+        mcz.open(server.address)
+    assert waited == []
+    assert "tried" not in str(found.value)
+
+
+def test_a_server_may_ask_to_wait(server: Server, waited: list[float]) -> None:
+    server.wrong = failing(1, busy(503, "7"))
+    mcz.open(server.address).close()
+    assert waited == [7.0]
+    server.wrong = busy(429, "3600")
+    with pytest.raises(AccessError, match="429 .* and asks to wait 3600 s"):
+        mcz.open(server.address)
+    server.wrong = failing(1, busy(503, "Mon, 23 Nov 2020 10:00:00 GMT"))  # long past
+    mcz.open(server.address).close()
+    server.wrong = failing(1, busy(503, "soon"))
+    mcz.open(server.address).close()
+    assert waited == [7.0, 0.5, 0.5]
+
+
+def test_a_connection_that_was_closed_is_made_anew(server: Server, waited: list[float]) -> None:
+    """A server closes what is idle: that is no failure."""
+
+    def once(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
+        ranged(handler, data, start, stop)
+        handler.close_connection = True  # unsaid
+
+    server.wrong = once
+    stream = http.HttpFile(server.address)
+    stream._tail = b""
+    assert stream.read_at(0, 8) == server.data[:8]
+    assert stream.read_at(8, 8) == server.data[8:16]
+    assert (server.n_connections, waited) == (3, [])
+    stream.close()
+
+
+# Redirects, proxies, threads, processes ------------------------------------------
+
+
+def leading(to: str, code: int = 302) -> Answering:
+    def answer(handler: BaseHTTPRequestHandler, data: bytes, start: int, stop: int) -> None:
+        if handler.path == "/a.mcz":
+            handler.send_response(code)
+            handler.send_header("Location", to)
+            handler.send_header("Content-Length", "0")
+            handler.end_headers()
+        else:
+            ranged(handler, data, start, stop)
+
+    return answer
+
+
+@pytest.mark.parametrize("code", [301, 302, 303, 307, 308])
+def test_later_requests_go_where_the_first_was_led(server: Server, code: int) -> None:
+    server.wrong = leading("b%20b.mcz?key=1", code)
+    stream = http.HttpFile(server.address)
+    stream._tail = b""
+    assert stream.read_at(4, 4) == server.data[4:8]
+    assert server.paths == ["/a.mcz", "/b%20b.mcz?key=1", "/b%20b.mcz?key=1"]
+    server.wrong = lambda handler, *rest: (  # that address has expired
+        leading("/c.mcz")(handler, *rest) if "key" not in handler.path else status(403)(handler)
+    )
+    assert stream.read_at(4, 4) == server.data[4:8]
+    assert server.paths[3:] == ["/b%20b.mcz?key=1", "/a.mcz", "/c.mcz"]
+    stream.close()
+
+
+@pytest.mark.parametrize("to", ["ftp://127.0.0.1/a", "https://127.0.0.1:x/", "http://"])
+def test_bad_redirects_are_refused(server: Server, to: str) -> None:
+    server.wrong = leading(to)
+    with pytest.raises(AccessError):
+        mcz.open(server.address)
+
+
+@pytest.mark.parametrize("address", ["http://", "https://a:b/c", "http://me:secret@127.0.0.1/a"])
+def test_bad_addresses_are_refused(address: str) -> None:
+    with pytest.raises(AccessError):
+        mcz.open(address)
+
+
+def test_proxies_of_the_system_are_used(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    proxy = server.address.removesuffix("/a.mcz").replace("://", "://me:se%20cret@")
+    monkeypatch.setenv("http_proxy", proxy)
+    monkeypatch.setenv("no_proxy", "localhost")
+    with mcz.open("http://example.invalid/a b.mcz") as file:
+        assert file.size == len(server.data)
+    assert server.paths == ["http://example.invalid/a%20b.mcz"]
+    assert server.headers[0]["Proxy-Authorization"] == "Basic bWU6c2UgY3JldA=="
+    assert server.headers[0]["Host"] == "example.invalid"
+
+
+def test_threads_share_a_file(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(http, "TAIL", 1000)
+    with mcz.open(server.address) as file, ThreadPoolExecutor(4) as pool:
+        clip = file.only_clip()
+        spans = [(at, at + 20) for at in range(0, 2000, 100)]
+        found = list(pool.map(clip.read, spans))
+        whole = clip.read()
+    for (first, stop), values in zip(spans, found, strict=True):
+        np.testing.assert_array_equal(values, whole[first:stop])
+    assert server.n_connections <= 4 + 1
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no such processes here")
+def test_a_fork_has_connections_of_its_own(server: Server) -> None:
+    stream = http.HttpFile(server.address)
+    stream._tail = b""
+    stream.read_at(0, 4)
+    before = server.n_connections
+    pid = os.fork()
+    if not pid:
+        os._exit(stream.read_at(0, 8) != server.data[:8])
+    assert os.waitpid(pid, 0)[1] == 0
+    assert stream.read_at(0, 4) == server.data[:4]
+    assert server.n_connections == before + 1
+    stream.close()
+
+
+# https ---------------------------------------------------------------------------
+
+CERTIFICATE = Path(__file__).parent / "https" / "server.pem"
+
+
+@pytest.fixture
+def secure(data: bytes, waited: list[float]) -> Iterator[Server]:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(CERTIFICATE)
+    found = Server(data)
+    with served(found, context):
+        yield found
+
+
+def test_https(secure: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With what the package installs, and one handshake."""
+    monkeypatch.setenv("SSL_CERT_FILE", str(CERTIFICATE))
+    monkeypatch.setattr(http, "TAIL", 1000)
+    with mcz.open(secure.address) as file:
+        assert file.only_clip().read((0, 10)).shape[0] == 10
+    assert len(secure.asked) > 1
+    assert secure.n_connections == 1
+
+
+def test_a_certificate_that_nobody_vouches_for(secure: Server, waited: list[float]) -> None:
+    with pytest.raises(AccessError, match="the certificate of 127.0.0.1 is not accepted: self"):
+        mcz.open(secure.address)
+    assert waited == []
+    assert secure.asked == []
+
+
+def test_https_does_not_lead_to_http(
+    secure: Server, server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SSL_CERT_FILE", str(CERTIFICATE))
+    secure.wrong = leading(server.address)
+    with pytest.raises(AccessError, match="leads from https to http"):
+        mcz.open(secure.address)
+    server.wrong = leading(secure.address.replace("a.mcz", "b.mcz"))
+    with mcz.open(server.address) as file:
+        assert file.size == len(server.data)
+    assert secure.paths[-1] == "/b.mcz"

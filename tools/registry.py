@@ -38,6 +38,9 @@ def registry(text: str) -> dict[str, Any]:
     limits = rows_after(text, "## Limits and profiles\n")
     return {
         "format_version": version[1],
+        "identification": _keyed(
+            rows_after(text, "**Identification**"), "what", "value", "meaning"
+        ),
         "chunk_types": _keyed(rows_after(text, "**Chunk types**"), "type", "flags", "meaning"),
         "packet_kinds": _keyed(rows_after(text, "**Kinds of packets**"), "id", "name"),
         "profiles": [

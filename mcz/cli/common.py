@@ -251,8 +251,7 @@ def about(path: str, *others: str) -> Iterator[None]:
     except (MczError, OSError) as error:
         text = reason(error)
         named = text if any(name in text for name in (path, *others)) else f"{path}: {text}"
-        kind = type(error).__name__
-        raise Failure(named, code_of(error), path=path, kind=kind) from error
+        raise Failure(named, code_of(error), path=path, kind=type(error).__name__) from error
     except MemoryError as error:
         raise Failure(f"{path}: {OUT_OF_MEMORY}", path=path, kind="MemoryError") from error
 
@@ -264,6 +263,16 @@ def existing(path: str) -> None:
         raise Failure(f"{path or repr(path)}: {what}", path=path, kind="AccessError")
 
 
+def given(path: str) -> str | bytes:
+    """``path``, which has to be there; of ``-`` the bytes of standard input."""
+    if path != "-":
+        existing(path)
+        return path
+    if sys.stdin is None:
+        raise Failure("standard input is closed")
+    return sys.stdin.buffer.read()
+
+
 @contextmanager
 def opened(path: str, **options: Any) -> Iterator[File]:
     """The MCZ file at ``path``, or on standard input where that is ``-``; errors name it.
@@ -272,13 +281,7 @@ def opened(path: str, **options: Any) -> Iterator[File]:
     """
     import mcz
 
-    target: str | bytes = path
-    if path == "-":
-        if sys.stdin is None:
-            raise Failure("standard input is closed")
-        target = sys.stdin.buffer.read()
-    else:
-        existing(path)
+    target = given(path)
     with about(path), hinted(target, options), mcz.open(target, **options) as file:
         if file.grows:
             say(f"{path}: another process is appending to it; this is what it held before")

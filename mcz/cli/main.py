@@ -16,6 +16,7 @@ COMMANDS = (
     "decode",
     "info",
     "verify",
+    "bag",
     "repair",
     "pack",
     "append",

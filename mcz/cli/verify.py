@@ -8,8 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, echo, existing, opened, print_json, say
-from mcz.cli.options import decoded_option, json_option, threads_option, where_option
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    echo,
+    existing,
+    given,
+    opened,
+    plural,
+    print_json,
+    say,
+)
+from mcz.cli.filed import Filed
+from mcz.cli.options import decoded_option, force_option, json_option, threads_option, where_option
 from mcz.cli.progress import Progress
 from mcz.errors import FormatError, LimitError, UnsupportedError
 
@@ -18,44 +30,171 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Prove that sources come back identical.")
-@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.argument("file", metavar="FILE.mcz|BAG", type=click.Path(readable=False))
 @click.option(
     "--source",
     metavar="SRC",
     type=click.Path(readable=False),
     help="Compare with this source file, too.",
 )
+@click.option("--quick", is_flag=True, help="Checksums and index alone: at the speed of the disk.")
+@click.option(
+    "--report",
+    metavar="REPORT",
+    type=click.Path(readable=False),
+    help="Also write a report to be filed: REPORT.txt or REPORT.json.",
+)
+@click.option(
+    "--date", metavar="DATE", help="The date of the report. Default: now; 'none' leaves it out."
+)
 @where_option
 @decoded_option
 @threads_option
+@force_option
 @json_option
 def command(
-    file: str, source: str | None, where: str | None, max_decoded: int | None, as_json: bool
+    file: str,
+    source: str | None,
+    quick: bool,
+    report: str | None,
+    date: str | None,
+    where: str | None,
+    max_decoded: int | None,
+    force: bool,
+    as_json: bool,
 ) -> Exit:
     """Check every checksum, decode everything, restore every source and compare its SHA-256.
 
-    With --where every checksum of the file, and all that is said of the clips that it takes.
+    With --where every checksum of the file, and all that is said of the clips that it takes. With
+    --quick every checksum and the index; it says that nothing was decoded. Of a BAG, a folder that
+    mcz bag or another tool has made (BagIt), each file against the manifests, then each .mcz in it.
     """
+    if quick and (where is not None or source is not None):
+        raise Failure("--quick decodes nothing: it takes no --where and no --source", Exit.USAGE)
+    if date is not None and report is None:
+        raise Failure("--date is that of the --report", Exit.USAGE)
     if source is not None:
         existing(source)
+    if Path(file).is_dir() and (where is not None or source is not None):
+        raise Failure("--where and --source are of one file, not of a bag", Exit.USAGE)
+    counts = ""
+    filed = None if report is None else Filed(report, date, force, inputs=(file,))
+    if Path(file).is_dir():
+        return _bag(file, quick, max_decoded, filed, as_json)
+    if quick:
+        rows, counts = _quickly(file, filed)
+    else:
+        rows = _fully(file, source, where, max_decoded, filed)
+    failed = [row for row in rows if row["problems"]]
+    if filed is not None:
+        filed.write(rows, quick=quick, where=where)
+    if as_json:
+        print_json({"verified": not failed, "mode": "quick" if quick else "full", "parts": rows})
+    elif not failed:
+        echo(_praise(file, rows, counts))
+    _say_problems(file, failed)
+    return Exit.NOT_VERIFIED if failed else Exit.FINE
+
+
+def _praise(file: str, rows: list[dict[str, Any]], counts: str) -> str:
+    """One line about a sound file; ``counts``: of a quick check."""
+    if counts:
+        return f"{file}: checksums right, {counts}; values and sources were not checked"
+    return f"{file}: verified, {', '.join(_counts(rows))}"
+
+
+def _say_problems(file: str, failed: list[dict[str, Any]]) -> None:
+    for row in failed:
+        for problem in row["problems"]:
+            say(f"{file}: {row['kind']} {row['name']}: {problem}".replace(" :", ":"))
+
+
+def _bag(
+    folder: str, quick: bool, max_decoded: int | None, filed: Filed | None, as_json: bool
+) -> Exit:
+    """Check a bag, and each archive in it."""
+    from mcz.bags import check_bag, is_bag
+
+    if not is_bag(folder):
+        text = f"{folder}: a folder and no bag: it has no bagit.txt"
+        raise Failure(text, path=folder, kind="AccessError")
+    with about(folder), Progress() as progress:
+        found = check_bag(folder, progress)
+    fine, documents, files = not found.problems, [], []
+    for name in found.files:
+        if not name.lower().endswith(".mcz"):
+            continue
+        path, counts = str(Path(folder) / name), ""
+        try:
+            if quick:
+                rows, counts = _quickly(path, filed)
+            else:
+                rows = _fully(path, None, None, max_decoded, filed)
+            if filed is not None:
+                documents.append(filed.document(rows, quick=quick, where=None))
+        except Failure as failure:  # the others are checked all the same
+            rows = [_row("file", "", [str(failure).removeprefix(f"{path}: ")])]
+        failed = [row for row in rows if row["problems"]]
+        files.append({"file": name, "verified": not failed, "parts": rows})
+        fine = fine and not failed
+        if not failed and not as_json:
+            echo(_praise(path, rows, counts))
+        _say_problems(path, failed)
+    if filed is not None:
+        filed.write_bag(found, fine, files, documents)
+    if as_json:
+        mode = "quick" if quick else "full"
+        document = {"verified": fine, "mode": mode, "problems": found.problems, "files": files}
+        print_json(document)
+    elif not found.problems:
+        count = plural(len(found.files), "file")
+        echo(f"{folder}: a valid bag, {count}, {found.n_bytes:,} bytes")
+    for problem in found.problems:
+        say(f"{folder}: {problem}")
+    return Exit.FINE if fine else Exit.NOT_VERIFIED
+
+
+def _fully(
+    file: str, source: str | None, where: str | None, max_decoded: int | None, filed: Filed | None
+) -> list[dict[str, Any]]:
+    """What is said of each part of the file."""
     try:
         with opened(file, max_decoded=max_decoded) as held, Progress() as progress:
             rows = list(_parts(held, where, progress))
             if source is not None:
                 rows.append(_compare(held, source))
+            if filed is not None:
+                filed.take(held)
     except Failure as failure:
         if not is_unsound(failure):
             raise
+        if filed is not None:
+            filed.take_bytes(file)
         rows = [_row("structure", "", [str(failure).removeprefix(f"{file}: ")])]
-    failed = [row for row in rows if row["problems"]]
-    if as_json:
-        print_json({"verified": not failed, "parts": rows})
-    elif not failed:
-        echo(f"{file}: verified, {', '.join(_counts(rows))}")
-    for row in failed:
-        for problem in row["problems"]:
-            say(f"{file}: {row['kind']} {row['name']}: {problem}".replace(" :", ":"))
-    return Exit.NOT_VERIFIED if failed else Exit.FINE
+    return rows
+
+
+def _quickly(file: str, filed: Filed | None) -> tuple[list[dict[str, Any]], str]:
+    """One row, that of the checksums; and what was seen."""
+    from mcz.reading.quick_check import quick_check
+
+    target = given(file)
+    with about(file), Progress() as progress:
+        seen, problems = quick_check(target, lambda done, total: progress(done, total, file))
+    if filed is not None:
+        try:
+            with opened(file) as held:
+                filed.take(held)
+        except Failure as failure:
+            if not is_unsound(failure):
+                raise
+            filed.take_bytes(file)
+    counts = f"{seen.n_chunks:,} chunks"
+    if seen.n_packets:
+        counts += f", {seen.n_packets:,} packets"
+    if not seen.indexed:
+        counts += ", no index"
+    return [_row("checksums", "", [f"at {p.offset}: {p.message}" for p in problems])], counts
 
 
 def is_unsound(failure: Failure) -> bool:

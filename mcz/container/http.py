@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-import http.client
 import io
 import re
-import urllib.error
-import urllib.request
-from typing import Any
+from email.message import Message
 
-from mcz.errors import AccessError
+from mcz.container.http_connections import Answer, Connections
 
-TIMEOUT = 30.0  # seconds that a server may be silent
+TAIL = 128 * 1024  # bytes at the end that come with the first request: most indexes fit
 RANGE = re.compile(r"bytes (?:([0-9]{1,18})-([0-9]{1,18})|\*)/([0-9]{1,18})")
+STRONG = re.compile(r'"[^"]*"')  # an ETag by which bytes are the same
+NO_SUFFIX = (200, 400, 416, 501)  # what servers answer that do not know of ranges at the end
+REPLACED = "the file was replaced while it was read"
 
 
 class HttpFile(io.RawIOBase):
-    """The file at an http or https address, which may seek; each read is a request.
+    """The file at an http or https address, which may seek; a read is at most one request.
 
-    The server must give ranges of bytes (RFC 9110, section 14), of one and the same file. Raises
-    AccessError, which names the address and what the server did.
+    The server must give ranges of bytes (RFC 9110, section 14), of one and the same file: by its
+    ETag, else by when it was last modified, and by its size. Threads may share it, and processes
+    after a fork. Raises AccessError, which names the address and what the server did.
     """
 
     is_remote = True  # as ByteSource asks
@@ -28,9 +29,10 @@ class HttpFile(io.RawIOBase):
         super().__init__()
         self.name = address
         self._at = 0
-        self._tag: str | None = None
-        self._size: int | None = None
-        _, self._size, self._tag = self._answer(0, 1)
+        self._server = Connections(address)
+        self._conditions: dict[str, str] = {}  # that each request after the first makes
+        self._said: tuple[str | None, ...] | None = None  # what tells this file from a later one
+        self._size, self._tail = self._first()
 
     def readable(self) -> bool:
         return True
@@ -39,62 +41,106 @@ class HttpFile(io.RawIOBase):
         return True
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at}.get(whence, self._size or 0)
+        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at}.get(whence, self._size)
         return self._at
 
     def tell(self) -> int:
         return self._at
 
     def read(self, size: int = -1) -> bytes:
-        left = max(0, (self._size or 0) - self._at)
-        size = left if size < 0 else min(size, left)
+        data = self.read_at(self._at, self._size if size < 0 else size)
+        self._at += len(data)
+        return data
+
+    def read_at(self, at: int, size: int) -> bytes:
+        """The ``size`` bytes at ``at``, fewer where the file ends; wherever the file stands."""
+        size = max(0, min(size, self._size - at))
+        start = at - (self._size - len(self._tail))
         if not size:
             return b""
-        data, _, _ = self._answer(self._at, size)
-        self._at += size
-        return data
+        if start >= 0:
+            return self._tail[start : start + size]
+        answer = self._answer(f"{at}-{at + size - 1}", size)
+        self._whole(answer, at, at + size - 1)
+        return self._body(answer, size)
 
-    def _answer(self, at: int, size: int) -> tuple[bytes, int, str | None]:
-        """The bytes of a range, the size of the whole file, and its tag."""
-        wanted = {"Range": f"bytes={at}-{at + size - 1}", "Accept-Encoding": "identity"}
-        request = urllib.request.Request(self.name, headers=wanted)
-        try:
-            with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
-                whole = self._check(answer, at, size)
-                return self._body(answer, min(size, whole - at)), whole, answer.headers.get("ETag")
-        except urllib.error.HTTPError as error:
-            error.close()
-            empty = RANGE.fullmatch(error.headers.get("Content-Range") or "")
-            if error.code == 416 and empty and empty[3] == "0":
-                return b"", 0, None
-            raise self._error(f"the server answers {error.code} {error.reason}") from None
-        except (OSError, http.client.HTTPException, ValueError) as error:
-            text = getattr(error, "reason", None) or str(error) or type(error).__name__
-            raise self._error(str(text)) from None
+    def close(self) -> None:
+        if not self.closed and hasattr(self, "_server"):
+            self._server.close()
+        super().close()
 
-    def _check(self, answer: Any, at: int, size: int) -> int:
-        """The size of the whole file, where this is an answer to what was asked."""
-        if answer.status != 206:
-            raise self._error(
-                f"the server answers {answer.status} to a range of bytes, so it gives no parts; "
+    def _first(self) -> tuple[int, bytes]:
+        """The size of the file, and the bytes at its end that came with it."""
+        answer = self._answer(f"-{TAIL}", TAIL)
+        if _is_empty(answer):
+            return 0, b""
+        if answer.status in NO_SUFFIX:
+            answer = self._answer("0-0", 1)
+            if _is_empty(answer):
+                return 0, b""
+            whole, tail = self._whole(answer, 0, 0), b""
+        else:
+            whole = self._whole(answer, None, None)
+            tail = self._body(answer, min(TAIL, whole))
+        tag, date = answer.headers.get("ETag"), answer.headers.get("Last-Modified")
+        self._said = _identity(answer.headers)
+        if tag and STRONG.fullmatch(tag):
+            self._conditions = {"If-Match": tag}
+        elif date and not tag:
+            self._conditions = {"If-Unmodified-Since": date}
+        return whole, tail
+
+    def _answer(self, asked: str, most: int) -> Answer:
+        headers = {
+            "Range": f"bytes={asked}",
+            "Accept-Encoding": "identity",
+            "User-Agent": "mcz",
+            **self._conditions,
+        }
+        return self._server.get(headers, most)
+
+    def _whole(self, answer: Answer, first: int | None, last: int | None) -> int:
+        """The size of the whole file, where this is an answer to what was asked.
+
+        ``first``, ``last``: the bytes that were, None for those at the end.
+        """
+        found = RANGE.fullmatch(answer.headers.get("Content-Range") or "")
+        if answer.status == 412 or (answer.status == 416 and self._said is not None):
+            raise self._server.error(REPLACED)
+        if answer.status == 200:
+            raise self._server.error(
+                "the server answers 200 to a range of bytes, so it gives no parts; "
                 "download the file first"
             )
-        found = RANGE.fullmatch(answer.headers.get("Content-Range") or "")
+        if answer.status != 206:
+            raise self._server.error(f"the server answers {answer.status} {answer.reason}")
         if found is None or found[1] is None:
-            raise self._error("the server does not say which range it gives")
-        first, last, whole = (int(number) for number in found.groups())
-        if (first, last) != (at, min(at + size, whole) - 1):
-            raise self._error(f"bytes {at} to {at + size - 1} are asked for, it gives {found[0]}")
-        if self._size not in (None, whole) or self._tag not in (None, answer.headers.get("ETag")):
-            raise self._error("the file was replaced while it was read")
+            raise self._server.error("the server does not say which range it gives")
+        start, stop, whole = (int(number) for number in found.groups())
+        if self._said not in (None, _identity(answer.headers)):
+            raise self._server.error(REPLACED)
+        if self._said is not None and whole != self._size:
+            raise self._server.error(REPLACED)
+        first = max(0, whole - TAIL) if first is None else first
+        last = whole - 1 if last is None else last
+        if (start, stop) != (first, min(last, whole - 1)):
+            raise self._server.error(f"bytes {first} to {last} are asked for, it gives {found[0]}")
         return whole
 
-    def _body(self, answer: Any, size: int) -> bytes:
-        data: bytes = answer.read(size + 1)
-        if len(data) != size:
-            came = "more" if len(data) > size else f"{len(data)}"
-            raise self._error(f"{size} bytes are announced, {came} came")
-        return data
+    def _body(self, answer: Answer, size: int) -> bytes:
+        if len(answer.body) != size:
+            came = "more" if len(answer.body) > size else f"{len(answer.body)}"
+            raise self._server.error(f"{size} bytes are announced, {came} came")
+        return answer.body
 
-    def _error(self, text: str) -> AccessError:
-        return AccessError(f"{self.name}: {text}")
+
+def _is_empty(answer: Answer) -> bool:
+    """Whether the answer says that the file has no bytes, so no range of them either."""
+    found = RANGE.fullmatch(answer.headers.get("Content-Range") or "")
+    return answer.status == 416 and found is not None and found[3] == "0"
+
+
+def _identity(headers: Message) -> tuple[str | None, ...]:
+    """By what a server tells one file from another: its ETag, else when it was modified."""
+    tag = headers.get("ETag")
+    return (tag, None) if tag else (None, headers.get("Last-Modified"))

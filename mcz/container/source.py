@@ -16,9 +16,9 @@ from mcz.errors import AccessError, MczError, OptionError, TruncatedError
 class ByteSource:
     """Reads ranges of a seekable binary stream and counts what it read.
 
-    Threads may share it, and processes after a fork: a file on disk is read at a position of the
-    read's own, a connection is opened anew. With ``target``, what ``open_source`` takes, it can be
-    pickled.
+    Threads may share it, and processes after a fork: a file on disk and one on a web server are
+    read at a position of the read's own, other streams are opened anew. With ``target``, what
+    ``open_source`` takes, it can be pickled.
 
     ``gap``: two wanted ranges that lie at most this far apart are read as one. Zero suits a disk;
     over a network a request costs more than the bytes between. ``tail``: how many bytes at the end
@@ -36,6 +36,7 @@ class ByteSource:
     ) -> None:
         self._stream = stream
         self._positioned = _is_plain_file(stream)
+        self._reads_at = getattr(stream, "read_at", None)  # of an HttpFile
         self._lock = Lock()  # seek and read belong together, whoever else reads
         self._process = os.getpid()
         self.target = target
@@ -112,15 +113,21 @@ class ByteSource:
     def _read_at(self, offset: int, size: int) -> bytes:
         if self._positioned:
             return os.pread(self._stream.fileno(), size, offset)
+        if self._reads_at is not None:
+            part: bytes = self._reads_at(offset, size)
+            return part
         with self._lock:
             self._stream.seek(offset)
             data: bytes = self._stream.read(size)
             return data
 
     def _forked(self) -> None:
-        """Let this process have what a fork would share: a connection, and a lock perhaps held."""
+        """Let this process have what a fork would share: a connection, and a lock perhaps held.
+
+        An HttpFile sees to that itself, and knows what it has read of.
+        """
         self._process, self._lock = os.getpid(), Lock()
-        if self.remote and isinstance(self.target, str):
+        if self.remote and self._reads_at is None and isinstance(self.target, str):
             self._stream = _remote_stream(self.target)
 
     def grows(self) -> bool:

@@ -287,11 +287,7 @@ def open(
         "reads_parts": unverified,
         "threads": checked(threads),
     }
-    try:
-        source = open_source(target)
-    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
-        text = getattr(error, "strerror", None) or error
-        raise AccessError(f"{target}: {text}") from None
+    source = reached(target)
     try:
         return _opened(source, options)
     except MczError as error:
@@ -301,6 +297,15 @@ def open(
     except BaseException:
         source.close()
         raise
+
+
+def reached(target: Any) -> ByteSource:
+    """The bytes of ``target``, as ``open`` takes it; raises AccessError and OptionError."""
+    try:
+        return open_source(target)
+    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
+        text = getattr(error, "strerror", None) or error
+        raise AccessError(f"{target}: {text}") from None
 
 
 def _file(container: Container) -> File:

@@ -6,37 +6,26 @@ Everything that ``mcz info`` and ``mcz verify`` print is computed here.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from mcz.brief import brief
 from mcz.codecs.basis_models import name_of
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
 from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import GROUP_NOTES
-from mcz.errors import ChecksumError, FormatError, MczError, UnsupportedError
+from mcz.errors import ChecksumError, FormatError, MczError, OptionError, UnsupportedError
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.layout import layout as layout
+from mcz.reading.quick_check import Problem as Problem
+from mcz.reading.quick_check import heading, quick_check
 from mcz.reading.recording_report import document_of
 from mcz.reading.signal_info import SignalInfo, read_segments
 from mcz.reading.sizes import Sizes, clip_sizes, models_used
 from mcz.schema import parse
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """One fault: where, under which heading of SPEC.md, and what."""
-
-    offset: int
-    heading: str
-    message: str
-
-    __repr__ = brief
 
 
 def info(
@@ -252,9 +241,6 @@ def _count(notes: bytes) -> int:
     return len(parse(payloads.GROUP_NOTES, notes, "group notes").exceptions)
 
 
-HEADINGS = tuple("HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL REPT COPY INDX".split())
-
-
 def validate(file: File, clips: Sequence[Clip] | None = None) -> list[Problem]:
     """Every fault of the file, once: structure, checksums, values, sources, index.
 
@@ -275,15 +261,8 @@ def structure_problems(file: File) -> list[Problem]:
         scan(file.container.source, whole=True)
     except FormatError as error:
         offset = error.offset or 0
-        return [Problem(offset, _heading(file, offset), str(error))]
+        return [Problem(offset, heading(file.container.source, offset), str(error))]
     return []
-
-
-def _heading(file: File, offset: int) -> str:
-    """The heading of SPEC.md under which the chunk at ``offset`` stands."""
-    source = file.container.source
-    kind = source.read(offset, min(4, source.size - offset)).decode("latin-1")
-    return kind if kind in HEADINGS else "Chunks"
 
 
 def verify(
@@ -291,13 +270,20 @@ def verify(
     max_decoded: int | None = None,
     threads: int | None = None,
     where: Where | None = None,
+    quick: bool = False,
 ) -> list[Problem]:
     """Check every checksum of a file, decode everything, restore every source.
 
     Returns the faults, none for a sound file; raises FormatError where it cannot even be opened.
     ``max_decoded`` and ``threads`` are those of ``mcz.open``. ``where``: check every checksum, but
     decode and restore only the clips that it takes, see ``File.find``; OptionError for none.
+    ``quick``: check the checksums and the index alone, at the speed of the disk; all faults of a
+    file that cannot be opened are told, too.
     """
+    if quick:
+        if where is not None:
+            raise OptionError("a quick check is of the whole file; it takes no where")
+        return quick_check(target)[1]
     with open(target, max_decoded=max_decoded, threads=threads) as file:
         return validate(file, None if where is None else file.chosen(where=where))
 

@@ -305,6 +305,7 @@ TWICE = [
     ("stream", "decode", "a.mcz", "--lost", "hold", "--lost", "linear"),
     ("train", "a.bvh", "-o", "x", "-o", "y"),
     ("verify", "a.mcz", "--source", "x", "--source", "y"),
+    ("bag", "a.mcz", "x", "--json", "--json"),
     ("unpack", "a.mcz", "x", "--force", "--force"),
     ("list", "a.mcz", "--json", "--json"),
     ("export", "a.mcz", "x", "--to", "npz", "--to", "csv"),

@@ -55,7 +55,12 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
             [str(file), "--clip", STEERING[:-1], "--to", "csv"],
         ],
         "info": [[str(file)], [str(file), "--layout"], [str(file), "--validate"]],
-        "verify": [[str(file)], [str(file), "--source", odd]],
+        "verify": [[str(file)], [str(file), "--source", odd], [str(file), "--quick"]],
+        "bag": [
+            [str(file), str(out)],
+            [str(file), str(out), "--info", f"{STEERING}=a"],
+            [odd, "x"],
+        ],
         "repair": [[str(file), "-o", f"{out}.mcz"]],
         "pack": [[str(file.parent), f"{out}.mcz"]],
         "append": [[odd, str(file)]],

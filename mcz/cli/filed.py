@@ -1,0 +1,117 @@
+"""The report of a verification as a file: ``mcz verify --report``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mcz.cli.common import Exit, Failure, about, check_new, given, write_output
+from mcz.cli.terminal import json_text
+
+if TYPE_CHECKING:
+    from mcz.bags import BagCheck
+    from mcz.reading.file import File
+
+SUFFIXES = (".txt", ".json")
+NONE = "none"  # as a date
+
+
+class Filed:
+    """A report at ``path``, which must be new unless ``force``; raises Failure at once."""
+
+    def __init__(self, path: str, date: str | None, force: bool, inputs: Sequence[str]) -> None:
+        from mcz.writing.inputs import refuse_inputs
+
+        self.path, self.force = Path(path), force
+        if self.path.suffix.lower() not in SUFFIXES:
+            raise Failure(f"{path}: a report is a .txt or a .json", Exit.USAGE)
+        with about(path):
+            refuse_inputs(path, inputs)
+        check_new(self.path, force)
+        self.date = _now() if date is None else None if date == NONE else date
+        self._facts: dict[str, Any] = {}  # of the file that was taken last
+
+    def take(self, held: File) -> None:
+        """Keep what the report says of an open file."""
+        from mcz.reading.verification import bytes_facts, contents
+
+        self._facts = {**bytes_facts(held.container.source), **contents(held)}
+
+    def take_bytes(self, file: str) -> None:
+        """Keep what can be said of a file that cannot be opened."""
+        from mcz.reading.file import reached
+        from mcz.reading.verification import bytes_facts
+
+        with about(file):
+            source = reached(given(file))
+            try:
+                self._facts = bytes_facts(source)
+            finally:
+                source.close()
+
+    def document(self, rows: Sequence[dict[str, Any]], *, quick: bool, where: str | None) -> Any:
+        """The report, see ``mcz.reading.verification.report``."""
+        from mcz import __version__
+        from mcz.reading.verification import report
+
+        tool = f"mcz {__version__}"
+        return report(self._facts, rows, tool=tool, date=self.date, quick=quick, chosen=where)
+
+    def write(self, rows: Sequence[dict[str, Any]], *, quick: bool, where: str | None) -> None:
+        """Write the report of ``rows``, what is said of each part."""
+        from mcz.reading.verification import text_lines
+
+        document = self.document(rows, quick=quick, where=where)
+        self._write(document, text_lines(document))
+
+    def write_bag(
+        self,
+        found: BagCheck,
+        verified: bool,
+        files: Sequence[dict[str, Any]],
+        documents: Sequence[dict[str, Any]],
+    ) -> None:
+        """Write the report of a bag: of itself, then the ``documents`` of the archives in it.
+
+        ``files``: what is said of each archive, those that could not be read too.
+        """
+        from mcz import __version__
+        from mcz.reading.verification import bag_lines, text_lines
+
+        unread = [
+            f"{row['file']}: {problem}"
+            for row in files
+            for part in row["parts"]
+            if part["kind"] == "file"
+            for problem in part["problems"]
+        ]
+        document = {
+            "verified": verified,
+            "bag": str(found.folder),
+            "tool": f"mcz {__version__}",
+            "date": self.date,
+            "bagit_version": found.version,
+            "algorithms": found.algorithms,
+            "info": dict(found.info),
+            "payload_files": len(found.files),
+            "payload_bytes": found.n_bytes,
+            "problems": [*found.problems, *unread],
+            "files": list(documents),
+        }
+        lines = bag_lines(document)
+        for held in documents:
+            lines += ["", *text_lines(held)]
+        self._write(document, lines)
+
+    def _write(self, document: Any, lines: Sequence[str]) -> None:
+        as_text = self.path.suffix.lower() == ".txt"
+        text = "\n".join(lines) if as_text else json_text(document)
+        write_output(self.path, f"{text}\n".encode("utf-8", "backslashreplace"), self.force)
+
+
+def _now() -> str:
+    """The date and time of the day, in UTC, to a second."""
+    from datetime import UTC, datetime
+
+    return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -1,0 +1,251 @@
+"""A report of a verification, to be filed beside an archive: what was checked, and what it held."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from mcz.brief import counted, printable
+from mcz.container import payloads
+from mcz.container.source import ByteSource
+from mcz.errors import MczError
+from mcz.reading.clip import Clip
+from mcz.reading.file import Attachment, File
+from mcz.schema import parse
+
+BLOCK = 1024 * 1024  # bytes that are hashed at a time
+CHECKED = {
+    "quick": ("every checksum of the file", "the index against what is there"),
+    "full": (
+        "every checksum of the file",
+        "the structure of the file, and the index against what is there",
+        "every value decoded, and compared with its SHA-256",
+        "every source file and attachment restored, and compared with its SHA-256",
+    ),
+    "unopened": ("whether the file can be opened",),
+}
+NOT_CHECKED = {
+    "quick": ("values were not decoded, source files were not restored",),
+    "full": (),
+    "unopened": ("all else, for the file cannot be opened",),
+}
+
+Part = Mapping[str, Any]  # kind, name and problems of a part, as ``mcz verify --json`` has them
+
+
+def bytes_facts(source: ByteSource) -> dict[str, Any]:
+    """Name, size and SHA-256 of a file, whatever it is."""
+    digest = hashlib.sha256()
+    for at in range(0, source.size, BLOCK):
+        digest.update(source.read(at, min(BLOCK, source.size - at)))
+    return {"file": source.name, "file_bytes": source.size, "sha256": digest.hexdigest()}
+
+
+def contents(file: File) -> dict[str, Any]:
+    """What a file says that it holds; nothing is decoded."""
+    clips = [_clip(clip) for clip in file]
+    skeletons = [_skeleton(file, id_) for id_, _ in file.skeletons]
+    attachments = [_attachment(file, held) for held in file.attachments.values()]
+    aliases = [
+        {"name": name, "of": kind, "target": target}
+        for name, (kind, target) in ((name, file.alias_of(name)) for name in file.aliases)
+    ]
+    files = _files(clips, skeletons, attachments, aliases)
+    return {
+        **file.header,
+        "totals": {
+            "clips": len(clips),
+            "frames": sum(row["n_frames"] for row in clips),
+            "skeletons": len(skeletons),
+            "attachments": len(attachments),
+            "aliases": len(aliases),
+            "files": len(files),
+            "files_bytes": sum(files.values()),
+        },
+        "clips": clips,
+        "skeletons": skeletons,
+        "attachments": attachments,
+        "aliases": aliases,
+    }
+
+
+def _files(
+    clips: list[dict[str, Any]],
+    skeletons: list[dict[str, Any]],
+    attachments: list[dict[str, Any]],
+    aliases: list[dict[str, Any]],
+) -> dict[str, int]:
+    """The files that ``unpack`` writes, and their sizes."""
+    sizes = {("clip", row["name"]): row["source_bytes"] or 0 for row in clips}
+    sizes |= {("skeleton", row["id"]): row["source_bytes"] or 0 for row in skeletons}
+    sizes |= {("attachment", row["name"]): row["bytes"] for row in attachments}
+    files = {row["source_path"]: row["source_bytes"] for row in clips if row["source_path"]}
+    files |= {row["name"]: row["bytes"] for row in attachments}
+    return files | {row["name"]: sizes.get((row["of"], row["target"]), 0) for row in aliases}
+
+
+def _clip(clip: Clip) -> dict[str, Any]:
+    try:
+        source = clip.source
+    except MczError:  # which is among the problems
+        source = None
+    return {"name": clip.name, "n_frames": clip.n_frames, **_source(source)}
+
+
+def _skeleton(file: File, id_: bytes) -> dict[str, Any]:
+    try:
+        skeleton = file.skeleton(id_, with_source=True)
+    except MczError:
+        return {"name": id_.hex(), "id": id_.hex(), **_source(None)}
+    return {"name": skeleton.name or id_.hex(), "id": id_.hex(), **_source(skeleton.source)}
+
+
+def _source(source: Any) -> dict[str, Any]:
+    return {
+        "source_path": source.path if source else None,
+        "source_bytes": source.size if source else None,
+        "source_sha256": source.sha256.hex() if source else None,
+    }
+
+
+def _attachment(file: File, held: Attachment) -> dict[str, Any]:
+    part = file.container.directory.attachments[held.name].parts[0]
+    try:
+        sha256 = parse(payloads.ATTA, file.container.payload(part), part.label).sha256.hex()
+    except MczError:
+        sha256 = None
+    return {"name": held.name, "bytes": held.size, "sha256": sha256}
+
+
+def report(
+    facts: Mapping[str, Any],
+    parts: Iterable[Part],
+    *,
+    tool: str,
+    date: str | None = None,
+    quick: bool = False,
+    chosen: str | None = None,
+) -> dict[str, Any]:
+    """The report as a document, ready for JSON; docs/scripts.md lists its keys.
+
+    ``facts``: those of ``bytes_facts``, and of ``contents`` where the file could be opened.
+    ``parts``: what the verification says of each part. ``chosen``: the query of the clips that a
+    full check decoded, None for all of them.
+    """
+    mode, rows = "quick" if quick else "full", list(parts)
+    done = mode if quick or "format_version" in facts else "unopened"
+    faults: dict[tuple[str, str], list[str]] = {}
+    for row in rows:  # skeletons may have one name
+        faults.setdefault((row["kind"], row["name"]), []).extend(row["problems"])
+    document = {
+        "verified": not any(faults.values()),
+        "mode": mode,
+        "checked": list(CHECKED[done]),
+        "not_checked": list(NOT_CHECKED[done]),
+        "tool": tool,
+        "date": date,
+        **{key: value for key, value in facts.items() if not isinstance(value, list)},
+    }
+    if chosen is not None:
+        document["not_checked"].append(f"values and sources of clips other than {chosen}")
+    document["problems"] = [
+        f"{row['kind']} {row['name']}".strip() + f": {text}"
+        for row in rows
+        for text in row["problems"]
+    ]
+    for kind in ("clip", "skeleton", "attachment"):
+        document[f"{kind}s"] = [
+            {**held, "result": _result(faults.get((kind, held["name"])), quick)}
+            for held in facts.get(f"{kind}s", ())
+        ]
+    document["aliases"] = list(facts.get("aliases", ()))
+    return document
+
+
+def _result(problems: list[str] | None, quick: bool) -> str:
+    if problems:
+        return "damaged"
+    return "not decoded" if quick or problems is None else "verified"
+
+
+def text_lines(document: Mapping[str, Any]) -> list[str]:
+    """The report as text, each name on one line and without what would steer a terminal."""
+    verdict = "VERIFIED" if document["verified"] else "NOT VERIFIED"
+    lines = [
+        f"Verification of {document['file']}: {verdict}",
+        "",
+        _fact("size", f"{document['file_bytes']:,} bytes"),
+        _fact("SHA-256", document["sha256"]),
+    ]
+    if "format_version" in document:
+        needs = f"needs a reader of {document['needs_version']}, profile {document['profile']}"
+        lines.append(_fact("format", f"MCZ {document['format_version']}, {needs}"))
+    lines.append(_fact("checked by", document["tool"]))
+    if document["date"]:
+        lines.append(_fact("date", document["date"]))
+    lines += [_fact("checked", text) for text in document["checked"]]
+    lines += [_fact("not checked", text) for text in document["not_checked"]]
+    if "totals" in document:
+        totals = document["totals"]
+        kinds = ("clip", "frame", "skeleton", "attachment")
+        counts = [counted(totals[f"{kind}s"], kind) for kind in kinds]
+        lines.append(_fact("holds", f"{', '.join(counts)}, {totals['aliases']} further names"))
+        text = f"{counted(totals['files'], 'file')}, {totals['files_bytes']:,} bytes"
+        lines.append(_fact("gives back", text))
+    lines += ["", f"Problems: {len(document['problems']) or 'none'}"]
+    lines += [f"  {text}" for text in document["problems"]]
+    for kind in ("clips", "skeletons", "attachments"):
+        lines += _rows(kind, document[kind])
+    if document["aliases"]:
+        lines += ["", "Further names: name, and of what"]
+        lines += [f"  {row['name']}  {row['of']} {row['target']}" for row in document["aliases"]]
+    return [printable(line) for line in lines]
+
+
+def bag_lines(document: Mapping[str, Any]) -> list[str]:
+    """The report of a bag as text, without those of the archives in it."""
+    verdict = "VERIFIED" if document["verified"] else "NOT VERIFIED"
+    lines = [f"Verification of the bag {document['bag']}: {verdict}", ""]
+    lines.append(_fact("checked by", document["tool"]))
+    if document["date"]:
+        lines.append(_fact("date", document["date"]))
+    version, algorithms = document["bagit_version"], ", ".join(document["algorithms"])
+    lines.append(_fact("checked", f"each file against the manifests: {algorithms}"))
+    lines.append(_fact("format", f"BagIt {version}"))
+    count = counted(document["payload_files"], "file")
+    lines.append(_fact("payload", f"{count}, {document['payload_bytes']:,} bytes"))
+    lines += [_fact(name, value) for name, value in document["info"].items()]
+    lines += ["", f"Problems: {len(document['problems']) or 'none'}"]
+    lines += [f"  {text}" for text in document["problems"]]
+    return [printable(line) for line in lines]
+
+
+def _fact(name: str, text: str) -> str:
+    return f"{name:<12} {text}"
+
+
+def _rows(kind: str, rows: list[dict[str, Any]]) -> list[str]:
+    if not rows:
+        return []
+    if kind == "attachments":
+        lines = [
+            f"  {row['result']}  {row['sha256'] or 'unknown':64}  {row['bytes']:,} bytes  "
+            f"{row['name']}"
+            for row in rows
+        ]
+        return ["", "Attachments: result, SHA-256, size, name", *lines]
+    lines = [
+        f"  {row['result']}  {row['source_sha256'] or 'no source':64}  "
+        f"{_size(row)}  {row['name']}  {row['source_path'] or row.get('id', '')}".rstrip()
+        for row in rows
+    ]
+    last = "path of the source" if kind == "clips" else "id"
+    heading = f"{kind.capitalize()}: result, SHA-256 of the source file, size, name, {last}"
+    return ["", heading, *lines]
+
+
+def _size(row: Mapping[str, Any]) -> str:
+    frames = [f"{row['n_frames']:,} frames"] if "n_frames" in row else []
+    sizes = [] if row["source_bytes"] is None else [f"{row['source_bytes']:,} bytes"]
+    return ", ".join(frames + sizes) or "-"

@@ -1,0 +1,277 @@
+"""The quick check finds what is damaged, whatever it is; a report says what was checked."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from contextlib import closing
+from fractions import Fraction
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mcz
+from conformance.manifest import VECTORS, load
+from mcz import codecs
+from mcz.cli.common import run
+from mcz.cli.main import cli
+from mcz.container.checksums import Checked, check_checksums
+from mcz.container.chunks import FOOT, build_foot
+from mcz.container.index import index_content
+from mcz.container.locks import lock
+from mcz.container.source import open_source
+from mcz.errors import UnsupportedError
+from tests import live_codec
+from tests.motions import skeleton, smooth
+
+Call = Callable[..., tuple[int, str, str]]
+DATE = "2026-11-24"
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Call:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = int(run(cli, "mcz", [str(word) for word in arguments]))
+        return code, *capsys.readouterr()
+
+    return call
+
+
+def archive() -> bytes:
+    """A clip in chunks."""
+    out = BytesIO()
+    mcz.write(smooth(12), out, "raw")
+    return out.getvalue()
+
+
+def live() -> bytes:
+    """A clip in packets, of a segment and of a frame."""
+    out = BytesIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(codecs.CODECS, live_codec.ID, live_codec.CODEC)
+        with mcz.LiveWriter(out, skeleton(), "stairs", frame_rate=Fraction(120)) as writer:
+            for row in smooth(20).signals[0].values.round(2):
+                writer.push(row)
+    return out.getvalue()
+
+
+@pytest.fixture(scope="module")
+def packed(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("packed")
+    for name in ("walk.asf", "walk.amc", "walk.bvh"):
+        (folder / "in" / "sub").mkdir(parents=True, exist_ok=True)
+        (folder / "in" / name).write_bytes((samples / name).read_bytes())
+    (folder / "in" / "sub" / "walk.bvh").write_bytes((samples / "walk.bvh").read_bytes())
+    (folder / "in" / "notes.txt").write_text("left foot first\n")
+    mcz.pack(folder / "in", folder / "all.mcz", rate=120, keep_all=True)
+    return folder / "all.mcz"
+
+
+def checked(target: Any, progress: Callable[[int, int], object] | None = None) -> Checked:
+    with closing(open_source(target)) as source:
+        return check_checksums(source, progress)
+
+
+# The quick check -----------------------------------------------------------------
+
+
+def test_sound_vectors_pass() -> None:
+    """All but those that need another reader."""
+    for vector in load()["vectors"]:
+        if vector["group"] == "invalid":
+            continue
+        try:
+            assert mcz.verify(VECTORS / vector["file"], quick=True) == [], vector["file"]
+        except UnsupportedError:
+            assert vector["group"] == "uncommon"
+
+
+@pytest.mark.parametrize("data", [archive(), live()], ids=["closed", "open"])
+def test_every_flipped_bit_is_found(data: bytes) -> None:
+    assert mcz.verify(data, quick=True) == []
+    for at in range(len(data)):
+        bad = bytearray(data)
+        bad[at] ^= 1 << at % 8
+        assert mcz.verify(bytes(bad), quick=True), at
+
+
+@pytest.mark.parametrize("data", [archive(), live()], ids=["closed", "open"])
+def test_every_beginning_is_found(data: bytes) -> None:
+    for stop in range(0, len(data), 7):
+        found = mcz.verify(data[:stop], quick=True)
+        assert found, stop
+        assert all(problem.offset <= stop for problem in found)
+
+
+def test_all_faults_are_named(packed: Path) -> None:
+    data = bytearray(packed.read_bytes())
+    with mcz.open(packed) as file:
+        rows = [clip.clip for clip in file.container.directory.clips.values()]
+        cends = [clip.cend for clip in file.container.directory.clips.values()]
+    data[rows[0].offset + 9] ^= 1  # a header, behind which the walk finds its way again
+    data[cends[1].payload_offset] ^= 1  # a payload
+    found = mcz.verify(bytes(data), quick=True)
+    assert [(problem.offset, problem.heading) for problem in found] == [
+        (rows[0].offset, "CLIP"),
+        (cends[1].offset, "CEND"),
+    ]
+
+
+def test_bodies_of_packets_are_named_one_by_one() -> None:
+    data = live()
+    with mcz.open(data) as file:
+        (clip,) = file.container.directory.clips.values()
+        rows = [row for row in clip.segments if row.size]
+    bad = bytearray(data)
+    for row in (rows[1], rows[4]):
+        bad[row.offset] ^= 1
+    found = mcz.verify(bytes(bad), quick=True)
+    assert len(found) == 2
+    assert all("body_check" in problem.message for problem in found)
+
+
+def test_an_index_of_another_file_is_found(packed: Path) -> None:
+    """Its checksum is right, what it says is not."""
+    from mcz.container.index import build_index
+
+    data = packed.read_bytes()
+    with mcz.open(packed) as file:
+        directory, foot = file.container.directory, file.container.index
+        assert foot is not None
+        assert index_content(directory)
+        for change in ("shared", "attachments", "aliases", "clips"):
+            table = dict(getattr(directory, change))
+            table.pop(next(iter(table)))
+            index = build_index(_with(directory, change, table))
+            bad = data[: foot.index_offset] + index + build_foot(foot.index_offset, len(index))
+            (problem,) = mcz.verify(bad, quick=True)
+            assert problem.heading == "INDX"
+            assert "it lists" in problem.message
+    foot_at_0 = data[: -FOOT.size] + build_foot(0, 0)
+    (problem,) = mcz.verify(foot_at_0, quick=True)
+    assert "the index is at" in problem.message
+
+
+def _with(directory: object, name: str, table: dict) -> object:
+    from dataclasses import replace
+
+    return replace(directory, **{name: table})
+
+
+def test_blocks_end_anywhere(packed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is read at a time does not change what is found; memory is bounded by it."""
+    from mcz.container import checksums
+
+    open_ones = live()
+    whole = checked(packed), checked(open_ones)
+    monkeypatch.setattr(checksums, "BLOCK", 70_000)  # a packet may have 64 KiB
+    assert (checked(packed), checked(open_ones)) == whole
+    assert whole[0].indexed
+    assert whole[1].n_packets == 20
+
+
+def test_a_file_that_grows_is_checked_up_to_its_end(packed: Path, tmp_path: Path) -> None:
+    path = tmp_path / "grows.mcz"
+    path.write_bytes(packed.read_bytes() + b"SKEL")
+    assert mcz.verify(path, quick=True)
+    with path.open("r+b") as writer:
+        assert lock(writer)
+        with closing(open_source(path)) as source:
+            grows = source.grows()
+        if grows:  # not every system can tell
+            assert mcz.verify(path, quick=True) == []
+
+
+def test_quick_takes_no_part(packed: Path, call: Call) -> None:
+    with pytest.raises(mcz.OptionError, match="takes no where"):
+        mcz.verify(packed, quick=True, where="n_frames > 1")
+    assert call("verify", packed, "--quick", "--where", "n_frames > 1")[0] == 2
+    assert call("verify", packed, "--quick", "--source", packed)[0] == 2
+
+
+def test_the_command_says_what_was_not_checked(packed: Path, tmp_path: Path, call: Call) -> None:
+    code, out, errors = call("verify", packed, "--quick")
+    assert (code, errors) == (0, "")
+    assert "values and sources were not checked" in out
+    seen: list[int] = []
+    checked(packed, lambda done, total: seen.append(done))
+    assert seen[-1] == packed.stat().st_size
+    bad = bytearray(packed.read_bytes())
+    bad[len(bad) // 2] ^= 1
+    (tmp_path / "bad.mcz").write_bytes(bad)
+    code, out, errors = call("verify", tmp_path / "bad.mcz", "--quick")
+    assert (code, out) == (3, "")
+    assert errors.startswith(f"mcz: {tmp_path / 'bad.mcz'}: checksums: at ")
+
+
+# Reports -------------------------------------------------------------------------
+
+
+def test_a_report_lists_what_was_verified(packed: Path, tmp_path: Path, call: Call) -> None:
+    import hashlib
+
+    path = tmp_path / "report.json"
+    words = ("verify", packed, "--report", path, "--date", "none")
+    assert call(*words)[0] == 0
+    first = path.read_bytes()
+    document = json.loads(first)
+    assert document["verified"] and document["mode"] == "full" and document["date"] is None
+    assert document["sha256"] == hashlib.sha256(packed.read_bytes()).hexdigest()
+    assert document["totals"]["files"] == 5
+    assert document["totals"]["files_bytes"] == sum(
+        file.stat().st_size for file in (packed.parent / "in").rglob("*.*") if file.is_file()
+    )
+    clip = next(row for row in document["clips"] if row["source_path"] == "walk.amc")
+    amc = (packed.parent / "in" / "walk.amc").read_bytes()
+    assert clip["source_sha256"] == hashlib.sha256(amc).hexdigest()
+    assert {row["result"] for row in (*document["clips"], *document["attachments"])} == {"verified"}
+    assert call(*words)[0] == 2  # a report is not overwritten
+    assert call(*words, "--force")[0] == 0
+    assert call("verify", packed, "--report", tmp_path / "now.json")[0] == 0
+    assert json.loads((tmp_path / "now.json").read_bytes())["date"].endswith("Z")
+    assert path.read_bytes() == first
+    assert call("verify", packed, "--report", tmp_path / "report.pdf")[0] == 2
+    assert call("verify", packed, "--report", f"{packed}", "--force")[0] == 2
+    assert call("verify", packed, "--date", "none")[0] == 2
+
+
+@pytest.mark.parametrize("quick", [[], ["--quick"]])
+@pytest.mark.parametrize("damage", ["none", "one clip", "no end"])
+def test_a_report_says_what_is_wrong(
+    packed: Path, tmp_path: Path, call: Call, quick: list[str], damage: str
+) -> None:
+    data = bytearray(packed.read_bytes())
+    with mcz.open(packed) as file:
+        at = next(iter(file.container.directory.clips.values())).segments[0].offset
+    if damage == "one clip":
+        data[at + 40] ^= 1
+    (tmp_path / "a.mcz").write_bytes(data[:-40] if damage == "no end" else data)
+    for suffix in ("json", "txt"):
+        report = tmp_path / f"r.{suffix}"
+        code = call("verify", tmp_path / "a.mcz", "--report", report, "--date", DATE, *quick)[0]
+        assert code == (0 if damage == "none" else 3)
+    document = json.loads((tmp_path / "r.json").read_bytes())
+    text = (tmp_path / "r.txt").read_text("utf-8")
+    assert document["verified"] == (damage == "none") == (not document["problems"])
+    assert (": VERIFIED" in text) == (damage == "none")
+    assert document["date"] == DATE and DATE in text
+    assert all(row["source_sha256"] in text for row in document["clips"])
+    assert all(problem in text for problem in document["problems"])
+    results = [row["result"] for row in document["clips"]]
+    if damage == "no end":
+        assert quick or (results == [] and "cannot be opened" in text)
+    elif quick:
+        assert set(results) == {"not decoded"}
+    else:
+        assert results.count("damaged") == (damage == "one clip")
+
+
+def test_a_report_of_some_clips_says_so(packed: Path, tmp_path: Path, call: Call) -> None:
+    path = tmp_path / "r.json"
+    code, _, _ = call("verify", packed, "--where", "format == 'bvh'", "--report", path)
+    document = json.loads(path.read_bytes())
+    assert code == 0
+    assert sorted(row["result"] for row in document["clips"]) == ["not decoded", "verified"]
+    assert document["not_checked"]
