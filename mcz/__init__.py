@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         SourceError,
         TruncatedError,
         UnsupportedError,
+        WorkerError,
     )
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
@@ -105,6 +106,7 @@ _HOMES = {
         "SourceError",
         "TruncatedError",
         "UnsupportedError",
+        "WorkerError",
     ),
     "mcz.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.reading.file": ("Attachment", "File", "open"),
@@ -187,6 +189,7 @@ __all__ = [
     "TruncatedError",
     "UnsupportedError",
     "Window",
+    "WorkerError",
     "accelerations",
     "append",
     "compare",

@@ -1,0 +1,53 @@
+"""How many processes work on the files of a command, and when they are worth their start.
+
+``pool.py`` runs them, ``worker.py`` is what each of them does. Parsing is Python, which threads of
+one process share and processes do not: packing takes half the time with two. What comes out does
+not depend on the number.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+from mcz import threads
+from mcz.errors import OptionError
+
+LEAST_BYTES = 8_000_000  # of source files; fewer are done before a worker has started
+ONE = 1  # in a library nobody expects processes that were not asked for
+
+_LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)
+
+
+def in_force() -> int:
+    """How many processes a call may use: one, unless more are asked for."""
+    return _LIMIT.get() or ONE
+
+
+@contextmanager
+def limited(jobs: int | None) -> Iterator[None]:
+    """Let what is called meanwhile use so many processes; None: as many as before.
+
+    Raises OptionError for a number below 1.
+    """
+    if jobs is not None and jobs < 1:
+        raise OptionError(f"jobs: {jobs}, not at least 1")
+    token = _LIMIT.set(jobs or _LIMIT.get())
+    try:
+        yield
+    finally:
+        _LIMIT.reset(token)
+
+
+def useful(n_items: int, n_bytes: int) -> int:
+    """How many processes are worth it for so many files or clips of so many bytes in all."""
+    if n_bytes < LEAST_BYTES or getattr(sys, "frozen", False):  # which has no interpreter to start
+        return ONE
+    return max(ONE, min(in_force(), n_items))
+
+
+def threads_each(jobs: int) -> int:
+    """How many threads each of ``jobs`` processes may use: all together what one would."""
+    return max(1, threads.in_force() // jobs)
