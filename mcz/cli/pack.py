@@ -11,6 +11,7 @@ from mcz.cli.options import (
     copies_option,
     encoding_options,
     force_option,
+    jobs_option,
     json_option,
     threads_option,
 )
@@ -26,6 +27,7 @@ from mcz.cli.progress import Progress
 @copies_option("yes")
 @force_option
 @threads_option
+@jobs_option
 @json_option
 def command(
     folder: str,

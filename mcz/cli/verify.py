@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mcz.cli.common import Exit, Failure, about, echo, existing, opened, print_json, say
-from mcz.cli.options import decoded_option, json_option, threads_option, where_option
+from mcz.cli.options import (
+    decoded_option,
+    jobs_option,
+    json_option,
+    threads_option,
+    where_option,
+)
 from mcz.cli.progress import Progress
 from mcz.errors import FormatError, LimitError, UnsupportedError
 
@@ -28,6 +34,7 @@ if TYPE_CHECKING:
 @where_option
 @decoded_option
 @threads_option
+@jobs_option
 @json_option
 def command(
     file: str, source: str | None, where: str | None, max_decoded: int | None, as_json: bool

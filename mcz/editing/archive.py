@@ -72,7 +72,11 @@ def pack(
     terms = Terms(coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
     inputs = (*paths, *(params or {}).values())
-    with limited(threads), jobs_limited(jobs), replacing(target, force=force, inputs=inputs) as stream:
+    with (
+        limited(threads),
+        jobs_limited(jobs),
+        replacing(target, force=force, inputs=inputs) as stream,
+    ):
         draft = Draft(stream, profile_of(archive), copies=copies)
         report = _write_entries(draft, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
@@ -134,7 +138,11 @@ def append(
     files = [source for source in sources if source not in held]
     named, others = sources_named(files, root, target)
     entries = [Entry(path, name, terms) for path, name in named]
-    with limited(threads), jobs_limited(jobs), growing(Path(target), salvage=salvage, force=force) as growth:
+    with (
+        limited(threads),
+        jobs_limited(jobs),
+        growing(Path(target), salvage=salvage, force=force) as growth,
+    ):
         container = growth.container
         paths, seen = stored_files(container)
         wanted = bool(container.copies()) if copies is None else copies

@@ -15,7 +15,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcz.codecs import CODECS, HOMES
 from mcz.container import payloads
 from mcz.container.directory import Directory
 from mcz.container.limits import Profile
@@ -23,16 +22,15 @@ from mcz.editing.carrying import Carrier, Change
 from mcz.editing.folders import size_of
 from mcz.editing.stored_files import Content
 from mcz.errors import MczError, WorkerError
-from mcz.formats import FORMATS
 from mcz.jobs import ONE, useful
 from mcz.jobs.pool import Answer, answers
 from mcz.reading.file import open
+from mcz.reading.sharing import only_own
 from mcz.reading.source_files import read_bytes
 from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry, Terms
 from mcz.writing.names import check_name, clip_name
 
-OWN = "mcz."
 
 @dataclass(frozen=True, slots=True)
 class Part:
@@ -123,12 +121,6 @@ def join(part: Part, draft: Draft, clip: str) -> None:
                 writer.alias(name, of, target)
 
 
-def only_own() -> bool:
-    """Whether every codec and format is one that another process has, too."""
-    formats = all(source.read.__module__.startswith(OWN) for source in FORMATS.values())
-    return formats and set(CODECS) <= set(HOMES)
-
-
 def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask | None]:
     """What is to be coded ahead; None for what may turn out to be there already."""
     sent: set[bytes] = set()
@@ -158,9 +150,7 @@ def ahead(entries: Sequence[Entry], draft: Draft, seen: Content) -> Iterator[Ite
         yield joined(entries, found)
 
 
-def joined(
-    entries: Iterable[Entry], found: Iterable[Answer[Part] | None]
-) -> Iterator[Entry]:
+def joined(entries: Iterable[Entry], found: Iterable[Answer[Part] | None]) -> Iterator[Entry]:
     """The entries, with the parts that were made of them."""
     for entry, answer in zip(entries, found, strict=True):
         yield entry if answer is None else Joined(entry, answer)

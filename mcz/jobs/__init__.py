@@ -16,6 +16,7 @@ from mcz import threads
 from mcz.errors import OptionError
 
 LEAST_BYTES = 8_000_000  # of source files; fewer are done before a worker has started
+LEAST_STORED = 2_000_000  # the same, of an MCZ file
 ONE = 1  # in a library nobody expects processes that were not asked for
 
 _LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)
@@ -41,9 +42,13 @@ def limited(jobs: int | None) -> Iterator[None]:
         _LIMIT.reset(token)
 
 
-def useful(n_items: int, n_bytes: int) -> int:
-    """How many processes are worth it for so many files or clips of so many bytes in all."""
-    if n_bytes < LEAST_BYTES or getattr(sys, "frozen", False):  # which has no interpreter to start
+def useful(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
+    """How many processes are worth it for so many files of so many bytes in all.
+
+    ``stored``: they are clips of an MCZ file of that size.
+    """
+    least = LEAST_STORED if stored else LEAST_BYTES
+    if n_bytes < least or getattr(sys, "frozen", False):  # which has no interpreter to start
         return ONE
     return max(ONE, min(in_force(), n_items))
 
