@@ -284,10 +284,10 @@ def test_a_full_disk_leaves_the_old_file(
     a, _ = files
     before = a.read_bytes()
 
-    def full(self: writer.Writer, name: str, payload: bytes) -> None:
+    def full(self: writer.Writer, row: object, payload: bytes) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(writer.Writer, "start_of", full)
+    monkeypatch.setattr(writer.Writer, "begin_carried", full)
     with pytest.raises(mcz.AccessError, match="No space"):
         mcz.reorder_clips(a, by="name")
     assert a.read_bytes() == before

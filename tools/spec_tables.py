@@ -29,6 +29,7 @@ MODULES = (
     "mcz.container.payloads",
     "mcz.container.copies",
     "mcz.container.index",
+    "mcz.container.metadata",
     "mcz.codecs.wavelet.shared",
     "mcz.codecs.curves.qbc",
     "mcz.codecs.pca.pca",

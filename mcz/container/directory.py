@@ -10,8 +10,8 @@ from mcz.container import payloads
 from mcz.container.chunks import HEADER, Chunk
 from mcz.container.limits import PROFILES, Profile
 from mcz.container.segments import SegmentHeader
-from mcz.errors import FormatError, UnsupportedError
-from mcz.schema import MAX_COUNT, parse
+from mcz.errors import FormatError, TruncatedError, UnsupportedError
+from mcz.schema import MAX_COUNT, parse, read_varint
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,13 +146,33 @@ class PackedClipRow(ClipRow):
 
     @property
     def cend(self) -> Chunk | None:
-        self._unpacked()
+        if self._cend is None and self._packed is not None:
+            self._cend = cend_of(self._packed, self.clip.offset + self.clip.size)
         return self._cend
 
     @cend.setter
     def cend(self, chunk: Any) -> None:
-        self._unpacked()
+        if chunk is not None:
+            self._unpacked()
         self._cend = chunk
+
+
+def cend_of(packed: Packed, at: int) -> Chunk:
+    """The CEND of a clip whose CLIP ends ``at``, its segments not looked into; FormatError."""
+    data, gap, length = packed
+    here, size = 0, len(data)
+    try:
+        while here < size:
+            before, here = read_varint(data, here)
+            own, here = read_varint(data, here)
+            at += before + own
+            for _ in range(5):  # signal, n_frames, lead, tail, flags
+                while data[here] >= 0x80:
+                    here += 1
+                here += 1
+    except IndexError:
+        raise TruncatedError("INDX: the segments of a clip run past their end") from None
+    return Chunk(b"CEND", 0, at + gap, length)
 
 
 @dataclass(slots=True)

@@ -203,6 +203,12 @@ COPY = Struct(
     "data" / GreedyBytes * "the copies, encoded",
 )
 
+META = Struct(
+    "encoding" / ENCODING * "0 stored, 1 raw deflate, 2 deflate after words",
+    "size" / UVARINT * "bytes of the records, decoded",
+    "data" / GreedyBytes * "the records, encoded",
+)
+
 QUAL = Struct(
     "entries" / counted(METADATA) * "metric id or setting, and its value as text",
     "extension" / EXTENSION * "ignored, kept",

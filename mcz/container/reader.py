@@ -6,16 +6,18 @@ SPEC.md, "Strict reading" and "Salvage", are normative.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 from weakref import finalize
 
 from mcz.container import payloads
+from mcz.container.attachments import joined_parts
 from mcz.container.chunks import (
     CRC,
     FOOT,
     HEADER,
+    META,
     SIGNATURE,
     Chunk,
     Foot,
@@ -26,6 +28,7 @@ from mcz.container.chunks import (
     read_chunk,
     read_payload,
 )
+from mcz.container.clip_head import clip_head
 from mcz.container.copies import Copy, copy_chunks, uncopied
 from mcz.container.directory import (
     AttachmentRow,
@@ -37,6 +40,7 @@ from mcz.container.directory import (
 )
 from mcz.container.index import parse_index
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
+from mcz.container.metadata import Record, applied, records_in
 from mcz.container.overlay import Overlay
 from mcz.container.packed import parse_skel
 from mcz.container.packets import (
@@ -180,6 +184,18 @@ class Container:
         check(f"chunk {chunk.label}: bytes", chunk.length, self.profile.chunk_bytes)
         return check_chunk(self.source.read(chunk.offset, chunk.size), chunk)
 
+    @cached_property
+    def records(self) -> dict[str, list[Record]]:
+        """What META chunks say of each clip, and of the file as "", in file order; read once."""
+        rows = self.directory.clips.values()
+        chunks = [chunk for row in rows for chunk in row.ancillary if chunk.type == META]
+        return records_in(chunks, self.payload, self.source.size, lenient=self.salvage)
+
+    def metadata(self, row: ClipRow) -> dict[str, str]:
+        """What CLIP says of a clip, and META chunks behind it."""
+        said = clip_head(self.payload(row.clip), row.clip.label).metadata
+        return applied(said, self.records.get(row.name, ()))
+
     def copies(self) -> list[Chunk]:
         """The COPY chunks of the file, in order."""
         return copy_chunks(self.source, self.directory)
@@ -273,28 +289,7 @@ class Container:
     def attachment(self, row: AttachmentRow) -> bytes:
         """The bytes of an attached file, its hash checked."""
         check_decoded(f"attachment {row.name!r}", row.size, self.max_decoded)
-        parts = []
-        left, digest = row.size, b""
-        for number, chunk in enumerate(row.parts):
-            fields = parse(payloads.ATTA, self.payload(chunk), chunk.label)
-            expected = (row.name, number, len(row.parts), row.size)
-            # ATTA-01, ATTA-02
-            if (fields.name, fields.part, fields.n_parts, fields.size) != expected:
-                raise FormatError(f"chunk {chunk.label}: not part {number} of {row.name!r}")
-            if digest not in (b"", fields.sha256):  # ATTA-02
-                raise FormatError(f"chunk {chunk.label}: another hash than in the part before")
-            if fields.part_size > left:  # ATTA-03
-                raise FormatError(
-                    f"chunk {chunk.label}: more than the {row.size} bytes of the file"
-                )
-            parts.append(decoded(fields.data, fields.encoding, fields.part_size, chunk.label))
-            left, digest = left - fields.part_size, fields.sha256  # ATTA-03
-        data = b"".join(parts)
-        if left or hashlib.sha256(data).digest() != digest:  # ATTA-04, ATTA-05
-            raise ChecksumError(
-                f"attachment {row.name!r}: {len(data)} bytes, hash or size is wrong"
-            )
-        return data
+        return joined_parts(row, self.payload)
 
     def table(self, row: SegmentRow, counts: StreamCounts) -> StreamTable:
         """The stream table of a segment, with as little read as will do."""

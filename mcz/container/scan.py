@@ -12,10 +12,10 @@ from contextlib import suppress
 from mcz.container import payloads, strict
 from mcz.container.chunks import (
     ANCILLARY,
-    COPY,
     FLAGS_OF,
     FOOT,
     HEADER,
+    META,
     REPEAT,
     REPEATED,
     SIGNATURE,
@@ -29,7 +29,6 @@ from mcz.container.chunks import (
     read_payload,
     resynchronize,
 )
-from mcz.container.copies import check_copies, parse_copies
 from mcz.container.directory import (
     AttachmentRow,
     ClipRow,
@@ -42,6 +41,7 @@ from mcz.container.limits import BASE, PROFILES, Search, check, index_limit
 from mcz.container.packets import CHECK_SIZE, SHORT, Packet, check_number, read_packets
 from mcz.container.segments import FRESH, SegmentHeader, parse_header
 from mcz.container.source import ByteSource, Forward
+from mcz.container.strict_ancillary import check_ancillary
 from mcz.container.writer import build_head, payload_id
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 from mcz.schema import parse
@@ -338,19 +338,15 @@ class Walker:
     def _ancillary(self, chunk: Chunk) -> None:
         if self.whole:
             payload = self._payload(chunk)
-            if self.strict and chunk.type == b"QUAL":
-                parse(payloads.QUAL, payload, chunk.label)  # QUAL-02
-            if self.strict and chunk.type == COPY:
-                self._copies(chunk, payload)
+            if self.strict:
+                check_ancillary(chunk, payload, self.source.size, self.found, self._payload)
+                if chunk.type == META and self.clip is not None:  # META-02
+                    raise FormatError(f"chunk {chunk.label} is inside the clip {self.clip.name!r}")
             if self.salvage and chunk.type == REPEAT:  # REPT-03
                 self._repeat(chunk, payload)
         if self.clip is None and self.found.directory.clips:
             last = next(reversed(self.found.directory.clips))
             self.found.directory.clips[last].ancillary.append(chunk)
-
-    def _copies(self, chunk: Chunk, payload: bytes) -> None:
-        copies = parse_copies(payload, chunk, self.source.size)
-        check_copies(copies, chunk, self.found.chunks, self._payload)
 
     def _repeat(self, chunk: Chunk, payload: bytes) -> None:
         """Take in the chunks of a REPT: of a clip that is open, those that may have been lost."""

@@ -15,6 +15,7 @@ from mcz.container.chunks import (
     ANCILLARY,
     COPIED,
     COPY,
+    META,
     OPEN_LENGTH,
     SAFE_TO_COPY,
     SIGNATURE,
@@ -33,6 +34,7 @@ from mcz.container.directory import (
 )
 from mcz.container.index import build_index
 from mcz.container.limits import BASE, MIB, Profile, check
+from mcz.container.metadata import Record, build_metas
 from mcz.container.packed import smallest
 from mcz.container.packets import (
     CHECK_SIZE,
@@ -270,19 +272,38 @@ class Writer:
         self.directory.clips[clip.name] = clip
         self._clip = None
 
-    def start_of(self, name: str, payload: bytes) -> Chunk:
-        """Write the CLIP of a clip whose chunks are carried over next, up to ``add_clip``."""
+    def metadata(self, records: Sequence[Record]) -> None:
+        """Write what is said of clips that are there, or of the file, in META chunks.
+
+        Raises MotionError in a file without a clip: no index would find them.
+        """
+        self._between_clips("META")
+        if records and not self.directory.clips:
+            raise MotionError("metadata in a file without a clip")  # META-01
+        for payload in build_metas(records, short=self.short):
+            self.ancillary(META, payload)
+
+    def begin_carried(self, row: ClipRow, payload: bytes) -> None:
+        """Write the CLIP ``payload`` of a clip whose chunks are carried over from another file.
+
+        They are written with ``chunk`` and ``raw``, CEND among them; ``row`` learns where its CLIP
+        is, and is in the directory from ``end_carried`` on.
+        """
         self._between_clips("CLIP")
-        self._new_name(name, self.directory.clips)
-        return self.chunk(b"CLIP", payload)
+        self._new_name(row.name, self.directory.clips)
+        row.clip = self.chunk(b"CLIP", payload)
+        self._clip = row
 
     def raw(self, data: bytes) -> None:
         """Write a part of an open DATA that another file holds."""
+        self._in_clip("DATA")
         self._write(data)
 
-    def add_clip(self, row: ClipRow) -> None:
-        """Take in a clip whose chunks, CEND among them, were carried over just now."""
+    def end_carried(self) -> None:
+        """End the clip that is carried over."""
+        row = self._in_clip("CEND")
         self.directory.clips[row.name] = row
+        self._clip = None
 
     def finish(self, *, index: bool = True) -> None:
         """Write the copies that are wanted, INDX, unless told otherwise, and FOOT."""

@@ -6,6 +6,7 @@ What is shared is named by its hash, so that it needs no new number and is writt
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -14,6 +15,7 @@ from mcz.container import payloads
 from mcz.container.chunks import (
     COPY,
     FOOT,
+    META,
     SAFE_TO_COPY,
     SIGNATURE,
     Chunk,
@@ -23,6 +25,7 @@ from mcz.container.chunks import (
 from mcz.container.clip_head import clip_head
 from mcz.container.directory import ClipRow, PackedClipRow, SegmentRow
 from mcz.container.index import packed_segments, parse_segments
+from mcz.container.metadata import Record, as_one
 from mcz.container.packed import parse_skel
 from mcz.container.packets import read_packets
 from mcz.container.reader import Container
@@ -55,9 +58,11 @@ class Carrier:
     Every checksum is compared on the way; raises FormatError where one is wrong.
     """
 
-    def __init__(self, container: Container, writer: Writer) -> None:
+    def __init__(
+        self, container: Container, writer: Writer, left_out: list[str] | None = None
+    ) -> None:
         self.container, self.writer = container, writer
-        self.left_out: list[str] = []
+        self.left_out = [] if left_out is None else left_out
 
     def stored(self, kind: bytes, id_: bytes) -> bytes:
         """The payload of the SKEL, MODL or SRCE with this id, its hash checked."""
@@ -111,9 +116,14 @@ class Carrier:
             at += chunk.size
 
     def ancillary(self, chunk: Chunk) -> bool:
-        """Carry an ancillary chunk over where that is safe; return whether it was."""
+        """Carry an ancillary chunk over where that is safe; return whether it was.
+
+        META is not: it may speak of other clips, see ``said_of``.
+        """
+        if chunk.type == META:
+            return False
         if chunk.flags & SAFE_TO_COPY:  # CHUNK-13, CHUNK-14
-            self.writer.chunk(chunk.type, self.container.payload(chunk), chunk.flags)
+            self.writer.ancillary(chunk.type, self.container.payload(chunk))
             return True
         if chunk.type != COPY:  # those are made anew where they are wanted
             self.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
@@ -139,17 +149,16 @@ class Carrier:
             row.rate_numerator if rate is None else rate.numerator,
             row.rate_denominator if rate is None else rate.denominator,
             row.signals,
-            self.writer.start_of(change.name or name, payload),
+            row.clip,
         )
+        self.writer.begin_carried(new, payload)
         self._body(row, new)
-        self.writer.add_clip(new)
+        self.writer.end_carried()
         for chunk in row.ancillary:
             found = read_chunk(self.container.source, chunk.offset)
             if found.type != chunk.type:
                 raise FormatError(f"{found.label} is {chunk.label} in the index")
-            if self.ancillary(found):
-                last = Chunk(found.type, found.flags, self.writer.offset - found.size, found.length)
-                new.ancillary.append(last)
+            self.ancillary(found)
 
     def _body(self, row: ClipRow, new: PackedClipRow) -> None:
         """What lies between CLIP and CEND, and CEND; ``new`` learns where."""
@@ -187,6 +196,13 @@ class Carrier:
         for at in range(chunk.offset, read.at, BLOCK):
             self.writer.raw(self.container.source.read(at, min(BLOCK, read.at - at)))
         return read.at
+
+
+def said_of(container: Container, names: Iterable[tuple[str, str]]) -> list[Record]:
+    """What META chunks say of the file, and of clips by their old and new names."""
+    pairs = [("", ""), *names]
+    said = ((new, container.records.get(old, ())) for old, new in pairs)
+    return [as_one(new, records) for new, records in said if records]
 
 
 def _moved(segment: SegmentRow, shift: int, moved: list[tuple[int, int]]) -> SegmentRow:

@@ -7,16 +7,17 @@ it is what cannot be cut coded anew (``anew.py``).
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, BinaryIO
 
 from mcz.brief import brief
 from mcz.container import payloads
-from mcz.container.chunks import COPY, FOOT, SAFE_TO_COPY, SIGNATURE, Chunk, is_foot_at, read_chunk
+from mcz.container.chunks import (
+    read_chunk,
+)
 from mcz.container.directory import ClipRow
-from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
 from mcz.container.value_hash import ValueDigest, value_hash
 from mcz.container.writer import Writer, payload_id
@@ -28,6 +29,7 @@ from mcz.editing.anew import (
     settings_of_joints,
     write_anew,
 )
+from mcz.editing.carrying import Carrier, said_of
 from mcz.editing.cut_quality import cut_quality, recoded_quality
 from mcz.editing.cutting import (
     WITHOUT_SOURCE,
@@ -39,7 +41,7 @@ from mcz.editing.cutting import (
     cut_skeleton,
     plan_cut,
 )
-from mcz.errors import ChecksumError, FormatError, MotionError, OptionError
+from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
@@ -149,6 +151,7 @@ class Copier:
             copies=bool(self.container.copies()) if copies is None else copies,
         )
         self.found = Extraction()
+        self.carrier = Carrier(self.container, self.writer, self.found.left_out)
         self.done = self.total = 0  # segments
 
     def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> Extraction:
@@ -158,12 +161,14 @@ class Copier:
                 self.writer.shared(kind, self.container.payload(chunk))
         if not alone:
             self.skeletons()
-            for chunk in self.before_clips():
-                self.ancillary(chunk)
+            self.before_clips()
             self.attachments()
         for cut in cuts:
             self.clip(cut)
         self.aliases({cut.clip.name: cut for cut in cuts}, alone)
+        if cuts:
+            names = ((cut.clip.name, self.name_of(cut)) for cut in cuts)
+            self.writer.metadata(said_of(self.container, names))
         self.writer.finish()
         self.found.size = self.writer.offset
         return self.found
@@ -174,53 +179,21 @@ class Copier:
             if kind == b"SKEL":
                 self.skeleton(id_)
 
+    def skeleton(self, id_: bytes) -> bytes:
+        """Copy a SKEL after its bases and their templates; return its payload."""
+        self.carrier.skeleton(id_)
+        return self.carrier.stored(b"SKEL", id_)
+
+    def before_clips(self) -> None:
+        """Copy the ancillary chunks that belong to no clip."""
+        self.carrier.before_clips()
+
     def attachments(self) -> None:
         for name in self.container.directory.attachments:
             self.attachment(name)
 
     def attachment(self, name: str) -> None:
-        row = self.container.directory.attachments[name]
-        parts = [self.container.payload(part) for part in row.parts]
-        self.writer.attachment_parts(name, row.size, parts)
-
-    def skeleton(self, id_: bytes) -> bytes:
-        """Copy a SKEL after its bases and their templates; return its payload."""
-        profile = self.container.profile
-        chain = [(id_, self.stored(b"SKEL", id_))]
-        while base := parse_skel(chain[-1][1], "SKEL", profile).base:
-            chain.append((bytes(base[0]), self.stored(b"SKEL", bytes(base[0]))))
-        for _, payload in reversed(chain):
-            for source in parse_skel(payload, "SKEL", profile).source:
-                self.template(bytes(source.template))
-            self.writer.shared(b"SKEL", payload)
-        return chain[0][1]
-
-    def template(self, id_: bytes) -> None:
-        self.writer.shared(b"SRCE", self.stored(b"SRCE", id_))
-
-    def stored(self, kind: bytes, id_: bytes) -> bytes:
-        """The payload of the SKEL or SRCE with this id."""
-        chunk = self.container.directory.shared.get((kind, id_))
-        if chunk is None:
-            raise FormatError(f"no {kind.decode()} has the id {id_.hex()}")
-        payload = self.container.payload(chunk)
-        if payload_id(payload) != id_:
-            raise ChecksumError(f"chunk {chunk.label}: its id is not {id_.hex()}")
-        return payload
-
-    def before_clips(self) -> Iterator[Chunk]:
-        """The ancillary chunks before the first clip, to which they do not belong."""
-        source, at = self.container.source, len(SIGNATURE)
-        clips = self.container.directory.clips.values()
-        end = min((row.clip.offset for row in clips), default=at)
-        while at < end:
-            if is_foot_at(source, at):
-                at += FOOT.size
-                continue
-            chunk = read_chunk(source, at)
-            if chunk.flags:
-                yield chunk
-            at += chunk.size
+        self.carrier.attachment(name)
 
     def is_same(self, cut: ClipCut) -> bool:
         """Whether the clip stays what it was."""
@@ -278,7 +251,7 @@ class Copier:
         self.inside(row)
         for chunk in row.ancillary:
             if chunk.type != b"QUAL":
-                self.ancillary(read_chunk(self.container.source, chunk.offset))
+                self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
         self._note(cut)
 
     def name_of(self, cut: ClipCut) -> str:
@@ -297,7 +270,7 @@ class Copier:
             pairs = new["metadata"]
             new["metadata"] = [{"key": key, "value": pairs[key]} for key in sorted(pairs)]
         for held in new["source"]:
-            self.template(bytes(held["template"]))
+            self.carrier.shared(b"SRCE", bytes(held["template"]))
         return source, hashes
 
     def _without_units(self, cut: ClipCut, new: dict[str, Any]) -> None:
@@ -362,19 +335,12 @@ class Copier:
             self.writer.ancillary(b"QUAL", build(payloads.QUAL, fields, "quality record"))
         for chunk in row.ancillary:
             if cut.is_whole or chunk.type != b"QUAL":
-                self.ancillary(read_chunk(self.container.source, chunk.offset))
+                self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
 
     def inside(self, row: ClipRow) -> None:
         """Copy the ancillary chunks between CLIP and CEND."""
         for chunk in inside(self.container, row):
-            self.ancillary(chunk)
-
-    def ancillary(self, chunk: Chunk) -> None:
-        """Copy an ancillary chunk where that is safe."""
-        if chunk.flags & SAFE_TO_COPY:  # CHUNK-13, CHUNK-14
-            self.writer.ancillary(chunk.type, self.container.payload(chunk))
-        elif chunk.type != COPY:  # those are made anew where they are wanted
-            self.found.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
+            self.carrier.ancillary(chunk)
 
     def _note(self, cut: ClipCut) -> None:
         written = self.writer.directory.clips[self.name_of(cut)].segments

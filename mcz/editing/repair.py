@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
 from mcz.container import payloads
-from mcz.container.chunks import COPY, FOOT, Chunk, parse_foot
+from mcz.container.chunks import COPY, FOOT, parse_foot
 from mcz.container.directory import ClipRow
 from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
@@ -234,9 +234,9 @@ class _Repairer(Copier):
             self.attachment(name)
             self.repair.attachments.append(name)
 
-    def before_clips(self) -> Iterator[Chunk]:
+    def before_clips(self) -> None:
         with suppress(FormatError):  # what is damaged there has been told
-            yield from super().before_clips()
+            super().before_clips()
 
     def inside(self, row: ClipRow) -> None:
         with suppress(FormatError):
@@ -254,7 +254,7 @@ class _Repairer(Copier):
         return self._skeletons[id_]
 
     def _poorer_skeleton(self, id_: bytes) -> bytes:
-        stored, where = self.stored(b"SKEL", id_), f"SKEL {id_.hex()}"
+        stored, where = self.carrier.stored(b"SKEL", id_), f"SKEL {id_.hex()}"
         fields = dict(parse_skel(stored, where, self.container.profile))
         bases = []
         for base in fields["base"]:

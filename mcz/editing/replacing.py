@@ -195,7 +195,7 @@ class _Editor(Copier):
         self.skeleton(cut.clip.skeleton_id)
         source = self._source(fields)
         for held in fields["source"]:
-            self.template(bytes(held["template"]))
+            self.carrier.shared(b"SRCE", bytes(held["template"]))
         self.writer.begin_clip(fields, [part.info.layout.n_channels for part in cut.signals])
         self.inside(row)
         self._edited_segments(cut, noted=bool(fields["source"]))
@@ -285,7 +285,7 @@ class _Editor(Copier):
             self.writer.ancillary(CHUNK, build(payloads.QUAL, fields, "quality record"))
         for chunk in row.ancillary:
             if chunk.type != CHUNK:
-                self.ancillary(read_chunk(self.container.source, chunk.offset))
+                self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
 
     def _entries(self, old: dict[str, str]) -> dict[str, str]:
         edit, codec = self.recoded, self.recoded.info.codec
@@ -326,7 +326,7 @@ class _AnewEditor(Copier):
         self.inside(row)
         for chunk in row.ancillary:
             if chunk.type != CHUNK:
-                self.ancillary(read_chunk(self.container.source, chunk.offset))
+                self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
 
     def _sourced(self, motion: Motion) -> Motion:
         """The motion with a source of its own values, or none where there can be none."""

@@ -22,7 +22,7 @@ from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
-from mcz.editing.carrying import SAME, Carrier, Change
+from mcz.editing.carrying import SAME, Carrier, Change, said_of
 from mcz.errors import AccessError, OptionError
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
@@ -100,6 +100,9 @@ def carry(file: File, writer: Writer, plan: Plan, step: Step) -> list[str]:
         step(name)
     for alias, as_name in plan.aliases.items():
         writer.alias(as_name, *_target(file, plan, alias))
+    names = ((name, change.name or name) for name, change in plan.clips.items())
+    if plan.clips:
+        writer.metadata(said_of(file.container, names))
     return carrier.left_out
 
 

@@ -93,16 +93,16 @@ class Clip(Posed):
 
     @cached_property
     def metadata(self) -> Mapping[str, str]:
-        return {pair.key: pair.value for pair in self._fields.metadata}
+        """Keys of the registry, or ``x-...``, and texts, as META chunks have changed them."""
+        return self.container.metadata(self._row)
 
     @property
     def frame_numbers(self) -> NDArray[np.int64]:
         """The number of every frame; 1, 2, 3, ... unless the metadata say otherwise."""
         where = f"clip {self.name!r}: frame numbers"
         check_decoded(where, 8 * self.n_frames, self.container.max_decoded)
-        return parse_frame_numbers(
-            self.metadata.get("frame-numbers", "1"), self.n_frames, self.name
-        )
+        said = self.metadata.get("frame-numbers", "1")
+        return parse_frame_numbers(said, self.n_frames, self.name)
 
     @property
     def damage(self) -> list[str]:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from mcz.brief import counted, shown
 from mcz.container import payloads
 from mcz.container.directory import AttachmentRow
+from mcz.container.metadata import applied
 from mcz.container.reader import Container
 from mcz.container.source import ByteSource, open_source
 from mcz.errors import (
@@ -152,6 +153,11 @@ class File:
             return AliasTarget("skeleton", target.hex())
         kind = "clip" if of == payloads.OF_CLIP else "attachment"
         return AliasTarget(kind, target.decode("utf-8", "replace"))
+
+    @property
+    def metadata(self) -> Mapping[str, str]:
+        """What is said of the file as a whole, see ``Clip.metadata``."""
+        return applied({}, self.container.records.get("", ()))
 
     @property
     def damage(self) -> list[str]:

@@ -1,0 +1,144 @@
+"""What is said of clips behind them, in chunks of their own: META.
+
+SPEC.md, "META", is normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from mcz.container import payloads
+from mcz.container.chunks import Chunk
+from mcz.container.cursor import Cursor
+from mcz.container.limits import MIB, check, index_limit
+from mcz.container.packed import smallest
+from mcz.container.strict import decoded
+from mcz.errors import FormatError
+from mcz.schema import build, parse, varint
+
+# What readers interpret belongs to the values of a clip and to its source, and stays in CLIP.
+INTERPRETED = ("frame-numbers", "name-encoding", "skeleton-note", "source-note")
+
+# Each record in a META: (name, type, meaning).
+META_RECORD_FIELDS = (
+    ("clip", "text", "name of the clip; empty: the whole file"),
+    ("removed", "counted text", "keys that are not there any more"),
+    ("entries", "counted METADATA", "pairs of key and value"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What a META says of the clip ``name``, or with "" of the whole file.
+
+    ``removed`` are keys that are not there any more, ``entries`` what is there from now on.
+    """
+
+    name: str
+    entries: Mapping[str, str] = field(default_factory=dict)
+    removed: tuple[str, ...] = ()
+
+
+def applied(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[str, str]:
+    """``pairs`` as they are after the records, in order."""
+    found = dict(pairs)
+    for record in records:
+        for key in record.removed:
+            found.pop(key, None)
+        found |= record.entries
+    return found
+
+
+def as_one(name: str, records: Iterable[Record]) -> Record:
+    """A record of ``name`` that says what ``records`` say together."""
+    entries: dict[str, str] = {}
+    removed: dict[str, None] = {}
+    for record in records:
+        for key in record.removed:
+            entries.pop(key, None)
+            removed[key] = None
+        entries |= record.entries
+    return Record(name, entries, tuple(key for key in removed if key not in entries))
+
+
+def build_metas(records: Sequence[Record], *, short: bool = False) -> Iterator[bytes]:
+    """The payloads of the META chunks that hold ``records``, each of about 1 MiB at most."""
+    content = bytearray()
+    for record in records:
+        content += _record(record)
+        if len(content) >= MIB:
+            yield _payload(bytes(content), short)
+            content.clear()
+    if content:
+        yield _payload(bytes(content), short)
+
+
+def _payload(content: bytes, short: bool) -> bytes:
+    encoding, data = smallest(content, short=short)
+    fields = {"encoding": encoding, "size": len(content), "data": data}
+    return build(payloads.META, fields, "META")
+
+
+def _record(record: Record) -> bytes:
+    texts = [record.name, *record.removed]
+    out = _text(record.name) + varint(len(texts) - 1) + b"".join(map(_text, record.removed))
+    pairs = b"".join(_text(key) + _text(value) for key, value in record.entries.items())
+    return out + varint(len(record.entries)) + pairs
+
+
+def _text(text: str) -> bytes:
+    data = text.encode("utf-8")
+    return varint(len(data)) + data
+
+
+def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
+    """The records in ``payload``, that of the META ``chunk`` of a file of ``file_bytes``.
+
+    Raises FormatError, and LimitError where they would be longer than an index may be.
+    """
+    where = f"chunk {chunk.label}"
+    fields = parse(payloads.META, payload, where)
+    check(f"{where}: bytes of the records", fields.size, index_limit(file_bytes))  # LIMIT-17
+    content = decoded(fields.data, fields.encoding, fields.size, where)
+    read, records = Cursor(content, where), []
+    while read.at < len(content):
+        name = read.text()
+        removed = tuple(read.text() for _ in range(read.varint()))
+        pairs = [(read.text(), read.text()) for _ in range(read.varint())]
+        _check_keys(removed, where)
+        _check_keys([key for key, _ in pairs], where)
+        records.append(Record(name, dict(pairs), removed))
+    return records
+
+
+def records_in(
+    chunks: Iterable[Chunk],
+    payload_of: Callable[[Chunk], bytes],
+    file_bytes: int,
+    *,
+    lenient: bool,
+) -> dict[str, list[Record]]:
+    """What META ``chunks`` say of each clip, and of the file as "", in file order.
+
+    ``lenient``: of one that is damaged nothing is taken, and nothing raised.
+    """
+    found: dict[str, list[Record]] = {}
+    for chunk in chunks:
+        try:
+            records = parse_meta(payload_of(chunk), chunk, file_bytes)
+        except FormatError:
+            if not lenient:
+                raise
+            continue
+        for record in records:
+            found.setdefault(record.name, []).append(record)
+    return found
+
+
+def _check_keys(keys: Sequence[str], where: str) -> None:
+    for key in keys:
+        if key in INTERPRETED:  # META-03
+            raise FormatError(f"{where}: {key!r} is not to be said behind a clip")
+    if len(keys) != len(set(keys)):  # META-04
+        raise FormatError(f"{where}: a key occurs twice in one record: {sorted(keys)}")
