@@ -59,10 +59,11 @@ ALLOWED = {
     "retargeting": MODEL | {"kinematics"},
     "editing": JOINT | {"jobs", "metrics", "queries", "reading", "writing", "conversion", "tables"},
     "live": JOINT | {"interrupts", "reading", "writing"},
+    "dask": JOINT | {"jobs", "reading", "writing", "editing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
-    | {"jobs"}
+    | {"jobs", "dask"}
     | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,

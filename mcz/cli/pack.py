@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -18,12 +20,20 @@ from mcz.cli.options import (
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
+if TYPE_CHECKING:
+    from mcz.editing.outcomes import Report
+
 
 @click.command(short_help="A folder of motion files to one .mcz.")
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @click.argument("target", metavar="OUT.mcz", type=click.Path(readable=False))
 @encoding_options
 @click.option("--keep-all", is_flag=True, help="Keep files of other kinds too, as attachments.")
+@click.option(
+    "--scheduler",
+    metavar="tcp://HOST:PORT",
+    help="Read and code on the machines of this Dask scheduler; DIR and OUT.mcz may be URLs.",
+)
 @copies_option("yes")
 @force_option
 @threads_option
@@ -33,6 +43,7 @@ def command(
     folder: str,
     target: str,
     keep_all: bool,
+    scheduler: str | None,
     copies: bool | None,
     force: bool,
     as_json: bool,
@@ -43,10 +54,8 @@ def command(
     A file that cannot be parsed is left out, listed at the end, and makes the exit code 1;
     --verbatim keeps it as an attachment instead.
     """
-    import mcz
-
     with about(folder, target), Progress() as progress:
-        report = mcz.pack(
+        report = _packing(scheduler)(
             folder,
             target,
             keep_all=keep_all,
@@ -56,3 +65,14 @@ def command(
             **options,
         )
     return conclude(report, target, as_json)
+
+
+def _packing(scheduler: str | None) -> Callable[..., Report]:
+    """What packs: this machine, or those of a scheduler."""
+    if scheduler is None:
+        from mcz.editing.archive import pack
+
+        return pack
+    from mcz.dask import pack as pack_there
+
+    return partial(pack_there, client=scheduler)

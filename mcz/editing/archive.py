@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
@@ -12,7 +11,7 @@ from typing import Any
 from mcz.codecs import chosen
 from mcz.container import payloads
 from mcz.editing.appending import growing
-from mcz.editing.coded_parts import ahead
+from mcz.editing.coded_parts import Far, ahead
 from mcz.editing.folders import files_below, left_out, motion_files, size_of, sources_named
 from mcz.editing.merging import add_files
 from mcz.editing.outcomes import Outcome, Report
@@ -21,7 +20,6 @@ from mcz.editing.stored_files import Content, stored_files
 from mcz.errors import MczError, OptionError, SourceError
 from mcz.jobs import limited as jobs_limited
 from mcz.reading.file import File
-from mcz.reading.source_files import read_bytes
 from mcz.threads import limited
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
@@ -199,7 +197,7 @@ def write_in_turn(
 ) -> None:
     """Write one file after the other; ``report`` learns what becomes of each."""
     for done, entry in enumerate(entries):
-        size = size_of(entry.path)
+        size = entry.size if isinstance(entry, Far) else size_of(entry.path)
         try:
             result = _write_entry(draft, entry, seen)
             notes = tuple(filter(None, (entry.remark, *entry.notes)))
@@ -212,7 +210,7 @@ def write_in_turn(
 
 def _write_entry(draft: Draft, entry: Entry, seen: Content) -> str:
     """Write one file, or only its name where the same bytes are there already."""
-    digest = hashlib.sha256(read_bytes(entry.path)).digest()
+    digest = entry.digest()
     is_amc = entry.path.suffix.lower() == ".amc"  # its values hang on the ASF beside it
     writer = draft.writer
     if digest in seen and not is_amc and not draft.holds(entry.name, digest):

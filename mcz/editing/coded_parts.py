@@ -8,7 +8,6 @@ one process would write.
 
 from __future__ import annotations
 
-import hashlib
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -22,11 +21,10 @@ from mcz.editing.carrying import Carrier, Change
 from mcz.editing.folders import size_of
 from mcz.editing.stored_files import Content
 from mcz.errors import MczError, WorkerError
-from mcz.jobs import ONE, useful
-from mcz.jobs.pool import Answer, answers
+from mcz.jobs import ONE, Answer, useful
+from mcz.jobs.pool import answers
 from mcz.reading.file import open
 from mcz.reading.sharing import only_own
-from mcz.reading.source_files import read_bytes
 from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry, Terms
 from mcz.writing.names import check_name, clip_name
@@ -73,6 +71,8 @@ def coded(state: object, ask: Ask) -> Part:
 class Joined(Entry):
     """An Entry of which somebody has made the part: what can be taken from it is not done again."""
 
+    can_be_read = True  # here, too
+
     def __init__(self, entry: Entry, answer: Answer[Part]) -> None:
         super().__init__(entry.path, entry.name, entry.terms)
         self.inputs = entry.inputs  # which its owner asks for
@@ -81,10 +81,14 @@ class Joined(Entry):
     def write(self, draft: Draft, progress: object = None) -> str:
         """Write the file, as ``Entry.write`` does; raises WorkerError where a process has died."""
         part = self._part()
-        if part is None or part.digest != hashlib.sha256(read_bytes(self.path)).digest():
+        if part is None or part.digest != self.digest():
             return super().write(draft)  # it fails, or has changed: with the words of one process
         name = clip_name(self.name, draft.writer.directory)
-        if part.result == "verbatim" and name != clip_name(self.name, Directory()):
+        if (
+            self.can_be_read
+            and part.result == "verbatim"
+            and name != clip_name(self.name, Directory())
+        ):
             return super().write(draft)  # the reason may name the clip
         check_name(self.name)
         if draft.holds(self.name, part.digest):
@@ -103,6 +107,25 @@ class Joined(Entry):
             raise
         except MczError:
             return None
+
+
+class Far(Joined):
+    """One whose file lies where only those can read it that made the part, ``size`` bytes."""
+
+    can_be_read = False
+
+    def __init__(self, entry: Entry, answer: Answer[Part], size: int) -> None:
+        super().__init__(entry, answer)
+        self.size = size
+        self._made: Part | None = None
+
+    def _part(self) -> Part:
+        if self._made is None:
+            self._made = self._answer()
+        return self._made
+
+    def digest(self) -> bytes:
+        return self._part().digest
 
 
 def join(part: Part, draft: Draft, clip: str) -> None:
@@ -126,7 +149,7 @@ def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask 
     sent: set[bytes] = set()
     for entry in entries:
         try:
-            digest = hashlib.sha256(read_bytes(entry.path)).digest()
+            digest = entry.digest()
         except MczError:
             yield None
             continue

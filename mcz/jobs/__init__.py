@@ -8,9 +8,10 @@ not depend on the number.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import Any, Protocol, TypeVar
 
 from mcz import threads
 from mcz.errors import OptionError
@@ -19,6 +20,22 @@ LEAST_BYTES = 8_000_000  # of source files; fewer are done before a worker has s
 LEAST_STORED = 2_000_000  # the same, of an MCZ file
 ONE = 1  # in a library nobody expects processes that were not asked for
 
+Result = TypeVar("Result")
+Answer = Callable[[], Result]  # gives a result, or raises what the function has raised
+
+
+class Engine(Protocol):
+    """What else can do the work of processes."""
+
+    @property
+    def jobs(self) -> int: ...
+
+    def in_order(
+        self, function: Callable[[Any, Any], Any], items: Iterable[Any], state: Any
+    ) -> Generator[Answer[Any] | None, None, None]: ...
+
+
+_ENGINE: ContextVar[Engine | None] = ContextVar("engine", default=None)
 _LIMIT: ContextVar[int | None] = ContextVar("jobs", default=None)
 
 
@@ -42,11 +59,28 @@ def limited(jobs: int | None) -> Iterator[None]:
         _LIMIT.reset(token)
 
 
+def engine() -> Engine | None:
+    """What does the work in place of processes of this machine."""
+    return _ENGINE.get()
+
+
+@contextmanager
+def using(engine: Engine) -> Iterator[None]:
+    """Let ``engine`` do what is called meanwhile, however little it is."""
+    token = _ENGINE.set(engine)
+    try:
+        yield
+    finally:
+        _ENGINE.reset(token)
+
+
 def useful(n_items: int, n_bytes: int, *, stored: bool = False) -> int:
     """How many processes are worth it for so many files of so many bytes in all.
 
     ``stored``: they are clips of an MCZ file of that size.
     """
+    if (other := engine()) is not None:
+        return max(other.jobs, ONE + 1)
     least = LEAST_STORED if stored else LEAST_BYTES
     if n_bytes < least or getattr(sys, "frozen", False):  # which has no interpreter to start
         return ONE

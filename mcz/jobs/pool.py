@@ -14,19 +14,18 @@ import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from queue import SimpleQueue
 from threading import Lock
 from types import TracebackType
 from typing import Any, BinaryIO, TypeVar, cast
 
 from mcz.errors import WorkerError
-from mcz.jobs import threads_each
+from mcz.jobs import Answer, engine, threads_each
 from mcz.jobs.worker import receive, send
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-Answer = Callable[[], Result]  # gives the result, or raises what the function has raised
 
 AHEAD = 2  # items in work or done, for each process: what waits is bounded
 TRIES = 2
@@ -184,6 +183,11 @@ def answers(
     jobs: int,
     state: Any = None,
 ) -> Iterator[Iterator[Answer[Result] | None]]:
-    """``Pool.in_order`` of a pool for this alone."""
+    """``Pool.in_order`` of a pool for this alone, or of the engine in use."""
+    other = engine()
+    if other is not None:
+        with closing(other.in_order(function, items, state)) as found:
+            yield found
+        return
     with Pool(jobs, state) as pool:
         yield pool.in_order(function, items)

@@ -15,8 +15,8 @@ from typing import Any, TypeVar, cast
 from mcz.codecs import CODECS, HOMES
 from mcz.errors import FormatError
 from mcz.formats import FORMATS
-from mcz.jobs import ONE, useful
-from mcz.jobs.pool import Answer, answers
+from mcz.jobs import ONE, Answer, useful
+from mcz.jobs.pool import answers
 from mcz.reading.file import File
 
 Item = TypeVar("Item")
