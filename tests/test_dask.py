@@ -256,7 +256,7 @@ def test_an_object_store(
             if path.is_file():
                 store.pipe_file(f"takes/in/{path.relative_to(folder)}", path.read_bytes())
         with RealClient(cluster.scheduler_address) as client:
-            client.run(os.environ.update, settings)
+            client.run(configure, settings)
             report = pack("s3://takes/in", "s3://takes/all.mcz", client)
             assert [o.path for o in report.failures] == ["more/broken.bvh"]
             assert store.cat_file("takes/all.mcz") == packed[0].read_bytes()
@@ -267,6 +267,10 @@ def test_an_object_store(
             interrupted(client, store)
     finally:
         server.stop()
+
+
+def configure(settings: dict[str, str]) -> None:
+    os.environ.update(settings)
 
 
 def interrupted(client: Any, store: Any) -> None:
@@ -281,13 +285,24 @@ def interrupted(client: Any, store: Any) -> None:
     assert not store.exists("takes/half.mcz")
 
 
-def test_answers_of_lost_machines_are_errors() -> None:
+def test_what_machines_were_lost_with_is_asked_for_again() -> None:
     pytest.importorskip("distributed")
+    keys: list[str] = []
 
-    def lost() -> None:
-        raise OSError("timed out")
+    def result() -> Any:
+        if len(keys) < wanted:
+            raise OSError("timed out")
+        return True, "fine"
 
-    answer = clusters._answer(SimpleNamespace(result=lost, release=lambda: None))
-    assert answer is not None
+    def submit(*words: Any, key: str, retries: int) -> Any:
+        keys.append(key)
+        return SimpleNamespace(result=result, release=lambda: None)
+
+    client = SimpleNamespace(submit=submit)
+    wanted = 3
+    assert clusters.Task(client, "key", b"", 1).answer() == "fine"
+    assert len(set(keys)) == 3
+    keys.clear()
+    wanted = 4
     with pytest.raises(MczError, match="the cluster is lost: timed out"):
-        answer()
+        clusters.Task(client, "key", b"", 1).answer()

@@ -15,6 +15,7 @@ from mcz.jobs import Answer
 from mcz.threads import limited
 
 AHEAD = 3  # tasks for each thread of the cluster: what waits there and here is bounded
+TRIES = 3  # of a task that the machines were lost with
 RETRIES = 2  # of a task whose worker failed in another way than by ending
 
 
@@ -42,47 +43,64 @@ class Cluster:
         import cloudpickle
 
         packed = cloudpickle.dumps((function, state))
-        waiting: deque[Any] = deque()
+        waiting: deque[Task | None] = deque()
         run, most = uuid4().hex, AHEAD * self.jobs
         try:
             for index, item in enumerate(items):
                 key = f"mcz-{run}-{index}"
-                waiting.append(
-                    None
-                    if item is None
-                    else self._client.submit(done, packed, item, key=key, retries=RETRIES)
-                )
+                waiting.append(None if item is None else Task(self._client, key, packed, item))
                 while waiting and (waiting[0] is None or len(waiting) > most):
                     yield _answer(waiting.popleft())
             while waiting:
                 yield _answer(waiting.popleft())
         finally:
-            for future in waiting:
-                if future is not None:
-                    future.cancel()
+            for left in waiting:
+                if left is not None:
+                    left.future.cancel()
 
 
-def _answer(future: Any) -> Answer[Any] | None:
-    """What gives the result, and lets the cluster forget it."""
-    if future is None:
-        return None
+class Task:
+    """One call, in work on the cluster from now on."""
 
-    def answer() -> Any:
+    def __init__(self, client: Any, key: str, packed: bytes, item: Any) -> None:
+        self._client, self._key, self._call = client, key, (done, packed, item)
+        self.future = self._submitted(0)
+
+    def _submitted(self, again: int) -> Any:
+        return self._client.submit(*self._call, key=f"{self._key}-{again}", retries=RETRIES)
+
+    def answer(self) -> Any:
+        """The result, or the MczError of the call; the cluster forgets both."""
+        for again in range(1, TRIES + 1):
+            try:
+                went_well, value = self._outcome()
+            except WorkerError:
+                # Dask blames all that was in the hands of a machine that ended: once more, when
+                # the task that ended it may be over.
+                if again == TRIES:
+                    raise
+                self.future = self._submitted(again)
+                continue
+            if not went_well:
+                raise value
+            break
+        return value
+
+    def _outcome(self) -> Any:
         from distributed.scheduler import KilledWorker
 
         try:
-            went_well, value = future.result()
+            return self.future.result()
         except KilledWorker as error:
             raise WorkerError(f"the machines that worked on it were lost: {error}") from None
         except OSError as error:
             raise WorkerError(f"the cluster is lost: {error}") from None
         finally:
-            future.release()
-        if not went_well:
-            raise value
-        return value
+            self.future.release()
 
-    return answer
+
+def _answer(task: Task | None) -> Answer[Any] | None:
+    return None if task is None else task.answer
 
 
 def done(packed: bytes, item: Any) -> tuple[bool, Any]:
@@ -108,15 +126,16 @@ def connected(client: Any) -> Iterator[Any]:
     None: the client that the process has. Raises OptionError where there is none, or no Dask.
     """
     try:
-        from distributed import Client, default_client
+        import distributed
     except ImportError:
         raise OptionError("Dask is not installed; pip install 'mcz[dask]'") from None
+    dask: Any = distributed  # which has types in part
     try:
         if isinstance(client, str):
-            with Client(client) as made:
+            with dask.Client(client) as made:
                 yield made
             return
-        found = default_client() if client is None else client
+        found = dask.default_client() if client is None else client
     except ValueError as error:
         raise OptionError(f"no Dask client: {error}") from None
     except OSError as error:

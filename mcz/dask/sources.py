@@ -57,7 +57,7 @@ def listed(root: str, target: Any) -> tuple[list[Found], list[Outcome]]:
     own = _opened(str(target))[1] if is_url(str(target)) else None
     try:
         details = fs.find(base, detail=True)
-    except OSError as error:
+    except Exception as error:  # each kind of store has errors of its own
         raise AccessError(f"{root}: {error}") from None
     found = [
         Found(posixpath.relpath(path, base), int(entry["size"] or 0))
@@ -129,5 +129,5 @@ def _fetch(ask: FarAsk, folder: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             path.write_bytes(fs.cat_file(f"{base}/{name}"))
-        except OSError as error:
+        except Exception as error:  # each kind of store has errors of its own
             raise SourceError(f"{ask.root.rstrip('/')}/{name}: {error}") from None
