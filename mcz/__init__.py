@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         SourceError,
         TruncatedError,
         UnsupportedError,
+        WorkerError,
     )
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
@@ -107,6 +108,7 @@ _HOMES = {
         "SourceError",
         "TruncatedError",
         "UnsupportedError",
+        "WorkerError",
     ),
     "mcz.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.reading.file": ("Attachment", "File", "open"),
@@ -190,6 +192,7 @@ __all__ = [
     "TruncatedError",
     "UnsupportedError",
     "Window",
+    "WorkerError",
     "accelerations",
     "append",
     "bag",

@@ -10,6 +10,7 @@ from mcz.cli.options import (
     clips_option,
     decoded_option,
     force_option,
+    jobs_option,
     json_option,
     salvage_option,
     threads_option,
@@ -36,6 +37,7 @@ from mcz.cli.progress import Progress
 @decoded_option
 @force_option
 @threads_option
+@jobs_option
 @json_option
 def command(
     file: str,
