@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
     from mcz.editing.arranging import delete_clips, rename_clips, reorder_clips, split
+    from mcz.editing.describing import set_metadata, set_rate
     from mcz.editing.exporting import export
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
     from mcz.editing.merging import merge
@@ -79,6 +80,7 @@ __version__ = "0.9.0"
 
 _HOMES = {
     "mcz.bags": ("BagCheck", "bag", "check_bag"),
+    "mcz.editing.describing": ("set_metadata", "set_rate"),
     "mcz.editing.exporting": ("export",),
     "mcz.tables": ("to_pandas", "to_xarray"),
     "mcz.writing.npz": ("to_npz",),
@@ -230,6 +232,8 @@ __all__ = [
     "root",
     "rotations",
     "select",
+    "set_metadata",
+    "set_rate",
     "split",
     "stream_decode",
     "stream_encode",

@@ -25,6 +25,7 @@ COMMANDS = (
     "unpack",
     "export",
     "list",
+    "meta",
     "delete",
     "rename",
     "reorder",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import Exit, about
+from mcz.cli.common import Exit, Failure, about
 from mcz.cli.options import (
     copies_option,
     encoding_options,
@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     metavar="tcp://HOST:PORT",
     help="Read and code on the machines of this Dask scheduler; DIR and OUT.mcz may be URLs.",
 )
+@click.option(
+    "--mtimes", is_flag=True, help="Keep when each file was last changed; unpack --mtimes sets it."
+)
 @copies_option("yes")
 @force_option
 @threads_option
@@ -44,6 +47,7 @@ def command(
     target: str,
     keep_all: bool,
     scheduler: str | None,
+    mtimes: bool,
     copies: bool | None,
     force: bool,
     as_json: bool,
@@ -54,6 +58,10 @@ def command(
     A file that cannot be parsed is left out, listed at the end, and makes the exit code 1;
     --verbatim keeps it as an attachment instead.
     """
+    if scheduler is not None and mtimes:
+        raise Failure("--mtimes are not kept with --scheduler", Exit.USAGE)
+    if mtimes:
+        options["mtimes"] = True
     with about(folder, target), Progress() as progress:
         report = _packing(scheduler)(
             folder,

@@ -12,13 +12,11 @@ from mcz.container import payloads
 from mcz.container.chunks import Chunk
 from mcz.container.cursor import Cursor
 from mcz.container.limits import MIB, check, metadata_limit
+from mcz.container.metadata_keys import INTERPRETED
 from mcz.container.packed import smallest
 from mcz.container.strict import decoded
 from mcz.errors import FormatError
 from mcz.schema import build, parse, varint
-
-# What readers interpret belongs to the values of a clip and to its source, and stays in CLIP.
-INTERPRETED = ("frame-numbers", "name-encoding", "skeleton-note", "source-note")
 
 # Each record in a META: (name, type, meaning).
 META_RECORD_FIELDS = (

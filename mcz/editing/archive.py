@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from mcz.codecs import chosen
 from mcz.container import payloads
+from mcz.container.metadata import Record
 from mcz.editing.appending import growing
 from mcz.editing.coded_parts import Far, ahead
 from mcz.editing.folders import files_below, left_out, motion_files, size_of, sources_named
 from mcz.editing.merging import add_files
+from mcz.editing.mtimes import stamp
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import notes_on
 from mcz.editing.stored_files import Content, stored_files
@@ -45,6 +48,7 @@ def pack(
     force: bool = False,
     archive: bool = False,
     copies: bool = True,
+    mtimes: bool = False,
     threads: int | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
@@ -54,9 +58,10 @@ def pack(
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
     relative to ``directory``. ``effort``, ``copies`` and ``threads`` are those of ``mcz.write``;
-    ``jobs`` processes may work at once, by default one: the bytes are the same. An
-    earlier MCZ file of the target's name is no part of the new one; any other file that the target
-    would replace is refused, even with ``force``.
+    ``jobs`` processes may work at once, by default one: the bytes are the same. ``mtimes`` keeps
+    when each file was last changed as metadata of its clip, so that the same files give other
+    bytes later. An earlier MCZ file of the target's name is no part of the new one; any other file
+    that the target would replace is refused, even with ``force``.
     """
     root = Path(directory)
     if not root.is_dir():
@@ -78,11 +83,24 @@ def pack(
         draft = Draft(stream, profile_of(archive), copies=copies)
         report = _write_entries(draft, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
+        if mtimes:
+            _note_times(draft, entries)
         draft.finish()
     report.size = draft.writer.offset
     report.note(notes_on(entry.name for entry in entries))
     report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
     return report
+
+
+def _note_times(draft: Draft, entries: Sequence[Entry]) -> None:
+    """Say of each clip that was written when its file was last changed."""
+    records = []
+    for entry in entries:
+        if entry.name in draft.clips:
+            with suppress(OSError):
+                records.append(Record(draft.clips[entry.name], {"mtime": stamp(entry.path)}))
+    with draft.step():
+        draft.writer.metadata(records)
 
 
 def _inputs_of(entries: Sequence[Entry]) -> Iterator[Path]:
@@ -224,6 +242,7 @@ def _write_entry(draft: Draft, entry: Entry, seen: Content) -> str:
     if len(writer.directory.clips) > clips:
         name = next(reversed(writer.directory.clips))
         seen[digest] = (payloads.OF_CLIP, name.encode())
+        draft.clips[entry.name] = name
     elif len(writer.directory.attachments) > attachments:
         seen[digest] = (payloads.OF_ATTACHMENT, entry.name.encode())
     return result

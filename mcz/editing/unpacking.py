@@ -12,6 +12,7 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.strict import check_path
+from mcz.editing.mtimes import set_time
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder, PortableNames, notes_on
 from mcz.errors import ExistsError, FormatError, MczError, OptionError
@@ -35,6 +36,7 @@ def unpack(
     salvage: bool = False,
     force: bool = False,
     names: str = "stored",
+    mtimes: bool = False,
     max_decoded: int | None = None,
     threads: int | None = None,
     jobs: int | None = None,
@@ -52,7 +54,8 @@ def unpack(
     ``names`` decides about names that some system cannot hold, or not beside another: "stored"
     writes them as they are, and refuses what this system or disk cannot hold; "portable" gives
     them others, which the outcomes tell; "strict" refuses them. One file never replaces another of
-    the same archive.
+    the same archive. ``mtimes``: files get the time of their last change that the metadata of
+    their clip has, where it has one (``mcz.pack(..., mtimes=True)``).
     """
     if names not in NAMES:
         raise OptionError(f"names is {names!r}, not one of {', '.join(NAMES)}")
@@ -67,6 +70,8 @@ def unpack(
         with shared_out(_restored, file, stored) as restoring:
             for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
                 outcome = writing.outcome(one.path, restore)
+                if mtimes and outcome.result == "restored" and one.kind == "clip":
+                    set_time(writing.place, file.clips[one.name].metadata.get("mtime"))
                 if salvage and isinstance(writing.error, FormatError):
                     outcome = replace(outcome, result="damaged")
                 report.outcomes.append(outcome)
@@ -149,6 +154,7 @@ class _Writing:
         self._names, self._notes = names, notes
         self._renamed, self._written = PortableNames(), set[str]()
         self.error: Exception | None = None
+        self.place = Path()  # of the file that was written last
 
     def outcome(self, path: str, restore: Callable[[], bytes]) -> Outcome:
         """Write what ``restore`` gives to its place; what became of it."""
@@ -175,6 +181,7 @@ class _Writing:
         with replacing(place, force=self._force, inputs=(self._target,)) as stream:
             stream.write(data)
         self._folder.note(path, place)
+        self.place = place
         return len(data), as_path
 
 

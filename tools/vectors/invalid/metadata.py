@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from mcz.container.chunks import ANCILLARY as OTHER
 from mcz.container.chunks import META, SAFE_TO_COPY
-from mcz.container.metadata import INTERPRETED, Record, record_bytes
+from mcz.container.metadata import Record, record_bytes
+from mcz.container.metadata_keys import INTERPRETED
 from mcz.schema import varint
 from tools.vectors.build.files import Broken, Crafter, Vector, finished
 from tools.vectors.build.metadata import content_of, meta_of, payload_of
