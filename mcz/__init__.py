@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
     from mcz.editing.arranging import delete_clips, rename_clips, reorder_clips, split
+    from mcz.editing.describing import set_metadata, set_rate
     from mcz.editing.exporting import export
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
     from mcz.editing.merging import merge
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
         SourceError,
         TruncatedError,
         UnsupportedError,
+        WorkerError,
     )
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
@@ -78,6 +80,7 @@ __version__ = "0.9.0"
 
 _HOMES = {
     "mcz.bags": ("BagCheck", "bag", "check_bag"),
+    "mcz.editing.describing": ("set_metadata", "set_rate"),
     "mcz.editing.exporting": ("export",),
     "mcz.tables": ("to_pandas", "to_xarray"),
     "mcz.writing.npz": ("to_npz",),
@@ -107,6 +110,7 @@ _HOMES = {
         "SourceError",
         "TruncatedError",
         "UnsupportedError",
+        "WorkerError",
     ),
     "mcz.editing.extraction": ("ExtractedClip", "Extraction", "extract"),
     "mcz.reading.file": ("Attachment", "File", "open"),
@@ -190,6 +194,7 @@ __all__ = [
     "TruncatedError",
     "UnsupportedError",
     "Window",
+    "WorkerError",
     "accelerations",
     "append",
     "bag",
@@ -227,6 +232,8 @@ __all__ = [
     "root",
     "rotations",
     "select",
+    "set_metadata",
+    "set_rate",
     "split",
     "stream_decode",
     "stream_encode",

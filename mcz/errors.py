@@ -8,6 +8,7 @@
     │   ├── AccessError      a file cannot be opened or written, or is in use
     │   └── ExistsError      the target exists and must not be replaced
     ├── SourceError          a source file (ASF, AMC, BVH, C3D) cannot be parsed
+    ├── WorkerError          a process that worked for this one ended unexpectedly
     └── FormatError          the bytes are not a valid MCZ file
         ├── TruncatedError   they end too early
         ├── ChecksumError    a stored checksum does not match them
@@ -44,6 +45,10 @@ class ExistsError(OptionError):
 
 class SourceError(MczError):
     """A source file cannot be parsed; the message names the line or the offset."""
+
+
+class WorkerError(MczError):
+    """A process or a machine that worked for this one ended before it was done."""
 
 
 class FormatError(MczError):

@@ -26,10 +26,11 @@ _LIMIT: ContextVar[int | None] = ContextVar("threads", default=None)
 
 def in_force() -> int:
     """How many threads a call may use: by default one a processor that the process may use."""
-    return _LIMIT.get() or _processors()
+    return _LIMIT.get() or processors()
 
 
-def _processors() -> int:
+def processors() -> int:
+    """How many processors the process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

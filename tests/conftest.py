@@ -33,7 +33,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "real" in item.keywords and not DATA:
             item.add_marker(pytest.mark.skip(reason="MCZ_DATA is not set"))
-        if "long" in item.keywords and not os.environ.get("MCZ_LONG"):
+        if {"long", "cluster"} & set(item.keywords) and not os.environ.get("MCZ_LONG"):
             item.add_marker(pytest.mark.skip(reason="MCZ_LONG is not set"))
 
 

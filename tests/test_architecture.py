@@ -42,6 +42,7 @@ ALLOWED = {
     "joint_errors": MODEL | {"kinematics"},
     "units": MODEL,
     "threads": {"errors"},
+    "jobs": {"errors", "threads"},
     "annexes": set(),
     "queries": {"brief", "errors"},
     "coding": GROUND | {"annexes"},
@@ -51,18 +52,19 @@ ALLOWED = {
     "formats": MODEL | {"kinematics"},
     "sample": MODEL | {"formats"},
     "tables": MODEL | {"kinematics", "poses"},
-    "reading": JOINT | {"poses", "queries", "tables"},
+    "reading": JOINT | {"jobs", "poses", "queries", "tables"},
     "bags": GROUND | {"reading"},
     "datasets": JOINT | {"poses", "reading"},
     "writing": JOINT | {"metrics", "reading", "tables"},
     "conversion": MODEL | {"kinematics", "formats", "reading"},
     "retargeting": MODEL | {"kinematics"},
-    "editing": JOINT | {"metrics", "queries", "reading", "writing", "conversion", "tables"},
+    "editing": JOINT | {"jobs", "metrics", "queries", "reading", "writing", "conversion", "tables"},
     "live": JOINT | {"interrupts", "reading", "writing"},
+    "dask": JOINT | {"jobs", "reading", "writing", "editing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
-    | {"bags"}
+    | {"bags", "jobs", "dask"}
     | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,

@@ -266,7 +266,9 @@ def busy(code: int, after: str = "") -> Answering:
 
 
 @pytest.mark.parametrize(
-    "wrong", [busy(429), busy(502), busy(503), busy(504), short, silent], ids=str
+    "wrong",
+    [busy(429), busy(502), busy(503), busy(504), short, silent],
+    ids=["429", "502", "503", "504", "short", "silent"],
 )
 def test_what_may_pass_is_tried_three_times(
     server: Server, waited: list[float], wrong: Answering

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import json
 import os
+import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -14,7 +16,10 @@ from hypothesis import strategies as st
 import mcz
 from mcz.container.chunks import Chunk
 from mcz.container.metadata import Record, applied, as_one, build_metas, parse_meta
+from mcz.container.metadata_keys import EXAMPLES, KEYS, TYPES, check_said
 from mcz.container.writer import Writer
+from mcz.editing.mtimes import nanoseconds, stamp
+from mcz.editing.tables_of_clips import from_table
 from mcz.sample import write_samples
 
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=8)
@@ -124,3 +129,137 @@ def test_what_is_said_of_a_deleted_clip_is_gone(archive: Path) -> None:
     assert b"Ada" not in archive.read_bytes()
     assert b"ada@" not in archive.read_bytes()
     assert mcz.verify(archive) == []
+
+
+# The registry, tables, lists ----------------------------------------------------
+
+
+def test_types_are_those_of_the_registry() -> None:
+    rows = json.loads((Path(mcz.__file__).parent / "annex" / "registry.json").read_text("utf-8"))
+    assert {row["key"]: row["type"] for row in rows["metadata_keys"]} == KEYS
+    assert {row["type"] for row in rows["metadata_keys"]} <= TYPES.keys()
+    assert TYPES.keys() - {"text"} == EXAMPLES.keys()
+
+
+GOOD = {
+    "date": ("2014", "2014-05", "2014-02-28"),
+    "time": ("2014-05-21T14:30", "2014-05-21T14:30:00Z", "2014-05-21T14:30:00.123456789+02:00"),
+    "start-time": ("0", "12.5", "-3"),
+    "licence": ("CC-BY-4.0", "MIT OR (Apache-2.0 AND GPL-2.0+)", "LicenseRef-ours"),
+    "doi": ("10.1000/182",),
+    "subject": ("", "Åsa"),
+    "x-mood": ("any",),
+}
+BAD = {
+    "date": ("2003-13", "2014-02-30", "21.5.2014", ""),
+    "time": ("2014-05-21", "14:30", "2014-05-21T25:00"),
+    "start-time": ("soon", "1e3", ""),
+    "licence": ("CC BY 4.0", ""),
+    "doi": ("https://doi.org/10.1000/182", "10.1/x"),
+    "x-": ("y",),
+    "sbject": ("05",),
+    "frame-numbers": ("1",),
+}
+
+
+@pytest.mark.parametrize("key", GOOD)
+def test_good_values(key: str) -> None:
+    for value in GOOD[key]:
+        check_said(key, value)
+
+
+@pytest.mark.parametrize("key", BAD)
+def test_bad_values(key: str) -> None:
+    for value in BAD[key]:
+        with pytest.raises(mcz.OptionError, match=key):
+            check_said(key, value)
+
+
+def test_nothing_is_written_where_nothing_changes(archive: Path) -> None:
+    mcz.set_metadata(archive, {"walk": {"subject": "05"}})
+    before = archive.read_bytes()
+    assert mcz.set_metadata(archive, {"walk": {"subject": "05", "place": None}}).outcomes == []
+    assert archive.read_bytes() == before
+    with pytest.raises(mcz.OptionError, match="no clip"):
+        mcz.set_metadata(archive, {"wlak": {"subject": "05"}})
+    with pytest.raises(mcz.OptionError, match="did you mean 'subject'"):
+        mcz.set_metadata(archive, {"walk": {"sbject": "05"}})
+    assert archive.read_bytes() == before
+    assert mcz.verify(archive) == []
+
+
+def test_a_rate_for_those_that_have_none(tmp_path: Path) -> None:
+    (tmp_path / "takes").mkdir()
+    write_samples(tmp_path / "takes")
+    mcz.pack(tmp_path / "takes", tmp_path / "a.mcz", codec="fast")
+    report = mcz.set_rate(tmp_path / "a.mcz", 120)
+    assert [outcome.path for outcome in report.outcomes] == ["walk"]
+    with mcz.open(tmp_path / "a.mcz") as file:
+        assert file.clips["walk"].frame_rate == 120
+        assert file.clips["walk"].source_bytes() == (tmp_path / "takes/walk.amc").read_bytes()
+    with pytest.raises(mcz.OptionError, match="its source states the rate"):
+        mcz.set_rate(tmp_path / "a.mcz", 100, ["walk.bvh"], force=True)
+    with pytest.raises(mcz.OptionError, match="has 120 frames a second"):
+        mcz.set_rate(tmp_path / "a.mcz", 100, ["walk"])
+    assert mcz.set_rate(tmp_path / "a.mcz", 100).outcomes == []
+    assert mcz.verify(tmp_path / "a.mcz") == []
+
+
+TABLES = {
+    "commas": "name,subject,date\nwalk,05,\nwalk.c3d,06,2014\n",
+    "tabs": "\ufeffclip\tsubject\tdate\r\nwalk\t05\t\r\nwalk.c3d\t06\t2014\r\n",
+    "semicolons": 'path;subject;date\n"walk.amc";05;\nwalk.c3d;06;2014\n',
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_tables(archive: Path, name: str) -> None:
+    (archive.parent / "t.csv").write_bytes(TABLES[name].encode())
+    with mcz.open(archive) as file:
+        said, unknown = from_table(archive.parent / "t.csv", file)
+    assert said == {"walk": {"subject": "05"}, "walk.c3d": {"subject": "06", "date": "2014"}}
+    assert unknown == []
+
+
+def test_columns_make_up_a_name(archive: Path) -> None:
+    table = archive.parent / "t.csv"
+    table.write_text("what,kind,fps\nwalk,bvh,120\nrun,bvh,120\n")
+    with mcz.open(archive) as file:
+        with pytest.raises(mcz.OptionError, match="no column clip, name, path, file"):
+            from_table(table, file)
+        with pytest.raises(mcz.OptionError, match="no clip for 1 of 2 rows: run.bvh"):
+            from_table(table, file, match="{what}.{kind}", take=[])
+        with pytest.raises(mcz.OptionError, match="no key of the metadata"):
+            from_table(table, file, match="{what}.{kind}", skip_unknown=True)
+        for bad in ("{what.__class__}", "{nothing}", "{what", "{what:d}"):
+            with pytest.raises(mcz.OptionError):
+                from_table(table, file, match=bad, take=[])
+        said, unknown = from_table(table, file, match="{what}.{kind}", take=[], skip_unknown=True)
+    assert (said, unknown) == ({"walk.bvh": {}}, ["run.bvh"])
+
+
+def test_a_registered_key_that_nobody_has_is_missing_and_no_error(archive: Path) -> None:
+    with mcz.open(archive) as file:
+        assert file.find("subject == '05'") == []
+        assert len(file.find("subject is missing")) == len(file)
+        with pytest.raises(mcz.OptionError):
+            file.find("sbject == '05'")
+
+
+def test_times_of_files_come_back(tmp_path: Path) -> None:
+    takes = tmp_path / "takes"
+    takes.mkdir()
+    write_samples(takes)
+    os.utime(takes / "walk.bvh", ns=(0, 1_400_000_000_123_456_700))
+    mcz.pack(takes, tmp_path / "a.mcz", codec="fast", mtimes=True)
+    mcz.unpack(tmp_path / "a.mcz", tmp_path / "out", mtimes=True)
+    assert (tmp_path / "out/walk.bvh").stat().st_mtime_ns == 1_400_000_000_123_456_700
+    assert mcz.verify(tmp_path / "a.mcz") == []
+
+
+@given(st.integers(-(10**9) * 10**9, 10**10 * 10**9))
+def test_any_time_is_written_and_read(ns: int) -> None:
+    with tempfile.NamedTemporaryFile() as file:
+        os.utime(file.name, ns=(0, ns))
+        path = Path(file.name)
+        assert nanoseconds(stamp(path)) == path.stat().st_mtime_ns

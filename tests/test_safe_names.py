@@ -59,7 +59,8 @@ def test_unpack_leaves_its_folder_with_no_names(
 ) -> None:
     archive = packed(tmp_path, "note.txt")
     for name in ("../out.txt", "/out.txt", "a/../../out.txt"):
-        monkeypatch.setattr(unpacking, "named_files", lambda file, of=name: [(of, bytes)])
+        stored = unpacking.Stored(name, "attachment", "note.txt")
+        monkeypatch.setattr(unpacking, "files_of", lambda file, clips, one=stored: [one])
         report = mcz.unpack(archive, tmp_path / names, names=names)
         assert [o.result for o in report.outcomes] == ["failed"]
         assert "not relative and plain" in report.outcomes[0].message

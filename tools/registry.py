@@ -59,7 +59,9 @@ def registry(text: str) -> dict[str, Any]:
             rows_after(text, "**Source formats**"), "id", "name", "suffixes", "source_of"
         ),
         "channel_kinds": list(_kinds(rows_after(text, "**Channel kinds**"))),
-        "metadata_keys": _keyed(rows_after(text, "**Metadata keys**"), "key", "value"),
+        "metadata_keys": _keyed(
+            rows_after(text, "**Metadata keys**"), "key", "value", "type", "dublin_core", "others"
+        ),
         "cut_keys": _keyed(
             rows_after(text, "- A quality record says what was cut"), "key", "value"
         ),

@@ -7,7 +7,13 @@ from typing import Any
 import click
 
 from mcz.cli.common import Exit, Failure, about, existing, say
-from mcz.cli.options import copies_option, encoding_options, json_option, threads_option
+from mcz.cli.options import (
+    copies_option,
+    encoding_options,
+    jobs_option,
+    json_option,
+    threads_option,
+)
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
 
@@ -46,6 +52,7 @@ from mcz.cli.progress import Progress
 @copies_option("where the file has some")
 @encoding_options
 @threads_option
+@jobs_option
 @json_option
 def command(
     sources: tuple[str, ...],

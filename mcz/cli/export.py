@@ -12,6 +12,7 @@ from mcz.cli.options import (
     clips_option,
     decoded_option,
     force_option,
+    jobs_option,
     json_option,
     threads_option,
     where_option,
@@ -34,6 +35,7 @@ from mcz.cli.suffixes import TARGETS
 @decoded_option
 @force_option
 @threads_option
+@jobs_option
 @json_option
 def command(
     file: str,

@@ -1,66 +1,167 @@
-"""``mcz list``: the names in a file, from its index alone."""
+"""``mcz list``: what is in a file, from its index alone unless other columns are asked for."""
 
 from __future__ import annotations
 
+import csv
+import io
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
 import click
 
-from mcz.cli.common import Exit, damage_of, echo, opened, print_json, table
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    damage_of,
+    echo,
+    opened,
+    plural,
+    print_json,
+    table,
+)
 from mcz.cli.options import json_option, salvage_option, where_option
 
+if TYPE_CHECKING:
+    from mcz.reading.clip import Clip
+    from mcz.reading.file import File
+
 ALIAS = ("name", "of", "target")
+USUAL = ("name", "codec", "n_frames", "n_channels", "frame_rate", "duration")
+HEADS = {"name": "clip", "n_frames": "frames", "n_channels": "channels", "frame_rate": "rate"}
 
 
 @click.command(short_help="Names of clips, from the index alone.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @where_option
+@click.option(
+    "--columns",
+    metavar="a,b",
+    help="Fields and metadata keys, such as name,subject,duration,description; see "
+    "docs/queries.md. Default: what the index has.",
+)
+@click.option("--sort", metavar="KEY", help="Sort by a field or metadata key; -KEY: descending.")
+@click.option("--csv", "as_csv", is_flag=True, help="Print a table with commas, clips alone.")
 @salvage_option
 @json_option
-def command(file: str, where: str | None, salvage: bool, as_json: bool) -> Exit:
+def command(
+    file: str,
+    where: str | None,
+    columns: str | None,
+    sort: str | None,
+    as_csv: bool,
+    salvage: bool,
+    as_json: bool,
+) -> Exit:
     """List the clips and attachments of FILE.mcz; only its index is read.
 
-    With --where the clips alone that it takes, and as much is read as it asks for.
+    With --where the clips alone that it takes; that, --columns and --sort read as much as they ask
+    for.
     """
-    with opened(file, salvage=salvage) as held:
-        clips = [
-            {
-                "name": clip.name,
-                "codec": clip.codec,
-                "n_frames": clip.n_frames,
-                "n_channels": clip.n_channels,
-                "frame_rate": None if clip.frame_rate is None else float(clip.frame_rate),
-                "skeleton": clip.skeleton_id.hex(),
-            }
-            for clip in held.chosen(where=where)
-        ]
-        others = held.attachments.values() if where is None else ()
-        attachments = [{"name": a.name, "bytes": a.size} for a in others]
-        names = sorted(held.aliases) if where is None else ()
-        aliases = [(name, *held.alias_of(name)) for name in names]
+    if as_csv and as_json:
+        raise Failure("--csv or --json, not both", Exit.USAGE)
+    names = None if columns is None else [name.strip() for name in columns.split(",")]
+    with opened(file, salvage=salvage) as held, about(file):
+        clips = held.chosen(where=where)
+        if sort is not None:
+            from mcz.editing.arranging import in_order
+
+            clips = in_order(held, clips, sort)
+        rows = _rows(held, clips, names)
+        totals = _totals(clips)
+        whole = where is None and names is None
+        attachments = [{"name": a.name, "bytes": a.size} for a in held.attachments.values()]
+        aliases = [(name, *held.alias_of(name)) for name in sorted(held.aliases)]
         damage = list(held.damage)
-    if as_json:
-        document = {
-            "clips": clips,
-            "attachments": attachments,
-            "aliases": [name for name, *_ in aliases],
-            "alias_targets": [dict(zip(ALIAS, alias, strict=True)) for alias in aliases],
+    if as_csv:
+        echo(*_as_csv(rows, names or USUAL).split("\n"))
+    elif as_json:
+        document: dict[str, Any] = {"clips": rows, "totals": totals}
+        document |= {
+            "attachments": attachments if where is None else [],
+            "aliases": [name for name, *_ in aliases] if where is None else [],
+            "alias_targets": [
+                dict(zip(ALIAS, alias, strict=True)) for alias in aliases if where is None
+            ],
         }
         print_json(document | ({"damage": damage} if salvage else {}))
-        return damage_of(file, damage)
-    rows = [
-        [
-            str(clip["name"]),
-            str(clip["codec"]),
-            f"{clip['n_frames']:,}",
-            f"{clip['n_channels']}",
-            "?" if clip["frame_rate"] is None else f"{clip['frame_rate']:g}",
-        ]
-        for clip in clips
-    ]
-    if rows:
-        echo(*table([["clip", "codec", "frames", "channels", "rate"], *rows], "llrrr").split("\n"))
+    else:
+        _print(rows, names or USUAL, totals)
+        if whole:
+            _print_others(attachments, aliases)
+    return damage_of(file, damage)
+
+
+def _rows(held: File, clips: Sequence[Clip], names: list[str] | None) -> list[dict[str, Any]]:
+    """The values of each clip by column; without ``names`` those of the index, and its skeleton."""
+    from mcz.reading.fields import getter_of
+
+    every = held.clips.values()
+    getters: dict[str, Callable[[Clip], Any]] = {
+        name: getter_of(name, every) for name in names or USUAL
+    }
+    if names is None:
+        getters["skeleton"] = lambda clip: clip.skeleton_id.hex()
+    return [{name: get(clip) for name, get in getters.items()} for clip in clips]
+
+
+def _totals(clips: Sequence[Clip]) -> dict[str, Any]:
+    """How many clips and frames there are, and seconds where the rate is known."""
+    known = [clip for clip in clips if clip.frame_rate is not None]
+    return {
+        "clips": len(clips),
+        "frames": sum(clip.n_frames for clip in clips),
+        "duration": float(sum(clip.n_frames / (clip.frame_rate or 1) for clip in known)),
+        "without_rate": len(clips) - len(known),
+    }
+
+
+def _text(name: str, value: Any) -> str:
+    """A value as a table has it; of the index ? stands for a rate that is unknown."""
+    if value is None:
+        return "?" if name in ("frame_rate", "duration") else ""
+    if name == "duration":
+        return f"{value:.2f}"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:g}"
+    return f"{value:,}" if isinstance(value, int) and name != "n_channels" else str(value)
+
+
+def _print(rows: list[dict[str, Any]], names: Sequence[str], totals: dict[str, Any]) -> None:
+    if not rows:
+        return
+    heads = [HEADS.get(name, name) for name in names]
+    cells = [[_text(name, row[name]) for name in names] for row in rows]
+    numbers = [all(isinstance(row[n], int | float | None) for row in rows) for n in names]
+    echo(*table([heads, *cells], "".join("r" if n else "l" for n in numbers)).split("\n"))
+    if len(rows) > 1:
+        echo(_summary(totals))
+
+
+def _summary(totals: dict[str, Any]) -> str:
+    seconds = round(totals["duration"])
+    time = f"{seconds // 3600}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+    unknown = totals["without_rate"]
+    rest = f" and {plural(unknown, 'clip')} without a rate" if unknown else ""
+    return f"{plural(totals['clips'], 'clip')}, {plural(totals['frames'], 'frame')}, {time}{rest}"
+
+
+def _print_others(
+    attachments: Sequence[dict[str, Any]], aliases: Sequence[tuple[str, str, str]]
+) -> None:
     for attachment in attachments:
         echo(f"{attachment['name']}  attachment, {attachment['bytes']:,} bytes")
     for name, of, target in aliases:
         same = f"same content as {of} {target}"
         echo(f"{name}  {f'the file of skeleton {target[:8]}' if of == 'skeleton' else same}")
-    return damage_of(file, damage)
+
+
+def _as_csv(rows: list[dict[str, Any]], names: Sequence[str]) -> str:
+    """RFC 4180 but for its line ends: a head, then the values as they are."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([["" if row[n] is None else row[n] for n in names] for row in rows])
+    return out.getvalue().rstrip("\n")

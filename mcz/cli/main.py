@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 import click
@@ -24,6 +25,7 @@ COMMANDS = (
     "unpack",
     "export",
     "list",
+    "meta",
     "delete",
     "rename",
     "reorder",
@@ -51,6 +53,8 @@ def cli() -> None:
 
 
 def main() -> None:
+    for library in ("OMP", "OPENBLAS", "MKL"):  # sums in one order, however many cores there are
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     sys.exit(run(cli, "mcz"))
 
 

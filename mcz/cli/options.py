@@ -80,6 +80,25 @@ def threads_option(function: Function) -> Function:
     )(command)
 
 
+def jobs_option(function: Function) -> Function:
+    """``--jobs``, as the argument ``jobs`` of ``mcz.pack`` and its kin, by default all cores."""
+
+    @wraps(function)
+    def command(*args: Any, jobs: int | None, **options: Any) -> Any:
+        from mcz import threads
+        from mcz.jobs import limited
+
+        with limited(jobs or threads.processors()):
+            return function(*args, **options)
+
+    return click.option(
+        "--jobs",
+        metavar="N",
+        type=click.IntRange(1),
+        help="Work with N processes where there is much to do. Default: one a processor.",
+    )(command)
+
+
 def copies_option(default: str) -> Callable[[Function], Function]:
     """``--copies``, as the argument ``copies`` of ``mcz.encode`` and its kin, None: ``default``."""
     return click.option(

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import Exit, about
+from mcz.cli.common import Exit, Failure, about
 from mcz.cli.options import (
     copies_option,
     encoding_options,
     force_option,
+    jobs_option,
     json_option,
     threads_option,
 )
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from mcz.editing.outcomes import Report
 
 
 @click.command(short_help="A folder of motion files to one .mcz.")
@@ -23,14 +29,25 @@ from mcz.cli.progress import Progress
 @click.argument("target", metavar="OUT.mcz", type=click.Path(readable=False))
 @encoding_options
 @click.option("--keep-all", is_flag=True, help="Keep files of other kinds too, as attachments.")
+@click.option(
+    "--scheduler",
+    metavar="tcp://HOST:PORT",
+    help="Read and code on the machines of this Dask scheduler; DIR and OUT.mcz may be URLs.",
+)
+@click.option(
+    "--mtimes", is_flag=True, help="Keep when each file was last changed; unpack --mtimes sets it."
+)
 @copies_option("yes")
 @force_option
 @threads_option
+@jobs_option
 @json_option
 def command(
     folder: str,
     target: str,
     keep_all: bool,
+    scheduler: str | None,
+    mtimes: bool,
     copies: bool | None,
     force: bool,
     as_json: bool,
@@ -41,10 +58,12 @@ def command(
     A file that cannot be parsed is left out, listed at the end, and makes the exit code 1;
     --verbatim keeps it as an attachment instead.
     """
-    import mcz
-
+    if scheduler is not None and mtimes:
+        raise Failure("--mtimes are not kept with --scheduler", Exit.USAGE)
+    if mtimes:
+        options["mtimes"] = True
     with about(folder, target), Progress() as progress:
-        report = mcz.pack(
+        report = _packing(scheduler)(
             folder,
             target,
             keep_all=keep_all,
@@ -54,3 +73,14 @@ def command(
             **options,
         )
     return conclude(report, target, as_json)
+
+
+def _packing(scheduler: str | None) -> Callable[..., Report]:
+    """What packs: this machine, or those of a scheduler."""
+    if scheduler is None:
+        from mcz.editing.archive import pack
+
+        return pack
+    from mcz.dask import pack as pack_there
+
+    return partial(pack_there, client=scheduler)

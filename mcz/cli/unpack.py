@@ -10,6 +10,7 @@ from mcz.cli.options import (
     clips_option,
     decoded_option,
     force_option,
+    jobs_option,
     json_option,
     salvage_option,
     threads_option,
@@ -33,9 +34,11 @@ from mcz.cli.progress import Progress
     help="Of names that some systems cannot hold, or not beside another: write them as stored "
     "where this system can, write portable ones instead, or refuse them.",
 )
+@click.option("--mtimes", is_flag=True, help="Give files the time that their clips' metadata have.")
 @decoded_option
 @force_option
 @threads_option
+@jobs_option
 @json_option
 def command(
     file: str,
@@ -43,6 +46,7 @@ def command(
     clips: tuple[str, ...],
     where: str | None,
     names: str,
+    mtimes: bool,
     salvage: bool,
     max_decoded: int | None,
     force: bool,
@@ -66,6 +70,7 @@ def command(
             salvage=salvage,
             force=force,
             names=names,
+            mtimes=mtimes,
             max_decoded=max_decoded,
             progress=progress,
         )

@@ -21,7 +21,14 @@ from mcz.cli.common import (
     say,
 )
 from mcz.cli.filed import Filed
-from mcz.cli.options import decoded_option, force_option, json_option, threads_option, where_option
+from mcz.cli.options import (
+    decoded_option,
+    force_option,
+    jobs_option,
+    json_option,
+    threads_option,
+    where_option,
+)
 from mcz.cli.progress import Progress
 from mcz.errors import FormatError, LimitError, UnsupportedError
 
@@ -51,6 +58,7 @@ if TYPE_CHECKING:
 @decoded_option
 @threads_option
 @force_option
+@jobs_option
 @json_option
 def command(
     file: str,

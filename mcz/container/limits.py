@@ -68,6 +68,11 @@ def index_limit(file_bytes: int) -> int:
     return max(64 * 1024, 2 * file_bytes)  # LIMIT-13
 
 
+def metadata_limit(file_bytes: int) -> int:
+    """The bytes that the records of a META may inflate to."""
+    return max(64 * 1024, 2 * file_bytes)  # LIMIT-17
+
+
 def output_limit(file_bytes: int) -> int:
     """The bytes that a reader decodes from one file unless its caller allows more."""
     return max(64 * MIB, 4096 * file_bytes)  # LIMIT-10

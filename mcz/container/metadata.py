@@ -11,14 +11,12 @@ from dataclasses import dataclass, field
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
 from mcz.container.cursor import Cursor
-from mcz.container.limits import MIB, check, index_limit
+from mcz.container.limits import MIB, check, metadata_limit
+from mcz.container.metadata_keys import INTERPRETED
 from mcz.container.packed import smallest
 from mcz.container.strict import decoded
 from mcz.errors import FormatError
 from mcz.schema import build, parse, varint
-
-# What readers interpret belongs to the values of a clip and to its source, and stays in CLIP.
-INTERPRETED = ("frame-numbers", "name-encoding", "skeleton-note", "source-note")
 
 # Each record in a META: (name, type, meaning).
 META_RECORD_FIELDS = (
@@ -38,6 +36,9 @@ class Record:
     name: str
     entries: Mapping[str, str] = field(default_factory=dict)
     removed: tuple[str, ...] = ()
+
+
+Placed = dict[str, list[tuple[int, Record]]]  # by name, each with where its META begins
 
 
 def applied(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[str, str]:
@@ -66,7 +67,7 @@ def build_metas(records: Sequence[Record], *, short: bool = False) -> Iterator[b
     """The payloads of the META chunks that hold ``records``, each of about 1 MiB at most."""
     content = bytearray()
     for record in records:
-        content += _record(record)
+        content += record_bytes(record)
         if len(content) >= MIB:
             yield _payload(bytes(content), short)
             content.clear()
@@ -80,7 +81,8 @@ def _payload(content: bytes, short: bool) -> bytes:
     return build(payloads.META, fields, "META")
 
 
-def _record(record: Record) -> bytes:
+def record_bytes(record: Record) -> bytes:
+    """A record as META has it."""
     texts = [record.name, *record.removed]
     out = _text(record.name) + varint(len(texts) - 1) + b"".join(map(_text, record.removed))
     pairs = b"".join(_text(key) + _text(value) for key, value in record.entries.items())
@@ -99,7 +101,7 @@ def parse_meta(payload: bytes, chunk: Chunk, file_bytes: int) -> list[Record]:
     """
     where = f"chunk {chunk.label}"
     fields = parse(payloads.META, payload, where)
-    check(f"{where}: bytes of the records", fields.size, index_limit(file_bytes))  # LIMIT-17
+    check(f"{where}: bytes of the records", fields.size, metadata_limit(file_bytes))
     content = decoded(fields.data, fields.encoding, fields.size, where)
     read, records = Cursor(content, where), []
     while read.at < len(content):
@@ -118,12 +120,12 @@ def records_in(
     file_bytes: int,
     *,
     lenient: bool,
-) -> dict[str, list[Record]]:
-    """What META ``chunks`` say of each clip, and of the file as "", in file order.
+) -> Placed:
+    """What META ``chunks`` say of each name, and where they begin, in file order.
 
     ``lenient``: of one that is damaged nothing is taken, and nothing raised.
     """
-    found: dict[str, list[Record]] = {}
+    found: Placed = {}
     for chunk in chunks:
         try:
             records = parse_meta(payload_of(chunk), chunk, file_bytes)
@@ -132,7 +134,7 @@ def records_in(
                 raise
             continue
         for record in records:
-            found.setdefault(record.name, []).append(record)
+            found.setdefault(record.name, []).append((chunk.offset, record))
     return found
 
 

@@ -45,7 +45,11 @@ def unpacked(payload: bytes, where: str, profile: Profile) -> bytes:
     at = _flags_at(payload, where)
     if at >= len(payload) or not payload[at] & PACKED:
         return payload
-    size, start = read_varint(payload, at + 1)
+    try:
+        size, start = read_varint(payload, at + 1)
+    except FormatError as error:
+        error.args = (f"{where}: {error}",)
+        raise
     check(f"{where}: bytes", size, profile.text_bytes)  # SKEL-09
     rest = inflate(payload[start:], size, where, words=words())
     return payload[:at] + bytes((payload[at] & ~PACKED,)) + rest

@@ -40,7 +40,7 @@ from mcz.container.directory import (
 )
 from mcz.container.index import parse_index
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
-from mcz.container.metadata import Record, applied, records_in
+from mcz.container.metadata import Placed, Record, applied, records_in
 from mcz.container.overlay import Overlay
 from mcz.container.packed import parse_skel
 from mcz.container.packets import (
@@ -185,16 +185,22 @@ class Container:
         return check_chunk(self.source.read(chunk.offset, chunk.size), chunk)
 
     @cached_property
-    def records(self) -> dict[str, list[Record]]:
-        """What META chunks say of each clip, and of the file as "", in file order; read once."""
+    def _records(self) -> Placed:
+        """What META chunks say of each name, read once."""
         rows = self.directory.clips.values()
         chunks = [chunk for row in rows for chunk in row.ancillary if chunk.type == META]
         return records_in(chunks, self.payload, self.source.size, lenient=self.salvage)
 
+    def said_of(self, name: str) -> list[Record]:
+        """What META chunks behind the clip ``name`` say of it; "": of the file as a whole."""
+        row = self.directory.clips.get(name)
+        start = row.clip.offset if row is not None else 0
+        return [record for at, record in self._records.get(name, ()) if at > start]
+
     def metadata(self, row: ClipRow) -> dict[str, str]:
         """What CLIP says of a clip, and META chunks behind it."""
         said = clip_head(self.payload(row.clip), row.clip.label).metadata
-        return applied(said, self.records.get(row.name, ()))
+        return applied(said, self.said_of(row.name))
 
     def copies(self) -> list[Chunk]:
         """The COPY chunks of the file, in order."""

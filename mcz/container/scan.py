@@ -339,14 +339,17 @@ class Walker:
         if self.whole:
             payload = self._payload(chunk)
             if self.strict:
-                check_ancillary(chunk, payload, self.source.size, self.found, self._payload)
                 if chunk.type == META and self.clip is not None:  # META-02
                     raise FormatError(f"chunk {chunk.label} is inside the clip {self.clip.name!r}")
+                self._check_ancillary(chunk, payload)
             if self.salvage and chunk.type == REPEAT:  # REPT-03
                 self._repeat(chunk, payload)
         if self.clip is None and self.found.directory.clips:
             last = next(reversed(self.found.directory.clips))
             self.found.directory.clips[last].ancillary.append(chunk)
+
+    def _check_ancillary(self, chunk: Chunk, payload: bytes) -> None:
+        check_ancillary(chunk, payload, self.source.size, self.found, self._payload)
 
     def _repeat(self, chunk: Chunk, payload: bytes) -> None:
         """Take in the chunks of a REPT: of a clip that is open, those that may have been lost."""

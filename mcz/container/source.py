@@ -213,7 +213,8 @@ def _remote_stream(target: str) -> Any:
     import fsspec
 
     try:
-        return fsspec.open(target, "rb", cache_type="none").open()
+        fs, path = fsspec.core.url_to_fs(target)
+        return fs.open(path, "rb", cache_type="none")  # an option of the file, not of its store
     except (ValueError, ImportError) as error:  # no such protocol, or not installed
         raise OptionError(f"{target}: {error}") from None
     except Exception as error:  # each file system has its own errors

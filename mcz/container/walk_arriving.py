@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from mcz.container.chunks import SIGNATURE, Chunk, check_signature
+from mcz.container.chunks import COPY, SIGNATURE, Chunk, check_signature
 from mcz.container.copies import parse_copies
 from mcz.container.directory import SegmentRow
 from mcz.container.scan import Walker
 from mcz.container.source import ByteSource
+from mcz.container.strict_ancillary import check_ancillary
 from mcz.errors import TruncatedError
 from mcz.schema import MAX_COUNT
 
@@ -130,6 +131,10 @@ class ArrivingWalker(Walker):
         self._payload(chunk)
         self.index = chunk
 
-    def _copies(self, chunk: Chunk, payload: bytes) -> None:
-        """Check its form: what the copies are of was let go, and is less than came before it."""
-        parse_copies(payload, chunk, chunk.offset)
+    def _check_ancillary(self, chunk: Chunk, payload: bytes) -> None:
+        """Check the form of copies: what they are of was let go, and is less than came before."""
+        size = chunk.offset + chunk.size
+        if chunk.type == COPY:
+            parse_copies(payload, chunk, size)
+        else:
+            check_ancillary(chunk, payload, size, self.found, self._payload)

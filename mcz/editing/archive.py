@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from mcz.codecs import chosen
 from mcz.container import payloads
+from mcz.container.metadata import Record
 from mcz.editing.appending import growing
+from mcz.editing.coded_parts import Far, ahead
 from mcz.editing.folders import files_below, left_out, motion_files, size_of, sources_named
 from mcz.editing.merging import add_files
+from mcz.editing.mtimes import stamp
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import notes_on
 from mcz.editing.stored_files import Content, stored_files
 from mcz.errors import MczError, OptionError, SourceError
+from mcz.jobs import limited as jobs_limited
 from mcz.reading.file import File
-from mcz.reading.source_files import read_bytes
 from mcz.threads import limited
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
@@ -45,16 +48,20 @@ def pack(
     force: bool = False,
     archive: bool = False,
     copies: bool = True,
+    mtimes: bool = False,
     threads: int | None = None,
+    jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Pack every motion file below ``directory`` into one MCZ file.
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
-    relative to ``directory``. ``effort``, ``copies`` and ``threads`` are those of ``mcz.write``. An
-    earlier MCZ file of the target's name is no part of the new one; any other file that the target
-    would replace is refused, even with ``force``.
+    relative to ``directory``. ``effort``, ``copies`` and ``threads`` are those of ``mcz.write``;
+    ``jobs`` processes may work at once, by default one: the bytes are the same. ``mtimes`` keeps
+    when each file was last changed as metadata of its clip, so that the same files give other
+    bytes later. An earlier MCZ file of the target's name is no part of the new one; any other file
+    that the target would replace is refused, even with ``force``.
     """
     root = Path(directory)
     if not root.is_dir():
@@ -68,15 +75,32 @@ def pack(
     terms = Terms(coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
     inputs = (*paths, *(params or {}).values())
-    with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
+    with (
+        limited(threads),
+        jobs_limited(jobs),
+        replacing(target, force=force, inputs=inputs) as stream,
+    ):
         draft = Draft(stream, profile_of(archive), copies=copies)
         report = _write_entries(draft, entries, progress)
         refuse_inputs(target, _inputs_of(entries))
+        if mtimes:
+            _note_times(draft, entries)
         draft.finish()
     report.size = draft.writer.offset
     report.note(notes_on(entry.name for entry in entries))
     report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
     return report
+
+
+def _note_times(draft: Draft, entries: Sequence[Entry]) -> None:
+    """Say of each clip that was written when its file was last changed."""
+    records = []
+    for entry in entries:
+        if entry.name in draft.clips:
+            with suppress(OSError):
+                records.append(Record(draft.clips[entry.name], {"mtime": stamp(entry.path)}))
+    with draft.step():
+        draft.writer.metadata(records)
 
 
 def _inputs_of(entries: Sequence[Entry]) -> Iterator[Path]:
@@ -103,6 +127,7 @@ def append(
     skip_identical: bool = False,
     copies: bool | None = None,
     threads: int | None = None,
+    jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Add files after the last valid FOOT of an MCZ file; what it held stays readable throughout.
@@ -118,6 +143,7 @@ def append(
     lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
     them. Where its end is damaged, one of the two has to be given. ``threads`` is that of
     ``mcz.write``, and so is ``copies``, of all that has none yet; None: where the file has some.
+    ``jobs`` is that of ``mcz.pack``.
     Raises AccessError while another process is appending, OptionError where the target is a source
     itself.
     """
@@ -128,7 +154,11 @@ def append(
     files = [source for source in sources if source not in held]
     named, others = sources_named(files, root, target)
     entries = [Entry(path, name, terms) for path, name in named]
-    with limited(threads), growing(Path(target), salvage=salvage, force=force) as growth:
+    with (
+        limited(threads),
+        jobs_limited(jobs),
+        growing(Path(target), salvage=salvage, force=force) as growth,
+    ):
         container = growth.container
         paths, seen = stored_files(container)
         wanted = bool(container.copies()) if copies is None else copies
@@ -170,8 +200,22 @@ def _write_entries(
     """Write the files; ``seen``: what the target holds already, by content."""
     report = Report()
     seen = {} if seen is None else seen
+    with ahead(entries, draft, seen) as in_turn:
+        write_in_turn(draft, in_turn, len(entries), report, progress, seen)
+    return report
+
+
+def write_in_turn(
+    draft: Draft,
+    entries: Iterable[Entry],
+    total: int,
+    report: Report,
+    progress: Progress | None,
+    seen: Content,
+) -> None:
+    """Write one file after the other; ``report`` learns what becomes of each."""
     for done, entry in enumerate(entries):
-        size = size_of(entry.path)
+        size = entry.size if isinstance(entry, Far) else size_of(entry.path)
         try:
             result = _write_entry(draft, entry, seen)
             notes = tuple(filter(None, (entry.remark, *entry.notes)))
@@ -179,13 +223,12 @@ def _write_entries(
         except MczError as error:
             report.outcomes.append(Outcome(entry.name, "failed", size, str(error)))
         if progress is not None:
-            progress(done + 1, len(entries), entry.name)
-    return report
+            progress(done + 1, total, entry.name)
 
 
 def _write_entry(draft: Draft, entry: Entry, seen: Content) -> str:
     """Write one file, or only its name where the same bytes are there already."""
-    digest = hashlib.sha256(read_bytes(entry.path)).digest()
+    digest = entry.digest()
     is_amc = entry.path.suffix.lower() == ".amc"  # its values hang on the ASF beside it
     writer = draft.writer
     if digest in seen and not is_amc and not draft.holds(entry.name, digest):
@@ -199,6 +242,7 @@ def _write_entry(draft: Draft, entry: Entry, seen: Content) -> str:
     if len(writer.directory.clips) > clips:
         name = next(reversed(writer.directory.clips))
         seen[digest] = (payloads.OF_CLIP, name.encode())
+        draft.clips[entry.name] = name
     elif len(writer.directory.attachments) > attachments:
         seen[digest] = (payloads.OF_ATTACHMENT, entry.name.encode())
     return result

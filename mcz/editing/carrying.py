@@ -201,7 +201,7 @@ class Carrier:
 def said_of(container: Container, names: Iterable[tuple[str, str]]) -> list[Record]:
     """What META chunks say of the file, and of clips by their old and new names."""
     pairs = [("", ""), *names]
-    said = ((new, container.records.get(old, ())) for old, new in pairs)
+    said = ((new, container.said_of(old)) for old, new in pairs)
     return [as_one(new, records) for new, records in said if records]
 
 

@@ -13,10 +13,12 @@ from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder
 from mcz.editing.unpacking import safe_path
 from mcz.errors import ExistsError, FormatError, MczError, OptionError
+from mcz.jobs import limited
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
-from mcz.reading.file import open
+from mcz.reading.file import File, open
+from mcz.reading.sharing import shared_out
 from mcz.reading.source_files import with_facts
 from mcz.tables.files import EXPORTS, table_of
 from mcz.writing.atomic import replacing
@@ -37,6 +39,7 @@ def export(
     force: bool = False,
     max_decoded: int | None = None,
     threads: int | None = None,
+    jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Write every clip of an MCZ file below ``directory`` as "npz", "csv", "bvh", "amc" or "c3d".
@@ -45,30 +48,47 @@ def export(
     of these alone, as in ``unpack``. ``rate`` and ``unit`` are those of clips that do not say them.
     A clip that the format cannot hold, or whose file is there and not ``force``, is reported as
     failed and the others are written. Files appear when they are whole; no link below ``directory``
-    is followed. Raises OptionError and what ``mcz.open`` raises.
+    is followed. ``jobs`` processes may work at once, by default one. Raises OptionError and what
+    ``mcz.open`` raises.
     """
     if to not in FORMS:
         raise OptionError(f"to {to!r}: one of {', '.join(FORMS)}")
     folder, report, written = Folder(Path(directory)), Report(), set[str]()
-    with open(target, max_decoded=max_decoded, threads=threads) as file:
+    with limited(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
         chosen = file.chosen(clips, where)
-        for done, clip in enumerate(chosen):
-            try:
-                for name, data in _files(clip, to, rate, unit):
-                    if name in written:
-                        raise FormatError(f"another clip becomes {name}, too")
-                    path = folder.place(str(safe_path(name)), force=force)
-                    with replacing(path, force=force, inputs=(target,)) as stream:
-                        stream.write(data)
-                    written.add(name)
-                    folder.note(name, path)
-                    report.outcomes.append(Outcome(name, "written", len(data)))
-            except (MczError, OSError) as error:
-                result = "exists" if isinstance(error, ExistsError) else "failed"
-                report.outcomes.append(Outcome(clip.name, result, 0, f"{clip.name}: {error}"))
-            if progress is not None:
-                progress(done + 1, len(chosen), clip.name)
+        called = [clip.name for clip in chosen]
+        with shared_out(_converted, file, called, (to, rate, unit)) as converting:
+            for done, (name, converted) in enumerate(zip(called, converting, strict=True)):
+                try:
+                    for path, data in converted():
+                        _write(path, data, folder, written, target, force)
+                        report.outcomes.append(Outcome(path, "written", len(data)))
+                except (MczError, OSError) as error:
+                    result = "exists" if isinstance(error, ExistsError) else "failed"
+                    report.outcomes.append(Outcome(name, result, 0, f"{name}: {error}"))
+                if progress is not None:
+                    progress(done + 1, len(called), name)
     return report
+
+
+def _write(
+    name: str, data: bytes, folder: Folder, written: set[str], target: Any, force: bool
+) -> None:
+    if name in written:
+        raise FormatError(f"another clip becomes {name}, too")
+    path = folder.place(str(safe_path(name)), force=force)
+    with replacing(path, force=force, inputs=(target,)) as stream:
+        stream.write(data)
+    written.add(name)
+    folder.note(name, path)
+
+
+def _converted(
+    shared: tuple[File, tuple[str, Fraction | float | None, str | None]], name: str
+) -> list[tuple[str, bytes]]:
+    """The files that the clip ``name`` becomes."""
+    file, (to, rate, unit) = shared
+    return list(_files(file.clips[name], to, rate, unit))
 
 
 def _files(

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from mcz.container import payloads
 from mcz.container.strict import check_path
+from mcz.editing.mtimes import set_time
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder, PortableNames, notes_on
 from mcz.errors import ExistsError, FormatError, MczError, OptionError
+from mcz.jobs import limited
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
+from mcz.reading.sharing import shared_out
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 
@@ -32,8 +36,10 @@ def unpack(
     salvage: bool = False,
     force: bool = False,
     names: str = "stored",
+    mtimes: bool = False,
     max_decoded: int | None = None,
     threads: int | None = None,
+    jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
     """Write every source file and attachment of an MCZ file below ``directory``.
@@ -42,46 +48,35 @@ def unpack(
     ``File.find``. Each file appears under its name only when it is whole and its hash is right. No
     symbolic link below ``directory`` is followed. Clips without a source are reported as skipped.
     With ``salvage`` the file may be damaged: what is whole is written, the rest is reported as
-    damaged. ``max_decoded`` and ``threads`` are those of ``mcz.open``.
+    damaged. ``max_decoded`` and ``threads`` are those of ``mcz.open``. ``jobs`` processes may
+    restore at once, by default one.
 
     ``names`` decides about names that some system cannot hold, or not beside another: "stored"
     writes them as they are, and refuses what this system or disk cannot hold; "portable" gives
     them others, which the outcomes tell; "strict" refuses them. One file never replaces another of
-    the same archive.
+    the same archive. ``mtimes``: files get the time of their last change that the metadata of
+    their clip has, where it has one (``mcz.pack(..., mtimes=True)``).
     """
     if names not in NAMES:
         raise OptionError(f"names is {names!r}, not one of {', '.join(NAMES)}")
     folder, report = Folder(Path(directory)), Report()
-    with open(target, salvage=salvage, max_decoded=max_decoded, threads=threads) as opened:
+    options: dict[str, Any] = {"max_decoded": max_decoded, "threads": threads}
+    with limited(jobs), open(target, salvage=salvage, **options) as opened:
         file = File(opened.container.strictly())
         report.damage += opened.damage
         wanted, whole = file.chosen(clips, where), clips is None and where is None
-        jobs = list(named_files(file) if whole else _files_of(file, wanted))
-        renamed, written, notes = PortableNames(), set[str](), notes_on(name for name, _ in jobs)
-        for done, (name, restore) in enumerate(jobs):
-            try:
-                as_name = str(safe_path(name))
-                if names == "portable":
-                    as_name = renamed(as_name)
-                if names == "strict" and name in notes:
-                    raise FormatError(notes[name])
-                if name in written:
-                    raise FormatError("another file in the archive has the same path")  # PATH-06
-                data = restore()
-                written.add(name)
-                path = folder.place(as_name, force=force)
-                with replacing(path, force=force, inputs=(target,)) as stream:
-                    stream.write(data)
-                folder.note(name, path)
-                text = "" if as_name == name else f"as {as_name}"
-                report.outcomes.append(Outcome(name, "restored", len(data), text))
-            except (MczError, OSError) as error:
-                result = "exists" if isinstance(error, ExistsError) else "failed"
-                if salvage and isinstance(error, FormatError):
-                    result = "damaged"
-                report.outcomes.append(Outcome(name, result, 0, f"{name}: {error}"))
-            if progress is not None:
-                progress(done + 1, len(jobs), name)
+        stored = list(files_of(file, None if whole else wanted))
+        writing = _Writing(target, folder, force, names, notes_on(one.path for one in stored))
+        with shared_out(_restored, file, stored) as restoring:
+            for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
+                outcome = writing.outcome(one.path, restore)
+                if mtimes and outcome.result == "restored" and one.kind == "clip":
+                    set_time(writing.place, file.clips[one.name].metadata.get("mtime"))
+                if salvage and isinstance(writing.error, FormatError):
+                    outcome = replace(outcome, result="damaged")
+                report.outcomes.append(outcome)
+                if progress is not None:
+                    progress(done + 1, len(stored), one.path)
         report.outcomes += _without_file(wanted)
     return report
 
@@ -95,53 +90,99 @@ def _without_file(clips: Iterable[Clip]) -> Iterator[Outcome]:
                 yield Outcome(clip.name, "skipped", 0, text)
 
 
-def named_files(file: File, *, clips: bool = True) -> Iterator[tuple[str, Any]]:
-    """Path and restoring function of every file that the archive holds under a name."""
-    yield from _sources_of(file.clips.values() if clips else ())
-    for attachment in file.attachments.values():
-        yield attachment.name, attachment.read
-    for name, (of, target) in file.aliases.items():
-        yield name, _alias_reader(file, name, of, target)
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """A file that the archive holds under ``path``, as the ``kind`` of thing called ``name``."""
+
+    path: str
+    kind: str
+    name: str
 
 
-def _sources_of(clips: Iterable[Clip]) -> Iterator[tuple[str, Any]]:
-    for clip in clips:
+def files_of(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Stored]:
+    """Every file that the archive holds under a name; of ``clips`` their sources and skeletons."""
+    for clip in file if clips is None else clips:
         try:
-            source = clip.source
-        except FormatError as error:  # damage of one clip is no other's
-            yield clip.name, partial(_fail, error)
-            continue
-        if source is not None and source.path:
-            yield source.path, clip.source_bytes
-
-
-def _files_of(file: File, clips: Sequence[Clip]) -> Iterator[tuple[str, Any]]:
-    """The same of some clips: their sources, and the files of their skeletons."""
-    yield from _sources_of(clips)
-    skeletons = file.skeleton_ids(clips)
+            path = clip.source.path if clip.source is not None else ""
+        except FormatError:  # which is that of restoring it, and no other clip's
+            path = clip.name
+        if path:
+            yield Stored(path, "clip", clip.name)
+    for name in file.attachments if clips is None else ():
+        yield Stored(name, "attachment", name)
+    skeletons = None if clips is None else file.skeleton_ids(clips)
     for name, (of, target) in file.aliases.items():
-        if of == payloads.OF_SKELETON and target in skeletons:
-            yield name, _alias_reader(file, name, of, target)
+        if skeletons is None or (of == payloads.OF_SKELETON and target in skeletons):
+            yield Stored(name, "alias", name)
 
 
-def _fail(error: FormatError) -> bytes:
-    raise error
+def named_files(file: File) -> Iterator[tuple[str, Callable[[], bytes]]]:
+    """Path and restoring function of every file that the archive holds under a name."""
+    for one in files_of(file):
+        yield one.path, partial(_restored, (file, None), one)
 
 
-def _alias_reader(file: File, name: str, of: int, target: bytes) -> Any:
-    """What restores an alias; it raises FormatError where its target is not there."""
+def _restored(shared: tuple[File, object], one: Stored) -> bytes:
+    """The bytes of a file; raises FormatError where they cannot be restored."""
+    file, _ = shared
+    if one.kind == "alias":
+        return _of_alias(file, one.name, *file.aliases[one.name])
+    return _of_thing(file, one.kind, one.name)
+
+
+def _of_thing(file: File, kind: str, name: str) -> bytes:
+    return file.clips[name].source_bytes() if kind == "clip" else file.attachments[name].read()
+
+
+def _of_alias(file: File, name: str, of: int, target: bytes) -> bytes:
+    """What an alias stands for; raises FormatError where that is not there."""
     if of == payloads.OF_SKELETON:
-        return lambda: file.skeleton_bytes(target)
+        return file.skeleton_bytes(target)
+    called = target.decode("utf-8", "replace")
+    if called not in (file.clips if of == payloads.OF_CLIP else file.attachments):
+        raise FormatError(f"alias {name!r} names {target!r}, which is not there")
+    return _of_thing(file, "clip" if of == payloads.OF_CLIP else "attachment", called)
 
-    def restore() -> bytes:
-        table: Mapping[str, Any] = file.clips if of == payloads.OF_CLIP else file.attachments
-        found = table.get(target.decode("utf-8", "replace"))
-        if found is None:
-            raise FormatError(f"alias {name!r} names {target!r}, which is not there")
-        data: bytes = found.source_bytes() if of == payloads.OF_CLIP else found.read()
-        return data
 
-    return restore
+class _Writing:
+    """Writes files below a folder, no two to one place; ``error`` is that of the last one."""
+
+    def __init__(
+        self, target: Any, folder: Folder, force: bool, names: str, notes: Mapping[str, str]
+    ) -> None:
+        self._target, self._folder, self._force = target, folder, force
+        self._names, self._notes = names, notes
+        self._renamed, self._written = PortableNames(), set[str]()
+        self.error: Exception | None = None
+        self.place = Path()  # of the file that was written last
+
+    def outcome(self, path: str, restore: Callable[[], bytes]) -> Outcome:
+        """Write what ``restore`` gives to its place; what became of it."""
+        try:
+            size, as_path = self._write(path, restore)
+        except (MczError, OSError) as error:
+            self.error = error
+            result = "exists" if isinstance(error, ExistsError) else "failed"
+            return Outcome(path, result, 0, f"{path}: {error}")
+        self.error = None
+        return Outcome(path, "restored", size, "" if as_path == path else f"as {as_path}")
+
+    def _write(self, path: str, restore: Callable[[], bytes]) -> tuple[int, str]:
+        as_path = str(safe_path(path))
+        if self._names == "portable":
+            as_path = self._renamed(as_path)
+        if self._names == "strict" and path in self._notes:
+            raise FormatError(self._notes[path])
+        if path in self._written:
+            raise FormatError("another file in the archive has the same path")  # PATH-06
+        data = restore()
+        self._written.add(path)
+        place = self._folder.place(as_path, force=self._force)
+        with replacing(place, force=self._force, inputs=(self._target,)) as stream:
+            stream.write(data)
+        self._folder.note(path, place)
+        self.place = place
+        return len(data), as_path
 
 
 def safe_path(name: str) -> PurePosixPath:

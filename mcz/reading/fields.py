@@ -13,6 +13,7 @@ from mcz.brief import among
 from mcz.codecs import by_id
 from mcz.container.chunks import FRAMING
 from mcz.container.directory import ClipRow
+from mcz.container.metadata_keys import SAID
 from mcz.errors import OptionError, UnsupportedError
 from mcz.formats import format_by_id
 from mcz.queries import Query, Value
@@ -71,7 +72,8 @@ def _known(name: str, clips: Collection[Clip]) -> Getter | None:
     if name in FIELDS:
         return FIELDS[name]
     key = name.removeprefix(METADATA)
-    return partial(_metadata, key) if any(key in clip.metadata for clip in clips) else None
+    is_key = key in SAID or any(key in clip.metadata for clip in clips)
+    return partial(_metadata, key) if is_key else None
 
 
 def _names(name: str, clips: Collection[Clip]) -> list[str]:

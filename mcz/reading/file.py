@@ -157,7 +157,7 @@ class File:
     @property
     def metadata(self) -> Mapping[str, str]:
         """What is said of the file as a whole, see ``Clip.metadata``."""
-        return applied({}, self.container.records.get("", ()))
+        return applied({}, self.container.said_of(""))
 
     @property
     def damage(self) -> list[str]:

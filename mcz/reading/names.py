@@ -26,6 +26,17 @@ def clip_called(clips: Mapping[str, Clip], aliases: Aliases, name: str) -> str:
     raise OptionError(f"no clip {name!r}; {_suggestion(clips, name)}")
 
 
+def names_of(clips: Mapping[str, Clip], aliases: Aliases) -> dict[str, set[str]]:
+    """What the clips may be called, as ``clips_meant`` finds it, for who asks for many."""
+    known: dict[str, set[str]] = {name: {name} for name in clips}
+    for names in _ways(clips, aliases):
+        found: dict[str, set[str]] = {}
+        for called, clip in names:
+            found.setdefault(called, set()).add(clip)
+        known = found | known
+    return known
+
+
 def clips_meant(clips: Mapping[str, Clip], aliases: Aliases, name: str) -> list[str]:
     """The names of the clips that ``name`` may mean, sorted."""
     if name in clips:

@@ -15,6 +15,7 @@ from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import GROUP_NOTES
 from mcz.errors import ChecksumError, FormatError, MczError, OptionError, UnsupportedError
+from mcz.jobs import limited
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
@@ -23,9 +24,12 @@ from mcz.reading.layout import layout as layout
 from mcz.reading.quick_check import Problem as Problem
 from mcz.reading.quick_check import heading, quick_check
 from mcz.reading.recording_report import document_of
+from mcz.reading.sharing import shared_out
 from mcz.reading.signal_info import SignalInfo, read_segments
 from mcz.reading.sizes import Sizes, clip_sizes, models_used
 from mcz.schema import parse
+
+Row = tuple[str, str, list[Problem]]  # kind, name and faults of a part of a file
 
 
 def info(
@@ -271,6 +275,7 @@ def verify(
     threads: int | None = None,
     where: Where | None = None,
     quick: bool = False,
+    jobs: int | None = None,
 ) -> list[Problem]:
     """Check every checksum of a file, decode everything, restore every source.
 
@@ -279,39 +284,57 @@ def verify(
     decode and restore only the clips that it takes, see ``File.find``; OptionError for none.
     ``quick``: check the checksums and the index alone, at the speed of the disk; all faults of a
     file that cannot be opened are told, too.
+    ``jobs`` processes may work at once, by default one.
     """
     if quick:
         if where is not None:
             raise OptionError("a quick check is of the whole file; it takes no where")
         return quick_check(target)[1]
-    with open(target, max_decoded=max_decoded, threads=threads) as file:
+    with limited(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
         return validate(file, None if where is None else file.chosen(where=where))
 
 
-def part_problems(
-    file: File, clips: Sequence[Clip] | None = None
-) -> Iterator[tuple[str, str, list[Problem]]]:
+def part_problems(file: File, clips: Sequence[Clip] | None = None) -> Iterator[Row]:
     """Kind, name and faults of every skeleton, clip and attachment, one after the other.
 
     ``clips``: of these alone, and of their skeletons.
     """
+    items = [("skeletons", "")]
+    items += [("clip", clip.name) for clip in (file if clips is None else clips)]
+    items += [("attachment", name) for name in (file.attachments if clips is None else ())]
+    names = None if clips is None else [clip.name for clip in clips]
+    with shared_out(_problems_of, file, items, names) as answers:
+        for answer in answers:
+            yield from answer()
+
+
+def _problems_of(shared: tuple[File, Sequence[str] | None], item: tuple[str, str]) -> list[Row]:
+    """The rows of ``part_problems`` for all skeletons, a clip or an attachment."""
+    (file, names), (kind, name) = shared, item
+    if kind == "clip":
+        return [(kind, name, clip_problems(file, file.clips[name]))]
+    if kind == "attachment":
+        return [(kind, name, _attachment_problems(file, name))]
+    return _skeleton_rows(file, None if names is None else [file.clips[name] for name in names])
+
+
+def _skeleton_rows(file: File, clips: Sequence[Clip] | None) -> list[Row]:
     problems: list[Problem] = []
+    rows: list[Row] = []
     for id_, skeleton in _guarded(problems, file, clips):
         found: list[Problem] = []
         _check(found, file, id_)
-        yield "skeleton", skeleton.name or id_.hex(), found
-    if problems:
-        yield "skeletons", "", problems
-    for clip in file if clips is None else clips:
-        yield "clip", clip.name, clip_problems(file, clip)
-    for attachment in file.attachments.values() if clips is None else ():
-        found = []
-        try:
-            attachment.read()
-        except MczError as error:
-            offset = file.container.directory.attachments[attachment.name].parts[0].offset
-            found.append(Problem(offset, "ATTA", str(error)))
-        yield "attachment", attachment.name, found
+        rows.append(("skeleton", skeleton.name or id_.hex(), found))
+    return [*rows, ("skeletons", "", problems)] if problems else rows
+
+
+def _attachment_problems(file: File, name: str) -> list[Problem]:
+    try:
+        file.attachments[name].read()
+    except MczError as error:
+        offset = file.container.directory.attachments[name].parts[0].offset
+        return [Problem(offset, "ATTA", str(error))]
+    return []
 
 
 def _guarded(

@@ -40,6 +40,7 @@ class Draft:
     ) -> None:
         self._sink, self._pending, self._hold = sink, io.BytesIO(), hold
         self.paths = dict(paths or {})
+        self.clips: dict[str, str] = {}  # what the clip of each file is called that was written
         offset = directory.end if directory is not None else 0
         self.writer = Writer(
             self,

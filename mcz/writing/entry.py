@@ -62,6 +62,10 @@ class Entry:
         self.inputs: list[Path] = [path]  # the files that it was made of
         self.quality: dict[str, str] | None = None  # of a lossy clip what its record says
 
+    def digest(self) -> bytes:
+        """The SHA-256 of the file."""
+        return hashlib.sha256(read_bytes(self.path)).digest()
+
     def write(self, draft: Draft, progress: Progress | None = None) -> str:
         """Write the file; return how: "skeleton", "parsed", "present" or "verbatim"."""
         check_name(self.name)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mcz.container import payloads
 from mcz.container.directory import Directory
+from mcz.container.metadata_keys import KEYS, PRIVATE
 from mcz.container.strict import is_plain_path
 from mcz.container.writer import Writer
 from mcz.errors import MotionError
@@ -42,12 +43,7 @@ def check_name(path: str) -> None:
         raise MotionError(f"source path {path!r} is not relative and plain; rename the file")
 
 
-# SPEC.md's registry; ``frame-numbers`` is written from the frame numbers of a motion.
-METADATA_KEYS = (
-    *("frame-numbers", "name-encoding", "skeleton-note", "source-note", "subject", "scene"),
-    *("start-time", "rights", "credit"),
-)
-PRIVATE = "x-"
+METADATA_KEYS = tuple(KEYS)  # ``frame-numbers`` is written from the numbers of a motion
 
 
 def check_metadata(metadata: Mapping[str, str], name: str) -> None:

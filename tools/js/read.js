@@ -19,6 +19,7 @@ import { Refused, Unsupported } from "./errors.js";
 import { readHead } from "./head.js";
 import { checkIndex } from "./index.js";
 import { decodedLimit, profile, within } from "./limits.js";
+import { apply, readRecords } from "./metadata.js";
 import { readPackets } from "./packets.js";
 import { readQuality } from "./qual.js";
 import { sha256 } from "./sha256.js";
@@ -37,6 +38,7 @@ const BASE_PROFILE = 0;
  * @property {Map<string, import("./skel.js").Skeleton>} skeletons by id
  * @property {Map<string, {kind: number, data: Uint8Array}>} models by id
  * @property {Map<string, {format: number, data: Uint8Array}>} templates by id, inflated
+ * @property {Map<string, string>} metadata of the file as a whole
  * @property {Map<string, Attachment>} attachments by name
  * @property {Map<string, object>} aliases by name
  * @property {Map<string, import("./clip.js").Clip>} clips by name, each with `findModel`,
@@ -71,6 +73,7 @@ class Walk {
       attachments: new Map(),
       aliases: new Map(),
       clips: new Map(),
+      metadata: new Map(),
     };
     this.modelBytes = 0;
     this.clip = null; // the clip that is open
@@ -149,14 +152,26 @@ class Walk {
     this.endOfFoot = foot.end;
   }
 
-  /** QUAL, REPT, COPY and unknown types: nothing that they say bears upon what is decoded. */
+  /** QUAL, META, REPT, COPY, unknown types: nothing that they say bears upon what is decoded. */
   readAncillary(chunk) {
     const { type, offset, payload } = chunk;
     if (type === "COPY") checkCopies(chunk, this.copied, this.bytes.length);
+    if (type === "META") this.readMetadata(payload);
     const quality = type === "QUAL" ? readQuality(payload) : null;
     if (this.clip || !this.lastClip) return;
     this.lastClip.ancillary.push({ type, offset, length: payload.length });
     if (quality !== null) this.lastClip.quality ??= quality;
+  }
+
+  /** Those of the file, and of the clips so far. */
+  readMetadata(payload) {
+    if (this.clip) this.refuse(`META in clip ${this.clip.name}`);
+    if (!this.lastClip) this.refuse("META before the first clip");
+    for (const record of readRecords(payload, this.bytes.length)) {
+      const clip = this.file.clips.get(record.name);
+      if (record.name === "") apply(this.file.metadata, record);
+      else if (clip) apply(clip.metadata, record);
+    }
   }
 
   readInClip(chunk) {

@@ -138,6 +138,8 @@ ARGUED: dict[str, str] = {
     "SALV-09": _SALVAGE + "test_copies.py::test_a_skeleton_is_made_again_from_its_asf",
     "LIMIT-16": "copies of chunks that are there, each once, are shorter than the file: whatever "
     "states more is refused by LIMIT-14, COPY-02 or COPY-03",
+    "META-05": _REWRITER + "test_metadata.py::test_it_goes_along",
+    "META-06": _REWRITER + "test_metadata.py::test_what_is_said_of_a_deleted_clip_is_gone",
     "LIMIT-07": "a file that breaks it has more than 2 GiB, or ends before the chunk (CHUNK-05)",
     "LIMIT-11": "raw deflate makes at most 1032 times its bytes, less than the 4096 times the file "
     "that is allowed: whatever states more is refused by LIMIT-14, ATTA-03 or ATTA-04",

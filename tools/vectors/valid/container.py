@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from mcz.container import payloads
-from mcz.container.chunks import COPY, SIGNATURE
+from mcz.container.chunks import COPY, META, SIGNATURE
 from mcz.container.limits import ARCHIVE
+from mcz.container.metadata import Record
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import build, varint
 from tools.vectors.build.copies import content_of, copies_of, payload_of
 from tools.vectors.build.deflate import END, Bits, code_of, own_lengths
 from tools.vectors.build.edits import at, put
 from tools.vectors.build.files import Crafter, Vector, Whole, attached, file_of, finished, partial
+from tools.vectors.build.metadata import meta_of
 from tools.vectors.build.motions import HUNDREDTHS, dance, numbers
 from tools.vectors.build.source_files import BOTH, PLAIN, take
 from tools.vectors.build.words import after_words, packed
@@ -32,6 +34,7 @@ def vectors() -> Iterable[Vector]:
     _attachments(shelf)
     _quality(shelf)
     _copies(shelf)
+    _metadata(shelf)
     _names(shelf)
     _versions(shelf)
     _unknown(shelf)
@@ -120,6 +123,39 @@ def _copies(shelf: Whole) -> None:
     crafter.ancillary(COPY, payload_of(content_of(first, crafter.offset)), safe_to_copy=False)
     purpose = "A COPY of nothing before any clip, and two of the same chunk behind it."
     shelf.hold("copies-few", spec, purpose, finished(crafter), dance())
+
+
+def _metadata(shelf: Whole) -> None:
+    two, spec = (dance(), dance(3, name="encore")), "META; Registry"
+    many = [
+        Record("dance", {"subject": "05", "x-mood": ""}),
+        Record("encore", {"subject": "06"}, ("nothing",)),
+        Record("dance", {"place": "Åbo"}, ("x-mood",)),
+        Record("", {"rights-holder": "all of us"}),
+        Record("nobody", {"subject": "07"}),
+    ]
+    for name, stored in (("metadata-behind", False), ("metadata-behind-stored", True)):
+        crafter = Crafter()
+        for motion in two:
+            crafter.clip(motion)
+        crafter.ancillary(META, meta_of(many, stored=stored))
+        purpose = "A META that says something of two clips, of the file and of a clip not there"
+        purpose += ", stored." if stored else "."
+        shelf.hold(name, spec, purpose, finished(crafter), *two)
+    crafter = Crafter()
+    crafter.clip(two[0])
+    crafter.ancillary(META, meta_of(many))
+    crafter.clip(two[1])
+    crafter.ancillary(META, meta_of(many[1:2]))
+    crafter.ancillary(META, meta_of([]))
+    purpose = "A META before a clip that it names, one that repeats it behind, and an empty one."
+    shelf.hold("metadata-between", spec, purpose, finished(crafter), *two)
+    crafter = Crafter()
+    crafter.clip(two[0])
+    words = meta_of([Record("dance", {"description": "Xrotation Yrotation " * 3})], after=True)
+    crafter.ancillary(META, words)
+    purpose = "A META deflated after words."
+    shelf.hold("metadata-words", "META; Deflate after words", purpose, finished(crafter), two[0])
 
 
 def _names(shelf: Whole) -> None:

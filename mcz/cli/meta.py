@@ -1,0 +1,203 @@
+"""``mcz meta``: what is said of clips, shown and set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mcz.cli.common import (
+    Exit,
+    Failure,
+    about,
+    echo,
+    existing,
+    opened,
+    plural,
+    print_json,
+    say,
+    to_rate,
+)
+from mcz.cli.options import clips_option, json_option, where_option
+from mcz.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from mcz.editing.describing import Said
+    from mcz.reading.clip import Clip
+    from mcz.reading.file import File
+
+
+def _to_pairs(
+    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
+) -> dict[str, str]:
+    """Callback of ``KEY=VALUE``; the value is text as it stands."""
+    pairs = {}
+    for value in values:
+        key, equals, text = value.partition("=")
+        if not equals or not key:
+            raise click.BadParameter(f"{value!r} is not KEY=VALUE")
+        if key in pairs:
+            raise click.BadParameter(f"{key!r} is set twice")
+        pairs[key] = text
+    return pairs
+
+
+@click.command(short_help="What is said of clips: shown, set, taken from a table.")
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@clips_option
+@where_option
+@click.option("--file", "of_file", is_flag=True, help="Of the file as a whole, not of clips.")
+@click.option(
+    "--set", "pairs", metavar="KEY=VALUE", multiple=True, callback=_to_pairs,
+    help="Say this; may be repeated. Keys: docs/metadata.md, or x-... of your own.",
+)  # fmt: skip
+@click.option(
+    "--remove", "removed", metavar="KEY", multiple=True, help="Say this no more; may be repeated."
+)
+@click.option(
+    "--from", "table", metavar="TABLE.csv", type=click.Path(readable=False),
+    help="What a table says: a row a clip, a column a key; CSV or TSV with a head.",
+)  # fmt: skip
+@click.option(
+    "--match",
+    metavar="TEXT",
+    help="How columns of the table name clips: {subject:0>2}_{trial:0>2}. Default: a column clip, "
+    "name, path or file.",
+)
+@click.option("--take", metavar="a,b", help="The columns of the table to take. Default: all.")
+@click.option("--skip-unknown", is_flag=True, help="Rows of the table without a clip are let be.")
+@click.option(
+    "--rate", metavar="R", callback=to_rate,
+    help="Frames a second of clips whose source does not say it (AMC): rewrites the file. Default: "
+    "of all whose rate is unknown.",
+)  # fmt: skip
+@click.option("--force", is_flag=True, help="Change a rate that is known.")
+@json_option
+def command(
+    file: str,
+    clips: tuple[str, ...],
+    where: str | None,
+    of_file: bool,
+    pairs: dict[str, str],
+    removed: tuple[str, ...],
+    table: str | None,
+    match: str | None,
+    take: str | None,
+    skip_unknown: bool,
+    rate: Any,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    """Show what is said of the clips of FILE.mcz, or set it, and leave their bytes untouched.
+
+    It is appended, and the last one said wins. What was said before stays in the bytes until the
+    file is rewritten, as mcz delete and mcz reorder do.
+    """
+    existing(file)
+    if of_file and (clips or where or table or rate):
+        raise Failure("--file is about no clip", Exit.USAGE)
+    if set(pairs) & set(removed):
+        raise Failure(f"{sorted(set(pairs) & set(removed))[0]} is set and removed", Exit.USAGE)
+    if not (pairs or removed or table or rate):
+        with opened(file) as held:
+            return _show(held, _chosen(held, clips, where, of_file), as_json)
+    changes, unknown = _changes(
+        file, clips, where, of_file, dict.fromkeys(removed) | pairs, table, match, take,
+        skip_unknown,
+    )  # fmt: skip
+    for name in unknown:
+        say(f"{table}: no clip {name}")
+    return _set(file, changes, rate, clips, where, force, as_json)
+
+
+def _chosen(
+    held: File, clips: tuple[str, ...], where: str | None, of_file: bool
+) -> Mapping[str, Clip | None]:
+    if of_file:
+        return {"": None}
+    chosen = held.chosen(clips or None, where)
+    every: dict[str, Clip | None] = {} if clips or where else {"": None}
+    return every | {clip.name: clip for clip in chosen}
+
+
+def _show(held: File, chosen: Mapping[str, Clip | None], as_json: bool) -> Exit:
+    said = {
+        name: dict(held.metadata if clip is None else clip.metadata)
+        for name, clip in chosen.items()
+    }
+    if as_json:
+        clips = [{"name": name, "metadata": pairs} for name, pairs in said.items() if name]
+        whole = {"metadata": said[""]} if "" in said else {}
+        print_json(whole | {"clips": clips})
+        return Exit.FINE
+    for name, pairs in said.items():
+        if pairs or len(said) == 1:
+            echo(f"{name}:" if name else "the file:")
+            echo(*(f"  {key}: {value}" for key, value in pairs.items()))
+    return Exit.FINE
+
+
+def _changes(
+    file: str,
+    clips: tuple[str, ...],
+    where: str | None,
+    of_file: bool,
+    said: Said,
+    table: str | None,
+    match: str | None,
+    take: str | None,
+    skip_unknown: bool,
+) -> tuple[dict[str, dict[str, str | None]], list[str]]:
+    """What is to be said of each clip, and the rows of the table without one."""
+    from mcz.editing.tables_of_clips import from_table
+
+    changes: dict[str, dict[str, str | None]] = {}
+    unknown: list[str] = []
+    with opened(file) as held, about(file, *([table] if table else [])):
+        if table is not None:
+            columns = None if take is None else [name.strip() for name in take.split(",")]
+            found, unknown = from_table(
+                table, held, match=match, take=columns, skip_unknown=skip_unknown
+            )
+            wanted = {clip.name for clip in held.chosen(clips or None, where)}
+            changes = {name: dict(row) for name, row in found.items() if name in wanted}
+        if said:
+            names: Iterable[str] = [""] if of_file else _chosen(held, clips, where, False)
+            for name in names:
+                if name or of_file:
+                    changes[name] = changes.get(name, {}) | dict(said)
+    return changes, unknown
+
+
+def _set(
+    file: str,
+    changes: Mapping[str, Said],
+    rate: Any,
+    clips: tuple[str, ...],
+    where: str | None,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    import mcz
+
+    outcomes = []
+    with about(file), Progress() as progress:
+        if rate is not None:
+            report = mcz.set_rate(
+                file, rate, clips or None, where=where, force=force, progress=progress
+            )
+            outcomes += report.outcomes
+        if changes:
+            outcomes += mcz.set_metadata(file, changes).outcomes
+    if as_json:
+        rows = [{"name": o.path, "result": o.result, "message": o.message} for o in outcomes]
+        print_json({"target": file, "changed": rows})
+        return Exit.FINE
+    of_rate = sum(outcome.result == "rate" for outcome in outcomes)
+    names = {outcome.path for outcome in outcomes if outcome.result == "said"}
+    of_clips = plural(len(names - {""}), "clip")
+    rates = f", the rate of {plural(of_rate, 'clip')}" if rate is not None else ""
+    whole = " and of the file" if "" in names else ""
+    echo(f"{file}: changed what is said of {of_clips}{whole}{rates}")
+    return Exit.FINE

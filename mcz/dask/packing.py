@@ -1,0 +1,94 @@
+"""``mcz.dask.pack``: files are read and coded on the machines of a cluster, and joined here."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from mcz.codecs import chosen
+from mcz.dask.cluster import Cluster, connected
+from mcz.dask.sources import FarAsk, Found, coded_there, listed, skeletons_beside
+from mcz.editing.archive import write_in_turn
+from mcz.editing.coded_parts import Far
+from mcz.editing.folders import motion_files
+from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.safe_names import notes_on
+from mcz.jobs import Answer
+from mcz.writing.atomic import replacing
+from mcz.writing.clip_writer import Progress
+from mcz.writing.draft import Draft
+from mcz.writing.entry import Entry, Terms
+from mcz.writing.file import profile_of
+
+
+def pack(
+    root: str | os.PathLike[str],
+    target: Any,
+    client: Any = None,
+    *,
+    codec: str | None = None,
+    effort: str | None = None,
+    params: Mapping[str, Any] | None = None,
+    rate: float | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+    verbatim: bool = False,
+    keep_all: bool = False,
+    force: bool = False,
+    archive: bool = False,
+    copies: bool = True,
+    progress: Progress | None = None,
+) -> Report:
+    """Pack every motion file below ``root`` into one MCZ file, as ``mcz.pack`` does.
+
+    ``root`` and ``target`` are paths or URLs that fsspec knows ("s3://bucket/takes"); all machines
+    can read ``root``, only this one writes ``target``. ``client`` is a ``distributed.Client``, the
+    address of a scheduler, or None for the client that there is. The bytes are those of
+    ``mcz.pack``. Raises OptionError, and WorkerError where the cluster has no workers; a file whose
+    machines are lost again and again is reported as failed.
+    """
+    root = os.fspath(root)
+    found, others = listed(root, target)
+    taken, left = _chosen(found, keep_all)
+    coded = chosen(codec, effort)
+    verbatim = verbatim or keep_all
+    params = None if params is None else dict(params)
+    terms = Terms(coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
+    paths = [os.path.join(root, one.name) for one in taken] if "://" not in root else []  # noqa: PTH118
+    inputs = (*paths, *(params or {}).values())
+    report, profile = Report(), profile_of(archive)
+    skeletons = [one.name for one in found if one.name.lower().endswith(".asf")]
+    asks = (
+        FarAsk(root, one.name, skeletons_beside(one.name, skeletons), terms, profile)
+        for one in taken
+    )
+    with connected(client) as used, replacing(target, force=force, inputs=inputs) as stream:
+        draft = Draft(stream, profile, copies=copies)
+        with closing(Cluster(used).in_order(coded_there, asks, None)) as answers:
+            entries = _entries(root, taken, terms, answers)
+            write_in_turn(draft, entries, len(taken), report, progress, {})
+        draft.finish()
+    report.size = draft.writer.offset
+    report.note(notes_on(one.name for one in taken))
+    report.outcomes += sorted([*others, *left], key=lambda one: os.fsencode(one.path))
+    return report
+
+
+def _chosen(found: Sequence[Found], keep_all: bool) -> tuple[list[Found], list[Outcome]]:
+    """The files that are packed, and what becomes of the others."""
+    motions, _ = motion_files([Path(one.name) for one in found])
+    known = {path.as_posix() for path in motions}
+    text = "no motion file; --keep-all keeps it"
+    left = [Outcome(o.name, "skipped", o.size, text) for o in found if o.name not in known]
+    return (list(found), []) if keep_all else ([o for o in found if o.name in known], left)
+
+
+def _entries(
+    root: str, found: Sequence[Found], terms: Terms, answers: Iterator[Answer[Any] | None]
+) -> Iterator[Entry]:
+    for one, answer in zip(found, answers, strict=True):
+        assert answer is not None  # every file was asked for
+        yield Far(Entry(Path(root, one.name), one.name, terms), answer, one.size)

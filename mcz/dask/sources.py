@@ -1,0 +1,133 @@
+"""Source files below a folder or a URL, as the machines of a cluster list and read them."""
+
+from __future__ import annotations
+
+import os
+import posixpath
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from mcz.container.limits import Profile
+from mcz.editing.coded_parts import Ask, Part, coded
+from mcz.editing.folders import files_below, size_of
+from mcz.editing.outcomes import Outcome
+from mcz.errors import AccessError, MczError, OptionError, SourceError
+from mcz.writing.entry import Terms
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A file below the root: its relative path, and its size in bytes."""
+
+    name: str
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class FarAsk:
+    """Which file below ``root`` is to be coded; ``beside``: names of the ASFs that it may need."""
+
+    root: str
+    name: str
+    beside: tuple[str, ...]
+    terms: Terms
+    profile: Profile
+
+
+def is_url(root: str) -> bool:
+    return "://" in root
+
+
+def listed(root: str, target: Any) -> tuple[list[Found], list[Outcome]]:
+    """The files below ``root`` but for an earlier ``target``, in the order of an archive.
+
+    Raises OptionError where it is no folder, AccessError where it cannot be listed.
+    """
+    if not is_url(root):
+        folder = Path(root)
+        if not folder.is_dir():
+            raise OptionError(f"{root}: not a folder")
+        paths, others = files_below(folder, target)
+        found = [Found(path.relative_to(folder).as_posix(), size_of(path)) for path in paths]
+        return found, others
+    fs, base = _opened(root)
+    own = _opened(str(target))[1] if is_url(str(target)) else None
+    try:
+        details = fs.find(base, detail=True)
+    except Exception as error:  # each kind of store has errors of its own
+        raise AccessError(f"{root}: {error}") from None
+    found = [
+        Found(posixpath.relpath(path, base), int(entry["size"] or 0))
+        for path, entry in details.items()
+        if entry["type"] == "file" and path != own and not path.endswith("/")
+    ]
+    if not found:
+        raise OptionError(f"{root}: no file is below it")
+    return sorted(found, key=lambda one: os.fsencode(one.name)), []
+
+
+def _opened(url: str) -> tuple[Any, str]:
+    """The file system of a URL and the path in it; raises OptionError."""
+    import fsspec
+
+    try:
+        fs, path = fsspec.core.url_to_fs(url)
+    except (ValueError, ImportError) as error:  # no such protocol, or not installed
+        raise OptionError(f"{url}: {error}") from None
+    return fs, str(path).rstrip("/")
+
+
+def skeletons_beside(name: str, skeletons: list[str]) -> tuple[str, ...]:
+    """Of an AMC the ASFs that ``mcz.formats.find`` looks at: in its folder, a sibling ``asf``."""
+    path = PurePosixPath(name)
+    if path.suffix.lower() != ".amc":
+        return ()
+    beside, above = path.parent, path.parent.parent
+
+    def is_near(folder: PurePosixPath) -> bool:
+        is_sibling = folder.parent == above != beside and folder.name.lower() == "asf"
+        return folder == beside or is_sibling
+
+    return tuple(asf for asf in skeletons if is_near(PurePosixPath(asf).parent))
+
+
+def coded_there(state: object, ask: FarAsk) -> Part:
+    """The part of a file, made by whoever can read it; raises as ``coded`` does."""
+    with ExitStack() as stack:
+        root = ask.root
+        if is_url(root):
+            own = stack.enter_context(TemporaryDirectory(prefix="mcz-"))
+            root = str(Path(own, "root"))  # around it there is nothing that may be taken for an ASF
+            _fetch(ask, Path(root))
+        try:
+            part = coded(state, Ask(Path(root, ask.name), ask.name, ask.terms, ask.profile))
+        except MczError as error:
+            error.args = tuple(_named(str(word), root, ask.root) for word in error.args)
+            raise
+    return replace(
+        part,
+        reason=_named(part.reason, root, ask.root),
+        remark=_named(part.remark, root, ask.root),
+        notes=tuple(_named(note, root, ask.root) for note in part.notes),
+        inputs=(),
+    )
+
+
+def _named(text: str, copy: str, root: str) -> str:
+    """``text`` about a copy, said of the file itself."""
+    return text.replace(copy, root.rstrip("/"))
+
+
+def _fetch(ask: FarAsk, folder: Path) -> None:
+    """Copy the file, and the skeletons that it may need, below ``folder``."""
+    fs, base = _opened(ask.root)
+    for name in (ask.name, *ask.beside):
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            path.write_bytes(fs.cat_file(f"{base}/{name}"))
+        except Exception as error:  # each kind of store has errors of its own
+            raise SourceError(f"{ask.root.rstrip('/')}/{name}: {error}") from None

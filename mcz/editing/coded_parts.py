@@ -1,0 +1,179 @@
+"""Files of an archive that are read and coded ahead, by other processes: each becomes a part.
+
+A part is an MCZ file of one file, whose chunks are carried over. Whatever depends on what the
+archive holds already (a name that is taken, the same file twice, a skeleton that is there) is
+decided where the parts are joined, in the order of the files; so the archive has the bytes that
+one process would write.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcz.container import payloads
+from mcz.container.directory import Directory
+from mcz.container.limits import Profile
+from mcz.editing.carrying import Carrier, Change
+from mcz.editing.folders import size_of
+from mcz.editing.stored_files import Content
+from mcz.errors import MczError, WorkerError
+from mcz.jobs import ONE, Answer, useful
+from mcz.jobs.pool import answers
+from mcz.reading.file import open
+from mcz.reading.sharing import only_own
+from mcz.writing.draft import Draft
+from mcz.writing.entry import Entry, Terms
+from mcz.writing.names import check_name, clip_name
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One file, read and coded: ``data`` is an MCZ file of it alone.
+
+    ``digest`` is the SHA-256 of the file that was read, the rest what ``Entry`` says of it.
+    """
+
+    digest: bytes
+    data: bytes
+    result: str
+    reason: str
+    remark: str
+    notes: tuple[str, ...]
+    inputs: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Which file is to be coded, on which terms, for a file of which limits."""
+
+    path: Path
+    name: str
+    terms: Terms
+    profile: Profile
+
+
+def coded(state: object, ask: Ask) -> Part:
+    """The part of a file; raises as ``Entry.write`` does."""
+    entry, sink = Entry(ask.path, ask.name, ask.terms), io.BytesIO()
+    draft = Draft(sink, ask.profile)
+    result = entry.write(draft)
+    draft.finish()
+    digest = draft.paths[ask.name]
+    assert isinstance(digest, bytes)
+    inputs = tuple(entry.inputs)
+    return Part(digest, sink.getvalue(), result, entry.reason, entry.remark, entry.notes, inputs)
+
+
+class Joined(Entry):
+    """An Entry of which somebody has made the part: what can be taken from it is not done again."""
+
+    can_be_read = True  # here, too
+
+    def __init__(self, entry: Entry, answer: Answer[Part]) -> None:
+        super().__init__(entry.path, entry.name, entry.terms)
+        self.inputs = entry.inputs  # which its owner asks for
+        self._answer = answer
+
+    def write(self, draft: Draft, progress: object = None) -> str:
+        """Write the file, as ``Entry.write`` does; raises WorkerError where a process has died."""
+        part = self._part()
+        if part is None or part.digest != self.digest():
+            return super().write(draft)  # it fails, or has changed: with the words of one process
+        name = clip_name(self.name, draft.writer.directory)
+        if (
+            self.can_be_read
+            and part.result == "verbatim"
+            and name != clip_name(self.name, Directory())
+        ):
+            return super().write(draft)  # the reason may name the clip
+        check_name(self.name)
+        if draft.holds(self.name, part.digest):
+            return "present"
+        with draft.step():
+            join(part, draft, name)
+        self.reason, self.remark, self.notes = part.reason, part.remark, part.notes
+        self.inputs[:] = part.inputs
+        draft.paths[self.name] = part.digest
+        return part.result
+
+    def _part(self) -> Part | None:
+        try:
+            return self._answer()
+        except WorkerError:
+            raise
+        except MczError:
+            return None
+
+
+class Far(Joined):
+    """One whose file lies where only those can read it that made the part, ``size`` bytes."""
+
+    can_be_read = False
+
+    def __init__(self, entry: Entry, answer: Answer[Part], size: int) -> None:
+        super().__init__(entry, answer)
+        self.size = size
+        self._made: Part | None = None
+
+    def _part(self) -> Part:
+        if self._made is None:
+            self._made = self._answer()
+        return self._made
+
+    def digest(self) -> bytes:
+        return self._part().digest
+
+
+def join(part: Part, draft: Draft, clip: str) -> None:
+    """Carry the chunks of ``part`` over; its clip is called ``clip`` from now on."""
+    writer = draft.writer
+    with open(part.data) as file:
+        carrier = Carrier(file.container, writer)
+        for kind, id_ in file.container.directory.shared:
+            writer.shared(kind, carrier.stored(kind, id_))
+        for name in file.attachments:
+            carrier.attachment(name)
+        for name in file.clips:
+            carrier.clip(name, Change(name=None if name == clip else clip))
+        for name, (of, target) in file.aliases.items():
+            if of != payloads.OF_SKELETON or name not in writer.directory.aliases:
+                writer.alias(name, of, target)
+
+
+def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask | None]:
+    """What is to be coded ahead; None for what may turn out to be there already."""
+    sent: set[bytes] = set()
+    for entry in entries:
+        try:
+            digest = entry.digest()
+        except MczError:
+            yield None
+            continue
+        is_amc = entry.path.suffix.lower() == ".amc"  # its values hang on the ASF beside it
+        is_there = not is_amc and (digest in seen or digest in sent)
+        if is_there or entry.name in draft.paths:
+            yield None
+            continue
+        sent.add(digest)
+        yield Ask(entry.path, entry.name, entry.terms, draft.writer.profile)
+
+
+@contextmanager
+def ahead(entries: Sequence[Entry], draft: Draft, seen: Content) -> Iterator[Iterator[Entry]]:
+    """The entries in order, those ahead in work by other processes where that is worth it."""
+    jobs = useful(len(entries), sum(size_of(entry.path) for entry in entries))
+    if jobs == ONE or not only_own():
+        yield iter(entries)
+        return
+    with answers(coded, asks(entries, draft, seen), jobs) as found:
+        yield joined(entries, found)
+
+
+def joined(entries: Iterable[Entry], found: Iterable[Answer[Part] | None]) -> Iterator[Entry]:
+    """The entries, with the parts that were made of them."""
+    for entry, answer in zip(entries, found, strict=True):
+        yield entry if answer is None else Joined(entry, answer)

@@ -1,0 +1,142 @@
+"""What is said of clips, and their frame rates, set later: nothing of their values is touched."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from mcz.brief import shown
+from mcz.container.metadata import Record, applied
+from mcz.container.metadata_keys import check_said
+from mcz.container.writer import Writer
+from mcz.editing.appending import growing
+from mcz.editing.carrying import Change
+from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.rewriting import rewrite, source_of, whole
+from mcz.errors import ChecksumError, OptionError
+from mcz.formats import FORMATS
+from mcz.reading.clip import Clip
+from mcz.reading.fields import Where
+from mcz.reading.file import File, open
+from mcz.writing.clip_writer import Progress
+
+Said = Mapping[str, str | None]  # a key and its value; None: it is not there any more
+WITHOUT_RATE = ("amc",)  # formats of sources that do not state a frame rate
+
+
+def set_metadata(
+    target: str | os.PathLike[str], changes: Mapping[str, Said], *, force: bool = False
+) -> Report:
+    """Say something of clips of an MCZ file, or of the file as a whole.
+
+    ``changes``: of each clip by its name, "" for the file, keys of the registry (or ``x-...``) and
+    their values; None removes a key. It is appended (SPEC.md, "META"), so that no byte of a clip is
+    touched, and what was said before is still in the bytes until the file is rewritten. Nothing is
+    written where nothing changes. Raises OptionError for a name, a key or a value that cannot be,
+    and AccessError while another process is appending; ``force`` is that of ``mcz.append``.
+    """
+    for said in changes.values():
+        for key, value in said.items():
+            check_said(key, value)
+    report = Report()
+    with growing(Path(target), salvage=False, force=force) as growth:
+        file = File(growth.container)
+        records = [_record(file, name, said) for name, said in changes.items()]
+        records = [record for record in records if record.entries or record.removed]
+        for record in records:
+            text = ", ".join([*record.entries, *(f"no {key}" for key in record.removed)])
+            report.outcomes.append(Outcome(record.name, "said", 0, text))
+        if records:
+            directory = growth.container.directory
+            writer = Writer(
+                growth.added,
+                profile=growth.container.profile,
+                directory=directory,
+                offset=directory.end,
+            )
+            writer.metadata(records)
+            writer.finish()
+    report.size = Path(target).stat().st_size
+    return report
+
+
+def _record(file: File, name: str, said: Said) -> Record:
+    """What changes; nothing where all is said already."""
+    clip = file.only_clip(name) if name else None
+    before = file.metadata if clip is None else clip.metadata
+    entries = {k: v for k, v in said.items() if v is not None and before.get(k) != v}
+    removed = tuple(key for key, value in said.items() if value is None and key in before)
+    record = Record(clip.name if clip is not None else "", entries, removed)
+    return record if applied(before, [record]) != before else Record(record.name)
+
+
+def set_rate(
+    target: Any,
+    rate: Fraction | float,
+    names: Iterable[str] | None = None,
+    *,
+    where: Where | None = None,
+    output: Any = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Report:
+    """Say how many frames a second clips of an MCZ file have whose source does not say it (AMC).
+
+    ``names``: of these clips, ``where``: of those that it takes, by default of all whose rate is
+    unknown. The rate stands in CLIP, so the file is rewritten, see ``delete_clips`` for ``output``;
+    the values stay what they are. Raises OptionError where the source of a clip states the rate,
+    and for another rate than a clip has, unless ``force``.
+    """
+    exact = Fraction(rate).limit_denominator(10**6)
+    if exact <= 0:
+        raise OptionError(f"rate is {rate}, not above 0")
+    with source_of(target, output) as file:
+        named = names is not None or where is not None
+        clips = file.chosen(names, where) if named else [c for c in file if c.frame_rate is None]
+        report, plan = Report(), whole(file)
+        for clip in clips:
+            _check_rate(clip, exact, force)
+            plan.clips[clip.name] = Change(rate=exact)
+            report.outcomes.append(Outcome(clip.name, "rate", 0, f"{float(exact):g}"))
+        done = 0
+
+        def step(name: str) -> None:
+            nonlocal done
+            done += 1
+            if progress is not None:
+                progress(done, len(plan.clips), name)
+
+        if not clips:
+            return report
+        written = rewrite(target, output, force, file, plan, step)
+        report.size, report.left_out = written.size, written.left_out
+    _check_sources(target if output is None else output, [clip.name for clip in clips])
+    return report
+
+
+def _check_rate(clip: Clip, rate: Fraction, force: bool) -> None:
+    source = clip.source
+    if source is not None and source.format not in WITHOUT_RATE:
+        stated = ", ".join(sorted(set(FORMATS) - {*WITHOUT_RATE, "asf"}))
+        raise OptionError(
+            f"clip {shown(clip.name)}: its source states the rate, as {stated} do; encode it anew"
+        )
+    if clip.frame_rate not in (None, rate) and not force:
+        raise OptionError(
+            f"clip {shown(clip.name)} has {float(clip.frame_rate or 0):g} frames a second; "
+            "force changes that"
+        )
+
+
+def _check_sources(target: Any, names: Iterable[str]) -> None:
+    """Raise ChecksumError where a source does not come back any more, which cannot be."""
+    if not isinstance(target, (str, os.PathLike)):
+        return
+    with open(target) as file:
+        for name in list(names)[:1]:
+            clip = file.clips[name]
+            if clip.source is not None and len(clip.source_bytes()) != clip.source.size:
+                raise ChecksumError(f"clip {shown(name)}: its source is not restored")

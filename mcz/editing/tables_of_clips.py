@@ -1,0 +1,143 @@
+"""What a table says of clips: a row each, a column a key of their metadata."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
+
+from mcz.brief import among
+from mcz.container.metadata_keys import INTERPRETED, KEYS, PRIVATE
+from mcz.errors import OptionError
+from mcz.reading.file import File
+from mcz.reading.names import listed, names_of
+
+NAMES = ("clip", "name", "path", "file")  # columns that name the clip, the first that there is
+DELIMITERS = ",;\t"
+FIELD = re.compile(r"\{([^{}:!.\[\]]+)(:[^{}]*)?\}")  # a column, and how wide it is
+
+
+def from_table(
+    path: str | os.PathLike[str],
+    file: File,
+    *,
+    match: str | None = None,
+    take: Sequence[str] | None = None,
+    skip_unknown: bool = False,
+) -> tuple[dict[str, dict[str, str]], list[str]]:
+    """What a table (CSV or TSV, UTF-8, with a head) says of the clips of ``file``, by name.
+
+    A row names its clip in a column ``clip``, ``name``, ``path`` or ``file``, or by ``match``, a
+    text with columns in braces: "{subject:0>2}_{trial:0>2}". That is a name as ``File.only_clip``
+    takes it. ``take``: the columns to take, by default all but the one with the name; each must be
+    a key of the registry or begin with ``x-``. Empty cells say nothing. Also returns the names of
+    rows without a clip, where ``skip_unknown``; otherwise those are an OptionError, as are a clip
+    that two rows name and a column that is no key.
+    """
+    rows = _rows(Path(path))
+    head = list(rows[0]) if rows else []
+    name_of = _namer(path, head, match)
+    columns = _columns(path, head, match, take)
+    known = names_of(file.clips, file.aliases)
+    said: dict[str, dict[str, str]] = {}
+    unknown: list[str] = []
+    for row in rows:
+        name = name_of(row)
+        found = known.get(name, ())
+        if len(found) > 1:
+            raise OptionError(f"{path}: {name!r} may be {listed(sorted(found))}")
+        if not found:
+            unknown.append(name)
+            continue
+        clip = next(iter(found))
+        if clip in said:
+            raise OptionError(f"{path}: two rows are about clip {clip!r}")
+        said[clip] = {key: row[key].strip() for key in columns if (row[key] or "").strip()}
+    if unknown and not skip_unknown:
+        raise OptionError(
+            f"{path}: no clip for {len(unknown)} of {len(rows)} rows: {listed(unknown)}"
+        )
+    return said, unknown
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise OptionError(f"{path}: not UTF-8: {error}") from None
+    except OSError as error:
+        raise OptionError(f"{path}: {error.strerror or error}") from None
+    first = text.partition("\n")[0]
+    delimiter = max(DELIMITERS, key=first.count)
+    reader = csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    try:
+        rows = list(reader)
+    except csv.Error as error:
+        raise OptionError(f"{path}: line {reader.line_num}: {error}") from None
+    head = reader.fieldnames or []
+    if len(set(head)) != len(head):
+        raise OptionError(f"{path}: two columns have the same name")
+    for number, row in enumerate(rows, 2):
+        if None in row or None in row.values():
+            raise OptionError(f"{path}: row {number} has not the {len(head)} columns of the head")
+    return rows
+
+
+def _fields(match: str) -> list[str]:
+    """The columns in ``match``; raises OptionError for a text that is no such format."""
+    text = match.replace("{{", "").replace("}}", "")
+    if set("{}") & set(FIELD.sub("", text)):
+        raise OptionError(f"match {match!r}: columns stand in braces, such as {{subject:0>2}}")
+    return [name for name, _ in FIELD.findall(text)]
+
+
+def _namer(
+    path: object, head: Sequence[str], match: str | None
+) -> Callable[[Mapping[str, str]], str]:
+    """What tells the name of a row's clip."""
+    if match is not None:
+        form = match
+        for name in _fields(form):
+            if name not in head:
+                raise OptionError(f"{path}: no column {name!r}; there are {among(head, name)}")
+
+        def formatted(row: Mapping[str, str]) -> str:
+            try:
+                return form.format_map({key: cell.strip() for key, cell in row.items()})
+            except ValueError as error:
+                raise OptionError(f"match {form!r}: {error}") from None
+
+        return formatted
+    column = next((name for name in NAMES if name in head), None)
+    if column is None:
+        raise OptionError(
+            f"{path}: no column {', '.join(NAMES)} names the clips; say how by match, such as "
+            "{subject}_{trial}"
+        )
+    return lambda row: row[column].strip()
+
+
+def _columns(
+    path: object, head: Sequence[str], match: str | None, take: Sequence[str] | None
+) -> Collection[str]:
+    """The columns that are taken."""
+    if take is not None:
+        if missed := [name for name in take if name not in head]:
+            raise OptionError(f"{path}: no column {missed[0]!r}; there are {', '.join(head)}")
+        return take
+    own = next((name for name in NAMES if name in head), None) if match is None else None
+    used = _fields(match or "")
+    columns = [name for name in head if name != own]
+    odd = [name for name in columns if not _is_key(name) and name not in used]
+    if odd:
+        raise OptionError(
+            f"{path}: {among(odd, None)}: no key of the metadata; name the columns to take"
+        )
+    return [name for name in columns if _is_key(name)]
+
+
+def _is_key(name: str) -> bool:
+    return (name in KEYS and name not in INTERPRETED) or name.startswith(PRIVATE)
