@@ -23,7 +23,7 @@ from mcz.errors import FormatError, OptionError
 from mcz.reading.recovery_check import recovery_chunks
 from mcz.recovery.making import Step, made
 from mcz.recovery.packets import Key, read_packet
-from mcz.recovery.shape import Shape, shape_for
+from mcz.recovery.shape import Shape, check_redundancy, shape_for
 
 DEFAULT = 0.05  # redundancy
 TRIES = 16  # to find the size of an index that names the chunk whose size depends on it
@@ -59,6 +59,7 @@ def protect(
     done. Returns what there is of it then, in the order of the file. Raises OptionError,
     AccessError where another process is appending, and as ``mcz.append`` for a file cut short.
     """
+    check_redundancy(redundancy)
     with growing(Path(target), salvage=False, force=False) as growth:
         found = [protection_of(key.shape) for key in protections(growth.container)]
         start, end = found[-1].stop if found else 0, growth.container.directory.end

@@ -113,10 +113,15 @@ class Shape:
         return found
 
 
-def shape_for(start: int, a_size: int, t_size: int, redundancy: float) -> Shape:
-    """The shape for a stream of these sizes; raises OptionError for a redundancy that cannot be."""
+def check_redundancy(redundancy: float) -> None:
+    """Raise OptionError for what is no share."""
     if not 0 < redundancy <= 1:
         raise OptionError(f"redundancy is {redundancy:g}, not above 0 and at most 1")
+
+
+def shape_for(start: int, a_size: int, t_size: int, redundancy: float) -> Shape:
+    """The shape for a stream of these sizes; raises OptionError for a redundancy that cannot be."""
+    check_redundancy(redundancy)
     size = a_size + t_size
     block = max(LEAST_BLOCK, isqrt(4 * size), -(-size // MOST_BLOCKS))
     block = -(-block // LANE) * LANE
