@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
     from mcz.editing.merging import merge
     from mcz.editing.outcomes import Outcome, Report
+    from mcz.editing.protecting import Protection, protect
+    from mcz.editing.recovering import Recovery
     from mcz.editing.repair import Repair, repair
     from mcz.editing.replacing import Replacement, replace
     from mcz.editing.unpacking import unpack
@@ -93,6 +95,8 @@ _HOMES = {
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions"),
+    "mcz.editing.protecting": ("Protection", "protect"),
+    "mcz.editing.recovering": ("Recovery",),
     "mcz.editing.repair": ("Repair", "repair"),
     "mcz.editing.replacing": ("Replacement", "replace"),
     "mcz.errors": (
@@ -180,7 +184,9 @@ __all__ = [
     "OptionError",
     "Outcome",
     "Problem",
+    "Protection",
     "Recording",
+    "Recovery",
     "Repair",
     "Replacement",
     "Report",
@@ -218,6 +224,7 @@ __all__ = [
     "point_names",
     "positions",
     "post_filter",
+    "protect",
     "read",
     "read_skeleton",
     "recording",

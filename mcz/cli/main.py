@@ -18,6 +18,7 @@ COMMANDS = (
     "info",
     "verify",
     "bag",
+    "protect",
     "repair",
     "pack",
     "append",

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 def command(file: str, output: str, max_decoded: int | None, force: bool, as_json: bool) -> Exit:
     """Write all that is whole in FILE.mcz to OUT.mcz, a sound file; FILE.mcz stays as it is.
 
-    Of a clip that has lost frames, each run of frames that is whole becomes a clip called
-    NAME.A-B. Nothing is coded anew and nothing is made up: what is lost is named, and the exit
-    code is 4; it is 0 where nothing is lost.
+    With recovery data (mcz protect) OUT.mcz is what was protected, byte for byte, as long as they
+    can give that back. Otherwise, of a clip that has lost frames, each run of frames that is whole
+    becomes a clip called NAME.A-B. Nothing is coded anew and nothing is made up: what is lost is
+    named, and the exit code is 4; it is 0 where nothing is lost.
     """
     import mcz
 
@@ -38,6 +39,8 @@ def command(file: str, output: str, max_decoded: int | None, force: bool, as_jso
         found = mcz.repair(file, output, force=force, max_decoded=max_decoded, progress=progress)
     if as_json:
         print_json({"output": output, **asdict(found)})
+    elif found.restored:
+        echo(f"{output}: every byte is as it was protected, {found.size:,} bytes")
     else:
         echo(*_lines(output, found))
     for text in found.damage:

@@ -29,13 +29,15 @@ KNOWN_FLAGS = ANCILLARY | SAFE_TO_COPY
 
 REPEAT = b"REPT"  # flags: ANCILLARY alone
 COPY = b"COPY"  # flags: ANCILLARY alone, for what it says is true of this file only
+RECOVERY = b"RECV"  # flags: ANCILLARY alone
 META = b"META"  # flags: ANCILLARY and SAFE_TO_COPY
-# CHUNK-16, CHUNK-17, CHUNK-18, CHUNK-19
+# CHUNK-16, CHUNK-17, CHUNK-18, CHUNK-19, CHUNK-20
 FLAGS_OF = {
     b"QUAL": ANCILLARY | SAFE_TO_COPY,
     REPEAT: ANCILLARY,
     COPY: ANCILLARY,
     META: ANCILLARY | SAFE_TO_COPY,
+    RECOVERY: ANCILLARY,
 }
 REPEATED = (b"HEAD", b"SKEL", b"MODL", b"CLIP")  # the chunks that a REPT holds again
 COPIED = (b"HEAD", b"SKEL", b"MODL", b"SRCE", b"ALIA", b"CLIP", b"CEND")  # and a COPY

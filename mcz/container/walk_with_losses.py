@@ -19,6 +19,7 @@ from mcz.container.chunks import (
     FOOT,
     HEADER,
     META,
+    RECOVERY,
     REPEAT,
     REPEATED,
     SIGNATURE,
@@ -39,7 +40,7 @@ from mcz.container.walk_arriving import PipeSource
 from mcz.errors import FormatError, TruncatedError, UnsupportedError
 
 TYPES = (b"HEAD", b"SKEL", b"MODL", b"SRCE", b"ATTA", b"ALIA", b"CLIP", b"DATA", b"CEND")
-KNOWN = frozenset((*TYPES, b"INDX", b"QUAL", REPEAT, COPY, META))
+KNOWN = frozenset((*TYPES, b"INDX", b"QUAL", REPEAT, COPY, META, RECOVERY))
 WANTED = frozenset((*REPEATED, b"DATA", b"CEND", REPEAT))
 SMALL = MIB  # a chunk that is not wanted is checked up to this length, and skipped beyond
 TRY = 256  # bytes that a try counts as, beside those that it reads

@@ -18,6 +18,7 @@ from mcz.editing.folders import files_below, left_out, motion_files, size_of, so
 from mcz.editing.merging import add_files
 from mcz.editing.mtimes import stamp
 from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.protecting import redundancy_of, still_protect
 from mcz.editing.safe_names import notes_on
 from mcz.editing.stored_files import Content, stored_files
 from mcz.errors import MczError, OptionError, SourceError
@@ -137,7 +138,8 @@ def append(
     target restores already under the same path is left out as "present", another one under a path
     that is taken is refused, and one whose content is there under another name is an alias. Of an
     MCZ file all that it holds is carried over, nothing coded anew; ``rename`` and
-    ``skip_identical`` are those of ``mcz.merge``. When a source cannot be added, nothing is.
+    ``skip_identical`` are those of ``mcz.merge``. When a source cannot be added, nothing is. What
+    is added to a file with recovery data gets its own.
 
     A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
     lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
@@ -179,8 +181,11 @@ def append(
             added = add_files(held, before, draft, rename, skip_identical, progress)
             report.outcomes += added.outcomes
             report.left_out += added.left_out
+        redundancy = None
         if growth.tail.kept or any(outcome.result != "present" for outcome in report.outcomes):
+            redundancy = redundancy_of(container)
             draft.finish()
+    still_protect(target, redundancy)
     report.size = Path(target).stat().st_size
     report.note(notes_on(draft.paths))
     report.outcomes += others

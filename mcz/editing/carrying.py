@@ -16,6 +16,7 @@ from mcz.container.chunks import (
     COPY,
     FOOT,
     META,
+    RECOVERY,
     SAFE_TO_COPY,
     SIGNATURE,
     Chunk,
@@ -34,6 +35,7 @@ from mcz.container.writer import Writer, payload_id
 from mcz.errors import ChecksumError, FormatError
 from mcz.schema import build, parse
 
+UNPROTECTED = "its recovery data, which are of the old file: mcz protect makes others"
 BLOCK = 1 << 20  # bytes of an open DATA that are copied at once
 
 
@@ -125,7 +127,9 @@ class Carrier:
         if chunk.flags & SAFE_TO_COPY:  # CHUNK-13, CHUNK-14
             self.writer.ancillary(chunk.type, self.container.payload(chunk))
             return True
-        if chunk.type != COPY:  # those are made anew where they are wanted
+        if chunk.type == RECOVERY:
+            self.left_out.append(UNPROTECTED)
+        elif chunk.type != COPY:  # those are made anew where they are wanted
             self.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
         return False
 

@@ -15,6 +15,7 @@ from mcz.container.writer import Writer
 from mcz.editing.appending import growing
 from mcz.editing.carrying import Change
 from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.protecting import redundancy_of, still_protect
 from mcz.editing.rewriting import rewrite, source_of, whole
 from mcz.errors import ChecksumError, OptionError
 from mcz.formats import FORMATS
@@ -59,6 +60,8 @@ def set_metadata(
             )
             writer.metadata(records)
             writer.finish()
+        redundancy = redundancy_of(growth.container) if records else None
+    still_protect(target, redundancy)
     report.size = Path(target).stat().st_size
     return report
 

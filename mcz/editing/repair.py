@@ -23,9 +23,10 @@ from mcz.container.source import ByteSource
 from mcz.container.writer import payload_id
 from mcz.editing.cutting import ClipCut, add_note, plan_cut
 from mcz.editing.extraction import Copier
+from mcz.editing.recovering import Recovery, recover
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.reading.clip import Clip
-from mcz.reading.file import File, open
+from mcz.reading.file import File, open, reached
 from mcz.reading.report import Problem, clip_problems, validate
 from mcz.reading.signal_reader import SignalReader
 from mcz.schema import build
@@ -42,7 +43,9 @@ NOTE = "lost: the template of the source file was damaged"
 class Repair:
     """What ``repair`` wrote: names of what is whole, runs of frames of other clips, what is lost.
 
-    ``damage`` is what salvage found wrong with the file, ``lost`` what of its content is gone.
+    ``damage`` is what was found wrong with the file, ``lost`` what of its content is gone.
+    ``recovery``: what its recovery data found, where it has some; ``restored``: these have given
+    every byte back, so that nothing is lost.
     """
 
     clips: list[str] = field(default_factory=list)
@@ -51,6 +54,8 @@ class Repair:
     lost: list[str] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
     size: int = 0
+    recovery: Recovery | None = None
+    restored: bool = False
 
 
 def repair(
@@ -66,10 +71,16 @@ def repair(
     Whole clips and attachments are copied as they are. Of another clip the runs of frames that can
     be decoded are clips called ``NAME.A-B``, with sources of these frames. What was written is
     read again, strictly, before it gets its name. Raises FormatError where nothing is whole.
+
+    A file with recovery data (``mcz.protect``) is first made what it was, byte for byte: what is
+    above happens only where more of it is bad than they can restore.
     """
+    found = Repair()
+    if _recovered(source, target, force, found, progress):
+        return found
     with open(source, salvage=True, max_decoded=max_decoded) as file:
         _refuse_same(file, target)
-        found = Repair(damage=file.damage)
+        found.damage += file.damage
         cuts = list(_cuts(file, found))
         found.lost += _gone(file.container)
         with replacing(target, force=force) as stream:
@@ -80,6 +91,26 @@ def repair(
                 raise FormatError(f"{file.name}: no clip and no attachment in it is whole")
             _check(stream, found.size, max_decoded)
     return found
+
+
+def _recovered(
+    source: Any, target: Any, force: bool, found: Repair, progress: Progress | None
+) -> bool:
+    """Whether recovery data have given the file back to ``target``."""
+    data = reached(source)
+    try:
+        found.recovery = recover(data, source, target, force, progress)
+        if found.recovery is None:
+            return False
+        found.damage += found.recovery.told()
+        if not found.recovery.possible:
+            return False
+    finally:
+        data.close()
+    with open(target) as file:
+        found.clips, found.attachments = list(file.clips), list(file.attachments)
+        found.size, found.restored = file.size, True
+    return True
 
 
 def _refuse_same(file: File, target: Any) -> None:

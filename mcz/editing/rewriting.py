@@ -22,7 +22,8 @@ from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
-from mcz.editing.carrying import SAME, Carrier, Change, said_of
+from mcz.editing.carrying import SAME, UNPROTECTED, Carrier, Change, said_of
+from mcz.editing.protecting import DEFAULT, protect, redundancy_of
 from mcz.errors import AccessError, OptionError
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
@@ -175,8 +176,13 @@ def rewrite(target: Any, output: Any, force: bool, file: File, plan: Plan, step:
         writer = writer_like(stream, [file])
         left_out = carry(file, writer, plan, step)
         writer.finish()
-        if getattr(stream, "seekable", bool)():
+        if getattr(stream, "readable", bool)():
             check_written(stream, writer.offset)
+    if output is None and UNPROTECTED in left_out:
+        redundancy = redundancy_of(file.container)
+        left_out = [text for text in left_out if text != UNPROTECTED]
+        size = protect(path, redundancy or DEFAULT)[-1].stop
+        return Written(size, left_out)
     return Written(writer.offset, left_out)
 
 

@@ -24,6 +24,7 @@ from mcz.reading.layout import layout as layout
 from mcz.reading.quick_check import Problem as Problem
 from mcz.reading.quick_check import heading, quick_check
 from mcz.reading.recording_report import document_of
+from mcz.reading.recovery_check import recovery_problems
 from mcz.reading.sharing import shared_out
 from mcz.reading.signal_info import SignalInfo, read_segments
 from mcz.reading.sizes import Sizes, clip_sizes, models_used
@@ -302,6 +303,7 @@ def part_problems(file: File, clips: Sequence[Clip] | None = None) -> Iterator[R
     items = [("skeletons", "")]
     items += [("clip", clip.name) for clip in (file if clips is None else clips)]
     items += [("attachment", name) for name in (file.attachments if clips is None else ())]
+    items += [("recovery data", "")] if clips is None else []
     names = None if clips is None else [clip.name for clip in clips]
     with shared_out(_problems_of, file, items, names) as answers:
         for answer in answers:
@@ -313,6 +315,8 @@ def _problems_of(shared: tuple[File, Sequence[str] | None], item: tuple[str, str
     (file, names), (kind, name) = shared, item
     if kind == "clip":
         return [(kind, name, clip_problems(file, file.clips[name]))]
+    if kind == "recovery data":
+        return [(kind, *row) for row in recovery_problems(file.container)]
     if kind == "attachment":
         return [(kind, name, _attachment_problems(file, name))]
     return _skeleton_rows(file, None if names is None else [file.clips[name] for name in names])

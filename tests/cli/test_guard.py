@@ -294,6 +294,7 @@ TWICE = [
     ("bench", "--cache", "--no-cache"),
     ("pack", "a", "b.mcz", "--rate", "1", "--rate", "2"),
     ("append", "a.bvh", "b.mcz", "--unit", "m", "--unit", "cm"),
+    ("protect", "a.mcz", "--redundancy", "5%", "--redundancy", "6%"),
     ("meta", "a.mcz", "--rate", "1", "--rate", "2"),
     ("merge", "a.mcz", "-o", "b.mcz", "--output", "c.mcz"),
     ("delete", "a.mcz", "x", "--where", "n_frames > 1", "--where", "n_frames > 2"),

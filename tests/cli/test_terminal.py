@@ -61,6 +61,7 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
             [str(file), str(out), "--info", f"{STEERING}=a"],
             [odd, "x"],
         ],
+        "protect": [[str(file)], [str(file), "--check"]],
         "repair": [[str(file), "-o", f"{out}.mcz"]],
         "pack": [[str(file.parent), f"{out}.mcz"]],
         "append": [[odd, str(file)]],

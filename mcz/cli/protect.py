@@ -1,0 +1,94 @@
+"""``mcz protect``: recovery data for an .mcz, from which a damaged one is made whole again."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import click
+
+from mcz.cli.common import Exit, about, echo, existing, plural, print_json, say
+from mcz.cli.options import json_option
+from mcz.cli.progress import Progress
+
+
+def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
+    """Callback of a share: ``5%`` or ``0.05``."""
+    try:
+        share = float(value.removesuffix("%")) / (100 if value.endswith("%") else 1)
+    except ValueError:
+        share = 0.0
+    if not 0 < share <= 1:
+        raise click.BadParameter(f"{value!r} is not a share such as 5% or 0.05, at most 100%")
+    return share
+
+
+@click.command(short_help="Recovery data: what repair makes a damaged .mcz whole with.")
+@click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
+@click.option(
+    "--redundancy",
+    metavar="5%",
+    default="5%",
+    show_default=True,
+    callback=_to_share,
+    help="Of its bytes, how many to add; a small file gets more, so that it can take something.",
+)
+@click.option("--check", is_flag=True, help="Say how the file is, and change nothing.")
+@json_option
+def command(file: str, redundancy: float, check: bool, as_json: bool) -> Exit:
+    """Append recovery data to FILE.mcz: mcz repair then restores every byte of it.
+
+    It does so as long as no more blocks are bad than there are recovery blocks, wherever they lie:
+    single bytes, a burst, the beginning or the end of the file. What the file held stays readable
+    at every moment. Where clips were appended since, they get recovery data of their own.
+    """
+    existing(file)
+    if check:
+        return _check(file, as_json)
+    import mcz
+
+    with about(file), Progress() as progress:
+        found = mcz.protect(
+            file,
+            redundancy,
+            progress=lambda done, total: progress(done + 1, total, "recovery data"),
+        )
+    if as_json:
+        print_json({"target": file, "protections": [asdict(one) for one in found]})
+        return Exit.FINE
+    for one in found:
+        echo(
+            f"{file}: bytes {one.start:,} to {one.stop:,} are protected: any "
+            f"{plural(one.n_recovery, 'block')} of {one.n_blocks:,} may be bad, of "
+            f"{one.block_size:,} bytes each, or {one.burst:,} bytes in a row; "
+            f"that takes {one.cost:,} bytes"
+        )
+    return Exit.FINE
+
+
+def _check(file: str, as_json: bool) -> Exit:
+    from mcz.container.source import open_source
+    from mcz.editing.recovering import examine
+
+    with about(file):
+        source = open_source(file)
+        try:
+            found, sets = examine(source)
+        finally:
+            source.close()
+    document = asdict(found) | {"protected": bool(sets)}
+    if as_json:
+        print_json({"target": file} | document)
+    elif not sets:
+        echo(f"{file}: there are no recovery data")
+    else:
+        if not found.told():
+            echo(f"{file}: none of {found.n_blocks:,} blocks is bad")
+        for line in found.told():
+            say(f"{file}: {line}")
+        if found.told():
+            can = "can" if found.possible else "cannot"
+            echo(f"{file}: mcz repair {can} restore every byte")
+        if found.behind:
+            echo(f"{file}: {found.behind:,} bytes at its end are not protected")
+    bad = found.bad_blocks or found.bad_recovery
+    return Exit.NOT_VERIFIED if bad or not sets else Exit.FINE

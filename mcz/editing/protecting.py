@@ -1,0 +1,156 @@
+"""``protect``: recovery data for an MCZ file, appended to it.
+
+SPEC.md, "RECV", is normative; ``mcz/recovery`` has the code.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mcz.brief import brief
+from mcz.container.chunks import ANCILLARY, CRC, FOOT, RECOVERY, Chunk, build_foot, build_header
+from mcz.container.directory import Directory
+from mcz.container.index import build_index
+from mcz.container.reader import Container
+from mcz.container.source import ByteSource
+from mcz.editing.appending import growing
+from mcz.errors import FormatError, OptionError
+from mcz.reading.recovery_check import recovery_chunks
+from mcz.recovery.making import Step, made
+from mcz.recovery.packets import Key, read_packet
+from mcz.recovery.shape import Shape, check_redundancy, shape_for
+
+DEFAULT = 0.05  # redundancy
+TRIES = 16  # to find the size of an index that names the chunk whose size depends on it
+
+
+@dataclass(frozen=True, slots=True)
+class Protection:
+    """What recovery data can do: of ``n_blocks`` blocks any ``n_recovery`` may be bad.
+
+    So may ``burst`` bytes in a row, wherever they lie. ``start`` and ``stop``: the bytes of the
+    file that it is about; ``cost`` those that it takes.
+    """
+
+    start: int
+    stop: int
+    n_blocks: int
+    block_size: int
+    n_recovery: int
+    burst: int
+    cost: int
+
+    __repr__ = brief
+
+
+def protect(
+    target: str | os.PathLike[str], redundancy: float = DEFAULT, *, progress: Step | None = None
+) -> list[Protection]:
+    """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
+
+    ``mcz.repair`` restores every byte of it as long as no more blocks are bad than there are
+    recovery blocks, wherever they lie: single bytes, a burst, the beginning, the end. Where the
+    file has some already, what was appended since gets its own; where nothing was, nothing is
+    done. Returns what there is of it then, in the order of the file. Raises OptionError,
+    AccessError where another process is appending, and as ``mcz.append`` for a file cut short.
+    """
+    check_redundancy(redundancy)
+    with growing(Path(target), salvage=False, force=False) as growth:
+        found = [protection_of(key.shape) for key in protections(growth.container)]
+        start, end = found[-1].stop if found else 0, growth.container.directory.end
+        if start < end:
+            shape = write_recovery(growth.container, growth.added, start, redundancy, progress)
+            found.append(protection_of(shape))
+    return found
+
+
+def still_protect(target: str | os.PathLike[str], redundancy: float | None) -> bool:
+    """Protect what was appended to a file that was protected so before; return whether it was."""
+    if redundancy is not None:
+        protect(target, redundancy)
+    return redundancy is not None
+
+
+def protection_of(shape: Shape) -> Protection:
+    sizes = shape.n_blocks, shape.block_size, shape.n_recovery, shape.burst
+    return Protection(shape.start, shape.stop, *sizes, shape.chunk_size)
+
+
+def protections(container: Container) -> list[Key]:
+    """What the RECV chunks of a file say of themselves, in its order; nothing is checked."""
+    found = []
+    for chunk in recovery_chunks(container):
+        packet = read_packet(container.source, chunk.payload_offset)
+        if packet is None:
+            raise FormatError(f"chunk {chunk.label}: its first packet is damaged")
+        found.append(packet[0])
+    return found
+
+
+def redundancy_of(container: Container) -> float | None:
+    """What a file is protected with, from its greatest part; None where it is not."""
+    shapes = [key.shape for key in protections(container)]
+    if not shapes:
+        return None
+    greatest = max(shapes, key=lambda shape: shape.size)
+    return min(1.0, greatest.n_recovery / greatest.n_blocks)
+
+
+def write_recovery(
+    container: Container, added: BinaryIO, start: int, redundancy: float, step: Step | None
+) -> Shape:
+    """Write RECV, INDX and FOOT behind the end of a file, for its bytes from ``start`` on."""
+    directory, end = container.directory, container.directory.end
+    shape, tail = _settled(directory, start, end, redundancy)
+
+    def read(block: int) -> bytes:
+        data = b"".join(_piece(container.source, tail, shape, *p) for p in shape.pieces(block))
+        return data.ljust(shape.block_size, b"\0")
+
+    _, packets = made(shape, read, step)
+    for data in chunk_bytes(shape, packets):
+        added.write(data)
+    added.write(tail)
+    return shape
+
+
+def _piece(source: ByteSource, tail: bytes, shape: Shape, offset: int, size: int) -> bytes:
+    behind = shape.chunk_offset + shape.chunk_size
+    if offset >= behind:
+        return tail[offset - behind : offset - behind + size]
+    return source.read(offset, size)
+
+
+def chunk_bytes(shape: Shape, packets: Iterator[bytes]) -> Iterator[bytes]:
+    """The RECV chunk, piece by piece."""
+    header = build_header(RECOVERY, ANCILLARY, shape.payload_size)
+    crc = zlib.crc32(header)
+    yield header
+    for packet in packets:
+        crc = zlib.crc32(packet, crc)
+        yield packet
+    yield CRC.pack(crc)
+
+
+def _settled(directory: Directory, start: int, end: int, redundancy: float) -> tuple[Shape, bytes]:
+    """The shape, and the INDX and FOOT that name a chunk of its size."""
+    last = next(reversed(directory.clips.values()), None)
+    t_size = FOOT.size
+    for _ in range(TRIES):
+        shape = shape_for(start, end - start, t_size, redundancy)
+        chunk = Chunk(RECOVERY, ANCILLARY, end, shape.payload_size)
+        if last is not None:
+            last.ancillary.append(chunk)
+        index = build_index(directory)
+        if last is not None:
+            last.ancillary.pop()
+        tail = index + build_foot(end + shape.chunk_size, len(index))
+        if len(tail) == t_size:
+            return shape, tail
+        t_size = len(tail)
+    raise OptionError(f"redundancy {redundancy:g}: no index fits; another one may do")

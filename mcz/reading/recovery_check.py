@@ -1,0 +1,55 @@
+"""Whether the recovery data of a file are those of its bytes: made anew, and compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from mcz.container.chunks import RECOVERY, Chunk
+from mcz.container.reader import Container
+from mcz.container.scan import scan
+from mcz.container.source import ByteSource
+from mcz.errors import FormatError, MczError
+from mcz.reading.quick_check import Problem
+from mcz.recovery.making import made
+from mcz.recovery.packets import read_packet
+from mcz.recovery.shape import Shape
+
+
+def recovery_chunks(container: Container) -> list[Chunk]:
+    """The RECV chunks of a file; without a clip no index lists them, and the file is walked."""
+    rows = container.directory.clips.values()
+    if rows:
+        return [c for row in rows for c in row.ancillary if c.type == RECOVERY]
+    return [chunk for chunk in scan(container.source).chunks if chunk.type == RECOVERY]
+
+
+def recovery_problems(container: Container) -> Iterator[tuple[str, list[Problem]]]:
+    """Of each RECV the bytes that it protects, and what is wrong with it."""
+    for chunk in recovery_chunks(container):
+        try:
+            yield _checked(container.source, chunk), []
+        except MczError as error:
+            yield f"at {chunk.offset}", [Problem(chunk.offset, "RECV", str(error))]
+
+
+def _checked(source: ByteSource, chunk: Chunk) -> str:
+    first = read_packet(source, chunk.payload_offset)
+    if first is None:
+        raise FormatError(f"chunk {chunk.label}: its first packet is damaged")
+    shape = first[0].shape
+    sizes = shape.chunk_offset, shape.payload_size
+    if sizes != (chunk.offset, chunk.length) or shape.stop > source.size:
+        raise FormatError(f"chunk {chunk.label}: it is about {shape}, not what is around it")
+    _, packets = made(shape, lambda block: stored_block(source, shape, block))
+    at = chunk.payload_offset
+    for packet in packets:
+        if source.read(at, len(packet)) != packet:
+            raise FormatError(f"chunk {chunk.label}: the packet at {at} is not that of its bytes")
+        at += len(packet)
+    return f"bytes {shape.start} to {shape.stop}"
+
+
+def stored_block(source: ByteSource, shape: Shape, block: int) -> bytes:
+    """A data block as it stands in the file."""
+    data = b"".join(source.read(offset, size) for offset, size in shape.pieces(block))
+    return data.ljust(shape.block_size, b"\0")

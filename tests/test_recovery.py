@@ -1,0 +1,292 @@
+"""Recovery data: the field, the code, and files that are protected, damaged and restored."""
+
+from __future__ import annotations
+
+import io
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import mcz
+from mcz.container.source import ByteSource
+from mcz.editing.protecting import protections
+from mcz.recovery import making
+from mcz.recovery.code import encoded, log_weights, recovered, runs_of
+from mcz.recovery.field import logarithms, over, times
+from mcz.recovery.packets import build_packet, read_packet
+from mcz.recovery.shape import Shape, shape_for
+from mcz.sample import write_samples
+
+SHARED = [HealthCheck.function_scoped_fixture]
+ELEMENTS = st.integers(0, 65535)
+
+
+@given(ELEMENTS, ELEMENTS, ELEMENTS)
+def test_the_field_is_one(a: int, b: int, c: int) -> None:
+    assert times(a, b) == times(b, a) == by_hand(a, b)
+    assert times(a, times(b, c)) == times(times(a, b), c)
+    assert times(a, b ^ c) == times(a, b) ^ times(a, c)
+    assert times(a, 1) == a
+    if b:
+        assert times(over(a, b), b) == a
+
+
+def by_hand(a: int, b: int) -> int:
+    product = 0
+    for bit in range(16):
+        if b >> bit & 1:
+            product ^= a << bit
+    for bit in range(31, 15, -1):
+        if product >> bit & 1:
+            product ^= 0x1100B << (bit - 16)
+    return product
+
+
+def words(blocks: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(blocks).view("<u2").astype(np.int64)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 40), st.integers(1, 20), st.integers(0, 2**32))
+def test_blocks_are_those_of_the_formula(n: int, m: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    data = random.integers(-(2**63), 2**63 - 1, (n, 2))
+    found = words(encoded(lambda a, b: data[a:b], n, m, 2))
+    exp, _ = logarithms()
+    size = runs_of(m)
+    weights = log_weights(np.arange(n), size)
+    own = words(data)
+    for i in range(m):
+        row = np.zeros(own.shape[1], np.int64)
+        for j in range(n):
+            factor = over(int(exp[weights[j]]), i ^ (size + j))
+            row ^= np.array([times(factor, int(word)) for word in own[j]])
+        np.testing.assert_array_equal(found[i], row)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 60), st.integers(1, 20), st.data())
+def test_any_lost_blocks_come_back(n: int, m: int, data: st.DataObject) -> None:
+    random = np.random.default_rng(data.draw(st.integers(0, 2**32)))
+    blocks = random.integers(-(2**63), 2**63 - 1, (n, 3))
+    recovery = encoded(lambda a, b: blocks[a:b], n, m, 3)
+    lost = sorted(data.draw(st.sets(st.integers(0, n - 1), min_size=1, max_size=min(n, m))))
+    order = st.permutations(range(m))
+    rows = data.draw(order)[: len(lost)]
+    there = blocks.copy()
+    there[lost] = 0
+    rest = (recovery ^ encoded(lambda a, b: there[a:b], n, m, 3))[rows]
+    np.testing.assert_array_equal(recovered(rest, lost, rows, m), blocks[lost])
+
+
+# Files ---------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """An archive with recovery data, and more clips behind these, which have some of their own."""
+    folder = tmp_path_factory.mktemp("recovery")
+    (folder / "takes").mkdir()
+    write_samples(folder / "takes")
+    mcz.pack(folder / "takes", folder / "a.mcz", codec="fast", rate=120)
+    (protection,) = mcz.protect(folder / "a.mcz", 0.1)
+    text = (folder / "takes" / "walk.bvh").read_bytes()
+    (folder / "more.bvh").write_bytes(text.replace(b"Time: ", b"Time:  "))
+    mcz.append([folder / "more.bvh"], folder / "a.mcz")
+    assert mcz.verify(folder / "a.mcz") == []
+    assert protection.n_recovery >= 4
+    return (folder / "a.mcz").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def shapes(archive: bytes) -> list[Shape]:
+    with mcz.open(archive) as file:
+        return [key.shape for key in protections(file.container)]
+
+
+def restored(bad: bytes, folder: Path) -> tuple[mcz.Repair, bytes]:
+    (folder / "bad.mcz").write_bytes(bad)
+    (folder / "out.mcz").unlink(missing_ok=True)
+    report = mcz.repair(folder / "bad.mcz", folder / "out.mcz")
+    return report, (folder / "out.mcz").read_bytes()
+
+
+def test_what_follows_a_protected_file_is_protected(archive: bytes, shapes: list[Shape]) -> None:
+    first, second = shapes
+    assert (first.start, first.stop, second.stop) == (0, second.start, len(archive))
+    for shape in shapes:
+        assert {kind for kind, _, _ in shape.packets()} == {0, 1}
+        assert sum(size for b in range(shape.n_blocks) for _, size in shape.pieces(b)) == shape.size
+
+
+def test_a_file_that_is_as_it_was_comes_back(archive: bytes, tmp_path: Path) -> None:
+    report, data = restored(archive, tmp_path)
+    assert (report.restored, report.damage, data) == (True, [], archive)
+
+
+@settings(max_examples=80, deadline=None, suppress_health_check=SHARED)
+@given(st.data())
+def test_bad_bytes_wherever_they_lie(
+    archive: bytes, shapes: list[Shape], tmp_path: Path, data: st.DataObject
+) -> None:
+    """As many single bytes as there are recovery blocks, in any place, packets among them."""
+    bad = bytearray(archive)
+    for shape in shapes:
+        most = shape.n_recovery
+        places = st.integers(shape.start, shape.stop - 1)
+        for at in data.draw(st.sets(places, min_size=1, max_size=most)):
+            bad[at] ^= data.draw(st.integers(1, 255))
+    report, found = restored(bytes(bad), tmp_path)
+    assert report.restored
+    assert found == archive
+
+
+@settings(max_examples=80, deadline=None, suppress_health_check=SHARED)
+@given(st.data())
+def test_a_burst_wherever_it_lies(
+    archive: bytes, shapes: list[Shape], tmp_path: Path, data: st.DataObject
+) -> None:
+    shape = data.draw(st.sampled_from(shapes))
+    at = data.draw(st.integers(shape.start, shape.stop - shape.burst))
+    fill = data.draw(st.sampled_from([b"\0", b"\xff", b"\x89RCV"]))
+    burst = (fill * shape.burst)[: shape.burst]
+    report, found = restored(archive[:at] + burst + archive[at + shape.burst :], tmp_path)
+    assert report.restored
+    assert found == archive
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=SHARED)
+@given(st.data())
+def test_what_is_cut_off_or_put_in(
+    archive: bytes, shapes: list[Shape], tmp_path: Path, data: st.DataObject
+) -> None:
+    """A lost beginning, a lost end, bytes taken out of the middle, bytes put in."""
+    first, last = shapes[0], shapes[-1]
+    kind = data.draw(st.sampled_from(["head", "tail", "gap", "more"]))
+    if kind == "head":
+        bad = archive[data.draw(st.integers(1, first.burst)) :]
+    elif kind == "tail":
+        bad = archive[: -data.draw(st.integers(1, last.burst))]
+    else:
+        at = data.draw(st.integers(0, first.chunk_offset))
+        size = data.draw(st.integers(1, first.burst - first.block_size))
+        bad = archive[:at] + (b"" if kind == "gap" else b"?" * size)
+        bad += archive[at + size if kind == "gap" else at :]
+    report, found = restored(bad, tmp_path)
+    assert report.restored, kind
+    assert found == archive
+
+
+def test_beyond_it_what_is_whole_is_saved(
+    archive: bytes, shapes: list[Shape], tmp_path: Path
+) -> None:
+    shape = shapes[0]
+    size = (shape.n_recovery + 1) * shape.block_size
+    report, _ = restored(archive[:1000] + bytes(size) + archive[1000 + size :], tmp_path)
+    assert not report.restored
+    assert report.recovery is not None
+    assert not report.recovery.possible
+    assert report.recovery.bad_blocks > shape.n_recovery
+    assert "blocks are bad" in report.damage[0]
+    assert report.lost
+    assert mcz.verify(tmp_path / "out.mcz") == []
+
+
+def test_verify_finds_recovery_data_that_are_none(archive: bytes, shapes: list[Shape]) -> None:
+    """Everything but the numbers in it is right, checksums too: repair would trust them."""
+    shape = shapes[1]
+    kind, index, at = next(p for p in shape.packets() if p[0] == 1)
+    source = ByteSource(io.BytesIO(archive))
+    key, packet = read_packet(source, at) or (None, None)
+    assert key is not None
+    assert packet is not None
+    wrong = build_packet(key, kind, index, bytes(len(packet.body)))
+    bad = bytearray(archive)
+    bad[at : at + len(wrong)] = wrong
+    chunk = bad[shape.chunk_offset : shape.chunk_offset + shape.chunk_size - 4]
+    crc = zlib.crc32(bytes(chunk)).to_bytes(4, "little")
+    where = shape.chunk_offset + shape.chunk_size - 4
+    bad[where : where + 4] = crc
+    (problem,) = mcz.verify(bytes(bad))
+    assert "not that of its bytes" in problem.message
+    assert mcz.verify(bytes(bad), quick=True) == []
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=SHARED)
+@given(st.data())
+def test_any_damage_is_repaired_or_salvaged_or_refused(
+    archive: bytes, tmp_path: Path, data: st.DataObject
+) -> None:
+    bad = bytearray(archive)
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(bad) - 1))
+        size = data.draw(st.integers(0, len(bad) // 3))
+        bad[at : at + size] = data.draw(st.sampled_from([b"", bytes(size), b"RECV" * size]))
+        if not bad:
+            break
+    try:
+        report, found = restored(bytes(bad), tmp_path)
+    except mcz.MczError:
+        return
+    assert found == archive or not report.restored
+    assert mcz.verify(tmp_path / "out.mcz") == []
+
+
+def test_rewriting_in_place_protects_anew(archive: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    path.write_bytes(archive)
+    report = mcz.delete_clips(path, "more")
+    assert report.left_out == []
+    assert report.size == path.stat().st_size
+    with mcz.open(path) as file:
+        (key,) = protections(file.container)
+    assert key.shape.stop == path.stat().st_size
+    assert mcz.verify(path) == []
+    report = mcz.reorder_clips(path, by="-name", output=tmp_path / "b.mcz")
+    assert "recovery data" in report.left_out[0]
+    mcz.set_metadata(path, {"walk": {"subject": "05"}})
+    mcz.set_rate(path, 100, ["walk"], force=True)
+    with mcz.open(path) as file:
+        assert protections(file.container)[-1].shape.stop == path.stat().st_size
+    assert mcz.verify(path) == []
+
+
+def test_protecting_twice_does_nothing(archive: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcz"
+    path.write_bytes(archive)
+    assert len(mcz.protect(path)) == 2
+    assert path.read_bytes() == archive
+    for wrong in (0, -1, 2, float("nan")):
+        with pytest.raises(mcz.OptionError, match="redundancy"):
+            mcz.protect(path, wrong)
+
+
+@pytest.mark.parametrize("size", [1, 300, 5000, 100_000, 10**6, 10**9, 10**12])
+def test_shapes_of_any_size(size: int) -> None:
+    for redundancy in (0.001, 0.05, 0.5, 1.0):
+        shape = shape_for(0, size, 32, redundancy)
+        assert shape.n_recovery >= 4
+        assert shape.n_recovery >= redundancy * shape.n_blocks
+        assert shape.section_size % 8 == 0
+        assert (shape.n_sections - 1) * shape.section_size < 8 * shape.n_blocks
+        if size > 10**6:
+            assert shape.burst > redundancy * size - 1.01 * shape.block_size
+            assert shape.chunk_size < 1.1 * redundancy * size + size / 500
+
+
+def test_large_blocks_are_worked_on_by_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    shape = shape_for(0, 100_000, 32, 0.1)
+    data = np.random.default_rng(1).integers(0, 255, shape.n_blocks * shape.block_size, np.uint8)
+    blocks = data.reshape(shape.n_blocks, -1)
+
+    def read(block: int) -> bytes:
+        return blocks[block].tobytes()
+
+    wanted = list(making.made(shape, read)[1])
+    monkeypatch.setattr(making, "AT_ONCE", 1 << 12)
+    monkeypatch.setattr(making, "IN_MEMORY", 1 << 10)
+    assert list(making.made(shape, read)[1]) == wanted
