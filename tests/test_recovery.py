@@ -290,3 +290,22 @@ def test_large_blocks_are_worked_on_by_columns(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(making, "AT_ONCE", 1 << 12)
     monkeypatch.setattr(making, "IN_MEMORY", 1 << 10)
     assert list(making.made(shape, read)[1]) == wanted
+
+
+VECTORS = Path(__file__).parent.parent / "conformance" / "vectors"
+DAMAGED = [
+    path
+    for path in sorted((VECTORS / "invalid" / "recovery").glob("*-*.mcz"))
+    if path.stem.endswith(("-hole", "-tail", "-head"))
+]
+
+
+@pytest.mark.parametrize("damaged", DAMAGED, ids=lambda path: path.stem)
+def test_the_vectors_are_repaired(damaged: Path, tmp_path: Path) -> None:
+    sound = VECTORS / "valid" / "recovery" / f"{damaged.stem.rpartition('-')[0]}.mcz"
+    report, data = restored(damaged.read_bytes(), tmp_path)
+    assert (report.restored, data) == (True, sound.read_bytes())
+
+
+def test_there_are_damaged_vectors() -> None:
+    assert len(DAMAGED) == 9

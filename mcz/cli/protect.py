@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 import click
 
 from mcz.cli.common import Exit, about, echo, existing, plural, print_json, say
 from mcz.cli.options import json_option
 from mcz.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from mcz.editing.recovering import Recovery
 
 
 def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
@@ -66,29 +70,29 @@ def command(file: str, redundancy: float, check: bool, as_json: bool) -> Exit:
 
 
 def _check(file: str, as_json: bool) -> Exit:
-    from mcz.container.source import open_source
-    from mcz.editing.recovering import examine
+    from mcz.editing.recovering import Recovery, checked
 
     with about(file):
-        source = open_source(file)
-        try:
-            found, sets = examine(source)
-        finally:
-            source.close()
-    document = asdict(found) | {"protected": bool(sets)}
+        found = checked(file)
     if as_json:
+        document = asdict(found or Recovery()) | {"protected": found is not None}
         print_json({"target": file} | document)
-    elif not sets:
+    elif found is None:
         echo(f"{file}: there are no recovery data")
     else:
-        if not found.told():
-            echo(f"{file}: none of {found.n_blocks:,} blocks is bad")
-        for line in found.told():
-            say(f"{file}: {line}")
-        if found.told():
-            can = "can" if found.possible else "cannot"
-            echo(f"{file}: mcz repair {can} restore every byte")
-        if found.behind:
-            echo(f"{file}: {found.behind:,} bytes at its end are not protected")
-    bad = found.bad_blocks or found.bad_recovery
-    return Exit.NOT_VERIFIED if bad or not sets else Exit.FINE
+        _tell(file, found)
+    bad = found is None or found.bad_blocks or found.bad_recovery
+    return Exit.NOT_VERIFIED if bad else Exit.FINE
+
+
+def _tell(file: str, found: Recovery) -> None:
+    told = found.told()
+    if not told:
+        echo(f"{file}: none of {found.n_blocks:,} blocks is bad")
+    for line in told:
+        say(f"{file}: {line}")
+    if told:
+        can = "can" if found.possible else "cannot"
+        echo(f"{file}: mcz repair {can} restore every byte")
+    if found.behind:
+        echo(f"{file}: {found.behind:,} bytes at its end are not protected")

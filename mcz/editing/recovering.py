@@ -20,6 +20,7 @@ from mcz.brief import brief
 from mcz.container.source import ByteSource
 from mcz.editing.protecting import chunk_bytes
 from mcz.errors import FormatError
+from mcz.reading.file import reached
 from mcz.recovery.code import LANE, encoded, recovered
 from mcz.recovery.field import Ints
 from mcz.recovery.making import Step, made
@@ -276,6 +277,19 @@ def examine(source: ByteSource) -> tuple[Recovery, list[tuple[_Set, dict[int, tu
         shift = max(last.shifts, default=0)
         found.behind = max(0, source.size - last.shape.stop - shift)
     return found, sets
+
+
+def checked(target: Any) -> Recovery | None:
+    """What the recovery data of a file find bad in it; None where it has none.
+
+    Raises AccessError where it cannot be read.
+    """
+    source = reached(target)
+    try:
+        found, sets = examine(source)
+    finally:
+        source.close()
+    return found if sets else None
 
 
 def recover(

@@ -12,7 +12,9 @@ from mcz.container.source import ByteSource
 from mcz.errors import MczError
 from mcz.reading.file import open, reached
 
-HEADINGS = tuple("HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL REPT COPY INDX".split())
+HEADINGS = tuple(
+    "HEAD SKEL SRCE MODL ATTA ALIA CLIP DATA CEND QUAL META REPT COPY RECV INDX".split()
+)
 
 
 @dataclass(frozen=True, slots=True)

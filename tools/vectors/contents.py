@@ -6,7 +6,15 @@ from collections.abc import Iterator
 
 from mcz.codecs import CODECS
 from mcz.container import payloads
-from mcz.container.chunks import COPY, HEADER, REPEAT, SIGNATURE, parse_header
+from mcz.container.chunks import (
+    COPY,
+    HEADER,
+    META,
+    RECOVERY,
+    REPEAT,
+    SIGNATURE,
+    parse_header,
+)
 from mcz.container.limits import BASE
 from mcz.container.packed import unpacked
 from mcz.container.packets import CHECK_SIZE, END, FRAME, NUMBERED, body_check
@@ -19,6 +27,7 @@ FIRST = "0.2"  # 0.1 is no longer read
 SINCE_03 = ("lsdt-frame", "lsdt-clip", "mdtt", "pca-rdo")
 SINCE_04 = ("online",)
 SINCE_09 = ("posewave",)
+SINCE_09_CHUNKS = (COPY, META, RECOVERY)
 BASES = b"\1"  # the kind of a MODL
 # What the first bytes of a file do not tell, or tell only where they are not at fault.
 SINCE = {"valid/filtered/": "0.4", "invalid/packets/REPT": "0.4", "invalid/packets/numbered": "0.4"}
@@ -64,7 +73,8 @@ def since(vector: Vector) -> str:
     own += ["0.9"] * any(name in SINCE_09 for name in names)
     own += ["0.3"] * any(name in SINCE_03 for name in names)
     own += ["0.4"] * any(True for _ in _payloads(vector.data, REPEAT))
-    own += ["0.9"] * any(True for _ in _payloads(vector.data, COPY))
+    for kind in SINCE_09_CHUNKS:
+        own += ["0.9"] * any(True for _ in _payloads(vector.data, kind))
     own += ["0.3"] * any(p[:1] == BASES for p in _payloads(vector.data, b"MODL"))
     own += [SHORT_OF[kind] for kind in _kinds(vector.data) if kind in SHORT_OF]
     if vector.since:

@@ -101,6 +101,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
 
 _REWRITER = "of rewriters, and a decoder writes no file: shown by tests/"
 _SALVAGE = "of salvaging readers, and the contract asks for strict ones: shown by tests/"
+_REPAIR = "of writers and repairers of RECV, which decoders skip: shown by tests/"
 _LIVE = (
     "of tolerant readers of live streams, and the contract asks for strict ones of files: shown by "
 )
@@ -140,6 +141,9 @@ ARGUED: dict[str, str] = {
     "states more is refused by LIMIT-14, COPY-02 or COPY-03",
     "META-05": _REWRITER + "test_metadata.py::test_it_goes_along",
     "META-06": _REWRITER + "test_metadata.py::test_what_is_said_of_a_deleted_clip_is_gone",
+    "RECV-01": _REPAIR + "test_recovery.py::test_the_vectors_are_repaired",
+    "RECV-02": _REPAIR + "test_recovery.py::test_any_damage_is_repaired_or_salvaged_or_refused",
+    "RECV-03": _REWRITER + "test_recovery.py::test_what_follows_a_protected_file_is_protected",
     "LIMIT-07": "a file that breaks it has more than 2 GiB, or ends before the chunk (CHUNK-05)",
     "LIMIT-11": "raw deflate makes at most 1032 times its bytes, less than the 4096 times the file "
     "that is allowed: whatever states more is refused by LIMIT-14, ATTA-03 or ATTA-04",

@@ -28,6 +28,7 @@ from tools.vectors.invalid import (
     posewave,
     qbc,
     raw,
+    recovery,
     shared,
     sources,
 )
@@ -43,6 +44,7 @@ MODULES = (
     packets,
     copies,
     metadata,
+    recovery,
     cut,
     notes,
     numbers,

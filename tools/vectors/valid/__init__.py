@@ -22,12 +22,14 @@ from tools.vectors.valid import (
     qbc,
     random,
     raw,
+    recovery,
     skeletons,
     sources,
 )
 
 MODULES = (
     container,
+    recovery,
     skeletons,
     numbers,
     notes,

@@ -1,0 +1,37 @@
+"""Invalid: RECV with other flags; files of valid/recovery with damage that a repairer mends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from mcz.container.chunks import ANCILLARY, RECOVERY, SAFE_TO_COPY
+from tools.vectors.build.files import Broken, Crafter, Vector, finished
+from tools.vectors.build.motions import dance
+from tools.vectors.valid import recovery as sound
+
+HOLE = 20  # bytes
+
+
+def vectors() -> Iterable[Vector]:
+    shelf = Broken("invalid/recovery")
+    for name, flags in (("critical", 0), ("safe-to-copy", ANCILLARY | SAFE_TO_COPY)):
+        crafter = Crafter()
+        crafter.clip(dance())
+        crafter.plain_chunk(RECOVERY, b"", flags)
+        data = finished(crafter, index=False)
+        shelf.add(name, "Chunks; RECV", f"A RECV with flags {flags}.", data)
+    _damaged(shelf)
+    return shelf.vectors
+
+
+def _damaged(shelf: Broken) -> None:
+    """Each is repaired to the file of valid/recovery that its name begins with."""
+    for vector in sound.vectors():
+        name, data = vector.name.rpartition("/")[2], vector.data
+        if name == "no-packets":
+            continue
+        at = data.index(b"CLIP")
+        hole = data[:at] + bytes(HOLE) + data[at + HOLE :]
+        shelf.add(f"{name}-hole", "RECV; Chunks", f"{HOLE} bytes are zeros.", hole)
+        shelf.add(f"{name}-tail", "RECV; FOOT", "The last 40 bytes are lost.", data[:-40])
+        shelf.add(f"{name}-head", "RECV; Signature", "The first 40 bytes are lost.", data[40:])
