@@ -26,6 +26,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
         "invalid/shared/ALIA-of",
         "invalid/clip/groups-kind",
     ),
+    "CHUNK-01": ("invalid/recovery/*-head",),
     "CHUNK-03": ("invalid/parts/*",),
     "CHUNK-05": ("invalid/chunks/length-*", "invalid/grammar/truncated*"),
     "CHUNK-11": ("uncommon/container/unknown-critical*",),
@@ -33,6 +34,9 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "FOOT-04": ("invalid/grammar/FOOT-*",),
     "GRAM-01": (
         "valid/random/*",
+        "valid/recovery/*",
+        "invalid/recovery/*-hole",
+        "invalid/recovery/*-tail",
         "uncommon/container/no-index",
         "invalid/grammar/*",
         "valid/container/*",

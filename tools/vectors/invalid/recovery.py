@@ -32,6 +32,10 @@ def _damaged(shelf: Broken) -> None:
             continue
         at = data.index(b"CLIP")
         hole = data[:at] + bytes(HOLE) + data[at + HOLE :]
-        shelf.add(f"{name}-hole", "RECV; Chunks", f"{HOLE} bytes are zeros.", hole)
-        shelf.add(f"{name}-tail", "RECV; FOOT", "The last 40 bytes are lost.", data[:-40])
-        shelf.add(f"{name}-head", "RECV; Signature", "The first 40 bytes are lost.", data[40:])
+        cases = (
+            ("hole", "RECV; Chunks", f"{HOLE} bytes are zeros", hole),
+            ("tail", "RECV; FOOT", "the last 40 bytes are lost", data[:-40]),
+            ("head", "RECV; Chunks", "the first 40 bytes are lost", data[40:]),
+        )
+        for kind, spec, damage, bad in cases:
+            shelf.add(f"{name}-{kind}", spec, f"Of {name}.mcz {damage}.", bad)

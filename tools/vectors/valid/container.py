@@ -155,7 +155,7 @@ def _metadata(shelf: Whole) -> None:
     words = meta_of([Record("dance", {"description": "Xrotation Yrotation " * 3})], after=True)
     crafter.ancillary(META, words)
     purpose = "A META deflated after words."
-    shelf.hold("metadata-words", "META; Deflate after words", purpose, finished(crafter), two[0])
+    shelf.hold("metadata-words", "META; Conventions", purpose, finished(crafter), two[0])
 
 
 def _names(shelf: Whole) -> None:
