@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from mcz.bags import BagCheck, bag, check_bag
     from mcz.conversion import Fit, convert, from_positions
+    from mcz.conversion.scenes import SceneFile, to_glb
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
     from mcz.editing.arranging import delete_clips, rename_clips, reorder_clips, split
@@ -95,6 +96,7 @@ _HOMES = {
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions"),
+    "mcz.conversion.scenes": ("SceneFile", "to_glb"),
     "mcz.editing.protecting": ("Protection", "protect"),
     "mcz.editing.recovering": ("Recovery",),
     "mcz.editing.repair": ("Repair", "repair"),

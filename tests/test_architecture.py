@@ -57,7 +57,7 @@ ALLOWED = {
     "bags": GROUND | {"reading"},
     "datasets": JOINT | {"poses", "reading"},
     "writing": JOINT | {"metrics", "reading", "tables"},
-    "conversion": MODEL | {"kinematics", "formats", "reading"},
+    "conversion": MODEL | {"kinematics", "formats", "poses", "reading", "retargeting"},
     "retargeting": MODEL | {"kinematics"},
     "editing": JOINT
     | {"recovery", "jobs", "metrics", "queries", "reading", "writing", "conversion", "tables"},

@@ -124,8 +124,8 @@ def _bound(scene: Scene, key_error_mm: float | None) -> float:
         raise OptionError(f"a key error of {key_error_mm} mm: a length of at least 0")
     if key_error_mm and not scene.has_unit:
         raise OptionError(
-            f"motion {scene.name!r}: its length unit is unknown, so keys cannot be {key_error_mm:g} "
-            "mm off; give the unit (--unit), or leave out the key error"
+            f"motion {scene.name!r}: its length unit is unknown, so keys cannot be "
+            f"{key_error_mm:g} mm off; give the unit (--unit), or leave out the key error"
         )
     return key_error_mm / MM_PER_M
 

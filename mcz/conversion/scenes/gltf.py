@@ -122,9 +122,7 @@ class _Document:
         for side, triangles in solid.triangles.items():
             indices = self._indices(triangles, len(solid.corners))
             material = self.sides.index(side)
-            primitives.append(
-                {"attributes": attributes, "indices": indices, "material": material}
-            )
+            primitives.append({"attributes": attributes, "indices": indices, "material": material})
         binds = np.zeros((count, 4, 4))  # from the world at rest to each node, column by column
         binds[:, :3, :3] = self.up  # the transpose of its inverse
         binds[:, 3, :3] = -self.scene.rest_places

@@ -27,7 +27,7 @@ def choose(times: Floats, exact: Floats, rounded: Floats, limits: Floats, kept: 
     ``exact`` (n_frames, 3 or 4) is what is wanted, ``rounded`` what a key has; ``limits``
     (n_frames,) is how far what lies between keys may be from what is wanted.
     """
-    n, width = exact.shape
+    n = len(exact)
     scratch, found = np.empty(4), np.empty(4)
     kept[:] = 0
     kept[0] = 1

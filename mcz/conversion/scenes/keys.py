@@ -21,9 +21,9 @@ from mcz.kinematics.chain import Floats
 
 Ints = NDArray[np.int64]
 
-SHARE = 0.7  # of the bound that a channel alone may use up at first
-TIGHTER = 0.6
-ROUNDS = 24  # after so many, what is still too far off gets a key in each frame
+SHARE = 1.2  # of the bound that a channel alone may use up at first
+TIGHTER = 0.75
+ROUNDS = 40  # after so many, what is still too far off gets a key in each frame
 BLOCK_FRAMES = 4096
 SAMPLED_FRAMES = 200  # by which levers are judged
 NO_TURN = np.array([[0.0, 0.0, 0.0, 1.0]])
@@ -89,6 +89,9 @@ class _Channel:
             marks = np.zeros(len(times), np.uint8)
             choose(times, self.exact, self.rounded, self.limits, marks)
             kept = np.flatnonzero(marks)
+            width = self.exact.shape[1]
+            if (width + 1) * len(kept) >= width * len(times):
+                kept = np.arange(len(times))  # as short, for all such channels share their times
         self.keys = Keys(kept, self.rounded[kept].astype(np.float32))
 
     def fill(self, times: Floats, first: int, stop: int) -> Floats:
@@ -102,8 +105,7 @@ class _Channel:
 class _Keyer:
     def __init__(self, scene: Scene, bound: float) -> None:
         self.scene, self.bound, self.nodes = scene, bound, scene.nodes
-        levers = _levers(scene)
-        self.turns = [self._turns(node, lever) for node, lever in zip(self.nodes, levers, strict=True)]
+        self.turns = list(map(self._turns, self.nodes, _levers(scene)))
         self.shifts = [self._shifts(node) for node in self.nodes]
 
     def _turns(self, node: Node, lever: float) -> _Channel | None:
@@ -130,8 +132,8 @@ class _Keyer:
                 break
             if number > ROUNDS:
                 raise OptionError(
-                    f"motion {self.scene.name!r}: float32 numbers alone are {errors.max():.2g} off, "
-                    f"and the keys may be {self.bound:.2g} off; allow more (--key-error)"
+                    f"motion {self.scene.name!r}: float32 numbers alone are {errors.max():.2g} m "
+                    f"off, and the keys may be {self.bound:.2g} m off; allow more (--key-error)"
                 )
             self._tighten(wrong, 0.0 if number == ROUNDS else TIGHTER)
             errors = self.errors()
@@ -149,9 +151,9 @@ class _Keyer:
         """The keys of a channel, None where they say nothing but the rest."""
         if channel is None:
             return None
-        at_rest = len(channel.keys.frames) == 1 and (
-            channel.keys.values == rest.astype(np.float32)
-        ).all()
+        at_rest = (
+            len(channel.keys.frames) == 1 and (channel.keys.values == rest.astype(np.float32)).all()
+        )
         return None if at_rest else channel.keys
 
     def _tighten(self, wrong: NDArray[np.bool_], by: float) -> None:
@@ -191,9 +193,9 @@ class _Keyer:
         rest = node.rest.astype(np.float32).astype(np.float64)[None]
         shifts = rest if shift is None else shift.fill(times, first, stop)
         above = placed[node.parent] if node.parent >= 0 else (NO_TURN, np.zeros((1, 3)))
-        out = np.empty((stop - first, 4)), np.empty((stop - first, 3))
-        hang(*above, turns, shifts, *out)
-        return out
+        out_turns, out_places = np.empty((stop - first, 4)), np.empty((stop - first, 3))
+        hang(above[0], above[1], turns, shifts, out_turns, out_places)
+        return out_turns, out_places
 
     def _reached(self, errors: Floats) -> Reached:
         channels = list(self._channels())

@@ -140,7 +140,8 @@ def _notes(motion: Motion) -> Iterator[str]:
         yield "the axis that points up is unknown: taken for y"
     plain = [channel.label for channel in skeleton.channels if not channel.kind]
     if plain:
-        yield f"left out: {', '.join(plain[:8])}{' ...' if len(plain) > 8 else ''}, which move nothing"
+        more = " ..." if len(plain) > 8 else ""
+        yield f"left out: {', '.join(plain[:8])}{more}, which move nothing"
     others = [signal.name for signal in motion.signals[1:]]
     if others:
         yield f"left out: signal {', '.join(others)}"
@@ -148,7 +149,7 @@ def _notes(motion: Motion) -> Iterator[str]:
 
 def _markers(motion: Motion, scale: float) -> Iterator[Node]:
     """A node a marker, somewhere on its way while it is missing."""
-    values = np.asarray(motion.values, np.float64).reshape(motion.n_frames, -1, 3)
+    values = np.asarray(motion.values, np.float64).reshape(motion.n_frames, motion.skeleton.n_joints, 3)
     kinds = [channel.kind for channel in motion.skeleton.channels]
     names = motion.skeleton.addresses()
     for number, (name, side) in enumerate(zip(names, sides_of(names), strict=True)):
@@ -189,11 +190,13 @@ def _joints(motion: Motion, scale: float) -> Iterator[Node]:
             rest = shifts[0]  # at rest it would lie on its parent, and its bone could not be seen
         turns, places = _turns(motion, values, index), placed.places[index, -1]
         yield Node(name, parent, rest, turns, shifts, places, side)
-        for count, (number, tail) in enumerate(placed.tails[index]):
-            end = f"{name} end" + (f" {count + 1}" if count else "")
+        for number, tail in placed.tails[index]:
+            end = f"{name} end" + (f" {number + 1}" if number else "")
             key = index, number
             at = np.array(tail) * scale
-            yield Node(end, numbers[index], at, None, placed.shifts.get(key), placed.places[key], side)
+            yield Node(
+                end, numbers[index], at, None, placed.shifts.get(key), placed.places[key], side
+            )
 
 
 class _Placed:

@@ -66,15 +66,14 @@ def _bones(scene: Scene) -> Iterator[tuple[Floats, int, int]]:
                 drawn = True
                 end = number if scene.nodes[child].shifts is None else child
                 yield _bone(places[number], bone, scene.size), number, end
-        is_end = scene.nodes[number].parent >= 0 and not below
-        if not drawn and not is_end or is_end and not _is_reached(scene, number):
+        if not drawn and not (_is_reached(scene, number) and not below):
             yield places[number] + knob(KNOB * scene.size), number, number
 
 
 def _is_reached(scene: Scene, number: int) -> bool:
     """Whether a bone ends at the node."""
     rest = scene.nodes[number].rest
-    return float(rest @ rest) > (LEAST_BONE * scene.size) ** 2
+    return scene.nodes[number].parent >= 0 and float(rest @ rest) > (LEAST_BONE * scene.size) ** 2
 
 
 def _bone(start: Floats, bone: Floats, size: float) -> Floats:
