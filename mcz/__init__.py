@@ -9,6 +9,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from mcz import version as _version
+
 if TYPE_CHECKING:
     from mcz.bags import BagCheck, bag, check_bag
     from mcz.conversion import Fit, convert, from_positions
@@ -79,7 +81,7 @@ if TYPE_CHECKING:
     from mcz.writing.file import encode, write
     from mcz.writing.npz import to_npz
 
-__version__ = "0.9.0"
+__version__ = _version.VERSION
 
 _HOMES = {
     "mcz.bags": ("BagCheck", "bag", "check_bag"),
@@ -193,6 +195,7 @@ __all__ = [
     "Replacement",
     "Report",
     "Root",
+    "SceneFile",
     "Signal",
     "Skeleton",
     "SkeletonWarning",
@@ -246,6 +249,7 @@ __all__ = [
     "split",
     "stream_decode",
     "stream_encode",
+    "to_glb",
     "to_npz",
     "to_pandas",
     "to_xarray",

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -16,6 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
 from mcz.conversion.scenes import SceneFile
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import origins_of, point_set, positions
@@ -211,7 +215,8 @@ def test_short_clips(kind: str, n_frames: int) -> None:
     short = replace(walk, signals=tuple(signal.cut(0, n_frames) for signal in walk.signals))
     if n_frames:
         check(short)
-    assert ("animations" in Glb(mcz.to_glb(short).data).document) == (n_frames > (kind == "c3d"))  # else all are at rest
+    moves = n_frames > (kind == "c3d")  # a single frame of markers is the rest
+    assert ("animations" in Glb(mcz.to_glb(short).data).document) == moves
 
 
 def test_odd_names_are_text() -> None:
@@ -221,6 +226,69 @@ def test_odd_names_are_text() -> None:
     assert [node["name"] for node in nodes] == ["</script>", 'a"\\\n?\x00é', "bones"]
 
 
+Call = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def call(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Call:
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words: str) -> tuple[int, str, str]:
+        code = int(run(cli, "mcz", list(words)))
+        return code, *capsys.readouterr()
+
+    call("sample", ".")
+    call("encode", "walk.amc", "-o", "amc.mcz")
+    call("encode", "walk.bvh", "-o", "bvh.mcz")
+    return call
+
+
+def test_decode_says_what_it_reached(call: Call) -> None:
+    code, out, err = call("decode", "amc.mcz", "-o", "a.glb", "--rate", "120", "--key-error", "1")
+    assert code == 0 and "a.glb" in out and err.count("\n") == 2
+    assert re.search(r"keys: [\d,]+ of 7,200; at most 0\.\d+ mm off \(frame \d+, [\w ]+\)", err)
+    assert "points up is unknown: taken for y" in err
+    motion = mcz.read("walk.amc", rate=120)
+    expected = mcz.to_glb(replace(motion, source=None), key_error_mm=1)
+    found = Path("a.glb").read_bytes()
+    assert len(found) == pytest.approx(len(expected.data), abs=100)  # the name of the source
+    code, out, _ = call("decode", "bvh.mcz", "--to", "glb", "--frames", "9:19", "--json")
+    scene = json.loads(out)["scene"]
+    assert code == 0 and scene["max_error"] <= scene["key_error"]
+    assert scene["n_values"] == 10 * 32 and len(scene["notes"]) == 2
+    assert "max_error_mm" not in scene  # its unit is unknown
+    assert call("decode", "bvh.mcz", "-o", "-", "--to", "glb")[0] == 0
+
+
+def test_decode_refuses(call: Call) -> None:
+    for words, wanted, message in (
+        (("amc.mcz", "-o", "a.glb"), 2, "its frame rate is unknown, and GLB states times"),
+        (("bvh.mcz", "-o", "b.glb", "--key-error", "1"), 2, "give the unit (--unit)"),
+        (("bvh.mcz", "--to", "csv", "--key-error", "1"), 2, "--key-error needs --to glb"),
+        (("bvh.mcz", "--to", "c3d", "--unit", "cm"), 2, "--unit needs --to glb"),
+        (("bvh.mcz", "--to", "csv", "--up", "z"), 2, "--up needs --to c3d or glb"),
+        (("bvh.mcz", "--to", "glb", "--joints", "Hips"), 2, "--joints needs --to csv"),
+    ):
+        code, out, err = call("decode", *words)
+        assert (code, out, err.count("\n")) == (wanted, "", 1), err
+        assert message in err
+    assert not list(Path().glob("*.glb"))
+
+
+def test_several_clips_are_several_files(call: Call) -> None:
+    call("pack", ".", "all.mcz", "--rate", "120")
+    code, _, err = call("decode", "all.mcz", "--clip", "walk", "--clip", "walk.bvh", "-o", "x.glb")
+    assert code == 2 and "x.glb is one file, for 2 clips" in err
+    code, out, err = call("export", "all.mcz", "scenes", "--to", "glb", "--key-error", "5")
+    assert code == 1 and "its length unit is unknown" in err and "2 written" in out
+    words = ("--unit", "cm", "--clip", "walk.bvh", "--json")
+    code, out, _ = call("export", "all.mcz", "scenes", "--to", "glb", "--key-error", "5", *words)
+    (file,) = json.loads(out)["files"]
+    assert code == 0 and file["notes"] == ["the axis that points up is unknown: taken for y"]
+
+
 def validator() -> dict[str, str] | None:
     """The environment in which node finds npm's gltf-validator, None where it does not."""
     folders = [os.environ.get("NODE_PATH", ""), str(ROOT / "tools/viewer/node_modules")]
@@ -228,7 +296,10 @@ def validator() -> dict[str, str] | None:
     if shutil.which("node") is None:
         return None
     asked = subprocess.run(
-        ["node", "-e", "require('gltf-validator')"], env=environment, capture_output=True
+        ["node", "-e", "require('gltf-validator')"],
+        env=environment,
+        capture_output=True,
+        check=False,
     )
     return environment if asked.returncode == 0 else None
 
@@ -250,9 +321,8 @@ def validate(folder: Path, files: dict[str, bytes]) -> None:
     for name, data in files.items():
         (folder / name).write_bytes(data)
     paths = [str(folder / name) for name in files]
-    ran = subprocess.run(
-        ["node", "-e", VALIDATE, *paths], env=environment, capture_output=True, text=True
-    )
+    command = ["node", "-e", VALIDATE, *paths]
+    ran = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     reports = json.loads(ran.stdout)
     assert len(reports) == len(files)
     assert [report["messages"] for report in reports] == [[]] * len(files)
@@ -267,6 +337,50 @@ def test_khronos_finds_no_fault(tmp_path: Path) -> None:
     motions = {**WALKS, "gappy": gappy, "still": still}
     motions["z"] = replace(WALKS["bvh"], skeleton=replace(WALKS["bvh"].skeleton, up_axis="z"))
     validate(tmp_path, {f"{name}.glb": mcz.to_glb(m).data for name, m in motions.items()})
+
+
+@pytest.mark.parametrize("kind", WALKS)
+def test_others_read_it(tmp_path: Path, kind: str) -> None:
+    """pygltflib and trimesh: all parts, and the nodes at rest."""
+    import pygltflib
+    import trimesh
+
+    path, motion = tmp_path / "walk.glb", WALKS[kind]
+    path.write_bytes(mcz.to_glb(motion).data)
+    own = Glb(path.read_bytes())
+    read = pygltflib.GLTF2().load(str(path))
+    assert [node.name for node in read.nodes] == [n["name"] for n in own.document["nodes"]]
+    assert len(read.animations[0].channels) == len(own.document["animations"][0]["channels"])
+    assert read.accessors[-1].count == own.document["accessors"][-1]["count"]
+    scene = trimesh.load_scene(path)
+    own.document["animations"] = []
+    for name, matrix in own.matrices(np.zeros(1)).items():
+        if name in scene.graph.nodes:
+            assert np.abs(scene.graph.get(name)[0] - matrix[0]).max() < 1e-6
+    n_meshes = len(own.document["materials"]) if kind != "c3d" else motion.skeleton.n_joints
+    assert len(scene.dump()) == n_meshes
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["amc", "bvh"])
+def test_blender_puts_the_bones_there(tmp_path: Path, kind: str) -> None:
+    """Blender interpolates the parts of quaternions, so that it may be a little farther off."""
+    if shutil.which("blender") is None:
+        pytest.skip("there is no Blender")
+    motion = WALKS[kind]
+    skeleton, clip, expected = motion.skeleton, tmp_path / "walk.glb", tmp_path / "walk.npz"
+    clip.write_bytes(mcz.to_glb(motion).data)
+    places = origins_of(skeleton, motion.values) * ((skeleton.unit_cm or 0) / 100)
+    np.savez(expected, names=skeleton.addresses(), places=places, rate=120.0)
+    script = ROOT / "tools/blender/check_import.py"
+    command = ["blender", "--background", "--python", script, "--", clip, expected]
+    python = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")  # Blender has a Python of its own
+    environment = {key: value for key, value in os.environ.items() if key not in python}
+    ran = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
+    (line,) = (line for line in ran.stdout.splitlines() if line.startswith("{"))
+    found = json.loads(line)
+    assert (found["bones"], found["frames"]) == (skeleton.n_joints, motion.n_frames)
+    assert found["distance"] < 2e-4
 
 
 REAL = [

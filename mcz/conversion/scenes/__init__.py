@@ -15,11 +15,13 @@ from mcz.conversion.scenes.nodes import Scene, scene_of
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion
 from mcz.reading.source_files import with_facts
+from mcz.version import VERSION
 
 KEY_ERROR_MM = 0.1
 KEY_ERROR_SIZE = 1 / 20_000  # of the figure, where its unit is unknown: 0.1 mm of 2 m
 MM_PER_M = 1000.0
 SCENES = ("glb",)
+GENERATOR = f"mcz {VERSION}"
 GREATEST = 2.0**100  # of a coordinate, in meters
 
 
@@ -82,7 +84,7 @@ def to_scene(
         "notes": list(scene.notes),
     }
     return SceneFile(
-        glb(scene, keys, _generator(), facts),
+        glb(scene, keys, GENERATOR, facts),
         bound * scale,
         reached.error * scale,
         reached.frame,
@@ -136,9 +138,3 @@ def _check_size(scene: Scene) -> None:
         places: Any = np.abs(node.places[node.seen])
         if not (places < GREATEST).all() or not (np.abs(node.rest) < GREATEST).all():
             raise MotionError(f"node {node.name!r} is farther away than float32 numbers reach")
-
-
-def _generator() -> str:
-    from mcz import __version__
-
-    return f"mcz {__version__}"

@@ -149,7 +149,9 @@ def _notes(motion: Motion) -> Iterator[str]:
 
 def _markers(motion: Motion, scale: float) -> Iterator[Node]:
     """A node a marker, somewhere on its way while it is missing."""
-    values = np.asarray(motion.values, np.float64).reshape(motion.n_frames, motion.skeleton.n_joints, 3)
+    values = np.asarray(motion.values, np.float64).reshape(
+        motion.n_frames, motion.skeleton.n_joints, 3
+    )
     kinds = [channel.kind for channel in motion.skeleton.channels]
     names = motion.skeleton.addresses()
     for number, (name, side) in enumerate(zip(names, sides_of(names), strict=True)):

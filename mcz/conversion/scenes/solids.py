@@ -18,9 +18,10 @@ from mcz.kinematics.chain import Floats
 Ints = NDArray[np.int64]
 
 SIDES = ("", "left", "right")
-COLORS = {"": (0.75, 0.75, 0.78), "left": (0.16, 0.45, 0.85), "right": (0.86, 0.36, 0.16)}  # linear
-WIDEST_AT, WIDTH, GREATEST_WIDTH = 0.15, 0.09, 0.025  # of the bone, of the bone, of the figure
-KNOB, MARKER = 0.012, 0.006  # radius, of the figure, of the markers' box
+COLORS = {"": (0.6, 0.6, 0.62), "left": (0.05, 0.25, 0.7), "right": (0.75, 0.2, 0.05)}  # linear
+WIDEST_AT, WIDTH = 0.15, 0.12  # of the bone, from where it begins, and from its middle
+LEAST_WIDTH, GREATEST_WIDTH = 0.007, 0.03  # of the figure
+KNOB, MARKER = 0.012, 0.008  # radius, of the figure, of the markers' box
 LEAST_BONE = 1e-4  # of the figure; what is shorter is not seen
 
 # Corners: one end, four around, the other end; triangles counterclockwise from outside.
@@ -81,7 +82,7 @@ def _bone(start: Floats, bone: Floats, size: float) -> Floats:
     along = bone / length
     aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     aside /= np.sqrt(aside @ aside)
-    wide = min(WIDTH * length, GREATEST_WIDTH * size)
+    wide = min(max(WIDTH * length, LEAST_WIDTH * size), GREATEST_WIDTH * size)
     ring = [aside, np.cross(along, aside), -aside, -np.cross(along, aside)]
     middle = start + WIDEST_AT * bone
     return np.stack([start, *(middle + wide * arm for arm in ring), start + bone])
