@@ -14,7 +14,7 @@ from mcz import version as _version
 if TYPE_CHECKING:
     from mcz.bags import BagCheck, bag, check_bag
     from mcz.conversion import Fit, convert, from_positions
-    from mcz.conversion.scenes import SceneFile, to_glb
+    from mcz.conversion.scenes import SceneFile, to_glb, to_usda
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
     from mcz.editing.arranging import delete_clips, rename_clips, reorder_clips, split
@@ -98,7 +98,7 @@ _HOMES = {
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions"),
-    "mcz.conversion.scenes": ("SceneFile", "to_glb"),
+    "mcz.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
     "mcz.editing.protecting": ("Protection", "protect"),
     "mcz.editing.recovering": ("Recovery",),
     "mcz.editing.repair": ("Repair", "repair"),
@@ -252,6 +252,7 @@ __all__ = [
     "to_glb",
     "to_npz",
     "to_pandas",
+    "to_usda",
     "to_xarray",
     "unpack",
     "velocities",

@@ -103,24 +103,25 @@ if TYPE_CHECKING:
 @click.option(
     "--stored", is_flag=True, help="Its words as they are stored, not in units (with --signal)."
 )
-@up_option("Axis that points up, where the clip does not know it (with --to c3d or glb).")
+@up_option("Axis that points up, where the clip does not know it (with --to c3d, glb or usda).")
 @click.option(
     "--unit",
     type=click.Choice(UNITS),
-    help="Length unit, where the clip does not know it (with --to glb).",
+    help="Length unit, where the clip does not know it (with --to glb or usda).",
 )
 @key_error_option
 @click.option(
     "--rate",
     metavar="R",
     callback=to_rate,
-    help="Frames a second, where the clip does not know them (--to bvh, c3d, glb, --post-filter).",
+    help="Frames a second, where the clip does not know them (--to bvh, c3d, glb or usda, "
+    "--post-filter).",
 )
 @click.option(
     "--solve-ik",
     "solve",
     is_flag=True,
-    help="Fit the skeleton of a clip of positions to them (with --to amc, bvh or glb).",
+    help="Fit the skeleton of a clip of positions to them (--to amc, bvh, glb or usda).",
 )
 @click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
 @salvage_option

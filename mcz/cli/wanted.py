@@ -75,10 +75,7 @@ def check_signal(wanted: Wanted) -> None:
         f"--up needs --to {' or '.join(('c3d', *SCENES))}",
     )
     refuse(wanted.unit is not None and not shown, f"--unit needs --to {' or '.join(SCENES)}")
-    refuse(
-        wanted.key_error is not None and not shown,
-        f"--key-error needs --to {' or '.join(SCENES)}",
-    )
+    refuse(wanted.key_error is not None and wanted.target != "glb", "--key-error needs --to glb")
 
 
 def refuse(wrong: bool, reason: str) -> None:

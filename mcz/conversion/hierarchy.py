@@ -151,6 +151,8 @@ def stretches(joint: Joint) -> bool:
 
 def loose_tails(skeleton: Skeleton, index: int) -> tuple[Vector, ...]:
     """The tails of a joint at which no child begins and stays."""
+    if not skeleton.joints[index].tails:
+        return ()
     children = {
         joint.offset
         for joint in skeleton.joints

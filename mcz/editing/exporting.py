@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from mcz.conversion import TARGETS, converted_files
-from mcz.conversion.scenes import SCENES, to_scene
+from mcz.conversion.scenes import WRITERS, to_scene
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder
 from mcz.editing.unpacking import safe_path
@@ -25,7 +25,7 @@ from mcz.tables.files import EXPORTS, table_of
 from mcz.writing.atomic import replacing
 
 Progress = Callable[[int, int, str], None]
-FORMS = (*EXPORTS, *TARGETS, *SCENES)
+FORMS = (*EXPORTS, *TARGETS, *WRITERS)
 
 
 def export(
@@ -46,7 +46,7 @@ def export(
 ) -> Report:
     """Write every clip of an MCZ file below ``directory`` as another format.
 
-    ``to`` is "npz", "csv", "bvh", "amc", "c3d" or "glb".
+    ``to`` is "npz", "csv", "bvh", "amc", "c3d", "glb" or "usda".
     A clip "day1/walk" becomes "day1/walk.npz"; with an AMC comes its ASF. ``clips`` and ``where``:
     of these alone, as in ``unpack``. ``rate`` and ``unit`` are those of clips that do not say them;
     ``key_error_mm`` is that of ``to_glb``.
@@ -104,7 +104,7 @@ def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iter
     if to in EXPORTS:
         yield _named(clip, to), EXPORTS[to](table_of(motion)), ()
         return
-    if to in SCENES:
+    if to in WRITERS:
         scene = to_scene(motion, to, key_error_mm=key_error)
         yield _named(clip, to), scene.data, scene.notes
         return

@@ -12,6 +12,7 @@ from mcz.brief import brief
 from mcz.conversion.scenes.gltf import glb
 from mcz.conversion.scenes.keys import keyed
 from mcz.conversion.scenes.nodes import Scene, scene_of
+from mcz.conversion.scenes.usda import usda
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion
 from mcz.reading.source_files import with_facts
@@ -20,7 +21,7 @@ from mcz.version import VERSION
 KEY_ERROR_MM = 0.1
 KEY_ERROR_SIZE = 1 / 20_000  # of the figure, where its unit is unknown: 0.1 mm of 2 m
 MM_PER_M = 1000.0
-SCENES = ("glb",)
+WRITERS = {"glb": glb, "usda": usda}
 GENERATOR = f"mcz {VERSION}"
 GREATEST = 2.0**100  # of a coordinate, in meters
 
@@ -58,18 +59,20 @@ def to_scene(
     unit: str | None = None,
     up: str | None = None,
 ) -> SceneFile:
-    """``motion`` as a file of the format ``to``; see ``to_glb``."""
-    if to not in SCENES:
-        raise OptionError(f"no scene as {to!r}, but as {', '.join(SCENES)}")
+    """``motion`` as a file of the format ``to``, "glb" or "usda"; see those."""
+    if to not in WRITERS:
+        raise OptionError(f"no scene as {to!r}, but as {', '.join(WRITERS)}")
     motion = with_facts(motion, rate, unit, up)
     if motion.frame_rate is None:
         raise OptionError(
             f"motion {motion.name!r}: its frame rate is unknown, and {to.upper()} states times; "
             "give the rate"
         )
+    if to == "usda" and key_error_mm:
+        raise OptionError("USD has a sample in every frame: a key error is for GLB")
     scene = scene_of(motion)
     _check_size(scene)
-    bound = _bound(scene, key_error_mm)
+    bound = 0.0 if to == "usda" else _bound(scene, key_error_mm)
     keys = keyed(scene, bound)
     scale = MM_PER_M if scene.has_unit else 1.0
     reached = keys.reached
@@ -84,7 +87,7 @@ def to_scene(
         "notes": list(scene.notes),
     }
     return SceneFile(
-        glb(scene, keys, GENERATOR, facts),
+        WRITERS[to](scene, keys, GENERATOR, facts),
         bound * scale,
         reached.error * scale,
         reached.frame,
@@ -116,6 +119,21 @@ def to_glb(
     bound; MotionError where the skeleton has no kinematics, or lacks a joint in some frame.
     """
     return to_scene(motion, "glb", key_error_mm=key_error_mm, rate=rate, unit=unit, up=up)
+
+
+def to_usda(
+    motion: Motion,
+    *,
+    rate: Fraction | float | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+) -> SceneFile:
+    """``motion`` as USD in text: a UsdSkel skeleton with solid bones, or a sphere a marker.
+
+    Every frame is a sample, so that ``max_error`` is that of float32 numbers. Arguments and errors
+    are those of ``to_glb``.
+    """
+    return to_scene(motion, "usda", rate=rate, unit=unit, up=up)
 
 
 def _bound(scene: Scene, key_error_mm: float | None) -> float:

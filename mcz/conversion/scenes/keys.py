@@ -216,16 +216,13 @@ def _channel(exact: Floats, limit: float, node: Node) -> _Channel:
 
 
 def _levers(scene: Scene) -> list[float]:
-    """How far below each node the farthest node is, over some of the frames."""
-    n_frames = len(scene.times)
-    step = max(1, n_frames // SAMPLED_FRAMES)
-    places = [node.places[::step] for node in scene.nodes]
-    levers = [0.0] * len(places)
-    for number, node in enumerate(scene.nodes):
-        above = node.parent
-        while above >= 0:
-            off = places[number] - places[above]
-            longest = float(np.sqrt((off * off).sum(axis=1)).max(initial=0.0))
-            levers[above] = max(levers[above], longest)
-            above = scene.nodes[above].parent
+    """How far below each node the farthest node can be, with bones as long as in some frames."""
+    step = max(1, len(scene.times) // SAMPLED_FRAMES)
+    levers = [0.0] * len(scene.nodes)
+    for number in range(len(levers) - 1, -1, -1):
+        above = scene.nodes[number].parent
+        if above >= 0:
+            bone = scene.nodes[number].places[::step] - scene.nodes[above].places[::step]
+            length = float(np.sqrt((bone * bone).sum(axis=1)).max(initial=0.0))
+            levers[above] = max(levers[above], length + levers[number])
     return levers
