@@ -9,9 +9,12 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from mcz import version as _version
+
 if TYPE_CHECKING:
     from mcz.bags import BagCheck, bag, check_bag
     from mcz.conversion import Fit, convert, from_positions
+    from mcz.conversion.scenes import SceneFile, to_glb, to_usda
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
     from mcz.editing.arranging import delete_clips, rename_clips, reorder_clips, split
@@ -78,7 +81,7 @@ if TYPE_CHECKING:
     from mcz.writing.file import encode, write
     from mcz.writing.npz import to_npz
 
-__version__ = "0.9.0"
+__version__ = _version.VERSION
 
 _HOMES = {
     "mcz.bags": ("BagCheck", "bag", "check_bag"),
@@ -95,6 +98,7 @@ _HOMES = {
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions"),
+    "mcz.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
     "mcz.editing.protecting": ("Protection", "protect"),
     "mcz.editing.recovering": ("Recovery",),
     "mcz.editing.repair": ("Repair", "repair"),
@@ -191,6 +195,7 @@ __all__ = [
     "Replacement",
     "Report",
     "Root",
+    "SceneFile",
     "Signal",
     "Skeleton",
     "SkeletonWarning",
@@ -244,8 +249,10 @@ __all__ = [
     "split",
     "stream_decode",
     "stream_encode",
+    "to_glb",
     "to_npz",
     "to_pandas",
+    "to_usda",
     "to_xarray",
     "unpack",
     "velocities",

@@ -44,6 +44,7 @@ ALLOWED = {
     "threads": {"errors"},
     "jobs": {"errors", "threads"},
     "annexes": set(),
+    "version": set(),
     "queries": {"brief", "errors"},
     "coding": GROUND | {"annexes"},
     "transforms": GROUND,
@@ -57,7 +58,7 @@ ALLOWED = {
     "bags": GROUND | {"reading"},
     "datasets": JOINT | {"poses", "reading"},
     "writing": JOINT | {"metrics", "reading", "tables"},
-    "conversion": MODEL | {"kinematics", "formats", "reading"},
+    "conversion": MODEL | {"kinematics", "formats", "poses", "reading", "retargeting", "version"},
     "retargeting": MODEL | {"kinematics"},
     "editing": JOINT
     | {"recovery", "jobs", "metrics", "queries", "reading", "writing", "conversion", "tables"},
@@ -71,7 +72,7 @@ ALLOWED = {
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
     "": MODEL
-    | {"bags", "kinematics", "metrics", "poses", "datasets", "retargeting", "tables"}
+    | {"version", "bags", "kinematics", "metrics", "poses", "datasets", "retargeting", "tables"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it

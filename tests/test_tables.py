@@ -177,7 +177,7 @@ def archive(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("to", ["npz", "csv", "bvh", "amc", "c3d"])
+@pytest.mark.parametrize("to", ["npz", "csv", "bvh", "amc", "c3d", "glb", "usda"])
 def test_export(archive: Path, tmp_path: Path, to: str) -> None:
     report = mcz.export(archive, tmp_path, to, rate=120, unit="cm", where="format != 'c3d'")
     names = {outcome.path for outcome in report.outcomes}

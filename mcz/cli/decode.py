@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,47 +19,30 @@ from mcz.cli.common import (
     to_rate,
 )
 from mcz.cli.delivery import Output, check_count, deliver
-from mcz.cli.fits import facts_of, told
+from mcz.cli.made import Made, facts_of, told
 from mcz.cli.options import (
+    UNITS,
     decoded_option,
     force_option,
     json_option,
+    key_error_option,
     salvage_option,
     threads_option,
     up_option,
     where_option,
 )
 from mcz.cli.parts import Filtered, Part, Preview
-from mcz.cli.suffixes import CONVERSIONS, TARGETS, check_kept, suffix_of, target_of
+from mcz.cli.suffixes import TARGETS, check_kept, suffix_of, target_of
+from mcz.cli.wanted import Wanted, check_options, check_signal, refuse
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from mcz.conversion import Fit
+    from mcz.conversion.scenes import SceneFile
     from mcz.motion import Motion
     from mcz.reading.clip import Clip
     from mcz.reading.file import File
-
-
-class _Wanted(NamedTuple):
-    """What of a file is wanted, and as what: the options of these names."""
-
-    frames: tuple[int, int | None] | None
-    joints: str | None
-    resolution: int
-    decimate: bool
-    preview: bool
-    filtered: bool
-    target: str | None
-    rate: Fraction | None
-    solve: bool
-    with_skeleton: bool
-    up: str | None
-    signal: str | None
-    stored: bool
-
-    @property
-    def is_converted(self) -> bool:
-        """Whether the target is a format of motions."""
-        return self.target in CONVERSIONS
 
 
 @click.command(short_help="The original file again, or its numbers.")
@@ -121,18 +103,25 @@ class _Wanted(NamedTuple):
 @click.option(
     "--stored", is_flag=True, help="Its words as they are stored, not in units (with --signal)."
 )
-@up_option("Axis that points up, where the clip does not know it (with --to c3d).")
+@up_option("Axis that points up, where the clip does not know it (with --to c3d, glb or usda).")
+@click.option(
+    "--unit",
+    type=click.Choice(UNITS),
+    help="Length unit, where the clip does not know it (with --to glb or usda).",
+)
+@key_error_option
 @click.option(
     "--rate",
     metavar="R",
     callback=to_rate,
-    help="Frames a second, where the clip does not know them (--to bvh or c3d, --post-filter).",
+    help="Frames a second, where the clip does not know them (--to bvh, c3d, glb or usda, "
+    "--post-filter).",
 )
 @click.option(
     "--solve-ik",
     "solve",
     is_flag=True,
-    help="Fit the skeleton of a clip of positions to them (with --to amc or bvh).",
+    help="Fit the skeleton of a clip of positions to them (--to amc, bvh, glb or usda).",
 )
 @click.option("--with-skeleton", is_flag=True, help="Write the skeleton's own file (ASF) too.")
 @salvage_option
@@ -161,31 +150,29 @@ def command(
 
     A file without clips gives its skeleton's ASF or its attachment.
     """
-    wanted = _Wanted(**options)
-    _refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
+    wanted = Wanted(**options)
+    refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
     if output == "-" and (as_json or wanted.with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
     if suffix_of(output) not in TARGETS:
-        _check_options(wanted, salvage)
-        _check_signal(wanted)
+        check_options(wanted, salvage)
+        check_signal(wanted)
     outputs: list[Output] = []
-    fits: dict[str, Fit] = {}
+    made: dict[str, Made] = {}
     with opened(file, salvage=salvage, max_decoded=max_decoded, unverified=unverified) as held:
         for clip in _chosen(held, output, names, where):
-            found, fit = _of_clip(held, clip, _as_named(clip, output, wanted, salvage))
+            found, made[clip.name] = _of_clip(held, clip, _as_named(clip, output, wanted, salvage))
             outputs += [part for part in found if part not in outputs]  # an ASF that clips share
-            if fit is not None:
-                fits[clip.name] = fit
         if not held.clips:
             _check_plain(file, wanted)
             outputs = [_other(held, names)]
             check_kept(output, outputs[0][1])
         facts: dict[str, Any] = {"damage": held.damage, "unverified_segments": held.unverified}
-    deliver(file, output, outputs, force, as_json, facts | _facts(fits))
+    deliver(file, output, outputs, force, as_json, facts | facts_of(made))
     if facts["unverified_segments"]:
         say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")
-    for fit in fits.values():
-        say(f"{file}: {told(fit)}")
+    for line in told(made):
+        say(f"{file}: {line}")
     return damage_of(file, facts["damage"])
 
 
@@ -203,17 +190,17 @@ def _chosen(
     return clips
 
 
-def _as_named(clip: Clip, output: str | None, wanted: _Wanted, salvage: bool) -> _Wanted:
+def _as_named(clip: Clip, output: str | None, wanted: Wanted, salvage: bool) -> Wanted:
     """``wanted`` as the suffix of the output says, unless ``--to`` does."""
     if wanted.target is None:
         plain = not (wanted.solve or wanted.preview)
         wanted = wanted._replace(target=target_of(clip, output, plain=plain))
-    _check_options(wanted, salvage)
-    _check_signal(wanted)
+    check_options(wanted, salvage)
+    check_signal(wanted)
     return wanted
 
 
-def _check_plain(file: str, wanted: _Wanted) -> None:
+def _check_plain(file: str, wanted: Wanted) -> None:
     """Raise Failure for options of clips, where the file has none."""
     if wanted.target is not None or wanted.frames is not None or wanted.filtered:
         raise Failure(
@@ -222,78 +209,36 @@ def _check_plain(file: str, wanted: _Wanted) -> None:
         )
 
 
-def _facts(fits: dict[str, Fit]) -> dict[str, Any]:
-    """What ``--json`` says of skeletons that were fitted: of one clip, or by the names of more."""
-    facts = {name: facts_of(fit) for name, fit in fits.items()}
-    if len(facts) == 1:
-        return {"fit": next(iter(facts.values()))}
-    return {"fits": facts} if facts else {}
-
-
-def _check_options(wanted: _Wanted, salvage: bool) -> None:
-    """Raise Failure for options that do not go together."""
-    if not wanted.target or wanted.is_converted:
-        _refuse(wanted.joints is not None, "--joints needs --to csv or --to npz")
-    lone = wanted.frames is not None or wanted.resolution or salvage or wanted.filtered
-    _refuse(
-        wanted.preview and (wanted.target is None or bool(lone)),
-        "--preview needs --to, and goes with none of --frames --resolution --salvage --post-filter",
-    )
-    _refuse(wanted.decimate and not wanted.resolution, "--decimate needs --resolution")
-    _refuse(
-        wanted.rate is not None and not (wanted.is_converted or wanted.filtered),
-        f"--rate needs --to {' or '.join(CONVERSIONS)}, or --post-filter",
-    )
-    _refuse(
-        wanted.solve and wanted.target not in ("amc", "bvh"),
-        "--solve-ik needs --to amc or --to bvh",
-    )
-
-
-def _check_signal(wanted: _Wanted) -> None:
-    """Raise Failure for options that do not go with a signal that is not the motion."""
-    numbers = wanted.target is not None and not wanted.is_converted
-    _refuse(wanted.signal is not None and not numbers, "--signal needs --to csv or --to npz")
-    _refuse(wanted.stored and wanted.signal is None, "--stored needs --signal")
-    other = wanted.joints is not None or wanted.preview or wanted.filtered
-    _refuse(
-        wanted.signal is not None and other,
-        "--signal goes with none of --joints --preview --post-filter",
-    )
-    _refuse(wanted.up is not None and wanted.target != "c3d", "--up needs --to c3d")
-
-
-def _refuse(wrong: bool, reason: str) -> None:
-    if wrong:
-        raise Failure(reason, Exit.USAGE)
-
-
-def _of_clip(held: File, clip: Clip, wanted: _Wanted) -> tuple[list[Output], Fit | None]:
-    """The outputs of a clip as it is wanted, and how well a skeleton fits where one is fitted."""
+def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made]:
+    """The outputs of a clip as it is wanted, and what is to be said of how they were made."""
     from mcz.reading.source_files import with_facts
 
-    target, fit = wanted.target, None
+    target, made = wanted.target, Made()
     part = _part(clip, wanted)
     if target is None:
         outputs = [_source(clip, part)]
     elif wanted.is_converted:
         motion = part.motion()
         if wanted.solve:
-            motion, fit = _solved(clip, motion)
+            motion, made.fit = _solved(clip, motion)
         elif target in ("amc", "bvh"):
             _check_moves(clip)
         if wanted.up is not None:
             motion = with_facts(motion, None, None, wanted.up)
         rate = None if wanted.filtered else wanted.rate
-        outputs = _converted(motion, target, rate, wanted.with_skeleton)
+        if wanted.is_scene:
+            made.scene = _scene(motion, target, rate, wanted)
+            outputs = [(target, f"{_stem(motion)}.{target}", made.scene.data)]
+        else:
+            outputs = _converted(motion, target, rate, wanted.with_skeleton)
     else:
         outputs = [_export(clip, target, part, wanted)]
     if wanted.with_skeleton and target != "amc":
         outputs.append(_skeleton(held, _sourced(held, clip)))
-    return outputs, fit
+    return outputs, made
 
 
-def _part(clip: Clip, wanted: _Wanted) -> Part:
+def _part(clip: Clip, wanted: Wanted) -> Part:
     frames = wanted.frames
     if frames is not None:
         start, stop = frames
@@ -330,6 +275,13 @@ def _solved(clip: Clip, motion: Motion) -> tuple[Motion, Fit]:
     return from_positions(motion, base)
 
 
+def _scene(motion: Motion, target: str, rate: Fraction | None, wanted: Wanted) -> SceneFile:
+    """The motion as a file of animated nodes."""
+    from mcz.conversion.scenes import to_scene
+
+    return to_scene(motion, target, key_error_mm=wanted.key_error, rate=rate, unit=wanted.unit)
+
+
 def _converted(
     motion: Motion, target: str, rate: Fraction | None, with_skeleton: bool
 ) -> list[Output]:
@@ -341,7 +293,7 @@ def _converted(
     return [(kinds.get(s, s), f"{_stem(motion)}.{s}", data) for s, data in files.items()]
 
 
-def _export(clip: Clip, target: str, part: Part, wanted: _Wanted) -> Output:
+def _export(clip: Clip, target: str, part: Part, wanted: Wanted) -> Output:
     from mcz.tables.files import EXPORTS, channel_names, channel_units
 
     joints = wanted.joints

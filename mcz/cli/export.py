@@ -14,6 +14,7 @@ from mcz.cli.options import (
     force_option,
     jobs_option,
     json_option,
+    key_error_option,
     threads_option,
     where_option,
 )
@@ -22,7 +23,7 @@ from mcz.cli.progress import Progress
 from mcz.cli.suffixes import TARGETS
 
 
-@click.command(short_help="Every clip as another format: NPZ, CSV, BVH, AMC, C3D.")
+@click.command(short_help="Every clip as another format: NPZ, CSV, BVH, AMC, C3D, GLB, USD.")
 @click.argument("file", metavar="FILE.mcz", type=click.Path(readable=False))
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @click.option("--to", "target", type=click.Choice(TARGETS), required=True, help="The format.")
@@ -32,6 +33,7 @@ from mcz.cli.suffixes import TARGETS
     "--rate", metavar="R", callback=to_rate, help="Frames a second of clips that do not say it."
 )
 @click.option("--unit", type=click.Choice(UNITS), help="Length unit of clips that say none.")
+@key_error_option
 @decoded_option
 @force_option
 @threads_option
@@ -45,6 +47,7 @@ def command(
     where: str | None,
     rate: Fraction | None,
     unit: str | None,
+    key_error: float | None,
     max_decoded: int | None,
     force: bool,
     as_json: bool,
@@ -66,6 +69,7 @@ def command(
             where=where,
             rate=rate,
             unit=unit,
+            key_error_mm=key_error,
             force=force,
             max_decoded=max_decoded,
             progress=progress,

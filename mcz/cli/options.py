@@ -158,6 +158,17 @@ def up_option(what: str) -> Callable[[Function], Function]:
     return click.option("--up", type=click.Choice(("x", "y", "z")), help=what)
 
 
+def key_error_option(function: Function) -> Function:
+    """``--key-error``, as the argument ``key_error``."""
+    return click.option(
+        "--key-error",
+        metavar="MM",
+        type=click.FloatRange(min=0),
+        help="Keys of an animation are left out where all stays within MM (with --to glb). 0: a "
+        "key in every frame. Default: 0.1, or 1/20,000 of the figure where its unit is unknown.",
+    )(function)
+
+
 def encoding_options(function: Function) -> Function:
     """``--codec --effort --param --rate --unit --up ...``, as the arguments of those names."""
     options = (

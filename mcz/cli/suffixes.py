@@ -12,12 +12,15 @@ if TYPE_CHECKING:
     from mcz.reading.clip import Clip
 
 CONVERSIONS = ("bvh", "amc", "c3d")
-TARGETS = ("csv", "npz", *CONVERSIONS)
+SCENES = ("glb", "usda")  # animated nodes; mcz.conversion.scenes writes them
+TARGETS = ("csv", "npz", *CONVERSIONS, *SCENES)
 # Formats that decode does not write; a file of that name would hold something else.
 OTHERS = {
     "mcz": "mcz extract takes clips out of an .mcz",
     "asf": "--with-skeleton writes the ASF beside it",
-    **dict.fromkeys(("trc", "tsv", "mot", "sto", "fbx", "gltf", "glb", "usd", "npy", "json"), ""),
+    **dict.fromkeys(("usd", "usdc", "usdz"), "--to usda writes USD as text"),
+    "gltf": "--to glb writes the same as one file",
+    **dict.fromkeys(("trc", "tsv", "mot", "sto", "fbx", "npy", "json"), ""),
 }
 
 

@@ -32,7 +32,8 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
     OptionError for an unknown format or a frame rate that is needed and unknown.
     """
     if to not in TARGETS:
-        raise OptionError(f"no conversion to {to!r}, but to {', '.join(TARGETS)}")
+        scene = "; mcz.to_glb writes scenes" if to in ("glb", "gltf") else ""
+        raise OptionError(f"no conversion to {to!r}, but to {', '.join(TARGETS)}{scene}")
     motion = with_facts(motion, rate, None)
     same = to == "c3d" and point_set(motion.skeleton) == "markers"
     if to != "amc" and not same and motion.frame_rate is None:

@@ -46,14 +46,14 @@ def to_bvh(motion: Motion) -> Motion:
         numbers.append(len(joints))
         parent = numbers[joint.parent] if joint.parent >= 0 else -1
         channels, offset = [], joint.offset
-        if _moves(skeleton, index):
+        if moves(skeleton, index):
             columns += list(_positions(skeleton, index, values))
             channels, offset = [Channel(kind) for kind in POSITION_KINDS], ORIGIN
         order, angles = _angles(skeleton, index, values)
         columns += list(angles.T)
         channels += [Channel(f"r{letter}") for letter in order]
-        stretched = _stretches(joint)
-        tails = _loose_tails(skeleton, index)
+        stretched = stretches(joint)
+        tails = loose_tails(skeleton, index)
         fixed = () if stretched else tails
         joints.append(Joint(joint.name, parent, offset, fixed, channels=tuple(channels)))
         for number, tail in enumerate(tails if stretched else (), 1):
@@ -137,19 +137,22 @@ def _check(motion: Motion) -> None:
             )
 
 
-def _moves(skeleton: Skeleton, index: int) -> bool:
+def moves(skeleton: Skeleton, index: int) -> bool:
     """Whether the joint's position relative to its parent changes; a root's may always."""
     joint = skeleton.joints[index]
-    moves = any(channel.kind in POSITION_KINDS for channel in joint.channels)
-    return joint.parent < 0 or moves or _stretches(skeleton.joints[joint.parent])
+    own = any(channel.kind in POSITION_KINDS for channel in joint.channels)
+    return joint.parent < 0 or own or stretches(skeleton.joints[joint.parent])
 
 
-def _stretches(joint: Joint) -> bool:
+def stretches(joint: Joint) -> bool:
+    """Whether channels of the joint change the lengths of what hangs on it."""
     return any(channel.kind in STRETCHING for channel in joint.channels)
 
 
-def _loose_tails(skeleton: Skeleton, index: int) -> tuple[Vector, ...]:
+def loose_tails(skeleton: Skeleton, index: int) -> tuple[Vector, ...]:
     """The tails of a joint at which no child begins and stays."""
+    if not skeleton.joints[index].tails:
+        return ()
     children = {
         joint.offset
         for joint in skeleton.joints

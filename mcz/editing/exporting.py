@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from mcz.conversion import TARGETS, converted_files
+from mcz.conversion.scenes import WRITERS, to_scene
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder
 from mcz.editing.unpacking import safe_path
@@ -24,7 +25,7 @@ from mcz.tables.files import EXPORTS, table_of
 from mcz.writing.atomic import replacing
 
 Progress = Callable[[int, int, str], None]
-FORMS = (*EXPORTS, *TARGETS)
+FORMS = (*EXPORTS, *TARGETS, *WRITERS)
 
 
 def export(
@@ -36,16 +37,19 @@ def export(
     where: Where | None = None,
     rate: Fraction | float | None = None,
     unit: str | None = None,
+    key_error_mm: float | None = None,
     force: bool = False,
     max_decoded: int | None = None,
     threads: int | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """Write every clip of an MCZ file below ``directory`` as "npz", "csv", "bvh", "amc" or "c3d".
+    """Write every clip of an MCZ file below ``directory`` as another format.
 
+    ``to`` is "npz", "csv", "bvh", "amc", "c3d", "glb" or "usda".
     A clip "day1/walk" becomes "day1/walk.npz"; with an AMC comes its ASF. ``clips`` and ``where``:
-    of these alone, as in ``unpack``. ``rate`` and ``unit`` are those of clips that do not say them.
+    of these alone, as in ``unpack``. ``rate`` and ``unit`` are those of clips that do not say them;
+    ``key_error_mm`` is that of ``to_glb``.
     A clip that the format cannot hold, or whose file is there and not ``force``, is reported as
     failed and the others are written. Files appear when they are whole; no link below ``directory``
     is followed. ``jobs`` processes may work at once, by default one. Raises OptionError and what
@@ -57,12 +61,13 @@ def export(
     with limited(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
         chosen = file.chosen(clips, where)
         called = [clip.name for clip in chosen]
-        with shared_out(_converted, file, called, (to, rate, unit)) as converting:
+        with shared_out(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:
             for done, (name, converted) in enumerate(zip(called, converting, strict=True)):
                 try:
-                    for path, data in converted():
+                    for path, data, notes in converted():
                         _write(path, data, folder, written, target, force)
-                        report.outcomes.append(Outcome(path, "written", len(data)))
+                        size = len(data)
+                        report.outcomes.append(Outcome(path, "written", size, notes=notes))
                 except (MczError, OSError) as error:
                     result = "exists" if isinstance(error, ExistsError) else "failed"
                     report.outcomes.append(Outcome(name, result, 0, f"{name}: {error}"))
@@ -83,25 +88,29 @@ def _write(
     folder.note(name, path)
 
 
+Made = tuple[str, bytes, tuple[str, ...]]  # the name of a file, its content, what is to be said
+
+
 def _converted(
-    shared: tuple[File, tuple[str, Fraction | float | None, str | None]], name: str
-) -> list[tuple[str, bytes]]:
+    shared: tuple[File, tuple[str, Fraction | float | None, str | None, float | None]], name: str
+) -> list[Made]:
     """The files that the clip ``name`` becomes."""
-    file, (to, rate, unit) = shared
-    return list(_files(file.clips[name], to, rate, unit))
+    file, (to, rate, unit, key_error) = shared
+    return list(_files(file.clips[name], to, _told(file.clips[name], rate, unit), key_error))
 
 
-def _files(
-    clip: Clip, to: str, rate: Fraction | float | None, unit: str | None
-) -> Iterator[tuple[str, bytes]]:
-    """The files that a clip becomes, by name: an ASF before the AMC that needs it."""
-    motion = _told(clip, rate, unit)
+def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Made]:
+    """The files that a clip becomes: an ASF before the AMC that needs it."""
     if to in EXPORTS:
-        yield _named(clip, to), EXPORTS[to](table_of(motion))
+        yield _named(clip, to), EXPORTS[to](table_of(motion)), ()
+        return
+    if to in WRITERS:
+        scene = to_scene(motion, to, key_error_mm=key_error)
+        yield _named(clip, to), scene.data, scene.notes
         return
     files = converted_files(motion, to, None, True)
     for suffix in sorted(files, reverse=True):
-        yield _named(clip, suffix), files[suffix]
+        yield _named(clip, suffix), files[suffix], ()
 
 
 def _told(clip: Clip, rate: Fraction | float | None, unit: str | None) -> Motion:

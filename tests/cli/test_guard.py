@@ -215,7 +215,7 @@ def test_to_wins(folder: Path, call: Call) -> None:
     assert (folder / "x.bvh").read_bytes().startswith(b"frame,")
 
 
-@pytest.mark.parametrize("suffix", ["asf", "mcz", "trc", "fbx"])
+@pytest.mark.parametrize("suffix", ["asf", "mcz", "trc", "fbx", "gltf", "usd"])
 def test_what_cannot_be_written_is_refused(folder: Path, call: Call, suffix: str) -> None:
     call("encode", folder / "walk.amc")
     out = folder / f"x.{suffix}"

@@ -71,7 +71,7 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
         "rename": [[str(file), STEERING, f"{STEERING}2", "-o", f"{out}.mcz"]],
         "reorder": [[str(file), STEERING, "-o", f"{out}.mcz"], [str(file), "--by", STEERING]],
         "split": [[str(file), str(out), "--rest", STEERING], [str(file), str(out)]],
-        "export": [[str(file), str(out), "--to", to] for to in ("npz", "amc")],
+        "export": [[str(file), str(out), "--to", to] for to in ("npz", "amc", "glb", "usda")],
         "list": [[str(file)], [str(file), "--columns", f"name,{STEERING}"], [str(file), "--csv"]],
         "meta": [
             [str(file)],

@@ -1,0 +1,96 @@
+"""What is said of outputs that were computed, as JSON and in words: skeletons fitted, scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mcz.conversion import Fit
+    from mcz.conversion.scenes import SceneFile
+
+
+@dataclass(slots=True)
+class Made:
+    """How the outputs of a clip were made, where there is something to say about it."""
+
+    fit: Fit | None = None
+    scene: SceneFile | None = None
+
+
+def facts_of(clips: Mapping[str, Made]) -> dict[str, Any]:
+    """What ``--json`` says: of one clip "fit" and "scene", of more "fits" and "scenes" by name."""
+    fits = {name: _fit(made.fit) for name, made in clips.items() if made.fit is not None}
+    scenes = {name: _scene(made.scene) for name, made in clips.items() if made.scene is not None}
+    facts: dict[str, Any] = {}
+    for key, found in (("fit", fits), ("scene", scenes)):
+        if len(found) == 1:
+            facts[key] = next(iter(found.values()))
+        elif found:
+            facts[f"{key}s"] = found
+    return facts
+
+
+def told(clips: Mapping[str, Made]) -> Iterator[str]:
+    """The same in words, a line a thing."""
+    for made in clips.values():
+        if made.fit is not None:
+            yield _fit_told(made.fit)
+        if made.scene is not None:
+            yield from _scene_told(made.scene)
+
+
+def _scene(scene: SceneFile) -> dict[str, Any]:
+    unit = "_mm" if scene.has_unit else ""
+    return {
+        f"key_error{unit}": scene.key_error,
+        f"max_error{unit}": scene.max_error,
+        "frame": scene.frame,
+        "point": scene.point,
+        "n_keys": scene.n_keys,
+        "n_values": scene.n_values,
+        "notes": list(scene.notes),
+    }
+
+
+def _scene_told(scene: SceneFile) -> Iterator[str]:
+    unit = "mm" if scene.has_unit else "units"
+    at = "" if scene.frame is None else f" (frame {scene.frame}, {scene.point})"
+    yield (
+        f"keys: {scene.n_keys:,} of {scene.n_values:,}; at most {scene.max_error:.3g} {unit} "
+        f"off{at}"
+    )
+    yield from scene.notes
+
+
+def _fit(fit: Fit) -> dict[str, Any]:
+    keys = ("mean_error", "max_error", "marker_mean_error", "marker_max_error")
+    distances = {name: getattr(fit, name) for key in keys for name in (key, f"{key}_cm")}
+    return {
+        "n_points": fit.n_points,
+        "n_markers": fit.n_markers,
+        **distances,
+        "frame": fit.frame,
+        "point": fit.point,
+        "unsolved": list(fit.unsolved),
+    }
+
+
+def _fit_told(fit: Fit) -> str:
+    scale, unit = (1.0, "units") if fit.unit_cm is None else (fit.unit_cm, "cm")
+    if fit.mean_error is None or fit.max_error is None:
+        text = "inverse kinematics: no position is known"
+    else:
+        text = (
+            f"inverse kinematics: {fit.n_points} points {fit.mean_error * scale:.3g} {unit} off on "
+            f"average, at most {fit.max_error * scale:.3g} {unit} (frame {fit.frame}, {fit.point})"
+        )
+    if fit.marker_mean_error is not None and fit.marker_max_error is not None:
+        text += (
+            f"; {fit.n_markers} virtual markers {fit.marker_mean_error * scale:.3g}, at most "
+            f"{fit.marker_max_error * scale:.3g} {unit}"
+        )
+    if fit.unsolved:
+        text += f"; left at 0: {', '.join(fit.unsolved)}"
+    return text

@@ -1,0 +1,84 @@
+"""What ``mcz decode`` is asked for, and which of its options go together."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import NamedTuple
+
+from mcz.cli.common import Exit, Failure
+from mcz.cli.suffixes import CONVERSIONS, SCENES
+
+
+class Wanted(NamedTuple):
+    """What of a file is wanted, and as what: the options of these names."""
+
+    frames: tuple[int, int | None] | None
+    joints: str | None
+    resolution: int
+    decimate: bool
+    preview: bool
+    filtered: bool
+    target: str | None
+    rate: Fraction | None
+    solve: bool
+    with_skeleton: bool
+    up: str | None
+    unit: str | None
+    key_error: float | None
+    signal: str | None
+    stored: bool
+
+    @property
+    def is_converted(self) -> bool:
+        """Whether the target is a format of motions."""
+        return self.target in CONVERSIONS or self.is_scene
+
+    @property
+    def is_scene(self) -> bool:
+        """Whether the target is a format of animated nodes."""
+        return self.target in SCENES
+
+
+def check_options(wanted: Wanted, salvage: bool) -> None:
+    """Raise Failure for options that do not go together."""
+    if not wanted.target or wanted.is_converted:
+        refuse(wanted.joints is not None, "--joints needs --to csv or --to npz")
+    lone = wanted.frames is not None or wanted.resolution or salvage or wanted.filtered
+    refuse(
+        wanted.preview and (wanted.target is None or bool(lone)),
+        "--preview needs --to, and goes with none of --frames --resolution --salvage --post-filter",
+    )
+    refuse(wanted.decimate and not wanted.resolution, "--decimate needs --resolution")
+    refuse(
+        wanted.rate is not None and not (wanted.is_converted or wanted.filtered),
+        f"--rate needs --to {' or '.join((*CONVERSIONS, *SCENES))}, or --post-filter",
+    )
+    refuse(
+        wanted.solve and wanted.target not in ("amc", "bvh", *SCENES),
+        f"--solve-ik needs {' or '.join(f'--to {to}' for to in ('amc', 'bvh', *SCENES))}",
+    )
+
+
+def check_signal(wanted: Wanted) -> None:
+    """Raise Failure for options that do not go with a signal that is not the motion."""
+    numbers = wanted.target is not None and not wanted.is_converted
+    refuse(wanted.signal is not None and not numbers, "--signal needs --to csv or --to npz")
+    refuse(wanted.stored and wanted.signal is None, "--stored needs --signal")
+    other = wanted.joints is not None or wanted.preview or wanted.filtered
+    refuse(
+        wanted.signal is not None and other,
+        "--signal goes with none of --joints --preview --post-filter",
+    )
+    shown = wanted.is_scene
+    refuse(
+        wanted.up is not None and not (shown or wanted.target == "c3d"),
+        f"--up needs --to {' or '.join(('c3d', *SCENES))}",
+    )
+    refuse(wanted.unit is not None and not shown, f"--unit needs --to {' or '.join(SCENES)}")
+    refuse(wanted.key_error is not None and wanted.target != "glb", "--key-error needs --to glb")
+
+
+def refuse(wrong: bool, reason: str) -> None:
+    """Raise Failure with the reason where something is wrong."""
+    if wrong:
+        raise Failure(reason, Exit.USAGE)
