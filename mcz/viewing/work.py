@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from functools import cache, partial
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from threading import BoundedSemaphore, Lock
@@ -58,21 +59,22 @@ class Work:
 
     def document(self) -> dict[str, Any]:
         """What the page is told first: ``api.json``."""
-        from mcz import __version__
-
-        files = [
-            {"name": file.name, "size": file.size, "url": url_of(number), "kind": file.kind}
-            for number, file in self._shelf.given()
-        ]
         return {
-            "version": __version__,
-            "files": files,
+            "version": import_module("mcz").__version__,
+            "files": self.files(),
             "salvage": self._shelf.salvage,
             "codecs": lossy_codecs(),
             "canEncode": True,
             "canConvert": True,
             "canGlb": glb_writer() is not None,
         }
+
+    def files(self) -> list[dict[str, Any]]:
+        """The files that were given; the size of one that is not made yet is None."""
+        return [
+            {"name": file.name, "size": file.size, "url": url_of(number), "kind": file.kind}
+            for number, file in self._shelf.given()
+        ]
 
     def convert(self, stream: Readable, size: int, content_type: str) -> dict[str, Any]:
         """Make an ``.mcz`` of the files of a form; of several motions one archive."""
@@ -158,7 +160,9 @@ class Work:
         writer = glb_writer()
         if writer is None:
             raise Refused(501, "this version writes no GLB")
-        return writer(self._motion(asked))
+        rate = asked.get("rate")
+        found: bytes = writer(self._motion(asked), rate=rate).data
+        return found
 
     def _file(self, asked: Mapping[str, Any]) -> Shelved:
         match = re.fullmatch(r"files/([0-9]{1,9})", text_of(asked, "url"))
@@ -191,6 +195,8 @@ class Work:
                 return motion
         with self._opened(asked) as (_, clip):
             motion = clip.motion()
+        unit = self._shelf.said.get("unit") if motion.skeleton.unit_cm is None else None
+        motion = with_facts(motion, None, unit)
         if sum(signal.values.nbytes for signal in motion.signals) <= HELD_BYTES:
             self._held.append((key, motion))
         return motion
@@ -237,6 +243,10 @@ def refuse_files(params: Mapping[str, Any]) -> None:
         raise OptionError(f"{OWN_BASES}: the page cannot name files of this machine")
 
 
-def glb_writer() -> Callable[[Motion], bytes] | None:
+def glb_writer() -> Callable[..., Any] | None:
     """What writes a motion as GLB; None where this version has no such thing."""
-    return None
+    try:
+        writer: Callable[..., Any] = import_module("mcz.conversion.scenes").to_glb
+    except ModuleNotFoundError:
+        return None
+    return writer
