@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from mcz.errors import MotionError
 from mcz.kinematics import positions_of
 from mcz.kinematics.points import first_points, listed_points
 from mcz.motion import Motion, Skeleton
+from mcz.reading.clip import Clip
 from mcz.retargeting.sides import sides_of
 
 MOST_POINTS = 4096
@@ -23,42 +24,49 @@ LARGEST = 32767
 FAR = 1e100  # what is farther away is missing: nothing else would be seen beside it
 AXES = {"x": 0, "y": 1, "z": 2}
 Words = NDArray[np.int16]
+Moving: TypeAlias = Motion | Clip
 
 
-class Moving(Protocol):
-    """What a Motion and a Clip have in common."""
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """What stays over time: ``bones``, pairs of points; ``sides`` 0, 1 left, 2 right of points."""
 
-    name: str
-    n_frames: int
-    skeleton: Skeleton
-    frame_rate: Any
+    bones: list[tuple[int, int]]
+    sides: list[int]
 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
     """Words of (frames, points, 3), each ``step`` length units from the middle of what is seen.
 
-    Every ``every``-th of the first ``n_read`` frames. ``bones`` are pairs of points, ``sides`` 0, 1
-    left, 2 right of every point; ``floor`` is the lowest coordinate along the axis ``up``.
+    Every ``every``-th of the first ``n_read`` frames. ``floor`` is the lowest coordinate along the
+    axis ``up``, ``radius`` the greatest of all, both counted from the middle.
     """
 
     words: Words
     step: float
     every: int
     n_read: int
-    bones: list[tuple[int, int]]
-    sides: list[int]
     up: int
     floor: float
     radius: float
 
 
-def drawn(moving: Any, most_frames: int, every: int = 1) -> Drawn:
+def figure(skeleton: Skeleton) -> Figure:
+    """The lines and sides; raises MotionError where there is no point, or too many to draw."""
+    points = list(listed_points(skeleton))
+    if not 0 < len(points) <= MOST_POINTS:
+        raise MotionError(f"{len(points):,} points, of which 1 to {MOST_POINTS:,} are drawn")
+    sides = [("", "left", "right").index(side) for side in sides_of(skeleton.addresses())]
+    return Figure(bones_of(skeleton), [sides[joint] for joint, _ in points])
+
+
+def drawn(moving: Moving, most_frames: int, every: int = 1) -> Drawn:
     """At most ``most_frames`` frames of a Motion or Clip; raises MczError for what has no points.
 
     ``every`` is the least distance of two of them.
     """
-    skeleton: Skeleton = moving.skeleton
+    skeleton = moving.skeleton
     n_read = frames_read(moving)
     every = max(every, -(-n_read // max(1, most_frames)))
     places = positions_of(skeleton, _values(moving, n_read, every))
@@ -66,39 +74,26 @@ def drawn(moving: Any, most_frames: int, every: int = 1) -> Drawn:
     words, step, middle = _words(places)
     up = AXES[skeleton.up_axis or "y"]
     known = places[np.isfinite(places).all(axis=2)] - middle
-    floor = float(known[:, up].min()) if len(known) else 0.0
-    radius = float(np.abs(known).max(initial=0.0))
-    names = skeleton.addresses()
-    by_joint = [("", "left", "right").index(side) for side in sides_of(names)]
-    sides = [by_joint[joint] for joint, _ in listed_points(skeleton)]
-    return Drawn(words, step, every, n_read, bones_of(skeleton), sides, up, floor, radius)
+    floor = float(known[:, up].min(initial=0.0))
+    return Drawn(words, step, every, n_read, up, floor, float(np.abs(known).max(initial=0.0)))
 
 
-def frames_read(moving: Any) -> int:
+def frames_read(moving: Moving) -> int:
     """How many frames are looked at: of a clip, which has to be decoded, the first of many."""
     if isinstance(moving, Motion):
         return moving.n_frames
-    return min(int(moving.n_frames), MOST_READ, MOST_NUMBERS // max(1, moving.n_channels) + 1)
+    return min(moving.n_frames, MOST_READ, MOST_NUMBERS // max(1, moving.n_channels) + 1)
 
 
-def check_points(skeleton: Skeleton) -> int:
-    """The number of points; raises MotionError where there are none, or too many to draw."""
-    n_points = sum(1 for _ in listed_points(skeleton))
-    if not 0 < n_points <= MOST_POINTS:
-        raise MotionError(f"{n_points:,} points, of which 1 to {MOST_POINTS:,} are drawn")
-    return n_points
-
-
-def _values(moving: Any, n_read: int, every: int) -> NDArray[np.float64]:
+def _values(moving: Moving, n_read: int, every: int) -> NDArray[np.float64]:
     """Every so many frames, (n, n_channels), NaN where invalid."""
     if moving.signals[0].channels is not None:
         raise MotionError(f"{moving.name!r}: its channels are not those of its skeleton")
     if isinstance(moving, Motion):
         signal = moving.signals[0]
         values = np.asarray(signal.values[:n_read:every], np.float64)
-        return (
-            values if signal.mask is None else np.where(signal.mask[:n_read:every], values, np.nan)
-        )
+        valid = None if signal.mask is None else signal.mask[:n_read:every]
+        return values if valid is None else np.where(valid, values, np.nan)
     return np.asarray(moving.read((0, n_read))[::every], np.float64)
 
 

@@ -10,11 +10,12 @@ import html
 import json
 from functools import cache
 from pathlib import Path
-from typing import Any
+
+import numpy as np
 
 from mcz.brief import counted, shown
 from mcz.errors import MczError
-from mcz.viewing.drawn import RATE, Drawn, check_points, drawn, frames_read
+from mcz.viewing.drawn import RATE, Drawn, Figure, Moving, drawn, figure, frames_read
 
 MOST_BYTES = 300_000
 SPARE = 500  # bytes that numbers may have more than they had in the first try
@@ -23,7 +24,7 @@ UNKNOWN_RATE = 30.0  # frames a second of a motion that does not say
 PLACE = "/*data*/null"
 
 
-def player(moving: Any) -> str:
+def player(moving: Moving) -> str:
     """The HTML of a Motion or Clip; where nothing can be drawn, what it is and why not."""
     try:
         return _player(moving)
@@ -32,19 +33,21 @@ def player(moving: Any) -> str:
         return f"<pre>{html.escape(repr(moving))}\n{html.escape(why)}</pre>"
 
 
-def _player(moving: Any) -> str:
-    n_points = check_points(moving.skeleton)
+def _player(moving: Moving) -> str:
+    lines = figure(moving.skeleton)
     if not moving.n_frames:
         return f"<pre>{html.escape(repr(moving))}</pre>"
     rate = float(moving.frame_rate or UNKNOWN_RATE)
-    n_read = frames_read(moving)
-    every = max(1, int(rate // RATE))
-    room = MOST_BYTES - SPARE - len(_frame(moving, drawn(moving, 1, n_read), rate))
+    n_points = len(lines.sides)
+    nothing = np.empty((0, n_points, 3), "<i2")
+    empty = Drawn(nothing, 1.0, frames_read(moving), frames_read(moving), 0, 0.0, 0.0)
+    room = MOST_BYTES - SPARE - len(_frame(moving, lines, empty, rate))
     most = room * 3 // 4 // (6 * n_points)
-    return _frame(moving, drawn(moving, max(1, most), every), rate)
+    found = drawn(moving, max(1, most), max(1, int(rate // RATE)))
+    return _frame(moving, lines, found, rate)
 
 
-def _frame(moving: Any, found: Drawn, rate: float) -> str:
+def _frame(moving: Moving, lines: Figure, found: Drawn, rate: float) -> str:
     document = {
         "caption": _caption(moving, found),
         "positions": base64.b64encode(found.words.tobytes()).decode(),
@@ -53,8 +56,8 @@ def _frame(moving: Any, found: Drawn, rate: float) -> str:
         "total": moving.n_frames,
         "rate": rate / found.every,
         "step": found.step,
-        "bones": found.bones,
-        "sides": found.sides,
+        "bones": lines.bones,
+        "sides": lines.sides,
         "up": found.up,
         "floor": found.floor,
         "radius": found.radius,
@@ -67,7 +70,7 @@ def _frame(moving: Any, found: Drawn, rate: float) -> str:
     )
 
 
-def _caption(moving: Any, found: Drawn) -> str:
+def _caption(moving: Moving, found: Drawn) -> str:
     rate = moving.frame_rate
     text = f"{shown(moving.name)}: {counted(moving.n_frames, 'frame')}"
     text += " at an unknown rate" if rate is None else f" at {float(rate):g} Hz"

@@ -45,13 +45,19 @@ class Server(ThreadingHTTPServer):
         *,
         host: str = "127.0.0.1",
         port: int = 0,
-        grace: float = GRACE,
+        grace: float | None = None,
     ) -> None:
         if host not in HOSTS:
             text = f"the page is served to this machine alone: one of {', '.join(HOSTS)}"
             raise OptionError(f"{host}: {text}")
         self.address_family = socket.AF_INET6 if ":" in HOSTS[host] else socket.AF_INET
-        self.site = Site(page, shelf, Work(shelf), Visitors(grace), secrets.token_urlsafe(24))
+        self.site = Site(
+            page,
+            shelf,
+            Work(shelf),
+            Visitors(GRACE if grace is None else grace),
+            secrets.token_urlsafe(24),
+        )
         self._free = BoundedSemaphore(MOST_CONNECTIONS)
         try:
             super().__init__((HOSTS[host], port), Handler)

@@ -264,11 +264,11 @@ def put(shelf: Shelf, path: str) -> None:
         shelf.give(Remote(path))
         return
     place = Path(path)
-    if place.is_dir():
+    if path and place.is_dir():
         _put_folder(shelf, place)
         return
-    if not place.is_file():
-        text = "not a file" if place.exists() else "no such file"
+    if not (path and place.is_file()):
+        text = "not a file" if path and place.exists() else "no such file"
         raise AccessError(f"{path or repr(path)}: {text}")
     kind = kind_of(place)
     if kind == "mcz":

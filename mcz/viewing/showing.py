@@ -5,7 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Sequence
 from fractions import Fraction
 from types import TracebackType
 from typing import Any, BinaryIO
@@ -29,8 +29,8 @@ class View:
     the end of the process does.
     """
 
-    def __init__(self, things: tuple[Any, ...], server: Server | None, close: Callable[[], None]):
-        self._things, self._server, self._close = things, server, close
+    def __init__(self, server: Server | None, players: Sequence[str] = ()) -> None:
+        self._server, self._players = server, players
         self.url = None if server is None else server.url
         if server is not None:
             _OPEN.add(self)
@@ -40,7 +40,7 @@ class View:
 
     def _repr_html_(self) -> str | None:
         """The players; None where a page is served."""
-        return None if self.url is not None else "\n".join(map(_player_of, self._things))
+        return None if self.url is not None else "\n".join(self._players)
 
     def __enter__(self) -> View:
         return self
@@ -55,8 +55,9 @@ class View:
 
     def close(self) -> None:
         """End the server, if it is not ended yet."""
-        _OPEN.discard(self)
-        self._close()
+        if self in _OPEN and self._server is not None:
+            _OPEN.discard(self)
+            self._server.close()
 
 
 def view(
@@ -81,7 +82,7 @@ def view(
         raise OptionError("there is nothing to view: give a Motion, a Clip or a path")
     said = {"skeleton": skeleton, "rate": rate, "unit": unit, "up": up}
     if in_notebook():
-        return View(tuple(_moving(thing, said, salvage) for thing in things), None, lambda: None)
+        return View(None, [_player_of(thing, said, salvage) for thing in things])
     shelf = Shelf(said, _tell, salvage=salvage)
     try:
         for thing in things:
@@ -90,7 +91,7 @@ def view(
     except BaseException:
         shelf.close()
         raise
-    shown = View(things, server, server.close)
+    shown = View(server)
     if browser:
         show(server.url)
     return shown
@@ -107,22 +108,19 @@ def _tell(line: str) -> None:
     sys.stderr.write(f"mcz: {line}\n")
 
 
-def _moving(thing: Any, said: dict[str, Any], salvage: bool) -> Any:
-    """A Motion or Clip: of an ``.mcz`` its first clip."""
+def _player_of(thing: Any, said: dict[str, Any], salvage: bool) -> str:
+    """A player of a Motion or Clip, or of a file; of an ``.mcz`` that is one of its first clip."""
     from mcz.reading.file import open
     from mcz.reading.read import read
 
     if isinstance(thing, Motion | Clip):
-        return thing
-    if "://" in str(thing) or str(thing).lower().endswith(".mcz"):
-        for clip in open(thing, salvage=salvage):
-            return clip
-        raise OptionError(f"{thing}: it has no clip")
-    return read(thing, **said)
-
-
-def _player_of(thing: Any) -> str:
-    return player(thing)
+        return player(thing)
+    if not ("://" in str(thing) or str(thing).lower().endswith(".mcz")):
+        return player(read(thing, **said))
+    with open(thing, salvage=salvage) as file:
+        for clip in file:
+            return player(clip)
+    raise OptionError(f"{thing}: it has no clip")
 
 
 def _give(shelf: Shelf, thing: Any) -> None:

@@ -27,7 +27,7 @@ TABLES = {
     "mdtt": ("window_start.json", BASES),
     "pca-rdo": ("window_start.json", BASES),
     "online": ("online_start.json", BASES),
-    "best": ("best_start.json",),
+    "best": ("best_start.json", "lossless_start.json"),
     "posewave": ("posewave_start.json",),
     "fast": ("fast_counts.json",),
 }

@@ -82,31 +82,30 @@ class Work:
         folder = self._shelf.spare_folder()
         try:
             paths = save_files(stream, size, boundary, folder)
-            motions = [path for path in paths if path.suffix.lower() != ".asf"]
-            for path in motions:
-                kind_of(path)
-            if not motions:
-                raise Refused(400, "there is no motion file among what was given")
             with self.turn():
-                return self._converted(folder, motions)
+                return self._converted(folder, paths)
         except OSError as error:
             raise Refused(507, f"the files could not be kept: {error.strerror}") from None
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
-
-    def _converted(self, folder: Path, motions: list[Path]) -> dict[str, Any]:
-        one = motions[0]
-        if len(motions) == 1:
-            name, kind = one.name, kind_of(one)
-            make = partial(encode, one, said=self._shelf.said)
-        else:
-            name, kind = f"{len(motions)} files", "folder"
-            make = partial(pack, folder, shelf=self._shelf)
-        try:
-            number, stored = self._shelf.upload(name, kind, make)
         except MczError as error:
             error.args = (str(error).replace(f"{folder}{os.sep}", ""),)  # which nobody knows
             raise
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _converted(self, folder: Path, paths: list[Path]) -> dict[str, Any]:
+        motions = [path for path in paths if path.suffix.lower() != ".asf"]
+        if not motions:
+            raise Refused(400, "there is no motion file among what was given")
+        kinds = [kind_of(path) for path in motions]
+        if "mcz" in kinds:
+            raise OptionError("an .mcz needs no converting; the page reads it")
+        if len(motions) == 1:
+            name, kind = motions[0].name, kinds[0]
+            make = partial(encode, motions[0], said=self._shelf.said)
+        else:
+            name, kind = f"{len(motions)} files", "folder"
+            make = partial(pack, folder, shelf=self._shelf)
+        number, stored = self._shelf.upload(name, kind, make)
         return {"url": url_of(number), "name": name, "size": stored.size}
 
     def encode(self, asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -118,7 +117,8 @@ class Work:
         codec, params = text_of(asked, "codec"), params_of(asked)
         by_name(codec).options(params)
         refuse_files(params)
-        motion = with_facts(self._motion(asked), None, asked.get("unit") or None)
+        unit = None if asked.get("unit") is None else text_of(asked, "unit")
+        motion = with_facts(self._motion(asked), None, unit)
         quality: dict[str, str] = {}
 
         def make(out: BinaryIO) -> None:
