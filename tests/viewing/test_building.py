@@ -91,7 +91,7 @@ def test_without_npm_the_command_is_said(
     page = checkout / building.VIEWER / "dist" / "viewer.html"
     page.parent.mkdir()
     page.write_bytes(PAGE.read_bytes())
-    changed(page, 200)
+    changed(page, 50)
     said: list[str] = []
     assert built(said.append, checkout) == page
     assert "older than its sources" in said[0]
