@@ -62,6 +62,7 @@ class Work:
         return {
             "version": import_module("mcz").__version__,
             "files": self.files(),
+            "diff": len(self._shelf.given()) == 2,
             "salvage": self._shelf.salvage,
             "codecs": lossy_codecs(),
             "canEncode": True,

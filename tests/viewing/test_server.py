@@ -77,6 +77,7 @@ def test_api_says_what_is_there(server: Server) -> None:
         ("broken.bvh", "bvh", "files/2"),
     ]
     assert (api["canEncode"], api["canConvert"], api["salvage"]) == (True, True, False)
+    assert api["diff"] is False  # there are three
     assert api["version"] == mcz.__version__
     codecs = {codec["name"]: codec for codec in api["codecs"]}
     assert "posewave" in codecs
