@@ -16,7 +16,7 @@ from mcz.reading.clip import Clip
 from mcz.retargeting.sides import sides_of
 
 MOST_POINTS = 4096
-MOST_READ = 6000  # frames of a clip that are decoded to show some of them
+MOST_READ = 3000  # frames of a clip that are decoded to show some of them
 MOST_NUMBERS = 2**21  # likewise, of all channels
 RATE = 30.0  # frames a second that are enough; the player draws what lies between two
 MISSING = -32768  # the word of a coordinate that is not known
@@ -56,7 +56,8 @@ def figure(skeleton: Skeleton) -> Figure:
     """The lines and sides; raises MotionError where there is no point, or too many to draw."""
     points = list(listed_points(skeleton))
     if not 0 < len(points) <= MOST_POINTS:
-        raise MotionError(f"{len(points):,} points, of which 1 to {MOST_POINTS:,} are drawn")
+        why = f"at most {MOST_POINTS:,} are drawn" if points else "there is nothing to draw"
+        raise MotionError(f"{len(points):,} points: {why}")
     sides = [("", "left", "right").index(side) for side in sides_of(skeleton.addresses())]
     return Figure(bones_of(skeleton), [sides[joint] for joint, _ in points])
 

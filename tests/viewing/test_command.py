@@ -68,6 +68,23 @@ def get(url: str, path: str) -> bytes:
     return data
 
 
+def opened(url: str) -> http.client.HTTPResponse:
+    """The event stream of a page."""
+    at = urlsplit(url)
+    connection = http.client.HTTPConnection(at.netloc, timeout=30)
+    connection.request("GET", at.path + "alive")
+    response = connection.getresponse()
+    assert response.readline() == b": here\n"
+    return response
+
+
+def test_a_page_hears_that_the_server_ends(samples: Path) -> None:
+    with mcz.view(samples / "walk.bvh", browser=False) as shown:
+        assert shown.url is not None
+        stream = opened(shown.url)
+    assert stream.read() == b"\nevent: end\ndata: \n\n"
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
 def test_a_signal_ends_it_and_nothing_is_left(
     samples: Path, temporary: Path, number: int, code: int
@@ -83,21 +100,17 @@ def test_a_signal_ends_it_and_nothing_is_left(
 def test_it_ends_with_its_pages(
     samples: Path, temporary: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A page that comes back in time goes on; when none does, all is over."""
+    """While one of them is open it stays; when the last has been closed for a while, all is over."""
     monkeypatch.setattr("mcz.viewing.server.GRACE", 0.2)
-    seen: list[str] = []
+    seen: list[object] = []
 
     def visit(url: str) -> bool:
         def pages() -> None:
-            at = urlsplit(url)
-            for _ in range(2):
-                connection = http.client.HTTPConnection(at.netloc, timeout=30)
-                connection.request("GET", at.path + "alive")
-                response = connection.getresponse()
-                seen.append(response.headers["Content-Type"])
-                get(url, "files/0")
-                response.close()
-                connection.close()
+            first, second = opened(url), opened(url)
+            seen.append(first.headers["Content-Type"])
+            first.close()
+            seen.append(get(url, "files/0")[:4])
+            second.close()
 
         Thread(target=pages).start()
         return True
@@ -106,7 +119,7 @@ def test_it_ends_with_its_pages(
     code, out, errors = call("view", samples / "walk.bvh")
     assert (code, errors) == (0, "")
     assert out.startswith("http://127.0.0.1:")
-    assert seen == ["text/event-stream"] * 2
+    assert seen == ["text/event-stream", b"\x89MCZ"]
     assert not list(temporary.iterdir())
 
 
