@@ -100,7 +100,7 @@ def test_a_signal_ends_it_and_nothing_is_left(
 def test_it_ends_with_its_pages(
     samples: Path, temporary: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """While one of them is open it stays; when the last has been closed for a while, all is over."""
+    """While one of them is open it stays; it ends when all have been closed for a while."""
     monkeypatch.setattr("mcz.viewing.server.GRACE", 0.2)
     seen: list[object] = []
 
