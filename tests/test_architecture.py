@@ -19,7 +19,7 @@ PACKAGE = Path(mcz.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # What a part may import; a part is the first name after ``mcz.``. Each may import itself.
-GROUND = {"brief", "errors", "schema", "numbers", "threads"}
+GROUND = {"brief", "displays", "errors", "schema", "numbers", "threads"}
 MODEL = GROUND | {"motion", "skeleton", "source"}
 # Where motion, codec and container meet: what each of the doors below needs of the layers.
 JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
@@ -28,6 +28,7 @@ ALLOWED = {
     "jit": set(),
     "interrupts": set(),
     "brief": set(),
+    "displays": set(),
     "errors": set(),
     "schema": {"errors"},
     "numbers": {"brief", "errors", "schema"},
@@ -36,7 +37,7 @@ ALLOWED = {
     "motion": GROUND | {"skeleton", "source"},
     "kinematics": MODEL,
     "angles": MODEL,
-    "metrics": MODEL | {"angles", "kinematics"},
+    "metrics": MODEL | {"angles", "joint_errors", "kinematics"},
     "poses": MODEL | {"kinematics", "units"},
     "bjontegaard": GROUND,
     "joint_errors": MODEL | {"kinematics"},
@@ -64,15 +65,17 @@ ALLOWED = {
     | {"recovery", "jobs", "metrics", "queries", "reading", "writing", "conversion", "tables"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "dask": JOINT | {"jobs", "reading", "writing", "editing"},
+    "viewing": JOINT | {"annexes", "metrics", "editing", "reading", "retargeting", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
-    | {"bags", "jobs", "dask"}
+    | {"bags", "jobs", "dask", "viewing"}
     | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
     "": MODEL
     | {"version", "bags", "kinematics", "metrics", "poses", "datasets", "retargeting", "tables"}
+    | {"viewing"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
