@@ -16,6 +16,7 @@ export { AccessError, LimitExceeded, MczError, Refused, Unsupported } from "./er
 export { fromBlob, fromBytes } from "./from-bytes.js";
 export { fromUrl } from "./from-url.js";
 export { open } from "./open.js";
+export { analogValues } from "./recording.js";
 
 /**
  * @typedef {object} Options

@@ -11,6 +11,7 @@ import { supplied } from "./missing.js";
 import { MOST_HEAD, indexedBody } from "./packets.js";
 import { readQuality } from "./qual.js";
 import { payloadIn } from "./ranges.js";
+import { c3dRecording } from "./recording.js";
 import { sourceFormatLabel } from "./registry.js";
 import { decodeSegments, openSignal, segmentsOf, takeColumns } from "./signals.js";
 import { restoreClip } from "./sources.js";
@@ -172,6 +173,19 @@ export class RangedClip {
     const { numbers } = clip;
     const maxBytes = this.file.decodedLimit;
     return restoreClip({ clip, signals, numbers, sourceSha256, maxBytes });
+  }
+
+  /**
+   * What the source of the clip, a C3D, says beside its numbers: events, names, units, scales.
+   *
+   * @returns {Promise<import("./recording.js").Recording | null>} null where it is no C3D
+   * @throws {import("./errors.js").MczError}
+   */
+  async recording() {
+    const { source } = this.clip;
+    if (!this.origin?.format.startsWith("c3d")) return null;
+    await this.file.shared.loadTemplate(source, "clip");
+    return c3dRecording(source);
   }
 
   /**
