@@ -1,6 +1,6 @@
 // What is wrong with a damaged file, in words, with the clips and frames that it is about.
 
-import { lostFrames } from "./losses.js";
+import { lostFrames, storedFrames } from "./losses.js";
 
 /**
  * @typedef {object} Loss
@@ -47,16 +47,16 @@ export class Damage {
     this.add(`bytes ${start} to ${stop}: ${n} segments of ${of}`, { clip, bytes: [start, stop] });
   }
 
-  /** A clip that ended without CEND; `declared` frames of it were announced, null: nobody knows. */
-  noEnd({ name, nFrames }, declared) {
-    const of = declared === null ? "" : ` of ${declared}`;
+  /** A clip that ended without CEND. */
+  noEnd({ name, nFrames, declared, open }) {
+    const of = open ? "" : ` of ${declared}`;
     this.add(`clip ${name} has no end: ${nFrames}${of} frames are there`, { clip: name });
   }
 
   /** The frames that a clip has lost. */
   ofClip(clip) {
     for (const signal of clip.signals) {
-      const stored = signal.skip + clip.nFrames + signal.spare;
+      const stored = storedFrames(clip, signal.skip + signal.spare, clip.end !== null);
       for (const [a, b] of lostFrames(signal.segments, stored)) {
         const from = Math.max(0, a - signal.skip);
         const to = Math.min(clip.nFrames, b - signal.skip);

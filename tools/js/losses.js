@@ -43,6 +43,19 @@ export function chainsOf(segments, stored) {
 }
 
 /**
+ * The stored frames of a signal, those that are lost among them.
+ *
+ * @param {{nFrames: number, declared: number, open: boolean}} clip `declared`: frames of CLIP
+ * @param {number} hidden frames that are not shown
+ * @param {boolean} ended the clip has its CEND
+ * @returns {number} Infinity where nobody knows
+ */
+export function storedFrames({ nFrames, declared, open }, hidden, ended) {
+  if (ended) return nFrames + hidden;
+  return open ? Infinity : declared + hidden;
+}
+
+/**
  * @param {import("./data.js").Segment[]} segments those that are there, in frame order
  * @param {number} stored frames of the signal, where it is whole
  * @returns {[number, number][]} runs of stored frames that cannot be decoded

@@ -12,15 +12,19 @@ export function overlaid(source, parts) {
     remote: source.remote,
     async read(start, stop) {
       const bytes = await source.read(start, stop);
-      const met = parts.filter((part) => part.start < stop && start < part.start + part.bytes.length);
+      const met = parts.filter((part) => part.start < stop && start < endOf(part));
       if (met.length === 0) return bytes;
       const out = bytes.slice();
       for (const part of met) {
         const from = Math.max(start, part.start);
-        const to = Math.min(stop, part.start + part.bytes.length);
+        const to = Math.min(stop, endOf(part));
         out.set(part.bytes.subarray(from - part.start, to - part.start), from - start);
       }
       return out;
     },
   };
+}
+
+function endOf({ start, bytes }) {
+  return start + bytes.length;
 }

@@ -7,7 +7,7 @@ import { FRAMING_SIZE, HEADER_SIZE } from "./chunks.js";
 import { addSegment, frameSegment, readSegment, takeStreams } from "./data.js";
 import { Refused } from "./errors.js";
 import { Room, decodedBytes } from "./limits.js";
-import { lostFrames } from "./losses.js";
+import { lostFrames, storedFrames } from "./losses.js";
 import { supplied } from "./missing.js";
 import { MOST_HEAD, indexedBody } from "./packets.js";
 import { readQuality } from "./qual.js";
@@ -38,6 +38,7 @@ export async function openClip(file, index, row) {
   const payload = await file.ranges.payload(place, file.limits.payloadBytes, ahead);
   const clip = await supplied(() => readClip(payload, place.offset, file.shared));
   if (!file.salvage) compare(clip, row);
+  clip.declared = clip.nFrames;
   clip.nFrames = row.nFrames;
   clip.findModel = file.shared.modelFinder(place.offset);
   clip.numbers = numbersOf(clip, file.salvage);
@@ -178,8 +179,7 @@ export class RangedClip {
     if (clip.source === null) return null;
     await this.file.shared.loadTemplate(clip.source, "clip");
     const { sourceSha256 } = await this.end();
-    const stored = ({ skip, spare }) => skip + clip.nFrames + spare;
-    if (clip.signals.some((of) => lostFrames(of.segments, stored(of)).length > 0)) {
+    if (clip.signals.some((of) => lostFrames(of.segments, this.stored(of)).length > 0)) {
       throw new Refused(`clip ${this.name} has lost frames, and its source with them`);
     }
     const signals = [];
@@ -267,10 +267,15 @@ export class RangedClip {
   /** The frames that are there; what their segments are is known from a walk through the file. */
   async decodeSalvaged(signal, request) {
     new Room(this.file.decodedLimit).take(bytesOf(request, signal));
-    return salvageSignal(signal, request, this.nFrames, (segments, from, to) => {
+    return salvageSignal(signal, request, this.stored(signal), (segments, from, to) => {
       const chain = this.chain(signal, segments);
       return this.decodeStrictly(chain, { ...request, from, to });
     });
+  }
+
+  /** The stored frames of a signal; Infinity where its clip was cut off and does not say it. */
+  stored({ skip, spare }) {
+    return storedFrames(this.clip, skip + spare, this.row.end !== null);
   }
 
   /** The signal with these segments alone. */

@@ -3,7 +3,6 @@
 import {
   FOOT_SIZE,
   HEADER_SIZE,
-  SIGNATURE_SIZE,
   checkSignature,
   isChunk,
   readChunk,

@@ -8,14 +8,14 @@ import { chainsOf } from "./losses.js";
  *
  * @param {import("./clip.js").Signal} signal with the segments that are there
  * @param {{from: number, to: number}} request frames of the clip
- * @param {number} nFrames of the clip
+ * @param {number} stored frames of the signal where it is whole
  * @param {(segments: object[], from: number, to: number) => Promise<object>} decode of frames of
  *   the clip from a chain of segments; may throw {@link Refused}
  * @returns {Promise<{nRows: number, nChannels: number, values: Float64Array | BigInt64Array,
  *   mask: Uint8Array, lost: [number, number][]}>}
  */
-export async function salvageSignal(signal, { from, to }, nFrames, decode) {
-  const { skip, spare, samplesPerFrame, integer } = signal;
+export async function salvageSignal(signal, { from, to }, stored, decode) {
+  const { skip, samplesPerFrame, integer } = signal;
   const nChannels = signal.channels.length;
   const perFrame = samplesPerFrame * nChannels;
   const size = (to - from) * perFrame;
@@ -30,7 +30,7 @@ export async function salvageSignal(signal, { from, to }, nFrames, decode) {
     else mask.fill(1, start, start + part.values.length);
     found.push([a, b]);
   };
-  for (const chain of chainsOf(signal.segments, skip + nFrames + spare)) {
+  for (const chain of chainsOf(signal.segments, stored)) {
     const a = Math.max(from, chain.from - skip);
     const b = Math.min(to, chain.to - skip);
     if (a < b) await halve(chain.segments, a, b, skip, rescue);
@@ -42,6 +42,9 @@ export async function salvageSignal(signal, { from, to }, nFrames, decode) {
 /** Lets `rescue` have frames; where that fails, those of fewer and fewer segments. */
 async function halve(segments, from, to, skip, rescue) {
   const todo = [[from, to]];
+  const last = segments.at(-1);
+  const end = Math.min(to, last.firstFrame + last.nFrames - skip);
+  const lead = segments.reduce((most, segment) => Math.max(most, segment.lead), 0);
   while (todo.length > 0) {
     const [a, b] = todo.pop();
     try {
@@ -50,9 +53,10 @@ async function halve(segments, from, to, skip, rescue) {
       if (!(error instanceof Refused) || error instanceof Unsupported) throw error;
       const starts = segments.map(({ firstFrame }) => firstFrame - skip);
       const inner = starts.filter((start) => start > a && start < b);
-      if (inner.length === 0) continue; // what cannot be decoded is known
       const middle = inner[inner.length >> 1];
-      todo.push([middle, b], [a, middle]);
+      if (inner.length > 0) todo.push([middle, b], [a, middle]);
+      // Of one segment, the frames that the one after bears upon may be lost with that.
+      else if (lead > 0 && b === end && end - lead > a) todo.push([a, end - lead]);
     }
   }
 }

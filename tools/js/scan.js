@@ -86,8 +86,9 @@ export class Scan extends Walk {
     const start = this.at;
     if (start >= this.file.size) this.refuse("the file ends without a FOOT");
     if (!isChunk(await this.view(start, 1), 0)) {
+      const foot = readFoot(await this.view(start, FOOT_SIZE), 0);
       this.closeClip();
-      this.takeFoot(this.placed(readFoot(await this.view(start, FOOT_SIZE), 0), start));
+      this.takeFoot(this.placed(foot, start));
       this.at = this.endOfFoot;
       this.sound.push(start, this.at);
       return;
@@ -163,7 +164,7 @@ export class Scan extends Walk {
       if (type === "REPT") this.readRepeated(chunk);
     } catch (error) {
       if (!(error instanceof Refused)) throw error;
-      this.note(error, offset, chunk.end);
+      if (this.clip === null) this.note(error, offset, chunk.end); // else nothing is lost by it
     }
     if (this.clip || !this.lastClip) return;
     this.lastClip.ancillary.push({ type, offset, length: payload.length });
@@ -293,9 +294,9 @@ export class Scan extends Walk {
     this.clip = null;
     clip.payload = null;
     if (clip.end === null) {
-      const declared = clip.open ? null : clip.nFrames;
+      clip.declared = clip.nFrames;
       clip.nFrames = framesFound(clip);
-      this.damage.noEnd(clip, declared);
+      this.damage.noEnd(clip);
     }
     try {
       clip.numbers = frameNumbers(clip);

@@ -41,7 +41,7 @@ export class SharedChunks {
     });
   }
 
-  /** A template of which only the id is known: `format` and `data` are read when they are needed. */
+  /** A template of which only the id is known: the rest of it is read when it is needed. */
   template(id) {
     const isThere = this.salvage || this.directory.shared.has(`SRCE ${id}`);
     return isThere ? { id, format: null, data: null } : undefined;

@@ -27,8 +27,8 @@ const BASE_PROFILE = 0;
  * @property {number} size bytes of the file
  * @property {Uint8Array} head payload of HEAD
  * @property {object} limits of its profile
- * @property {object[]} shared where SKEL, MODL and SRCE lie, the first of each id: type, id, offset,
- *   length
+ * @property {object[]} shared where SKEL, MODL and SRCE lie, the first of each id: type, id,
+ *   offset, length
  * @property {Map<string, import("./skel.js").Skeleton>} skeletons by id
  * @property {Map<string, {kind: number, data: Uint8Array}>} models by id
  * @property {Map<string, {format: number, data: Uint8Array}>} templates by id, inflated
