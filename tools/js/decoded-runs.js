@@ -48,6 +48,32 @@ export function runsWithin(runs, from, to) {
   return runs.slice(low, end);
 }
 
+/**
+ * Wanted frames, cut out of what was decoded of neighboring runs.
+ *
+ * @param {{from: number, to: number, decoded: object}[]} parts frames of the clip
+ * @param {import("./clip.js").Signal} signal
+ * @param {{from: number, to: number}} request frames of the clip
+ * @returns {{signal: object, nRows: number, nChannels: number, values: object, mask: object}}
+ */
+export function joined(parts, signal, { from, to }) {
+  const { samplesPerFrame, integer, channels } = signal;
+  const perFrame = samplesPerFrame * channels.length;
+  const size = (to - from) * perFrame;
+  const values = integer ? new BigInt64Array(size) : new Float64Array(size);
+  const anyMask = parts.some(({ decoded }) => decoded.mask !== null);
+  const mask = anyMask ? new Uint8Array(size).fill(1) : null;
+  for (const { from: first, to: end, decoded } of parts) {
+    const a = Math.max(from, first);
+    const b = Math.min(to, end);
+    const cut = (array) => array.subarray((a - first) * perFrame, (b - first) * perFrame);
+    values.set(cut(decoded.values), (a - from) * perFrame);
+    if (decoded.mask) mask.set(cut(decoded.mask), (a - from) * perFrame);
+  }
+  const nRows = (to - from) * samplesPerFrame;
+  return { signal, nRows, nChannels: channels.length, values, mask };
+}
+
 /** What was decoded of runs, the run that was used last at the end. */
 export class DecodedRuns {
   constructor() {

@@ -55,10 +55,12 @@ export class Rows {
   /**
    * @param {number} length
    * @param {(index: number) => ClipRow} make
+   * @param {(index: number) => string} nameOf
    */
-  constructor(length, make) {
+  constructor(length, make, nameOf = (index) => make(index).name) {
     this.length = length;
     this.make = make;
+    this.nameOf = nameOf;
     this.names = null;
   }
 
@@ -75,7 +77,7 @@ export class Rows {
   indexOf(name) {
     if (this.names === null) {
       this.names = new Map();
-      for (let i = 0; i < this.length; i++) this.names.set(this.make(i).name, i);
+      for (let i = 0; i < this.length; i++) this.names.set(this.nameOf(i), i);
       if (this.names.size < this.length) throw new Refused("INDX: two clips have the same name");
     }
     return this.names.get(name) ?? -1;
@@ -146,7 +148,7 @@ function placeOf(reader, type) {
 
 // Clips
 
-/** Where each entry begins; all of them are read once, so that none is refused later. */
+/** Where each entry begins; what is in it is read when it is asked for. */
 function readRows(reader) {
   const n = reader.varint();
   if (n > reader.left / LEAST_CLIP) reader.refuse(`${n} clips in ${reader.left} bytes`);
@@ -154,10 +156,29 @@ function readRows(reader) {
   const metadata = [];
   for (let i = 0; i < n; i++) {
     starts[i] = reader.at;
-    for (const place of readRow(reader).ancillary) if (place.type === "META") metadata.push(place);
+    skipRow(reader, metadata);
   }
-  const make = (i) => readRow(new ByteReader(reader.bytes, "INDX, inflated", starts[i]));
-  return { rows: new Rows(n, make), metadata };
+  const at = (i) => new ByteReader(reader.bytes, "INDX, inflated", starts[i]);
+  return { rows: new Rows(n, (i) => readRow(at(i)), (i) => at(i).text()), metadata };
+}
+
+/** Steps over an entry; only its META chunks are looked at. */
+function skipRow(reader, metadata) {
+  const skipNumbers = (n) => {
+    if (n > reader.left) reader.refuse(`${n} numbers in ${reader.left} bytes`);
+    for (let i = 0; i < n; i++) reader.varint();
+  };
+  reader.skip(reader.varint()); // name
+  reader.skip(ID_SIZE);
+  skipNumbers(3); // frames, rate
+  skipNumbers(NUMBERS_OF_SIGNAL * reader.varint());
+  skipNumbers(2); // place
+  reader.skip(reader.varint()); // segments
+  skipNumbers(2); // CEND
+  for (let left = reader.varint(); left > 0; left--) {
+    const place = placeOf(reader, typeOf(reader));
+    if (place.type === "META") metadata.push(place);
+  }
 }
 
 function readRow(reader) {

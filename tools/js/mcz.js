@@ -1,8 +1,9 @@
 // The public interface: what an MCZ file holds, as arrays and as the source files it was made of.
 
 import { codecLabel } from "./codecs.js";
-import { LimitExceeded, Refused, Unsupported } from "./errors.js";
+import { Refused, Unsupported } from "./errors.js";
 import { Room, decodedLimit } from "./limits.js";
+import { guarded } from "./memory.js";
 import { canFilter, postFilter } from "./post-filter.js";
 import { readFile } from "./read.js";
 import { sourceFormatLabel } from "./registry.js";
@@ -149,20 +150,6 @@ function contentOf({ of, target }, contents, room) {
 
 function limitOf(file, options) {
   return options.decodedLimit ?? decodedLimit(file.size);
-}
-
-const NO_MEMORY = /allocation failed|Invalid typed array length/;
-
-/** Memory that cannot be had is a limit like any other. */
-function guarded(work) {
-  try {
-    return work();
-  } catch (error) {
-    if (error instanceof RangeError && NO_MEMORY.test(error.message)) {
-      throw new LimitExceeded(`too large for this machine: ${error.message}`);
-    }
-    throw error;
-  }
 }
 
 function wantedClips(file, { clip: name }) {

@@ -14,15 +14,18 @@ import { DecodedRuns } from "./decoded-runs.js";
 import { readIndex } from "./directory.js";
 import { Refused } from "./errors.js";
 import { readHead } from "./head.js";
-import { decodedLimit } from "./limits.js";
+import { decodedLimit, within } from "./limits.js";
+import { guarded, guardedLater } from "./memory.js";
 import { apply, readRecords } from "./metadata.js";
 import { supplied } from "./missing.js";
 import { openClip } from "./ranged-clip.js";
 import { Ranges, payloadIn } from "./ranges.js";
 import { salvaged } from "./salvage.js";
 import { SharedChunks } from "./shared-chunks.js";
+import { Attachment } from "./shared.js";
 import { walked } from "./walked.js";
 
+const ALIASED = ["clip", "skeleton", "attachment"];
 const TAIL = 128 * 1024; // bytes at the end that are read first
 const MOST_INDEX = 2 ** 29; // bytes of an INDX chunk
 
@@ -36,7 +39,11 @@ const MOST_INDEX = 2 ** 29; // bytes of an INDX chunk
  * @returns {Promise<MczFile>}
  * @throws {import("./errors.js").MczError}
  */
-export async function open(source, { salvage = false, limit } = {}) {
+export async function open(source, options = {}) {
+  return guardedLater(() => opened(source, options));
+}
+
+async function opened(source, { salvage = false, limit }) {
   const ranges = new Ranges(await source);
   const most = limit ?? decodedLimit(ranges.size);
   if (salvage) {
@@ -107,6 +114,14 @@ export class MczFile {
     this.size = ranges.size;
     /** The clips in file order: see clip-list.js. */
     this.clips = clipList(directory);
+    /** Attached files: see {@link attachment}. */
+    this.attachments = Array.from(directory.attachments.values(), ({ name, size }) => {
+      return { name, size };
+    });
+    /** Paths that have the content of the source of a clip or skeleton, or of an attached file. */
+    this.aliases = Array.from(directory.aliases.values(), ({ name, of, target }) => {
+      return { name, of: ALIASED[of], target };
+    });
     /** What is lost of a damaged file that is salvaged: see damage.js. */
     this.damage = directory.damage ?? [];
   }
@@ -123,6 +138,40 @@ export class MczFile {
     const row = this.directory.rows.at(index);
     if (row === undefined) throw new Refused(`no clip ${which}`);
     return openClip(this, index, row);
+  }
+
+  /**
+   * @param {string} id in hexadecimal, as the clips have it
+   * @returns {Promise<import("./skel.js").Skeleton>}
+   * @throws {import("./errors.js").MczError}
+   */
+  async skeleton(id) {
+    const found = await supplied(() => this.shared.skeletons.get(id));
+    if (!found) throw new Refused(`no skeleton ${id}`);
+    return found;
+  }
+
+  /**
+   * An attached file.
+   *
+   * @param {string} name
+   * @returns {Promise<Uint8Array>}
+   * @throws {import("./errors.js").MczError}
+   */
+  async attachment(name) {
+    const found = this.directory.attachments.get(name);
+    if (!found) throw new Refused(`no attachment ${name}`);
+    within(found.size, this.decodedLimit, `bytes of attachment ${name}`);
+    let attachment = null;
+    for (const part of found.parts) {
+      const payload = await this.ranges.payload(part, this.limits.payloadBytes);
+      await supplied(() => {
+        if (attachment === null) attachment = new Attachment(payload, this.decodedLimit);
+        else attachment.add(payload);
+      });
+    }
+    if (!attachment.complete) throw new Refused(`attachment ${name} is not whole`);
+    return guarded(() => attachment.content());
   }
 
   /**

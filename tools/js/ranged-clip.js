@@ -3,16 +3,15 @@
 import { readClipEnd } from "./cend.js";
 import { frameNumbers, readClip } from "./clip.js";
 import { codecLabel } from "./codecs.js";
-import { FRAMING_SIZE, HEADER_SIZE } from "./chunks.js";
-import { addSegment, frameSegment, readSegment, takeStreams } from "./data.js";
-import { runsOf, runsWithin } from "./decoded-runs.js";
+import { addSegment, takeStreams } from "./data.js";
+import { joined, runsOf, runsWithin } from "./decoded-runs.js";
 import { Refused } from "./errors.js";
 import { Room, decodedBytes } from "./limits.js";
+import { loadSegments } from "./loading.js";
 import { lostFrames, storedFrames } from "./losses.js";
+import { guardedLater } from "./memory.js";
 import { supplied } from "./missing.js";
-import { MOST_HEAD, indexedBody } from "./packets.js";
 import { readQuality } from "./qual.js";
-import { payloadIn } from "./ranges.js";
 import { c3dRecording } from "./recording.js";
 import { sourceFormatLabel } from "./registry.js";
 import { salvageSignal } from "./salvaged-signal.js";
@@ -20,7 +19,6 @@ import { decodeSegments, openSignal, segmentsOf, takeColumns } from "./signals.j
 import { restoreClip } from "./sources.js";
 
 const AHEAD = 64 * 1024; // bytes of segments that come with CLIP where requests cost
-const CHECK_SIZE = 2; // of a packet
 const UP_AXES = [null, "x", "y", "z"];
 const LENGTH_UNITS = { 0.1: "mm", 1: "cm", 10: "dm", 100: "m", 2.54: "in", 30.48: "ft" };
 
@@ -152,7 +150,11 @@ export class RangedClip {
    *   frames that a damaged file does not have any more
    * @throws {import("./errors.js").MczError}
    */
-  async read({ frames, resolution = 0, joints, signal: wanted = 0 } = {}) {
+  async read(request = {}) {
+    return guardedLater(() => this.readRows(request));
+  }
+
+  async readRows({ frames, resolution = 0, joints, signal: wanted = 0 }) {
     const signal = this.signal(wanted);
     const [from, to] = this.range(frames);
     if (!isCount(resolution)) throw new Refused(`resolution ${resolution}`);
@@ -177,6 +179,10 @@ export class RangedClip {
    * @throws {import("./errors.js").MczError}
    */
   async source() {
+    return guardedLater(() => this.restore());
+  }
+
+  async restore() {
     const { clip } = this;
     if (clip.source === null) return null;
     await this.file.shared.loadTemplate(clip.source, "clip");
@@ -232,7 +238,7 @@ export class RangedClip {
     const overlapping = signal.segments.filter(
       ({ firstFrame, nFrames }) => firstFrame < to && from < firstFrame + nFrames,
     );
-    const loaded = await this.load(signal, overlapping);
+    const loaded = await loadSegments(this.file, this.clip, signal, overlapping);
     return loaded.map((segment) => sizesOf(segment, signal));
   }
 
@@ -275,7 +281,8 @@ export class RangedClip {
     const runs = isWhole || from === to ? null : this.runs(signal, dropped, decoder.alone === true);
     const near = runs && runsWithin(runs, skip + from, skip + to);
     const shown = (run) => {
-      return { dropped, from: Math.max(0, run.from - skip), to: Math.min(this.nFrames, run.to - skip) };
+      const end = Math.min(this.nFrames, run.to - skip);
+      return { dropped, from: Math.max(0, run.from - skip), to: end };
     };
     const { decoded: kept } = this.file;
     if (!near || !near.every((run) => kept.mayKeep(bytesOf(shown(run), signal)))) {
@@ -324,7 +331,7 @@ export class RangedClip {
     const opened = await this.open(signal);
     const room = new Room(this.file.decodedLimit);
     const needed = segmentsOf(opened, { ...request, room });
-    const segments = await this.load(signal, needed);
+    const segments = await loadSegments(this.file, this.clip, signal, needed);
     const isWhole = request.from === 0 && request.to === this.nFrames && request.dropped === 0;
     if (isWhole && !this.file.salvage) await this.end();
     return supplied(() => decodeSegments(opened, segments, request));
@@ -346,58 +353,10 @@ export class RangedClip {
     }
     return this.clip.end;
   }
-
-  /** Segments with their payloads, checked and compared with what the index says. */
-  async load(signal, segments) {
-    const { ranges, limits } = this.file;
-    const parts = await ranges.readAll(segments.map(extentOf));
-    return segments.map((segment, i) => {
-      const { packet, offset, size, firstFrame, fresh } = segment;
-      const place = { type: "DATA", offset: offset - HEADER_SIZE, length: size };
-      const payload = packet ? indexedBody(parts[i], segment) : payloadIn(parts[i], place);
-      const reading = { ...signal, due: firstFrame };
-      if (packet > 1) return { ...frameSegment(payload, fresh, reading, limits), offset };
-      const signals = [...this.clip.signals];
-      signals[signal.index] = reading;
-      const found = readSegment(payload, { ...this.clip, signals }, limits);
-      const fields = ["signal", "nFrames", "lead", "tail", "flags"];
-      if (fields.some((field) => found[field] !== segment[field])) {
-        throw new Refused(`DATA at ${place.offset}: it is not as the index says`);
-      }
-      return { ...found, offset };
-    });
-  }
-}
-
-/** Wanted frames, cut out of what was decoded of neighboring runs. */
-function joined(parts, signal, { from, to }) {
-  const { samplesPerFrame, integer, channels } = signal;
-  const perFrame = samplesPerFrame * channels.length;
-  const size = (to - from) * perFrame;
-  const values = integer ? new BigInt64Array(size) : new Float64Array(size);
-  const anyMask = parts.some(({ decoded }) => decoded.mask !== null);
-  const mask = anyMask ? new Uint8Array(size).fill(1) : null;
-  for (const { from: first, to: end, decoded } of parts) {
-    const a = Math.max(from, first);
-    const b = Math.min(to, end);
-    const cut = (array) => array.subarray((a - first) * perFrame, (b - first) * perFrame);
-    values.set(cut(decoded.values), (a - from) * perFrame);
-    if (decoded.mask) mask.set(cut(decoded.mask), (a - from) * perFrame);
-  }
-  const nRows = (to - from) * samplesPerFrame;
-  return { signal, nRows, nChannels: channels.length, values, mask };
 }
 
 function bytesOf({ from, to }, { samplesPerFrame, channels }) {
   return decodedBytes((to - from) * samplesPerFrame, channels.length);
-}
-
-/** Where the bytes of a segment lie, with what checks them. */
-function extentOf({ packet, offset, size }) {
-  if (packet === 0) {
-    return { start: offset - HEADER_SIZE, stop: offset - HEADER_SIZE + FRAMING_SIZE + size };
-  }
-  return { start: Math.max(0, offset - MOST_HEAD), stop: offset + size + CHECK_SIZE };
 }
 
 function sizesOf(segment, signal) {

@@ -17,7 +17,8 @@ const ROOT = new URL("../../", import.meta.url);
 const MANY = "conformance/vectors/valid/fast/";
 
 /** A server of one file whose manners a test may change. */
-const manners = { bytes: new Uint8Array(0), ranges: true, suffix: true, fails: 0, short: 0, tag: "a" };
+const USUAL = { ranges: true, suffix: true, fails: 0, short: 0, tag: "a" };
+const manners = { ...USUAL, bytes: new Uint8Array(0) };
 const asked = [];
 let server;
 let address;
@@ -51,14 +52,13 @@ function answer(request, response) {
     response.setHeader("Content-Length", stop - start);
     response.writeHead(206);
     const part = bytes.subarray(start, stop);
-    if (manners.short-- > 0) response.write(part.subarray(0, part.length >> 1), () => response.destroy());
-    else response.end(part);
+    if (manners.short-- <= 0) response.end(part);
+    else response.write(part.subarray(0, part.length >> 1), () => response.destroy());
   }
 }
 
 function serve(bytes, changes = {}) {
-  const usual = { ranges: true, suffix: true, fails: 0, short: 0, tag: "a" };
-  Object.assign(manners, usual, { bytes }, changes);
+  Object.assign(manners, USUAL, { bytes }, changes);
   asked.length = 0;
 }
 

@@ -5,14 +5,16 @@ import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
 
 import { readAnnex } from "./annex-node.js";
-import { MczError, Refused, decode, fromBytes, list, open, setAnnex } from "./mcz.js";
+import { MczError, Refused, analogValues, decode, fromBytes, list, open, setAnnex, sources } from "./mcz.js";
+import { c3dRecording } from "./recording.js";
 
 setAnnex(readAnnex);
 const VECTORS = new URL("../../conformance/vectors/", import.meta.url);
 
 function vectors(folder) {
   const names = readdirSync(new URL(folder, VECTORS), { recursive: true });
-  return names.filter((name) => name.endsWith(".mcz")).sort().map((name) => `${folder}/${name}`);
+  const files = names.filter((name) => name.endsWith(".mcz")).sort();
+  return files.map((name) => `${folder}/${name}`);
 }
 
 /** One of four, since all take long; MCZ_EVERY=1 asks for all. */
@@ -150,6 +152,104 @@ test("a lost segment is told with its frames", async () => {
   assert.ok(Number.isNaN(values[frames[0] * nChannels]));
   assert.equal(mask[frames[1] * nChannels], 1);
   await assert.rejects((await (await open(fromBytes(bytes))).clip(0)).read(), Refused);
+});
+
+test("sources, and what a C3D says beside its numbers", async () => {
+  let n = 0;
+  for (const name of vectors("valid/sources")) {
+    const bytes = bytesOf(name);
+    const held = attempt(() => sources(bytes));
+    if (held === null) continue;
+    const file = await open(fromBytes(bytes));
+    for (const { index } of file.clips) {
+      const clip = await file.clip(index);
+      const expected = held.find(({ path }) => path === clip.origin?.path);
+      assert.deepEqual((await clip.source()) ?? undefined, expected?.bytes, name);
+      const recording = await clip.recording();
+      assert.equal(recording !== null, clip.origin?.format.startsWith("c3d") ?? false, name);
+      if (recording === null) continue;
+      const [motion, ...others] = clip.signals;
+      const nOf = (signal) => others.find((other) => other.name === signal)?.nChannels ?? 0;
+      assert.equal(3 * recording.points.length, motion.nChannels + nOf("outputs"), name);
+      assert.equal(recording.analog.length, nOf("analog"), name);
+      n++;
+    }
+  }
+  assert.ok(n > 0);
+});
+
+/** The source of a C3D of no frames, whose parameters are [group, name, type, dims, bytes]. */
+function c3dSource(header, parameters) {
+  const head = new Uint8Array(2048);
+  head.set([2, 0x50]);
+  header(new DataView(head.buffer));
+  const ascii = (text) => [...text].map((c) => c.charCodeAt(0));
+  const groups = [...new Set(parameters.map(([group]) => group))];
+  const entries = groups.map((group, i) => [group.length, 255 - i, ...ascii(group), 3, 0, 0]);
+  for (const [group, name, type, dims, bytes] of parameters) {
+    const content = [type & 255, dims.length, ...dims, ...bytes, 0];
+    const size = content.length + 2;
+    const id = groups.indexOf(group) + 1;
+    entries.push([name.length, id, ...ascii(name), size & 255, size >> 8, ...content]);
+  }
+  head.set([1, 80, 3, 84, ...entries.flat()], 512);
+  const sized = (bytes) => [(bytes.length & 127) | 128, bytes.length >> 7, ...bytes];
+  const template = [84, 4, 1, 0, 1, 0, 0, 1, ...sized(head), 0, 0, 0];
+  const detail = Uint8Array.of(0, 1, 0, 0, 0);
+  return { format: 4, template: { data: Uint8Array.from(template) }, detail };
+}
+
+test("events of a C3D: those of the group EVENT, else those of its header", () => {
+  const header = (view) => {
+    view.setUint16(298, 12345, true);
+    view.setUint16(300, 1, true);
+    view.setFloat32(304, 1.5, true);
+    for (let i = 0; i < 4; i++) view.setUint8(396 + i, "RFO ".charCodeAt(i));
+  };
+  const none = { context: "", subject: "", description: "" };
+  const units = ["POINT", "UNITS", -1, [2], [0x6d, 0x6d]];
+  const found = c3dRecording(c3dSource(header, [units]));
+  assert.deepEqual(found.events, [{ label: "RFO", time: 1.5, ...none }]);
+  assert.equal(found.unit, "mm");
+  const floats = (...numbers) => [...new Uint8Array(Float32Array.from(numbers).buffer)];
+  const texts = (text) => [...text].map((c) => c.charCodeAt(0));
+  const listed = c3dRecording(
+    c3dSource(header, [
+      ["EVENT", "USED", 2, [], [2, 0]],
+      ["EVENT", "TIMES", 4, [2, 3], floats(0, 0.5, 1, 2, 0, 9)],
+      ["EVENT", "LABELS", -1, [4, 2], texts("Off Down")],
+      ["EVENT", "CONTEXTS", -1, [5, 2], texts("Left Right")],
+    ]),
+  );
+  assert.deepEqual(listed.events, [
+    { ...none, label: "Off", time: 0.5, context: "Left" },
+    { ...none, label: "Down", time: 62, context: "Right" },
+  ]);
+});
+
+test("what analog words mean", () => {
+  const analog = [
+    { offset: 2048, scale: 0.5 },
+    { offset: 0, scale: 2 },
+  ];
+  const values = analogValues({ analog, generalScale: 3 }, BigInt64Array.of(2050n, 1n, 2048n, -1n));
+  assert.deepEqual([...values], [3, 6, 0, -6]);
+});
+
+test("attached files, and those of aliases", async () => {
+  let n = 0;
+  for (const name of vectors("valid/container")) {
+    const bytes = bytesOf(name);
+    const file = await open(fromBytes(bytes));
+    const held = new Map(attempt(() => sources(bytes))?.map((of) => [of.path, of.bytes]));
+    for (const { name: path, size } of file.attachments) {
+      const content = await file.attachment(path);
+      assert.equal(content.length, size);
+      assert.deepEqual(content, held.get(path));
+      n++;
+    }
+  }
+  assert.ok(n > 0);
 });
 
 test("a list of clips is looked at without making them", async () => {
