@@ -1,8 +1,9 @@
 // The public interface: what an MCZ file holds, as arrays and as the source files it was made of.
 
 import { codecLabel } from "./codecs.js";
-import { LimitExceeded, Refused, Unsupported } from "./errors.js";
+import { Refused, Unsupported } from "./errors.js";
 import { Room, decodedLimit } from "./limits.js";
+import { guarded } from "./memory.js";
 import { canFilter, postFilter } from "./post-filter.js";
 import { readFile } from "./read.js";
 import { sourceFormatLabel } from "./registry.js";
@@ -11,7 +12,12 @@ import { decodeSignal, takeColumns } from "./signals.js";
 import { restoreClip, restoreSkeleton } from "./sources.js";
 
 export { setAnnex } from "./annex.js";
-export { LimitExceeded, MczError, Refused, Unsupported } from "./errors.js";
+export { annexFrom } from "./annex-url.js";
+export { AccessError, LimitExceeded, MczError, Refused, Unsupported } from "./errors.js";
+export { fromBlob, fromBytes } from "./from-bytes.js";
+export { fromUrl } from "./from-url.js";
+export { open } from "./open.js";
+export { analogValues } from "./recording.js";
 
 /**
  * @typedef {object} Options
@@ -144,20 +150,6 @@ function contentOf({ of, target }, contents, room) {
 
 function limitOf(file, options) {
   return options.decodedLimit ?? decodedLimit(file.size);
-}
-
-const NO_MEMORY = /allocation failed|Invalid typed array length/;
-
-/** Memory that cannot be had is a limit like any other. */
-function guarded(work) {
-  try {
-    return work();
-  } catch (error) {
-    if (error instanceof RangeError && NO_MEMORY.test(error.message)) {
-      throw new LimitExceeded(`too large for this machine: ${error.message}`);
-    }
-    throw error;
-  }
 }
 
 function wantedClips(file, { clip: name }) {

@@ -16,6 +16,17 @@ const FRESH_BIT = 0x80;
 const INDEX_FLAGS = { [KIND_SEGMENT]: 128, [KIND_FRAME]: 64, [KIND_NUMBERED]: 32 };
 
 /**
+ * The kind of the packet that a segment is, as an index says it; 0 of a closed DATA.
+ *
+ * @param {number} indexFlags
+ * @returns {{kind: number, bit: number}} `bit` is not one of the flags of the segment itself
+ */
+export function packetOf(indexFlags) {
+  const kind = [KIND_SEGMENT, KIND_FRAME, KIND_NUMBERED].find((k) => indexFlags & INDEX_FLAGS[k]);
+  return kind === undefined ? { kind: 0, bit: 0 } : { kind, bit: INDEX_FLAGS[kind] };
+}
+
+/**
  * Reads the packets of an open DATA and adds their segments to the signals of the clip.
  *
  * @param {Uint8Array} bytes the file
@@ -28,14 +39,43 @@ const INDEX_FLAGS = { [KIND_SEGMENT]: 128, [KIND_FRAME]: 64, [KIND_NUMBERED]: 32
  */
 export function readPackets(bytes, start, clip, limits, found) {
   const reader = new ByteReader(bytes, `open DATA of ${clip.name}`, start);
-  let frameIsDue = false; // a segment of signal 0 has come in this DATA
-  for (let sequence = 0; ; sequence++) {
-    const packet = readHead(reader, sequence, limits);
+  const packets = new Packets(clip, limits);
+  for (;;) {
+    const segment = packets.next(reader, 0);
+    if (segment === null) return reader.at;
+    found(segment);
+  }
+}
+
+/** The packets of an open DATA, one after the other. */
+export class Packets {
+  /**
+   * @param {import("./clip.js").Clip} clip whose signals are given the segments
+   * @param {object} limits of the profile
+   */
+  constructor(clip, limits) {
+    this.clip = clip;
+    this.limits = limits;
+    this.sequence = 0;
+    this.frameIsDue = false; // a segment of signal 0 has come in this DATA
+  }
+
+  /**
+   * Reads the next packet.
+   *
+   * @param {ByteReader} reader at the packet
+   * @param {number} base where the bytes of the reader begin in the file
+   * @returns {import("./data.js").Segment | null} null at the end packet
+   * @throws {Refused}
+   */
+  next(reader, base) {
+    const { clip, limits } = this;
+    const packet = readHead(reader, this.sequence, limits);
     if (packet.kind === KIND_END) {
       checkEnd(reader, packet);
-      return reader.at;
+      return null;
     }
-    const offset = reader.at;
+    const offset = base + reader.at;
     const body = reader.take(packet.length);
     const check = reader.u16();
     let segment;
@@ -43,15 +83,16 @@ export function readPackets(bytes, start, clip, limits, found) {
       checkBody(reader, check, crc32(body));
       segment = readSegment(body, clip, limits);
       if (segment.fresh !== packet.fresh) reader.refuse("packet and segment differ on freshness");
-      frameIsDue ||= segment.signal === 0;
     } else {
-      segment = readFrame(reader, packet, body, check, clip, frameIsDue, limits);
+      segment = readFrame(reader, packet, body, check, clip, this.frameIsDue, limits);
     }
+    this.frameIsDue ||= segment.signal === 0;
     segment.offset = offset;
     segment.size = packet.length;
     segment.indexFlags |= INDEX_FLAGS[packet.kind];
     addSegment(clip.signals[segment.signal], segment);
-    found(segment);
+    this.sequence++;
+    return segment;
   }
 }
 
@@ -98,4 +139,55 @@ function u64Bytes(value) {
   view.setUint32(0, value % 2 ** 32, true);
   view.setUint32(4, Math.floor(value / 2 ** 32), true);
   return out;
+}
+
+/** Bytes before the body of a packet that its head may have. */
+export const MOST_HEAD = 1 + 8 + 8 + 2;
+const CHECK_SIZE = 2;
+const MOST_SEQUENCE = 8; // bytes of a sequence number
+
+/**
+ * The checked body of a packet that an index names.
+ *
+ * @param {Uint8Array} bytes up to the end of the packet, from {@link MOST_HEAD} bytes before its
+ *   body on, or fewer where the file begins
+ * @param {import("./data.js").Segment} segment as the index has it
+ * @returns {Uint8Array}
+ * @throws {Refused}
+ */
+export function indexedBody(bytes, { packet, offset, size, firstFrame, fresh }) {
+  const begin = bytes.length - CHECK_SIZE - size;
+  const what = `the packet at ${offset}`;
+  const body = bytes.subarray(begin, begin + size);
+  const number = packet === KIND_NUMBERED ? u64Bytes(firstFrame) : new Uint8Array(0);
+  const reader = new ByteReader(bytes, what, begin + size);
+  checkBody(reader, reader.u16(), crc32(number, 0, number.length, crc32(body)));
+  const kind = packet | (fresh ? FRESH_BIT : 0);
+  if (packet !== KIND_SEGMENT && !hasHead(bytes.subarray(0, begin), kind, size)) {
+    reader.refuse("it is not as the index says");
+  }
+  return body;
+}
+
+/** Whether some bytes end with the head of such a packet, whatever its number in its DATA. */
+function hasHead(bytes, kind, length) {
+  for (let size = 1; size <= MOST_SEQUENCE; size++) {
+    const start = bytes.length - CHECK_SIZE - varintSize(length) - size - 1;
+    if (start < 0) return false;
+    const reader = new ByteReader(bytes, "packet", start);
+    const last = bytes[start + size];
+    const isNumber = last < 0x80 && bytes.subarray(start + 1, start + size).every((b) => b > 0x7f);
+    if (reader.u8() !== kind || !isNumber) continue;
+    reader.skip(size);
+    if (bytes[bytes.length - CHECK_SIZE - 1] > 0x7f || reader.varint() !== length) continue;
+    const check = crc32(bytes, start, reader.at);
+    if (reader.left === CHECK_SIZE && reader.u16() === (check & 0xffff)) return true;
+  }
+  return false;
+}
+
+function varintSize(value) {
+  let size = 1;
+  for (let rest = value; rest >= 128; rest = Math.floor(rest / 128)) size++;
+  return size;
 }
