@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from mcz.live.writer import LiveWriter
     from mcz.metrics import Comparison, compare
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
+    from mcz.pictures.rendering import Rendered, render
     from mcz.poses import (
         Root,
         accelerations,
@@ -135,6 +136,7 @@ _HOMES = {
         "rotations",
         "velocities",
     ),
+    "mcz.pictures.rendering": ("Rendered", "render"),
     "mcz.kinematics.contacts": ("Contact", "Contacts", "contacts"),
     "mcz.reading.report": ("Problem", "verify"),
     "mcz.metrics": ("Comparison", "compare"),
@@ -187,6 +189,7 @@ __all__ = [
     "Protection",
     "Recording",
     "Recovery",
+    "Rendered",
     "Repair",
     "Replacement",
     "Report",
@@ -230,6 +233,7 @@ __all__ = [
     "recording",
     "rename",
     "rename_clips",
+    "render",
     "reorder_clips",
     "repair",
     "replace",

@@ -63,21 +63,23 @@ ALLOWED = {
     | {"recovery", "jobs", "metrics", "queries", "reading", "writing", "conversion", "tables"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "dask": JOINT | {"jobs", "reading", "writing", "editing"},
+    # Pictures draw what the layers know, with the names that the public has for it.
+    "pictures": JOINT | {"joint_errors", "metrics", "poses", "reading", "retargeting", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
     | {"bags", "jobs", "dask"}
     | DOORS,
     # On top of all: it measures every part by itself.
-    "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
+    "bench": JOINT | {"angles", "bjontegaard", "metrics", "pictures", ""} | DOORS,
     "": MODEL
-    | {"bags", "kinematics", "metrics", "poses", "datasets", "retargeting", "tables"}
+    | {"bags", "kinematics", "metrics", "pictures", "poses", "datasets", "retargeting", "tables"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 
 BANNED_CONSTRUCTS = {"GreedyRange", "Enum", "Flag", "Padding", "VarInt", "Compressed"}
-HEAVY = {"llvmlite", "rich", "fsspec", "pywt", "scipy", "matplotlib"}
+HEAVY = {"llvmlite", "rich", "fsspec", "pywt", "scipy", "matplotlib", "PIL", "av"}
 
 
 def name_of(path: Path) -> str:

@@ -34,6 +34,7 @@ COMMANDS = (
     "extract",
     "replace",
     "diff",
+    "render",
     "stream",
     "bench",
     "train",

@@ -103,3 +103,24 @@ def _swapped(pattern: re.Pattern[str], name: str) -> Iterator[str]:
         yield pattern.sub(lambda match: _OTHER[match[0]], name)
     for match in pattern.finditer(name):
         yield name[: match.start()] + _OTHER[match[0]] + name[match.end() :]
+
+
+def sides_of(names: Sequence[str]) -> list[str]:
+    """Of every joint "left", "right" or "", by its name; one without a counterpart is no error.
+
+    >>> sides_of(["root", "lfemur", "rfemur", "lowerback", "Hand.L", "LeftFoot"])
+    ['', 'left', 'right', '', 'left', 'left']
+    """
+    held = set(names)
+    return [_side(name, held) for name in names]
+
+
+def _side(name: str, names: set[str]) -> str:
+    for pattern in (_WORD, _LETTER, _PREFIX, _SUFFIX):
+        match = pattern.search(name)
+        if match is None:
+            continue
+        sure = pattern in (_WORD, _LETTER) or bool(_BODY.match(name, match.end()))
+        if sure or any(other in names for other in _swapped(pattern, name)):
+            return "left" if match[0][0] in "lL" else "right"
+    return ""

@@ -82,6 +82,11 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
         "extract": [[str(file), f"{out}.mcz"], [str(file), f"{out}2.mcz", "--joints", STEERING]],
         "replace": [[str(file), f"{out}.mcz", "--joint", STEERING, "--values", str(file)]],
         "diff": [[str(file), str(file)], [str(file), odd]],
+        "render": [
+            [str(file), "-o", f"{out}.png", "--size", "64"],
+            [str(file), "-o", f"{out}.svg", "--clip", STEERING[:-1]],
+            [odd],
+        ],
         "stream": [["decode", str(file)], ["encode", "--skeleton", odd]],
         "bench": [[odd]],
         "train": [[odd, "-o", str(out)]],
