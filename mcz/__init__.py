@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from mcz.live.writer import LiveWriter
     from mcz.metrics import Comparison, compare
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
+    from mcz.pictures.plotting import Plotted, plot
     from mcz.pictures.rendering import Rendered, render
     from mcz.poses import (
         Root,
@@ -136,6 +137,7 @@ _HOMES = {
         "rotations",
         "velocities",
     ),
+    "mcz.pictures.plotting": ("Plotted", "plot"),
     "mcz.pictures.rendering": ("Rendered", "render"),
     "mcz.kinematics.contacts": ("Contact", "Contacts", "contacts"),
     "mcz.reading.report": ("Problem", "verify"),
@@ -185,6 +187,7 @@ __all__ = [
     "MotionError",
     "OptionError",
     "Outcome",
+    "Plotted",
     "Problem",
     "Protection",
     "Recording",
@@ -224,6 +227,7 @@ __all__ = [
     "mirror",
     "open",
     "pack",
+    "plot",
     "point_names",
     "positions",
     "post_filter",

@@ -64,7 +64,8 @@ ALLOWED = {
     "live": JOINT | {"interrupts", "reading", "writing"},
     "dask": JOINT | {"jobs", "reading", "writing", "editing"},
     # Pictures draw what the layers know, with the names that the public has for it.
-    "pictures": JOINT | {"joint_errors", "metrics", "poses", "reading", "retargeting", "writing"},
+    "pictures": JOINT
+    | {"angles", "joint_errors", "metrics", "poses", "reading", "retargeting", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}

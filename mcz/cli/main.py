@@ -35,6 +35,7 @@ COMMANDS = (
     "replace",
     "diff",
     "render",
+    "plot",
     "stream",
     "bench",
     "train",

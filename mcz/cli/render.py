@@ -27,7 +27,7 @@ from mcz.cli.progress import Progress
 VIEWS = ("front", "side", "top", "three-quarter")  # as in mcz.pictures, which takes longer
 
 
-def _to_size(
+def to_size(
     ctx: click.Context, param: click.Parameter, value: str | None
 ) -> tuple[int, int] | None:
     """Callback of ``640x480``, or ``640`` for a square."""
@@ -54,7 +54,7 @@ def _to_size(
 @click.option(
     "--speed", metavar="X", type=float, default=1.0, help="How fast it plays. Default: 1."
 )
-@click.option("--size", metavar="WxH", callback=_to_size, help="Pixels. Default: 640x640.")
+@click.option("--size", metavar="WxH", callback=to_size, help="Pixels. Default: 640x640.")
 @click.option(
     "--view",
     type=click.Choice(VIEWS),

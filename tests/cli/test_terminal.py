@@ -87,6 +87,12 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
             [str(file), "-o", f"{out}.svg", "--clip", STEERING[:-1]],
             [odd],
         ],
+        "plot": [
+            [str(file), "-o", f"{out}.png"],
+            [str(file), str(file), "-o", f"{out}.html"],
+            [str(file), "-o", f"{out}.svg", "--what", "bytes"],
+            [str(file), "-o", f"{out}.svg", "--joint", STEERING],
+        ],
         "stream": [["decode", str(file)], ["encode", "--skeleton", odd]],
         "bench": [[odd]],
         "train": [[odd, "-o", str(out)]],
