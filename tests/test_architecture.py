@@ -69,7 +69,7 @@ ALLOWED = {
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
-    | {"bags", "jobs", "dask"}
+    | {"bags", "jobs", "dask", "pictures", "poses"}
     | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", "pictures", ""} | DOORS,
