@@ -181,13 +181,13 @@ def test_bars_are_the_greatest_and_the_rest() -> None:
     rows = [
         {"signal": "motion", "joints": f"j{n}", "resolution": 0, "bytes": n + 1} for n in range(12)
     ]
-    found = bars_of(rows)
+    found, rest = bars_of(rows)
     assert found[0] == ("j11", 12)
-    assert found[-1] == ("4 others", 1 + 2 + 3 + 4)
+    assert (len(found), rest) == (8, [("4 others", 1 + 2 + 3 + 4)])
     parts = [{**row, "joints": "all", "resolution": n} for n, row in enumerate(rows[:3])]
     assert bars_of(parts) == [
         ("resolution 0, coarsest", 1),
         ("resolution 1", 2),
         ("resolution 2", 3),
     ]
-    assert bars_of([]) == []
+    assert bars_of([]) == ([], [])

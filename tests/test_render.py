@@ -44,9 +44,9 @@ def pixels(path: Path) -> np.ndarray:
         return np.asarray(image.convert("RGB")).astype(int)
 
 
-def near(picture: np.ndarray, colour: str, reach: int = 40) -> np.ndarray:
-    """Where a picture has about this colour."""
-    return (np.abs(picture - np.array(rgb(colour)) * 255).max(axis=2) < reach).nonzero()
+def near(picture: np.ndarray, color: str, reach: int = 40) -> np.ndarray:
+    """Where a picture has about this color."""
+    return (np.abs(picture - np.array(rgb(color)) * 255).max(axis=2) < reach).nonzero()
 
 
 @pytest.mark.parametrize("theme", THEMES)

@@ -52,7 +52,7 @@ MOST_ROWS = 24  # of a table that is printed
 )
 @moving_options
 @click.option("--size", metavar="WxH", callback=to_size, help="Pixels. Default: what suits it.")
-@click.option("--theme", type=click.Choice(("light", "dark")), default="light", help="Colours.")
+@click.option("--theme", type=click.Choice(("light", "dark")), default="light", help="Colors.")
 @force_option
 @json_option
 def command(

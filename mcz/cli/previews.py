@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"
 EIGHTHS, PLAIN = "▏▎▍▌▋▊▉█", "#"
+Bar = tuple[str, int]  # what takes so many bytes
+
 WIDTH = 24  # letters of the longest bar
 MOST_BARS = 8
 
@@ -51,14 +53,13 @@ def preview_lines(preview: dict[str, Any]) -> Iterator[str]:
         speeds = motion["mean_speeds"]
         most = max(speed for speed in speeds if speed is not None)
         yield f"  motion     {sparkline(speeds)}  mean speed, up to {most:.4g} {motion['unit']}"
-    bars = bars_of(preview.get("payload", []))
+    bars, rest = bars_of(preview.get("payload", []))
     if len(bars) > 1:
-        greatest, total = max(n for _, n in bars[:MOST_BARS]), sum(n for _, n in bars)
-        rows = [
-            [name, bar(n / greatest) if k < MOST_BARS else "", f"{n:,}", f"{100 * n / total:.1f} %"]
-            for k, (name, n) in enumerate(bars)
-        ]
-        lines = table([["payload", "", "bytes", "share"], *rows], "llrr").split("\n")
+        greatest, total = max(n for _, n in bars), sum(n for _, n in (*bars, *rest))
+        rows = [(name, bar(n / greatest), n) for name, n in bars]
+        rows += [(name, "", n) for name, n in rest]
+        cells = [[name, own, f"{n:,}", f"{100 * n / total:.1f} %"] for name, own, n in rows]
+        lines = table([["payload", "", "bytes", "share"], *cells], "llrr").split("\n")
         yield from (f"  {line}" for line in lines)
 
 
@@ -86,8 +87,9 @@ def bar(share: float, blocks: bool | None = None) -> str:
     return EIGHTHS[7] * (eighths // 8) + (EIGHTHS[eighths % 8 - 1] if eighths % 8 else "")
 
 
-def bars_of(payload: Sequence[dict[str, Any]]) -> list[tuple[str, int]]:
-    """What the bars are of: the joints that take most, or of one group its resolutions."""
+def bars_of(payload: Sequence[dict[str, Any]]) -> tuple[list[Bar], list[Bar]]:
+    """What the bars are of, and the rest: the joints that take most, or of one group its
+    resolutions."""
     groups: dict[str, int] = {}
     parts: dict[str, int] = {}
     several = len({share["signal"] for share in payload}) > 1
@@ -100,8 +102,8 @@ def bars_of(payload: Sequence[dict[str, Any]]) -> list[tuple[str, int]]:
         part += ", coarsest" if level == 0 else ""
         parts[part] = parts.get(part, 0) + share["bytes"]
     if len(groups) == 1:
-        return list(parts.items())
+        return list(parts.items()), []
     ordered = sorted(groups.items(), key=lambda each: -each[1])
     rest = ordered[MOST_BARS:]
-    shown = ordered[:MOST_BARS]
-    return shown + ([(f"{len(rest)} others", sum(n for _, n in rest))] if rest else [])
+    others = [(f"{len(rest)} others", sum(n for _, n in rest))] if rest else []
+    return ordered[:MOST_BARS], others

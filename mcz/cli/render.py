@@ -61,7 +61,7 @@ def to_size(
     default="three-quarter",
     help="From where the figure faces first. Default: three-quarter.",
 )
-@click.option("--theme", type=click.Choice(("light", "dark")), default="light", help="Colours.")
+@click.option("--theme", type=click.Choice(("light", "dark")), default="light", help="Colors.")
 @click.option(
     "--follow/--no-follow",
     default=None,
@@ -83,7 +83,7 @@ def command(
     """Draw the motion in FILE (.mcz, .bvh, .amc or .c3d): a film, a still or a sheet of poses.
 
     A .png or .svg without --sheet shows the middle frame of --frames. A grid on the floor has its
-    length, left and right have colours of their own. It needs pip install 'mcz[render]'.
+    length, left and right have colors of their own. It needs pip install 'mcz[render]'.
     """
     import mcz
     from mcz.writing.inputs import refuse_inputs

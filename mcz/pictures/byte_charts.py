@@ -115,7 +115,7 @@ def _with_rest(ordered: Sequence[tuple[str, dict[str, int]]]) -> list[tuple[str,
 
 
 def _ramp(theme: Theme, sorts: Sequence[str]) -> dict[str, Any]:
-    """Colours: resolutions from strong to pale, what is no codec's in another."""
+    """Colors: resolutions from strong to pale, what is no codec's in another."""
     strong, pale = np.array(rgb(theme.series[0])), np.array(rgb(theme.grid))
     levels = [sort for sort in sorts if sort.isdigit()]
     found: dict[str, Any] = dict.fromkeys(sorts, theme.series[1])
@@ -179,8 +179,8 @@ def _draw_rates(
             own = [(p.n_bytes, getattr(p.figures, key)) for p in points if p.codec == name]
             pairs = [(n_bytes, error * factor) for n_bytes, error in own if error]
             if pairs:
-                colour = theme.series[place % len(theme.series)]
-                axes.loglog(*zip(*pairs, strict=True), "o-", color=colour, label=name, ms=4)
+                color = theme.series[place % len(theme.series)]
+                axes.loglog(*zip(*pairs, strict=True), "o-", color=color, label=name, ms=4)
         legend(axes, theme, loc="upper right")
         _plain_ticks(axes)
 

@@ -23,7 +23,7 @@ class Word:
     x: float
     y: float
     text: str
-    colour: str
+    color: str
     size: float
     side: str = "left"  # of the text at x
     bold: bool = False
@@ -63,9 +63,9 @@ class Canvas:
         self._lines.set_segments(drawing.lines[0])
         self._lines.set_color(drawing.lines[1])
         pairs = ((self._shadows, drawing.shadows), (self._figures, drawing.figures))
-        for collection, (corners, colours) in pairs:
+        for collection, (corners, colors) in pairs:
             collection.set_verts(corners)
-            collection.set_facecolor(colours)
+            collection.set_facecolor(colors)
         for number, word in enumerate(drawing.words):
             self._place(number, word)
         for number in range(len(drawing.words), len(self._words)):
@@ -77,7 +77,7 @@ class Canvas:
         text = self._words[number]
         text.set_position((word.x, word.y))
         text.set_text(printable(word.text))
-        text.set_color(word.colour)
+        text.set_color(word.color)
         text.set_fontsize(word.size * 0.72)  # pixels as points of 100 dots an inch
         text.set_ha(word.side)
         text.set_va("baseline")

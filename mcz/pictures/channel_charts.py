@@ -120,10 +120,10 @@ def _panels(
 def _draw_channels(figure: Any, theme: Theme, *, series: Sequence[_Series], when: str) -> None:
     for axes, own in _panels(figure, theme, series, when, "{unit}"):
         for place, each in enumerate(own):
-            line(axes, each.at, each.numbers, _colour(theme, place), each.label)
+            line(axes, each.at, each.numbers, _color(theme, place), each.label)
 
 
-def _colour(theme: Theme, place: int) -> str:
+def _color(theme: Theme, place: int) -> str:
     return theme.series[place % len(theme.series)]
 
 
@@ -184,8 +184,8 @@ def _draw_spectra(figure: Any, theme: Theme, *, series: Sequence[_Series], per: 
     for axes, own in _panels(figure, theme, series, per, f"({{unit}})² / {per}"):
         for place, each in enumerate(own):
             power = np.maximum(each.numbers, LEAST_POWER)
-            colour = _colour(theme, place)
-            axes.loglog(each.at, power, color=colour, label=printable(each.label), linewidth=1.1)
+            color = _color(theme, place)
+            axes.loglog(each.at, power, color=color, label=printable(each.label), linewidth=1.1)
         highest = max(float(each.numbers.max()) for each in own)
         if highest > LEAST_POWER / DEEP:
             axes.set_ylim(highest * DEEP, highest * 3)

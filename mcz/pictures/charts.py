@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import os
 from collections.abc import Callable, Sequence
@@ -16,7 +15,7 @@ from mcz.brief import printable
 from mcz.errors import OptionError
 from mcz.kinematics.chain import Floats
 from mcz.pictures.libraries import new_figure, quietly
-from mcz.pictures.pages import Page, Sheet, page
+from mcz.pictures.pages import Page, Sheet, data_uri, page
 from mcz.pictures.themes import THEMES, Theme, theme_of
 from mcz.writing.atomic import replacing
 
@@ -50,30 +49,26 @@ def save(
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise OptionError(f"{path}: a plot is one of {', '.join(SUFFIXES)}, by its suffix")
-    colours = theme_of(theme)
+    colors = theme_of(theme)
     width, height = size or chart.size
     if suffix == ".html":
         data = html(chart, (width, height))
     else:
-        data = drawn(chart, colours, (width, height), suffix[1:])
+        data = drawn(chart, colors, (width, height), suffix[1:])
     with replacing(path, force=force) as stream:
         stream.write(data)
 
 
-def drawn(chart: Chart, theme: Theme, size: tuple[int, int], kind: str) -> bytes:
-    """The picture as bytes of a PNG or an SVG."""
+def drawn(
+    chart: Chart, theme: Theme, size: tuple[int, int], kind: str, *, titled: bool = True
+) -> bytes:
+    """The picture as bytes of a PNG or an SVG, ``kind`` "png" or "svg"."""
     figure = new_figure(*size, facecolor=theme.ground, layout="constrained")
     out = io.BytesIO()
     with quietly():
-        figure.suptitle(
-            printable(chart.title),
-            parse_math=False,
-            color=theme.ink,
-            fontsize=11,
-            fontweight="bold",
-            x=0.012,
-            ha="left",
-        )
+        if titled:
+            heading = {"color": theme.ink, "fontsize": 11, "fontweight": "bold", "ha": "left"}
+            figure.suptitle(printable(chart.title), parse_math=False, x=0.012, **heading)
         chart.draw(figure, theme)
         about = {"Date": None, "Title": printable(chart.title)} if kind == "svg" else {}
         figure.savefig(out, format=kind, metadata=about, dpi=100 if kind == "svg" else 150)
@@ -83,7 +78,7 @@ def drawn(chart: Chart, theme: Theme, size: tuple[int, int], kind: str) -> bytes
 def html(chart: Chart, size: tuple[int, int]) -> bytes:
     """A page of the chart in both themes and its tables, as UTF-8."""
     pictures = {
-        name: data_uri(drawn(chart, theme, size, "svg"), "svg+xml")
+        name: data_uri(drawn(chart, theme, size, "svg", titled=False), "svg+xml")
         for name, theme in THEMES.items()
     }
     found = Page(chart.title, chart.notes)
@@ -93,12 +88,8 @@ def html(chart: Chart, size: tuple[int, int]) -> bytes:
     return page(found)
 
 
-def data_uri(data: bytes, kind: str) -> str:
-    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
-
-
 def styled(axes: Any, theme: Theme, *, x: str = "", y: str = "", title: str = "") -> Any:
-    """Axes in the colours of the theme, with words of which none is mathematics."""
+    """Axes in the colors of the theme, with words of which none is mathematics."""
     axes.set_facecolor(theme.ground)
     for side, spine in axes.spines.items():
         spine.set_visible(side in ("left", "bottom"))
@@ -115,7 +106,7 @@ def styled(axes: Any, theme: Theme, *, x: str = "", y: str = "", title: str = ""
 
 
 def legend(axes: Any, theme: Theme, **options: Any) -> None:
-    """The legend in the colours of the theme; its texts are no mathematics."""
+    """The legend in the colors of the theme; its texts are no mathematics."""
     found = axes.legend(frameon=False, fontsize=8, labelcolor=theme.ink, **options)
     for text in found.get_texts():
         text.set_parse_math(False)
@@ -130,10 +121,10 @@ def name_ticks(axes: Any, places: Any, names: Sequence[str], most: int) -> None:
     axes.grid(False, axis="y")
 
 
-def line(axes: Any, x: Floats, y: Floats, colour: str, label: str = "", **options: Any) -> None:
+def line(axes: Any, x: Floats, y: Floats, color: str, label: str = "", **options: Any) -> None:
     """A line of many points, of which those are drawn that are seen; breaks where y is NaN."""
     x, y = thinned(x, y)
-    axes.plot(x, y, color=colour, label=printable(label), **{"linewidth": 1.1} | options)
+    axes.plot(x, y, color=color, label=printable(label), **{"linewidth": 1.1} | options)
 
 
 def thinned(x: Floats, y: Floats) -> tuple[Floats, Floats]:

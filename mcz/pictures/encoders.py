@@ -90,7 +90,7 @@ class _Gif:
         self._before, self._waiting = indices, (self._as_image(part), corner, at)
 
     def _as_image(self, indices: Any) -> Any:
-        """Indices as a picture of a palette, whose colours are those of the whole film."""
+        """Indices as a picture of a palette, whose colors are those of the whole film."""
         image = self._image.fromarray(np.ascontiguousarray(indices, np.uint8))
         image.putpalette(bytes(768))
         return image

@@ -214,9 +214,9 @@ def _draw_bars(axes: Any, theme: Theme, found: Errors) -> None:
 def _draw_figure(
     axes: Any, theme: Theme, motion: Motion, found: Errors, up: str | None, first: int
 ) -> None:
-    """The original in the frame of the greatest error, each joint in the colour of its mean."""
+    """The original in the frame of the greatest error, each joint in the color of its mean."""
     axes.set_axis_off()
-    heading = f"frame {found.frame + first}, coloured by mean error"
+    heading = f"frame {found.frame + first}, colored by mean error"
     axes.set_title(heading, loc="left", fontsize=9.5, color=theme.ink)
     try:
         track = track_of(motion, np.array([found.frame], np.int64), None, up)
@@ -240,12 +240,12 @@ def _draw_figure(
     bar.set_label(f"mean error, {found.unit}", color=theme.quiet, fontsize=9)
 
 
-def _add_polygons(axes: Any, track: Track, colours: Floats, theme: Theme) -> None:
-    """The one frame of a track, its nodes in these colours (n_nodes, 3)."""
+def _add_polygons(axes: Any, track: Track, colors: Floats, theme: Theme) -> None:
+    """The one frame of a track, its nodes in these colors (n_nodes, 3)."""
     port = Viewport(0, 0, 420, 560)
     camera = scene_of(track, theme, "front", port, None, 1.0).camera
     ((_, nodes),) = track
-    pieces = pieces_of(track, nodes, colours)
+    pieces = pieces_of(track, nodes, colors)
     shadows, figures = Shapes(), Shapes()
     add_shadow(shadows, camera, pieces, track.floor, theme)
     add_figure(figures, camera, pieces, theme, track.size)

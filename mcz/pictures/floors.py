@@ -41,7 +41,7 @@ def length_text(length: float, unit: str) -> str:
 def floor_lines(
     camera: Camera, middle: Floats, reach: Floats, floor: float, square: float, theme: Theme
 ) -> tuple[Floats, Floats]:
-    """Pieces of lines (n, 2, 2) in pixels and their colours (n, 3).
+    """Pieces of lines (n, 2, 2) in pixels and their colors (n, 3).
 
     The grid reaches ``reach`` (2,) from ``middle`` (2,) at the height ``floor``; its lines lie at
     multiples of ``square``, wherever that is.
@@ -55,8 +55,8 @@ def floor_lines(
     fade = np.clip((np.sqrt(away.sum(axis=1)) - FADE) / (1 - FADE), 0, 1)[:, None]
     pixels, _ = camera.seen(lines)
     kept = np.isfinite(pixels).all(axis=(1, 2)) & (fade[:, 0] < 1)
-    colours = np.array(rgb(theme.grid)) * (1 - fade) + np.array(rgb(theme.ground)) * fade
-    return pixels[kept], colours[kept]
+    colors = np.array(rgb(theme.grid)) * (1 - fade) + np.array(rgb(theme.ground)) * fade
+    return pixels[kept], colors[kept]
 
 
 def _pieces(fixed: Floats, steps: Floats, floor: float) -> Floats:

@@ -23,6 +23,7 @@ h2 { font-size: 1.1rem; margin: 2.5rem 0 .5rem; overflow-wrap: anywhere; }
 p, li, figcaption { color: var(--quiet); max-width: 60rem; overflow-wrap: anywhere; }
 figure { margin: 1rem 0; }
 img { max-width: 100%; height: auto; display: block; border-radius: .4rem; }
+img.card { background: #fff; padding: .5rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .2rem .7rem; border-bottom: 1px solid var(--line); text-align: left;
@@ -58,10 +59,11 @@ class Page:
 
     def add_picture(self, name: str, light: str, dark: str | None = None) -> None:
         """A picture as a data: URI, and how it looks on dark ground."""
-        source = ""
+        source, kind = "", ' class="card"'
         if dark is not None:
             source = f'<source media="(prefers-color-scheme: dark)" srcset="{_text(dark)}">'
-        image = f'<img src="{_text(light)}" alt="{_text(name)}">'
+            kind = ""
+        image = f'<img{kind} src="{_text(light)}" alt="{_text(name)}">'
         self.parts.append(f"<figure><picture>{source}{image}</picture></figure>")
 
     def add_table(self, table: Sheet) -> None:
@@ -82,6 +84,11 @@ class Page:
     def add_heading(self, text: str) -> None:
         self.headings.append(text)
         self.parts.append(f'<h2 id="part{len(self.headings)}">{_text(text)}</h2>')
+
+
+def data_uri(data: bytes, kind: str) -> str:
+    """A picture, "png" or "svg+xml", as the page holds it."""
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def page(content: Page) -> bytes:

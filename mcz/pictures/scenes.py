@@ -135,8 +135,8 @@ def words_around(scene: Scene, width: int, height: int, title: str, when: str) -
     x = edge
     sides = scene.track.body.sides[scene.track.body.shown]
     if (sides == LEFT).any() and (sides == RIGHT).any():
-        for text, colour in (("left", theme.left), ("right", theme.right)):
-            words.append(Word(x, bottom, f"\u25cf {text}", colour, letter))
+        for text, color in (("left", theme.left), ("right", theme.right)):
+            words.append(Word(x, bottom, f"\u25cf {text}", color, letter))
             x += (len(text) + 2.4) * 0.66 * letter
     if scene.track.up_assumed:
         words.append(Word(x, bottom, f"{scene.track.up} up assumed", theme.quiet, letter))

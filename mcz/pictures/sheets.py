@@ -52,7 +52,7 @@ def sheet_size(count: int, size: tuple[int, int] | None) -> Layout:
 
 def sheet_drawing(scene: Scene, layout: Layout, title: str, when: Callable[[int], str]) -> Drawing:
     """The sheet as a drawing; ``when`` says of a frame what is written below it."""
-    shadows, figures, lines, colours, words = Shapes(), Shapes(), [], [], []
+    shadows, figures, lines, colors, words = Shapes(), Shapes(), [], [], []
     letter, theme = 12.0, scene.theme
     small = min(letter, layout.cell[0] / 12)
     for number, (frame, nodes) in enumerate(scene.track):
@@ -63,14 +63,14 @@ def sheet_drawing(scene: Scene, layout: Layout, title: str, when: Callable[[int]
         pixels, shades = scene.floor(camera)
         inside = _inside(pixels, left, bottom, layout.cell)
         lines.append(pixels[inside])
-        colours.append(shades[inside])
+        colors.append(shades[inside])
         scene.add(shadows, figures, camera, nodes)
         middle = left + layout.cell[0] / 2
         words.append(Word(middle, bottom - 0.62 * LABEL, when(frame), theme.quiet, small, "center"))
     top = layout.height - 0.64 * HEAD
     words += _heading(scene, layout, title, top, letter + 2)
     return Drawing(
-        (np.concatenate(lines), np.concatenate(colours)), shadows.arrays(), figures.arrays(), words
+        (np.concatenate(lines), np.concatenate(colors)), shadows.arrays(), figures.arrays(), words
     )
 
 
@@ -86,8 +86,8 @@ def _heading(scene: Scene, layout: Layout, title: str, top: float, letter: float
         x -= (len(note) + 2) * 0.62 * (letter - 2)
     sides = scene.track.body.sides[scene.track.body.shown]
     if (sides == LEFT).any() and (sides == RIGHT).any():
-        for text, colour in (("right", theme.right), ("left", theme.left)):
-            words.append(Word(x, top, f"\u25cf {text}", colour, letter - 2, "right"))
+        for text, color in (("right", theme.right), ("left", theme.left)):
+            words.append(Word(x, top, f"\u25cf {text}", color, letter - 2, "right"))
             x -= (len(text) + 3) * 0.62 * (letter - 2)
     return words
 

@@ -15,27 +15,27 @@ from mcz.pictures.tracks import Track
 ARC = np.linspace(0.0, 1.0, 15)  # along the round end of a capsule
 LIGHT = np.array([-0.42, 0.62])  # where on the picture the light comes from
 EDGE = 0.9  # pixels of an outline
-FAR = 0.38  # how much of the ground's colour the farthest has
+FAR = 0.38  # how much of the ground's color the farthest has
 SUN = np.array([0.22, 0.30])  # how far shadows reach sideways, of the height above the floor
 MOST = 4.0  # picture widths off the middle: what is farther is not drawn
 
 
 @dataclass(slots=True)
 class Shapes:
-    """Polygons (n, n_corners, 2) in pixels and their colours (n, 3), in the order of drawing."""
+    """Polygons (n, n_corners, 2) in pixels and their colors (n, 3), in the order of drawing."""
 
     corners: list[Floats] = field(default_factory=list)
-    colours: list[Floats] = field(default_factory=list)
+    colors: list[Floats] = field(default_factory=list)
 
-    def add(self, corners: Floats, colours: Floats) -> None:
+    def add(self, corners: Floats, colors: Floats) -> None:
         self.corners.append(corners)
-        self.colours.append(colours)
+        self.colors.append(colors)
 
     def arrays(self) -> tuple[Floats, Floats]:
         n_corners = 2 * len(ARC)
         return (
             np.concatenate([np.empty((0, n_corners, 2)), *self.corners]),
-            np.concatenate([np.empty((0, 3)), *self.colours]),
+            np.concatenate([np.empty((0, 3)), *self.colors]),
         )
 
 
@@ -59,23 +59,23 @@ def _round(center: Floats, radius: Floats, angles: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pieces:
-    """The parts of a figure in one frame: ends (n, 3), radii (n,) of both, colours (n, 3)."""
+    """The parts of a figure in one frame: ends (n, 3), radii (n,) of both, colors (n, 3)."""
 
     starts: Floats
     ends: Floats
     start_radii: Floats
     end_radii: Floats
-    colours: Floats
+    colors: Floats
     has_bones: bool
 
 
-def pieces_of(track: Track, nodes: Floats, colours: Floats) -> Pieces:
-    """What is drawn of a frame, whose nodes are (n_nodes, 3) and have the colours (n_nodes, 3)."""
+def pieces_of(track: Track, nodes: Floats, colors: Floats) -> Pieces:
+    """What is drawn of a frame, whose nodes are (n_nodes, 3) and have the colors (n_nodes, 3)."""
     body = track.body
     starts, ends = nodes[body.bones[:, 0]], nodes[body.bones[:, 1]]
     dots = nodes[body.lone]
     dot = np.full(len(dots), DOT * track.size)
-    of_bones = colours[body.bones[:, 1]]
+    of_bones = colors[body.bones[:, 1]]
     low, top, bulk = _heads(track, starts, ends)
     inside = body.bones[body.heads, 1] >= track.moving.skeleton.n_joints
     ends[body.heads[inside]] = low[inside]
@@ -84,7 +84,7 @@ def pieces_of(track: Track, nodes: Floats, colours: Floats) -> Pieces:
         np.concatenate([ends, top, dots]),
         np.concatenate([track.radii[:, 0], 0.86 * bulk, dot]),
         np.concatenate([track.radii[:, 1], bulk, dot]),
-        np.concatenate([of_bones, of_bones[body.heads], colours[body.lone]]),
+        np.concatenate([of_bones, of_bones[body.heads], colors[body.lone]]),
         has_bones=len(starts) > 0,
     )
 
@@ -121,7 +121,7 @@ def add_figure(shapes: Shapes, camera: Camera, pieces: Pieces, theme: Theme, siz
     span = size * camera.zoom / camera.distance**2  # how much scales differ across a figure
     haze = np.clip((depth.max() - depth[order]) / max(span, 1e-12), 0, 1)[:, None] * FAR
     ground = np.array(rgb(theme.ground))
-    body = pieces.colours[near] * (1 - haze) + ground * haze
+    body = pieces.colors[near] * (1 - haze) + ground * haze
     dark, light = body * 0.62, body + (1 - body) * 0.38
     shift = LIGHT * 0.42
     layers = (
@@ -134,7 +134,7 @@ def add_figure(shapes: Shapes, camera: Camera, pieces: Pieces, theme: Theme, siz
 
 
 def add_shadow(shapes: Shapes, camera: Camera, pieces: Pieces, floor: float, theme: Theme) -> None:
-    """The shadow on the floor, in one colour."""
+    """The shadow on the floor, in one color."""
     flat = []
     sun = SUN if pieces.has_bones else np.zeros(2)  # that of markers is below them
     for places in (pieces.starts, pieces.ends):

@@ -1,4 +1,4 @@
-"""Colours of pictures: Okabe and Ito's blue and orange for left and right, on light or dark."""
+"""Colors of pictures: Okabe and Ito's blue and orange for left and right, on light or dark."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from mcz.errors import OptionError
 
-Colour = tuple[float, float, float]  # red, green, blue, each 0 to 1
+Color = tuple[float, float, float]  # red, green, blue, each 0 to 1
 
 
-def rgb(text: str) -> Colour:
+def rgb(text: str) -> Color:
     """
     >>> rgb("#ff0000")
     (1.0, 0.0, 0.0)
@@ -23,7 +23,7 @@ def rgb(text: str) -> Colour:
 
 @dataclass(frozen=True, slots=True)
 class Theme:
-    """The colours of a picture; ``series`` are those of lines in plots."""
+    """The colors of a picture; ``series`` are those of lines in plots."""
 
     ground: str
     ink: str
@@ -36,7 +36,7 @@ class Theme:
     series: tuple[str, ...]
 
     def sides(self) -> NDArray[np.float64]:
-        """The colours of the middle, the left and the right, float64 (3, 3)."""
+        """The colors of the middle, the left and the right, float64 (3, 3)."""
         return np.array([rgb(self.middle), rgb(self.left), rgb(self.right)])
 
 
