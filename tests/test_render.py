@@ -306,6 +306,7 @@ def test_a_frame_far_away_spoils_nothing(tmp_path: Path) -> None:
         ("a.gif", {"sheet": 3}, "no film"),
         ("a.gif", {"fps": 0}, "pictures a second"),
         ("a.gif", {"speed": float("nan")}, "above 0"),
+        ("a.gif", {"speed": 1e-12}, "below 1,000,000"),
         ("a.png", {"frames": (5, 99)}, "0 to 8"),
         ("a.png", {"unit": "mile"}, "not one of"),
     ],
@@ -365,9 +366,12 @@ def test_the_command(samples: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     assert (code, document["width"], document["height"]) == (0, 200, 100)
     assert document["bytes"] == out.stat().st_size
     assert "its up axis is unknown: y up assumed (--up)" in said
+    assert "frame rate" not in said  # of a still
     assert call(*words)[0] == 2  # it exists
     assert call(*words, "--force", "--up", "y", "--frames", "7:8")[2] == ""
-    assert call(samples / "walk.bvh", "-o", tmp_path / "a.gif", "--size", "big")[0] == 2
+    film = (samples / "walk.amc", "-o", tmp_path / "a.gif", "--frames", ":9")
+    assert "frame rate is unknown: 120 a second assumed" in call(*film, "--size", "64")[2]
+    assert call(samples / "walk.bvh", "-o", tmp_path / "a.gif", "--size", "big", "--force")[0] == 2
     assert call(samples / "walk.bvh", "-o", samples / "walk.bvh", "--force")[0] == 2
     assert call(tmp_path / "none.bvh", "-o", tmp_path / "b.png")[0] == 1
     mcz.pack(samples, tmp_path / "all.mcz")

@@ -9,6 +9,7 @@ from typing import Any, BinaryIO, Protocol
 
 import numpy as np
 
+from mcz.errors import OptionError
 from mcz.pictures.canvases import Pixels
 from mcz.pictures.libraries import library
 
@@ -35,7 +36,10 @@ def film(stream: BinaryIO, kind: str, width: int, height: int, fps: Fraction) ->
     av = library("av")
     codec, options = VIDEO[kind]
     with av.open(stream, "w", format=kind) as container:
-        video = container.add_stream(codec, rate=fps)
+        try:
+            video = container.add_stream(codec, rate=fps)
+        except (ValueError, OSError) as error:
+            raise OptionError(f".{kind}: this build of PyAV has no {codec}: {error}") from None
         video.width, video.height, video.pix_fmt = width, height, "yuv420p"
         video.options = options
         yield _Video(container, video, av.VideoFrame)

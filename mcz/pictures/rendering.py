@@ -36,6 +36,7 @@ SIZE, SIZE_OF_GIF = (640, 640), (480, 480)
 SMALLEST, GREATEST = 64, 4096
 FASTEST = 120  # frames a second of a film
 MOST_POSES = 400
+MOST_PICTURES = 10**6  # of a film
 
 Progress = Callable[[int, int, str], None]
 
@@ -95,6 +96,28 @@ def render(
     Raises OptionError, also where a library is not installed, MotionError where there is nothing to
     draw, ExistsError where ``path`` exists and not ``force``.
     """
+    suffix = _kind(path, sheet)
+    look = Look(view, theme_of(theme), checked_size(size), follow)
+    notes: list[str] = []
+    known_rate = _rate(moving, rate)
+    first, stop = frame_range(moving, frames)
+    if first == stop:
+        raise MotionError(f"{moving.name!r} has no frame there: nothing to draw")
+    told = progress or (lambda *_: None)
+    job = _Job(moving, path, look, known_rate, (unit, up), force, told, notes)
+    if suffix in FILMS:
+        wanted = _fps(fps, FILMS[suffix])
+        if known_rate is None:
+            notes.append(f"its frame rate is unknown: {USUAL_RATE} a second assumed (--rate)")
+        shown = drawn_frames(first, stop, known_rate or USUAL_RATE, wanted, speed)
+        return job.film(shown, wanted, suffix)
+    if sheet is not None:
+        return job.sheet(np.linspace(first, stop - 1, sheet).round().astype(np.int64))
+    return job.still(np.array([(first + stop - 1) // 2], np.int64))
+
+
+def _kind(path: str | os.PathLike[str], sheet: int | None) -> str:
+    """The suffix of what is drawn, whose libraries are there; raises OptionError."""
     suffix = Path(path).suffix.lower()
     if suffix not in (*FILMS, *STILLS):
         known = ", ".join((*FILMS, *STILLS))
@@ -103,23 +126,9 @@ def render(
         raise OptionError(f"{path}: a sheet is a .png or a .svg, no film")
     if sheet is not None and not 1 <= sheet <= MOST_POSES:
         raise OptionError(f"a sheet of {sheet} poses: 1 to {MOST_POSES}")
-    look = Look(view, theme_of(theme), checked_size(size), follow)
-    for name in NEEDED.get(suffix, ("matplotlib",)):
+    for name in NEEDED.get(suffix, ("matplotlib", "PIL")):
         library(name)  # before any work
-    notes: list[str] = []
-    known_rate = _rate(moving, rate, notes if suffix in FILMS else [])
-    first, stop = frame_range(moving, frames)
-    if first == stop:
-        raise MotionError(f"{moving.name!r} has no frame there: nothing to draw")
-    job = _Job(
-        moving, path, look, known_rate, (unit, up), force, progress or (lambda *_: None), notes
-    )
-    if suffix in FILMS:
-        wanted = _fps(fps, FILMS[suffix])
-        return job.film(drawn_frames(first, stop, known_rate, wanted, speed), wanted, suffix)
-    if sheet is not None:
-        return job.sheet(np.linspace(first, stop - 1, sheet).round().astype(np.int64))
-    return job.still(np.array([(first + stop - 1) // 2], np.int64))
+    return suffix
 
 
 def checked_size(size: tuple[int, int] | None) -> tuple[int, int] | None:
@@ -139,20 +148,23 @@ def drawn_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: fl
     if not 0 < speed < np.inf:
         raise OptionError(f"speed {speed:g} is not a number above 0")
     step = float(rate) * speed / float(fps)
-    count = max(1, int((stop - 1 - first) / step + 1e-9) + 1)
+    wanted = (stop - 1 - first) / step + 1e-9 if step else np.inf
+    if wanted >= MOST_PICTURES:
+        raise OptionError(
+            f"a film of {wanted:.3g} pictures: below {MOST_PICTURES:,} (--speed, --fps, --frames)"
+        )
+    count = max(1, int(wanted) + 1)
     found: Ints = (first + np.floor(np.arange(count) * step + 0.5)).astype(np.int64)
     return np.minimum(found, stop - 1)
 
 
-def _rate(moving: Moving, rate: float | Fraction | None, notes: list[str]) -> Fraction:
-    if moving.frame_rate is not None:
+def _rate(moving: Moving, rate: float | Fraction | None) -> Fraction | None:
+    """Frames a second, as the motion or else the caller says; None while unknown."""
+    if moving.frame_rate is not None or rate is None:
         return moving.frame_rate
-    if rate is None:
-        notes.append(f"its frame rate is unknown: {float(USUAL_RATE):g} a second assumed (--rate)")
-        return USUAL_RATE
     if not 0 < rate < np.inf:
         raise OptionError(f"frame rate {rate} is not positive")
-    return Fraction(rate).limit_denominator(2**20)
+    return Fraction(rate).limit_denominator(2**20) or Fraction(1, 2**20)
 
 
 def _fps(fps: float | Fraction | None, usual: Fraction) -> Fraction:
@@ -170,7 +182,7 @@ class _Job:
     moving: Moving
     path: str | os.PathLike[str]
     look: Look
-    rate: Fraction
+    rate: Fraction | None  # None while unknown: no time is shown
     facts: tuple[str | None, str | None]  # unit and up axis of a motion without
     force: bool
     progress: Progress
@@ -233,8 +245,9 @@ class _Job:
         return scene_of(track, self.look.theme, self.look.view, port, follow, rate, around)
 
     def _when(self, frame: int) -> str:
-        seconds = frame / self.rate
-        return f"frame {frame}  {float(seconds):.2f} s"
+        if self.rate is None:
+            return f"frame {frame}"
+        return f"frame {frame}  {float(frame / self.rate):.2f} s"
 
     def _write(self, canvas: Canvas) -> None:
         with replacing(self.path, force=self.force) as stream:
