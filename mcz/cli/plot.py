@@ -93,7 +93,7 @@ def command(
         moving = stack.enter_context(moving_of(file, **wanted))
         if other is not None:
             options["other"] = stack.enter_context(moving_of(other, **wanted))
-        stack.enter_context(about(target, file, other or file))
+        stack.enter_context(about(file, target, other or file))
         progress = stack.enter_context(Progress())
         cut = cut_of(frames, moving)
         plotted = mcz.plot(

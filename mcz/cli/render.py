@@ -95,7 +95,7 @@ def command(
     check_new(Path(target), force)
     facts = {key: options[key] for key in ("rate", "up", "unit")}
     wanted = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts}
-    with moving_of(file, **wanted) as moving, about(target, file), Progress() as progress:
+    with moving_of(file, **wanted) as moving, about(file, target), Progress() as progress:
         drawn = mcz.render(
             moving,
             target,
