@@ -55,6 +55,8 @@ if TYPE_CHECKING:
     from mcz.live.writer import LiveWriter
     from mcz.metrics import Comparison, compare
     from mcz.motion import Channel, Exceptions, Joint, Motion, Signal, Skeleton, Source
+    from mcz.pictures.plotting import Plotted, plot
+    from mcz.pictures.rendering import Rendered, render
     from mcz.poses import (
         Root,
         accelerations,
@@ -140,6 +142,8 @@ _HOMES = {
         "rotations",
         "velocities",
     ),
+    "mcz.pictures.plotting": ("Plotted", "plot"),
+    "mcz.pictures.rendering": ("Rendered", "render"),
     "mcz.kinematics.contacts": ("Contact", "Contacts", "contacts"),
     "mcz.reading.report": ("Problem", "verify"),
     "mcz.metrics": ("Comparison", "compare"),
@@ -189,10 +193,12 @@ __all__ = [
     "MotionError",
     "OptionError",
     "Outcome",
+    "Plotted",
     "Problem",
     "Protection",
     "Recording",
     "Recovery",
+    "Rendered",
     "Repair",
     "Replacement",
     "Report",
@@ -229,6 +235,7 @@ __all__ = [
     "mirror",
     "open",
     "pack",
+    "plot",
     "point_names",
     "positions",
     "post_filter",
@@ -238,6 +245,7 @@ __all__ = [
     "recording",
     "rename",
     "rename_clips",
+    "render",
     "reorder_clips",
     "repair",
     "replace",

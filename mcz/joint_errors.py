@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mcz.brief import brief
 from mcz.errors import MotionError
 from mcz.kinematics import origins_of
-from mcz.motion import Motion
+from mcz.motion import Motion, Skeleton
 
 BLOCK = 2**20  # coordinates that are looked at in one go
 
@@ -64,9 +64,8 @@ def joint_errors(original: Motion, other: Motion) -> JointErrors:
     if original.signals[0].n_rows != other.signals[0].n_rows:
         raise MotionError(f"{original.n_frames} and {other.n_frames} frames")
     names_a, names_b = a.addresses(), b.addresses()
-    there = {name.lower(): index for index, name in reversed(list(enumerate(names_b)))}
-    pairs = [(i, there[n.lower()]) for i, n in enumerate(names_a) if n.lower() in there]
-    both = {name.lower() for name in names_a} & set(there)
+    pairs = pairs_of(a, b)
+    both = {names_a[i].lower() for i, _ in pairs}
     unit = a.unit_cm if b.unit_cm is not None else None
     scale = b.unit_cm / a.unit_cm if a.unit_cm is not None and b.unit_cm is not None else 1.0
     found = JointErrors(
@@ -76,6 +75,13 @@ def joint_errors(original: Motion, other: Motion) -> JointErrors:
         unit_cm=unit,
     )
     return _measured(found, original, other, pairs, scale) if pairs else found
+
+
+def pairs_of(a: Skeleton, b: Skeleton) -> list[tuple[int, int]]:
+    """The joints that both have, by index; names are equal in any case of letters."""
+    there = {name.lower(): index for index, name in reversed(list(enumerate(b.addresses())))}
+    names = enumerate(a.addresses())
+    return [(index, there[name.lower()]) for index, name in names if name.lower() in there]
 
 
 def _measured(

@@ -66,22 +66,25 @@ ALLOWED = {
     "live": JOINT | {"interrupts", "reading", "writing"},
     "dask": JOINT | {"jobs", "reading", "writing", "editing"},
     "viewing": JOINT | {"annexes", "metrics", "editing", "reading", "retargeting", "writing"},
+    # Pictures draw what the layers know, with the names that the public has for it.
+    "pictures": JOINT
+    | {"angles", "joint_errors", "metrics", "poses", "reading", "retargeting", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
-    | {"bags", "jobs", "dask", "viewing"}
+    | {"bags", "jobs", "dask", "pictures", "poses", "viewing"}
     | DOORS,
     # On top of all: it measures every part by itself.
-    "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
+    "bench": JOINT | {"angles", "bjontegaard", "metrics", "pictures", ""} | DOORS,
     "": MODEL
-    | {"version", "bags", "kinematics", "metrics", "poses", "datasets", "retargeting", "tables"}
-    | {"viewing"}
+    | {"bags", "kinematics", "metrics", "pictures", "poses", "datasets", "retargeting", "tables"}
+    | {"version", "viewing"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 
 BANNED_CONSTRUCTS = {"GreedyRange", "Enum", "Flag", "Padding", "VarInt", "Compressed"}
-HEAVY = {"llvmlite", "rich", "fsspec", "pywt", "scipy", "matplotlib"}
+HEAVY = {"llvmlite", "rich", "fsspec", "pywt", "scipy", "matplotlib", "PIL", "av"}
 
 
 def name_of(path: Path) -> str:

@@ -247,11 +247,20 @@ def test_whole_run_with_report(
     if plots.can_draw():
         assert {path.name for path in out.glob("*.png")} == {"walk.png", "walk_mrdwt.png"}
         assert "![walk.png](walk.png)" in report
+    page = (out / "index.html").read_text("utf-8")
+    for table in results["tables"]:
+        assert f">{table['title']}</h2>" in page
+    assert page.count("<img") == page.count('src="data:image/png;base64,')
+    assert page.count("<img") == (2 if plots.can_draw() else 0)
+    assert "http" not in page.replace("http-equiv", "")  # all is in it
+    assert page.count("default-src 'none'") == 1
+    assert "<script" not in page
     # Without matplotlib: everything else, and a plain word about it.
     monkeypatch.setattr(plots, "can_draw", lambda: False)
     assert run_command(command, "bench", [*arguments, "--out", str(tmp_path / "bare")]) == 0
     assert "matplotlib is not installed" in capsys.readouterr().err
     assert not list((tmp_path / "bare").glob("*.png"))
+    assert (tmp_path / "bare" / "index.html").exists()
     assert run_command(command, "bench", [*arguments, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["clips"] == results["clips"]
 

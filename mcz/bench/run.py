@@ -14,6 +14,7 @@ from mcz.bench.cases import find_cases, named, variants_of
 from mcz.bench.sweep import ClipResult
 from mcz.bench.tables import Table
 from mcz.bench.tasks import Runner
+from mcz.pictures import pages
 
 Figures = Callable[[Path], Iterator[Path]]  # draws into a folder, says what it drew
 
@@ -49,6 +50,17 @@ class Outcome:
             yield ""
         for table in self.tables:
             yield from table.markdown()
+
+    def page(self, plots: Sequence[Path]) -> bytes:
+        """One page with all tables and the ``plots``, which are inside of it; UTF-8."""
+        known = f"By mcz {mcz.__version__}; its SPEC.md defines sizes, ratios and metrics."
+        page = pages.Page("Codecs compared", [known, *self.notes])
+        for plot in plots:
+            page.add_picture(plot.stem, pages.data_uri(plot.read_bytes(), "png"))
+        for table in self.tables:
+            sheet = pages.Sheet(table.title, table.cells(), table.right, table.caption)
+            page.add_table(sheet)
+        return pages.page(page)
 
 
 def bench(

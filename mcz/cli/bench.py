@@ -39,7 +39,7 @@ PAPERS = "python -m tools.papers"
     "--out",
     metavar="DIR",
     type=click.Path(file_okay=False, path_type=Path),
-    help="Write results.json, report.md and plots into DIR, over those of an earlier run.",
+    help="Write index.html, results.json, report.md and plots into DIR, over earlier ones.",
 )
 @click.option(
     "--jobs", metavar="N", type=click.IntRange(1), help="Processes. Default: one a processor."
@@ -136,9 +136,11 @@ def _write(outcome: Outcome, folder: Path) -> list[str]:
             outcome.notes.append(plots.MISSING)
         text = "\n".join(outcome.markdown([path.name for path in drawn]))
         report, results = folder / "report.md", folder / "results.json"
+        page = folder / "index.html"
         report.write_text(text, "utf-8")
+        page.write_bytes(outcome.page(drawn))
         document = json.dumps(outcome.document(), indent=1, ensure_ascii=False, allow_nan=False)
         results.write_text(document + "\n", "utf-8")
     except OSError as error:
         raise Failure(f"{folder}: {error.strerror or error}") from None
-    return [str(path) for path in (results, report, *drawn)]
+    return [str(path) for path in (results, report, page, *drawn)]

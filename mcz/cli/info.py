@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from typing import Any
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -32,9 +33,15 @@ from mcz.cli.options import (
     version_option,
     where_option,
 )
+from mcz.cli.previews import preview_lines
 from mcz.cli.recording import recording_lines
 from mcz.cli.repeats import Once
+from mcz.cli.terminal import is_terminal
 from mcz.cli.verify import is_unsound
+from mcz.errors import MczError
+
+if TYPE_CHECKING:
+    from mcz.reading.file import File
 
 DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
 FEW = 4  # clips that are shown in full; more are shown as a table
@@ -65,6 +72,12 @@ RATIOS = (
 @click.option(
     "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of an AMC."
 )
+@click.option(
+    "--preview/--no-preview",
+    default=None,
+    help="How much it moves over time, as a line, and which joints take which bytes, as bars. "
+    "Default: on a terminal, of clips that are quickly decoded.",
+)
 @decoded_option
 def command(
     file: str,
@@ -75,6 +88,7 @@ def command(
     where: str | None,
     salvage: bool,
     skeleton: str | None,
+    preview: bool | None,
     max_decoded: int | None,
 ) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz.
@@ -86,7 +100,7 @@ def command(
     if source_report.is_source(file) and not (show_layout or check):
         if where is not None:
             raise Failure("--where chooses among the clips of an .mcz", Exit.USAGE)
-        return _of_source(file, skeleton, as_json)
+        return _of_source(file, skeleton, as_json, bool(preview))
     if skeleton is not None:
         raise Failure("--skeleton is the ASF of an AMC", Exit.USAGE)
     if (clips or where is not None) and (show_layout or check):
@@ -99,6 +113,7 @@ def command(
             parts = report.layout(held)
         else:
             document = report.info(held, clips or None, where)
+            _add_previews(held, document, as_json, preview)
         damage = list(held.damage)
     if show_layout:
         _print_layout(parts, as_json)
@@ -109,13 +124,36 @@ def command(
     return damage_of(file, damage)
 
 
-def _of_source(file: str, skeleton: str | None, as_json: bool) -> Exit:
+def _add_previews(
+    held: File, document: dict[str, Any], as_json: bool, preview: bool | None
+) -> None:
+    """Add a preview to each clip that is shown in full, where it is wanted."""
+    if preview is False or (preview is None and (as_json or not is_terminal())):
+        return
+    if not as_json and len(document["clips"]) > FEW:
+        return
+    from mcz.cli.previews import preview_of
+    from mcz.pictures.energy import is_cheap
+
+    for clip in document["clips"]:
+        found = held.clips[clip["name"]]
+        if preview or is_cheap(found):
+            with suppress(MczError):  # damaged: the rest is shown
+                clip["preview"] = preview_of(found)
+
+
+def _of_source(file: str, skeleton: str | None, as_json: bool, preview: bool) -> Exit:
+    import mcz
+    from mcz.cli.previews import motion_of
     from mcz.cli.source_text import source_lines
     from mcz.reading.source_report import source_info
 
     existing(file)
     with about(file):
         document = source_info(file, skeleton)
+        for clip in document["clips"] if preview else ():
+            motion = mcz.read(file, skeleton=skeleton)
+            clip["preview"] = {"motion": motion_of(motion)}
     if as_json:
         print_json(document)
     else:
@@ -265,6 +303,8 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
         if clip[key] is not None:
             yield f"  {clip[key]:7.2f} : 1 against {against}"
     yield from (f"  damage: {line}" for line in clip["damage"])
+    if "preview" in clip:
+        yield from preview_lines(clip["preview"])
 
 
 def _codec(name: str, signal: dict[str, Any]) -> str:

@@ -35,6 +35,8 @@ COMMANDS = (
     "replace",
     "diff",
     "view",
+    "render",
+    "plot",
     "stream",
     "bench",
     "train",

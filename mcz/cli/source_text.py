@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from mcz.cli.common import plural
+from mcz.cli.previews import preview_lines
 from mcz.cli.recording import recording_lines
 
 
@@ -40,3 +41,5 @@ def source_lines(
         yield from recording_lines(clip["recording"])
         for key, value in clip["metadata"].items():
             yield f"  {key}  {value[:80]}"
+        if "preview" in clip:
+            yield from preview_lines(clip["preview"])

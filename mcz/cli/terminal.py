@@ -27,6 +27,20 @@ def echo(*lines: str) -> None:
         click.echo(printable(line))
 
 
+def can_show(letters: str) -> bool:
+    """Whether the encoding of standard output has these letters."""
+    try:
+        letters.encode(getattr(sys.stdout, "encoding", None) or "ascii")
+    except (UnicodeError, LookupError):
+        return False
+    return True
+
+
+def is_terminal() -> bool:
+    """Whether standard output is a terminal."""
+    return sys.stdout is not None and sys.stdout.isatty()
+
+
 def say(message: str) -> None:
     """Print one line on standard error."""
     click.echo(f"mcz: {printable(' '.join(message.split()))}", err=True)

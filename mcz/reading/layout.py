@@ -54,13 +54,13 @@ def _filled(parts: list[tuple[int, int, str]], size: int) -> list[tuple[int, int
 def _segment_tables(file: File) -> Iterator[tuple[int, _Segment]]:
     for clip in file.clips.values():
         for signal in clip.signals:
-            names = _group_names(clip, signal)
+            names = [f"group {number} ({text})" for number, text in group_names(clip, signal)]
             for row in signal.rows:
                 table = file.container.table(row, signal.counts)
                 yield row.offset, _Segment(table, names, bool(row.packet))
 
 
-def _group_names(clip: Clip, signal: SignalInfo) -> list[str]:
+def group_names(clip: Clip, signal: SignalInfo) -> list[tuple[int, str]]:
     """Of each group its number and its joints; of one channel, or of a signal that has no joints,
     its channels."""
     if signal.channels is not None:
@@ -73,7 +73,7 @@ def _group_names(clip: Clip, signal: SignalInfo) -> list[str]:
     names = []
     for number, group in enumerate(signal.layout.groups):
         called = channels if len(group) == 1 else owners
-        names.append(f"group {number} ({_listed(list(dict.fromkeys(called[c] for c in group)))})")
+        names.append((number, _listed(list(dict.fromkeys(called[c] for c in group)))))
     return names
 
 

@@ -302,6 +302,8 @@ TWICE = [
     ("reorder", "a.mcz", "--by", "name", "--by", "codec"),
     ("split", "a.mcz", "x", "--by", "name", "--by", "codec"),
     ("diff", "a.mcz", "b.mcz", "--frames", "0:1", "--frames", "0:2"),
+    ("render", "a.mcz", "--view", "top", "--view", "side"),
+    ("plot", "a.mcz", "--what", "bytes", "--what", "error"),
     ("extract", "a.mcz", "b.mcz", "--resolution", "1", "--resolution", "2"),
     ("view", "a.mcz", "--port", "1", "--port", "2"),
     ("stream", "encode", "--name", "a", "--name", "b"),

@@ -89,6 +89,17 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
             [odd],
             [str(file.parent / f"note{STEERING}.bvh"), "-o", f"{out}4.html"],
         ],
+        "render": [
+            [str(file), "-o", f"{out}.png", "--size", "64"],
+            [str(file), "-o", f"{out}.svg", "--clip", STEERING[:-1]],
+            [odd],
+        ],
+        "plot": [
+            [str(file), "-o", f"{out}.png"],
+            [str(file), str(file), "-o", f"{out}.html"],
+            [str(file), "-o", f"{out}.svg", "--what", "bytes"],
+            [str(file), "-o", f"{out}.svg", "--joint", STEERING],
+        ],
         "stream": [["decode", str(file)], ["encode", "--skeleton", odd]],
         "bench": [[odd]],
         "train": [[odd, "-o", str(out)]],

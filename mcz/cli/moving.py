@@ -1,0 +1,98 @@
+"""The one motion of a file that a command draws, whatever its format, and options that tell it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mcz.cli.common import about, existing, opened, to_frames, to_rate
+from mcz.cli.options import UNITS, decoded_option, up_option
+
+if TYPE_CHECKING:
+    from mcz.motion import Motion
+    from mcz.reading.clip import Clip
+
+Function = Callable[..., Any]
+
+
+def moving_options(function: Function) -> Function:
+    """``--clip --frames --rate --unit --up --skeleton --max-decoded``."""
+    options = (
+        click.option(
+            "--clip", "name", metavar="NAME", help="Which clip of an .mcz. Default: the only one."
+        ),
+        click.option(
+            "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B, from 0."
+        ),
+        click.option(
+            "--rate",
+            metavar="R",
+            callback=to_rate,
+            help="Frames a second of a file that does not say.",
+        ),
+        click.option("--unit", type=click.Choice(UNITS), help="Length unit of a file without."),
+        up_option("Axis that points up, of a file that does not say."),
+        click.option(
+            "--skeleton",
+            metavar="FILE.asf",
+            type=click.Path(readable=False),
+            help="The ASF of an AMC, or none.",
+        ),
+        decoded_option,
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+@contextmanager
+def moving_of(
+    path: str,
+    *,
+    name: str | None,
+    rate: Fraction | None,
+    unit: str | None,
+    up: str | None,
+    skeleton: str | None,
+    max_decoded: int | None,
+) -> Iterator[Motion | Clip]:
+    """The motion of a source file, or a clip of an .mcz that stays open; errors name the file.
+
+    What is told of a clip is not in it: whoever draws it is told the same.
+    """
+    import mcz
+
+    if path == "-" or PurePath(path).suffix.lower() == ".mcz":
+        with opened(path, max_decoded=max_decoded) as file, about(path):
+            yield file.only_clip(name)
+        return
+    existing(path)
+    with about(path):
+        is_amc = PurePath(path).suffix.lower() == ".amc"
+        motion = mcz.read(path, skeleton=skeleton if is_amc else None)
+        yield told(motion, rate, unit, up)
+
+
+def told(motion: Motion, rate: Fraction | None, unit: str | None, up: str | None) -> Motion:
+    """``motion`` with what it does not say itself."""
+    from mcz.reading.source_files import with_facts
+
+    return with_facts(
+        motion,
+        rate if motion.frame_rate is None else None,
+        unit if motion.skeleton.unit_cm is None else None,
+        None if motion.skeleton.up_axis else up,
+    )
+
+
+def cut_of(frames: tuple[int, int | None] | None, moving: Motion | Clip) -> tuple[int, int] | None:
+    """``--frames`` with its end, of this motion."""
+    if frames is None:
+        return None
+    start, stop = frames
+    return start, moving.n_frames if stop is None else stop

@@ -1,0 +1,109 @@
+"""What ``mcz info --preview`` adds: a line of motion and bars of bytes, in letters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from mcz.cli.common import table
+from mcz.cli.terminal import can_show
+
+if TYPE_CHECKING:
+    from mcz.poses.moving import Moving
+    from mcz.reading.clip import Clip
+
+LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"
+EIGHTHS, PLAIN = "▏▎▍▌▋▊▉█", "#"
+Bar = tuple[str, int]  # what takes so many bytes
+
+WIDTH = 24  # letters of the longest bar
+MOST_BARS = 8
+
+
+def preview_of(clip: Clip) -> dict[str, Any]:
+    """The keys of a clip's preview; ``motion`` is None where there is none."""
+    from mcz.reading.shares import byte_shares
+
+    shares = [
+        {"signal": s.signal, "joints": s.name, "resolution": s.resolution, "bytes": s.n_bytes}
+        for s in byte_shares(clip)
+    ]
+    return {"motion": motion_of(clip), "payload": shares}
+
+
+def motion_of(moving: Moving) -> dict[str, Any] | None:
+    """The speeds of equal parts of the time, and what they are in; None where they are unknown."""
+    from mcz.pictures.energy import motion_energy
+
+    speeds = motion_energy(moving)
+    if speeds is None:
+        return None
+    unit = moving.skeleton.unit_cm
+    values = [float(speed) * (unit or 1.0) for speed in speeds]
+    length, time = "units" if unit is None else "cm", "s" if moving.frame_rate else "frame"
+    known = [value if math.isfinite(value) else None for value in values]
+    return {"unit": f"{length}/{time}", "mean_speeds": known}
+
+
+def preview_lines(preview: dict[str, Any]) -> Iterator[str]:
+    """The preview as people read it."""
+    motion = preview["motion"]
+    if motion is not None and any(speed is not None for speed in motion["mean_speeds"]):
+        speeds = motion["mean_speeds"]
+        most = max(speed for speed in speeds if speed is not None)
+        yield f"  motion     {sparkline(speeds)}  mean speed, up to {most:.4g} {motion['unit']}"
+    bars, rest = bars_of(preview.get("payload", []))
+    if len(bars) > 1:
+        greatest, total = max(n for _, n in bars), sum(n for _, n in (*bars, *rest))
+        rows = [(name, bar(n / greatest), n) for name, n in bars]
+        rows += [(name, "", n) for name, n in rest]
+        cells = [[name, own, f"{n:,}", f"{100 * n / total:.1f} %"] for name, own, n in rows]
+        lines = table([["payload", "", "bytes", "share"], *cells], "llrr").split("\n")
+        yield from (f"  {line}" for line in lines)
+
+
+def sparkline(numbers: Sequence[float | None], blocks: bool | None = None) -> str:
+    """Numbers from 0 as letters of growing height, a blank for None.
+
+    >>> sparkline([0, 1.0, None, 8.0], blocks=True), sparkline([0, 1.0, None, 8.0], blocks=False)
+    ('▁▂ █', '_. #')
+    """
+    letters = LEVELS if (can_show(LEVELS) if blocks is None else blocks) else PLAIN_LEVELS
+    most = max((n for n in numbers if n is not None), default=0.0) or 1.0
+    return "".join(
+        " " if n is None else letters[min(7, max(0, int(8 * n / most)))] for n in numbers
+    )
+
+
+def bar(share: float, blocks: bool | None = None) -> str:
+    """
+    >>> bar(0.5, blocks=False), bar(1 / 24, blocks=True), bar(1.5 / 24, blocks=True)
+    ('############', '█', '█▌')
+    """
+    eighths = math.ceil(share * WIDTH * 8 - 1e-9)
+    if not (can_show(EIGHTHS) if blocks is None else blocks):
+        return PLAIN * math.ceil(eighths / 8)
+    return EIGHTHS[7] * (eighths // 8) + (EIGHTHS[eighths % 8 - 1] if eighths % 8 else "")
+
+
+def bars_of(payload: Sequence[dict[str, Any]]) -> tuple[list[Bar], list[Bar]]:
+    """What the bars are of, and the rest: the joints that take most, or of one group its
+    resolutions."""
+    groups: dict[str, int] = {}
+    parts: dict[str, int] = {}
+    several = len({share["signal"] for share in payload}) > 1
+    for share in payload:
+        of = share["joints"] or "frame notes"
+        name = f"{share['signal']}: {of}" if several else of
+        groups[name] = groups.get(name, 0) + share["bytes"]
+        level = share["resolution"]
+        part = "exceptions, masks" if level is None else f"resolution {level}"
+        part += ", coarsest" if level == 0 else ""
+        parts[part] = parts.get(part, 0) + share["bytes"]
+    if len(groups) == 1:
+        return list(parts.items()), []
+    ordered = sorted(groups.items(), key=lambda each: -each[1])
+    rest = ordered[MOST_BARS:]
+    others = [(f"{len(rest)} others", sum(n for _, n in rest))] if rest else []
+    return ordered[:MOST_BARS], others

@@ -1,0 +1,116 @@
+"""``mcz render``: a motion as a film, a still or a sheet of poses."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from mcz.cli.common import (
+    EXIT_CODES,
+    Exit,
+    Failure,
+    about,
+    check_new,
+    echo,
+    plural,
+    print_json,
+    say,
+)
+from mcz.cli.moving import cut_of, moving_of, moving_options
+from mcz.cli.options import force_option, json_option
+from mcz.cli.progress import Progress
+
+VIEWS = ("front", "side", "top", "three-quarter")  # as in mcz.pictures, which takes longer
+
+
+def to_size(
+    ctx: click.Context, param: click.Parameter, value: str | None
+) -> tuple[int, int] | None:
+    """Callback of ``640x480``, or ``640`` for a square."""
+    if value is None:
+        return None
+    match = re.fullmatch(r"([0-9]{1,6})(?:[xX]([0-9]{1,6}))?", value)
+    if not match:
+        raise click.BadParameter(f"{value!r} is not a size such as 640x480 or 640")
+    return int(match[1]), int(match[2] or match[1])
+
+
+@click.command(short_help="A motion as GIF, MP4, WebM, PNG or SVG.", epilog=EXIT_CODES)
+@click.argument("file", metavar="FILE", type=click.Path(readable=False))
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT",
+    type=click.Path(readable=False),
+    help="A .gif, .mp4, .webm, .png or .svg. Default: FILE as .gif, of a sheet as .png.",
+)
+@moving_options
+@click.option("--sheet", metavar="N", type=int, help="N poses on one .png or .svg.")
+@click.option("--fps", metavar="R", type=float, help="Pictures a second. Default: GIF 25, else 30.")
+@click.option(
+    "--speed", metavar="X", type=float, default=1.0, help="How fast it plays. Default: 1."
+)
+@click.option("--size", metavar="WxH", callback=to_size, help="Pixels. Default: 640x640.")
+@click.option(
+    "--view",
+    type=click.Choice(VIEWS),
+    default="three-quarter",
+    help="From where the figure faces first. Default: three-quarter.",
+)
+@click.option("--theme", type=click.Choice(("light", "dark")), default="light", help="Colors.")
+@click.option(
+    "--follow/--no-follow",
+    default=None,
+    help="Let the camera go along. Default: where the figure would be small otherwise.",
+)
+@force_option
+@json_option
+def command(
+    file: str,
+    output: str | None,
+    name: str | None,
+    frames: tuple[int, int | None] | None,
+    skeleton: str | None,
+    max_decoded: int | None,
+    as_json: bool,
+    force: bool,
+    **options: Any,
+) -> Exit:
+    """Draw the motion in FILE (.mcz, .bvh, .amc or .c3d): a film, a still or a sheet of poses.
+
+    A .png or .svg without --sheet shows the middle frame of --frames. A grid on the floor has its
+    length, left and right have colors of their own. It needs pip install 'mcz[render]'.
+    """
+    import mcz
+    from mcz.writing.inputs import refuse_inputs
+
+    if file == "-" and output is None:
+        raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)
+    target = output or str(Path(file).with_suffix(".gif" if options["sheet"] is None else ".png"))
+    refuse_inputs(target, (file, skeleton))
+    check_new(Path(target), force)
+    facts = {key: options[key] for key in ("rate", "up", "unit")}
+    wanted = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts}
+    with moving_of(file, **wanted) as moving, about(file, target), Progress() as progress:
+        drawn = mcz.render(
+            moving,
+            target,
+            frames=cut_of(frames, moving),
+            force=force,
+            progress=progress,
+            **options,
+        )
+    for note in drawn.notes:
+        say(f"{file}: {note}")
+    size = Path(target).stat().st_size
+    if as_json:
+        print_json({**asdict(drawn), "bytes": size})
+        return Exit.FINE
+    what = plural(drawn.n_pictures, "picture" if drawn.fps else "pose")
+    at = f" at {drawn.fps:g} a second" if drawn.fps else ""
+    echo(f"{target}: {what}{at}, {drawn.width} x {drawn.height} pixels, {size:,} bytes")
+    return Exit.FINE

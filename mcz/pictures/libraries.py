@@ -1,0 +1,52 @@
+"""Libraries that only pictures need: imported on use, and named plainly where they are missing."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+from mcz.errors import OptionError
+
+EXTRAS = {"matplotlib": "plot", "PIL": "plot", "av": "render"}
+PACKAGES = {"PIL": "pillow", "av": "av (PyAV)"}
+
+
+def library(name: str) -> Any:
+    """The module ``name``; OptionError that names the extra of mcz where it is not installed."""
+    package = name.partition(".")[0]
+    try:
+        return import_module(name)
+    except ImportError as error:
+        called = PACKAGES.get(package, package)
+        extra = EXTRAS[package]
+        raise OptionError(
+            f"this picture needs {called}, which is not installed (pip install 'mcz[{extra}]')"
+        ) from error
+
+
+def new_figure(width: int, height: int, **options: Any) -> Any:
+    """A matplotlib figure of so many pixels, apart from every global state of pyplot."""
+    library("matplotlib")
+    canvas = library("matplotlib.backends.backend_agg")
+    figure = library("matplotlib.figure").Figure(
+        figsize=(width / DPI, height / DPI), dpi=DPI, **options
+    )
+    canvas.FigureCanvasAgg(figure)
+    return figure
+
+
+DPI = 100
+SVG = {"svg.fonttype": "path", "svg.hashsalt": "mcz", "axes.unicode_minus": False}
+
+
+@contextmanager
+def quietly() -> Iterator[None]:
+    """Draw letters that the font lacks as boxes, without a word, and SVG the same every time."""
+    matplotlib = library("matplotlib")
+    with warnings.catch_warnings(), matplotlib.rc_context(SVG):
+        warnings.filterwarnings("ignore", message="Glyph .* missing")
+        warnings.filterwarnings("ignore", message="Matplotlib currently does not support")
+        yield

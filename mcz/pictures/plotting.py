@@ -1,0 +1,120 @@
+"""``mcz.plot``: numbers of a motion as a chart, in a picture or on a page with its tables."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from mcz.errors import OptionError
+from mcz.motion import Motion
+from mcz.pictures.byte_charts import bytes_chart, rate_chart
+from mcz.pictures.channel_charts import channel_chart, spectrum_chart
+from mcz.pictures.charts import Chart, save
+from mcz.pictures.error_charts import error_chart
+from mcz.pictures.rendering import Progress, checked_size
+from mcz.poses.moving import Frames, Moving, frame_range
+from mcz.reading.clip import Clip
+from mcz.reading.source_files import with_facts
+
+KINDS = ("channels", "spectrum", "error", "bytes", "rate-distortion")
+CODECS = ("posewave", "mrdwt")  # of a chart of rate and distortion, unless others are asked for
+
+
+@dataclass(frozen=True, slots=True)
+class Plotted:
+    """What was written: ``tables`` are the numbers of the chart, headings first, as text."""
+
+    path: str
+    what: str
+    title: str
+    tables: tuple[tuple[tuple[str, ...], ...], ...]
+    notes: tuple[str, ...] = ()
+
+
+def plot(
+    moving: Moving,
+    path: str | os.PathLike[str],
+    what: str | None = None,
+    *,
+    other: Moving | None = None,
+    joint: int | str | None = None,
+    frames: Frames = None,
+    codecs: Sequence[str] = CODECS,
+    theme: str = "light",
+    size: tuple[int, int] | None = None,
+    rate: float | Fraction | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Plotted:
+    """Draw numbers of a Motion or a Clip into ``path``: a .png, a .svg, or a .html with its tables.
+
+    ``what``: "channels" of ``joint`` over time (None: of the first that has any), their "spectrum",
+    the "error" of ``other`` against ``moving`` (the default where that is given), the "bytes" of a
+    clip by joint and resolution, or "rate-distortion" at a few settings of lossy ``codecs``.
+    ``frames`` (a, b) alone; ``rate``, ``unit`` and ``up`` are for motions that do not say theirs. A
+    page has both themes. Raises OptionError, MotionError, ExistsError.
+    """
+    what = what or ("channels" if other is None else "error")
+    if what not in KINDS:
+        raise OptionError(f"a plot of {what!r}: one of {', '.join(KINDS)}")
+    if (other is None) == (what == "error"):
+        text = "takes the two that are compared" if what == "error" else "is of one motion"
+        raise OptionError(f"a plot of {what} {text}")
+    if joint is not None and what not in ("channels", "spectrum"):
+        raise OptionError(f"a plot of {what} is of all joints, not of {joint!r}")
+    size = checked_size(size)
+    cut = frame_range(moving, frames)
+    facts = (rate, unit, up)
+    chart = _chart(moving, what, other, joint, cut, codecs, facts, progress or (lambda *_: None))
+    save(chart, path, theme=theme, size=size, force=force)
+    tables = tuple(tuple(map(tuple, table.rows)) for table in chart.tables)
+    return Plotted(str(path), what, chart.title, tables, chart.notes)
+
+
+def _chart(
+    moving: Moving,
+    what: str,
+    other: Moving | None,
+    joint: int | str | None,
+    cut: tuple[int, int],
+    codecs: Sequence[str],
+    facts: Any,
+    progress: Progress,
+) -> Chart:
+    if what == "bytes":
+        if not isinstance(moving, Clip):
+            raise OptionError(f"{moving.name!r}: where the bytes go is asked of a clip of an .mcz")
+        return bytes_chart(moving)
+    motion = _motion(moving, cut, facts)
+    if other is not None:
+        theirs = _motion(other, cut if other.n_frames == moving.n_frames else None, facts)
+        return error_chart(motion, theirs, facts[2], cut[0])
+    if what == "rate-distortion":
+        return rate_chart(motion, codecs, progress)
+    if what == "spectrum":
+        return spectrum_chart(motion, joint)
+    return channel_chart(motion, joint, cut[0])
+
+
+def _motion(moving: Moving, cut: tuple[int, int] | None, facts: Any) -> Motion:
+    """These frames as a motion, with what it does not say itself."""
+    if isinstance(moving, Motion):
+        motion = moving
+        if cut is not None and cut != (0, moving.n_frames):
+            signals = tuple(signal.cut(*cut) for signal in moving.signals)
+            motion = replace(moving, signals=signals, source=None, frame_numbers=None)
+    else:
+        clip: Any = moving
+        motion = clip.motion(cut)
+    rate, unit, up = facts
+    return with_facts(
+        motion,
+        rate if motion.frame_rate is None else None,
+        unit if motion.skeleton.unit_cm is None else None,
+        None if motion.skeleton.up_axis else up,
+    )

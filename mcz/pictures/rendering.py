@@ -1,0 +1,265 @@
+"""``mcz.render``: a motion as a film, a still or a sheet of poses."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from mcz.errors import MotionError, OptionError
+from mcz.pictures.bodies import Ints
+from mcz.pictures.cameras import Viewport
+from mcz.pictures.canvases import Canvas
+from mcz.pictures.encoders import film
+from mcz.pictures.libraries import library
+from mcz.pictures.scenes import AROUND, Scene, drawing_of, scene_of, words_around
+from mcz.pictures.sheets import sheet_drawing, sheet_size
+from mcz.pictures.themes import Theme, theme_of
+from mcz.pictures.tracks import track_of
+from mcz.poses.moving import Frames, Moving, frame_range
+from mcz.writing.atomic import replacing
+
+FILMS = {".gif": Fraction(25), ".mp4": Fraction(30), ".webm": Fraction(30)}
+STILLS = (".png", ".svg")
+NEEDED = {
+    ".gif": ("matplotlib", "PIL"),
+    ".mp4": ("matplotlib", "av"),
+    ".webm": ("matplotlib", "av"),
+}
+USUAL_RATE = Fraction(120)  # frames a second where nobody says: that of CMU's AMC files
+SIZE, SIZE_OF_GIF = (640, 640), (480, 480)
+SMALLEST, GREATEST = 64, 4096
+FASTEST = 120  # frames a second of a film
+MOST_POSES = 400
+MOST_PICTURES = 10**6  # of a film
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Rendered:
+    """What was written: ``n_pictures`` of ``width`` x ``height``, ``fps`` None of a still.
+
+    ``notes`` say what was assumed.
+    """
+
+    path: str
+    n_pictures: int
+    width: int
+    height: int
+    fps: float | None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How it is drawn; ``size`` None: the usual one, ``follow`` None: where that is needed."""
+
+    view: str = "three-quarter"
+    theme: Theme = field(default_factory=lambda: theme_of("light"))
+    size: tuple[int, int] | None = None
+    follow: bool | None = None
+
+
+def render(
+    moving: Moving,
+    path: str | os.PathLike[str],
+    *,
+    frames: Frames = None,
+    sheet: int | None = None,
+    view: str = "three-quarter",
+    theme: str = "light",
+    size: tuple[int, int] | None = None,
+    fps: float | Fraction | None = None,
+    speed: float = 1.0,
+    follow: bool | None = None,
+    rate: float | Fraction | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Rendered:
+    """Draw a Motion or a Clip into ``path``: a film (.gif, .mp4, .webm) or a still (.png, .svg).
+
+    A still is the middle one of ``frames`` (a, b), or with ``sheet`` that many poses, evenly over
+    them. ``view`` "front", "side", "top" or "three-quarter" is from where the figure faces first;
+    ``theme`` "light" or "dark"; ``size`` (width, height) in pixels. A film has ``fps`` pictures a
+    second and plays ``speed`` times as fast as the motion was. ``follow``: the camera goes along;
+    None lets it where the figure would be small otherwise. ``rate`` in frames a second, ``unit``
+    and ``up`` are for motions that do not say theirs; what is assumed else, the result says.
+
+    Raises OptionError, also where a library is not installed, MotionError where there is nothing to
+    draw, ExistsError where ``path`` exists and not ``force``.
+    """
+    suffix = _kind(path, sheet)
+    look = Look(view, theme_of(theme), checked_size(size), follow)
+    notes: list[str] = []
+    known_rate = _rate(moving, rate)
+    first, stop = frame_range(moving, frames)
+    if first == stop:
+        raise MotionError(f"{moving.name!r} has no frame there: nothing to draw")
+    told = progress or (lambda *_: None)
+    job = _Job(moving, path, look, known_rate, (unit, up), force, told, notes)
+    if suffix in FILMS:
+        wanted = _fps(fps, FILMS[suffix])
+        if known_rate is None:
+            notes.append(f"its frame rate is unknown: {USUAL_RATE} a second assumed (--rate)")
+        shown = drawn_frames(first, stop, known_rate or USUAL_RATE, wanted, speed)
+        return job.film(shown, wanted, suffix)
+    if sheet is not None:
+        return job.sheet(np.linspace(first, stop - 1, sheet).round().astype(np.int64))
+    return job.still(np.array([(first + stop - 1) // 2], np.int64))
+
+
+def _kind(path: str | os.PathLike[str], sheet: int | None) -> str:
+    """The suffix of what is drawn, whose libraries are there; raises OptionError."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in (*FILMS, *STILLS):
+        known = ", ".join((*FILMS, *STILLS))
+        raise OptionError(f"{path}: a picture is one of {known}, by its suffix")
+    if sheet is not None and suffix in FILMS:
+        raise OptionError(f"{path}: a sheet is a .png or a .svg, no film")
+    if sheet is not None and not 1 <= sheet <= MOST_POSES:
+        raise OptionError(f"a sheet of {sheet} poses: 1 to {MOST_POSES}")
+    for name in NEEDED.get(suffix, ("matplotlib", "PIL")):
+        library(name)  # before any work
+    return suffix
+
+
+def checked_size(size: tuple[int, int] | None) -> tuple[int, int] | None:
+    """``size``; OptionError where a picture cannot have it."""
+    if size is not None and not all(SMALLEST <= each <= GREATEST for each in size):
+        raise OptionError(
+            f"a picture of {size[0]} x {size[1]} pixels: each is {SMALLEST} to {GREATEST}"
+        )
+    return size
+
+
+def drawn_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: float) -> Ints:
+    """The frame that each picture of a film shows, the nearest in time; at least one.
+
+    Raises OptionError for a speed that is no positive number.
+    """
+    if not 0 < speed < np.inf:
+        raise OptionError(f"speed {speed:g} is not a number above 0")
+    step = float(rate) * speed / float(fps)
+    wanted = (stop - 1 - first) / step + 1e-9 if step else np.inf
+    if wanted >= MOST_PICTURES:
+        raise OptionError(
+            f"a film of {wanted:.3g} pictures: below {MOST_PICTURES:,} (--speed, --fps, --frames)"
+        )
+    count = max(1, int(wanted) + 1)
+    found: Ints = (first + np.floor(np.arange(count) * step + 0.5)).astype(np.int64)
+    return np.minimum(found, stop - 1)
+
+
+def _rate(moving: Moving, rate: float | Fraction | None) -> Fraction | None:
+    """Frames a second, as the motion or else the caller says; None while unknown."""
+    if moving.frame_rate is not None or rate is None:
+        return moving.frame_rate
+    if not 0 < rate < np.inf:
+        raise OptionError(f"frame rate {rate} is not positive")
+    return Fraction(rate).limit_denominator(2**20) or Fraction(1, 2**20)
+
+
+def _fps(fps: float | Fraction | None, usual: Fraction) -> Fraction:
+    if fps is None:
+        return usual
+    if not 0 < fps <= FASTEST:
+        raise OptionError(f"{float(fps):g} pictures a second: above 0, up to {FASTEST}")
+    return Fraction(fps).limit_denominator(1001)
+
+
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """One picture to make."""
+
+    moving: Moving
+    path: str | os.PathLike[str]
+    look: Look
+    rate: Fraction | None  # None while unknown: no time is shown
+    facts: tuple[str | None, str | None]  # unit and up axis of a motion without
+    force: bool
+    progress: Progress
+    notes: list[str]
+
+    def film(self, frames: Ints, fps: Fraction, suffix: str) -> Rendered:
+        width, height = self.look.size or (SIZE if suffix != ".gif" else SIZE_OF_GIF)
+        if suffix != ".gif":
+            width, height = width // 2 * 2, height // 2 * 2  # as these codecs want it
+        scene = self._scene(frames, width, height, float(fps))
+        canvas = Canvas(width, height, self.look.theme)
+        with (
+            replacing(self.path, force=self.force) as stream,
+            film(stream, suffix[1:], width, height, fps) as taken,
+        ):
+            for number, (frame, nodes) in enumerate(scene.track):
+                self.progress(number, len(frames), f"frame {frame}")
+                words = words_around(scene, width, height, self.moving.name, self._when(frame))
+                canvas.draw(drawing_of(scene, number, nodes, words))
+                taken.add(canvas.pixels())
+        return self._rendered(len(frames), width, height, float(fps))
+
+    def still(self, frames: Ints) -> Rendered:
+        width, height = self.look.size or SIZE
+        scene = self._scene(frames, width, height, 1.0)
+        canvas = Canvas(width, height, self.look.theme)
+        ((frame, nodes),) = scene.track
+        words = words_around(scene, width, height, self.moving.name, self._when(frame))
+        canvas.draw(drawing_of(scene, 0, nodes, words))
+        self._write(canvas)
+        return self._rendered(1, width, height, None)
+
+    def sheet(self, frames: Ints) -> Rendered:
+        layout = sheet_size(len(frames), self.look.size)
+        port = Viewport(0, 0, *layout.cell)
+        # Each pose is looked at where it is, from the same side and as far.
+        scene = self._scene(frames, *layout.cell, rate=0.0, follow=True, port=port, around=0.6)
+        canvas = Canvas(layout.width, layout.height, self.look.theme)
+        title = f"{self.moving.name}"
+        canvas.draw(sheet_drawing(scene, layout, title, self._when))
+        self._write(canvas)
+        return self._rendered(len(frames), layout.width, layout.height, None)
+
+    def _scene(
+        self,
+        frames: Ints,
+        width: int,
+        height: int,
+        rate: float,
+        follow: bool | None = None,
+        port: Viewport | None = None,
+        around: float = AROUND,
+    ) -> Scene:
+        track = track_of(self.moving, frames, *self.facts)
+        if track.up_assumed:
+            self.notes.append(f"its up axis is unknown: {track.up} up assumed (--up)")
+        if port is None:
+            port = Viewport(0, 0.06 * height, width, 0.87 * height)
+        follow = self.look.follow if follow is None else follow
+        return scene_of(track, self.look.theme, self.look.view, port, follow, rate, around)
+
+    def _when(self, frame: int) -> str:
+        if self.rate is None:
+            return f"frame {frame}"
+        return f"frame {frame}  {float(frame / self.rate):.2f} s"
+
+    def _write(self, canvas: Canvas) -> None:
+        with replacing(self.path, force=self.force) as stream:
+            write_still(canvas, stream, Path(self.path).suffix.lower(), self.moving.name)
+
+    def _rendered(self, count: int, width: int, height: int, fps: float | None) -> Rendered:
+        return Rendered(str(self.path), count, width, height, fps, tuple(self.notes))
+
+
+def write_still(canvas: Canvas, stream: BinaryIO, suffix: str, title: str) -> None:
+    if suffix == ".svg":
+        canvas.svg(stream, title)
+        return
+    image = library("PIL.Image").fromarray(canvas.pixels())
+    image.save(stream, format="PNG", optimize=True)
