@@ -74,7 +74,8 @@ async function respond(words, bytes, limits) {
 /** The clips of an open file, as {@link decode} gives them. */
 async function decodeByRanges(file, { clip: name, frames, joints, resolution = 0 }) {
   const clips = [];
-  for (const { index } of name === undefined ? file.clips : [file.clips[file.clips.indexOf(name)]]) {
+  const wanted = name === undefined ? file.clips : [{ index: name }];
+  for (const { index } of wanted) {
     const clip = await file.clip(index);
     const signals = [];
     for (const { index: signal, ownChannels, nResolutions } of clip.signals) {

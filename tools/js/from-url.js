@@ -117,11 +117,21 @@ class RemoteFile {
     const parts = [];
     let found = 0;
     const tooLong = `the server gives no ranges, and whole files of ${this.limit} bytes at most`;
-    if (size > this.limit) await this.cancel(response, `${tooLong} are read, this has ${size}`);
-    for await (const part of response.body ?? []) {
-      found += part.length;
-      if (found > this.limit) await this.cancel(null, `${tooLong} are read, this has more`);
-      parts.push(part);
+    if (size > this.limit) {
+      await response.body.cancel();
+      this.refuse(`${tooLong} are read, this has ${size}`);
+    }
+    const reader = response.body.getReader();
+    for (;;) {
+      const { done, value } = await reader.read().catch((error) => {
+        throw this.passing(error);
+      });
+      if (done) break;
+      found += value.length;
+      parts.push(value);
+      if (found <= this.limit) continue;
+      await reader.cancel();
+      this.refuse(`${tooLong} are read, this has more`);
     }
     const out = new Uint8Array(found);
     let at = 0;
@@ -132,11 +142,6 @@ class RemoteFile {
     this.stats.bytes += found;
     this.size = found;
     return out;
-  }
-
-  async cancel(response, message) {
-    await response?.body?.cancel();
-    this.refuse(message);
   }
 
   async request(range, mayFail = false, method = "GET") {

@@ -145,7 +145,8 @@ function eventsOf(parameters, head) {
   if (dims.length > 1 && dims[0] === 2) {
     // Minutes and seconds; some files hold seconds alone.
     const pairs = times;
-    times = Array.from({ length: pairs.length >> 1 }, (_, i) => 60 * pairs[2 * i] + pairs[2 * i + 1]);
+    const seconds = (i) => 60 * pairs[2 * i] + pairs[2 * i + 1];
+    times = Array.from({ length: pairs.length >> 1 }, (_, i) => seconds(i));
   }
   times = times.slice(0, parameters.count("EVENT", "USED") ?? times.length);
   if (times.length === 0) return eventsOfHeader(parameters.order, head);

@@ -29,18 +29,16 @@ export async function resynchronize(scan, start) {
   return null;
 }
 
-/** Where the header of a chunk may begin, or a FOOT, before `end`. */
-function candidates(bytes, end) {
-  const found = [];
+/** Where the header of a chunk may begin, or a FOOT, before `end`; no farther than is asked for. */
+function* candidates(bytes, end) {
   for (let i = 0; i < end; i++) {
     const first = bytes[i] & 0xdf;
     if (first >= 0x41 && first <= 0x5a) {
-      if (bytes[i + 5] === 0 && bytes[i + 4] <= 3 && hasHeader(bytes, i)) found.push(i);
+      if (bytes[i + 5] === 0 && bytes[i + 4] <= 3 && hasHeader(bytes, i)) yield i;
     } else if (bytes[i + END_MAGIC_AT] === 0x89 && hasFoot(bytes, i)) {
-      found.push(i);
+      yield i;
     }
   }
-  return found;
 }
 
 function hasHeader(bytes, at) {

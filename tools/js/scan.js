@@ -326,6 +326,7 @@ export class Scan extends Walk {
   /** Where to go on after a fault in what begins at `begin`; null: nowhere. */
   async next(begin) {
     this.index = null;
+    if (this.at > begin) return resynchronize(this, this.at); // behind whole packets
     try {
       const { open, length } = readHeader(await this.view(begin, HEADER_SIZE), 0);
       const end = begin + FRAMING_SIZE + length;
@@ -333,7 +334,7 @@ export class Scan extends Walk {
     } catch (error) {
       if (!(error instanceof Refused)) throw error;
     }
-    return resynchronize(this, Math.max(begin + 1, this.at));
+    return resynchronize(this, begin + 1);
   }
 }
 

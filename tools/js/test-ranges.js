@@ -5,7 +5,8 @@ import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
 
 import { readAnnex } from "./annex-node.js";
-import { MczError, Refused, analogValues, decode, fromBytes, list, open, setAnnex, sources } from "./mcz.js";
+import { MczError, Refused } from "./errors.js";
+import { analogValues, decode, fromBytes, list, open, setAnnex, sources } from "./mcz.js";
 import { c3dRecording } from "./recording.js";
 
 setAnnex(readAnnex);
