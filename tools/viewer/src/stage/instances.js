@@ -19,6 +19,14 @@ export function boneShape() {
   return new LatheGeometry(outline, 14);
 }
 
+/** A head: an egg of length 1 along y and radius 1. */
+export function headShape() {
+  const shape = new SphereGeometry(1, 20, 16);
+  shape.scale(1, 0.55, 1);
+  shape.translate(0, 0.55, 0);
+  return shape;
+}
+
 export const ballShape = () => new SphereGeometry(1, 20, 14);
 export const rodShape = () => new CapsuleGeometry(1, 1, 2, 8);
 
