@@ -131,6 +131,7 @@ class Stage {
     const compared = this.page.store.get("compared");
     if (compared !== null) this.#compare(compared);
     this.view.draw();
+    this.firstPicture ??= performance.now(); // ms since the page was asked for
   }
 
   async #prepared(actor) {
