@@ -1,6 +1,6 @@
 // Many solids of one shape, whose matrices are written as numbers.
 
-import { CapsuleGeometry, DynamicDrawUsage, InstancedMesh, LatheGeometry, MeshStandardMaterial, SphereGeometry, Vector2 } from "three";
+import { CapsuleGeometry, DynamicDrawUsage, InstancedMesh, LatheGeometry, MeshLambertMaterial, SphereGeometry, Vector2 } from "three";
 
 /** A bone of length 1 along y and radius 1: thick near its start, thin at its end. */
 export function boneShape() {
@@ -31,9 +31,7 @@ export const ballShape = () => new SphereGeometry(1, 20, 14);
 export const rodShape = () => new CapsuleGeometry(1, 1, 2, 8);
 
 export function solids(shape, count, { opacity = 1 } = {}) {
-  const material = new MeshStandardMaterial({
-    roughness: 0.62,
-    metalness: 0,
+  const material = new MeshLambertMaterial({
     transparent: opacity < 1,
     opacity,
     depthWrite: opacity === 1,

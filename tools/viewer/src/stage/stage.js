@@ -10,7 +10,7 @@ import { PointErrors, alike, byNumber, bySide, palette } from "./painting.js";
 import { View } from "./view.js";
 
 const GHOST = 0.5; // opacity of a figure that is laid over another
-const FAR = 1.7; // a clip goes farther than so many figures: the camera follows
+const FAR = 1.2; // a clip goes farther than so many figures: the camera follows
 const ASIDE = 1.15; // units of the picture between figures side by side, at least
 const BETWEEN = 0.35; // radians: they stand side by side as seen from the front and a little beside
 const CLICK = 5; // pixels that a pointer may move in a click
