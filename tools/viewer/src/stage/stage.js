@@ -79,15 +79,17 @@ class Stage {
 
   #watchTheme() {
     const dark = matchMedia("(prefers-color-scheme: dark)");
+    const { store } = this.page;
     const change = () => {
-      this.theme = themeOf(dark.matches);
+      const chosen = store.get("theme"); // "light", "dark", or none
+      this.theme = themeOf(chosen ? chosen === "dark" : dark.matches);
       this.colors = palette(this.theme);
       this.view.world.paint(this.theme);
       this.#paint();
       this.view.ask();
     };
     dark.addEventListener("change", change);
-    change();
+    store.watch(["theme"], change);
   }
 
   #watchStore() {
