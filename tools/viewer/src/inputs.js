@@ -192,7 +192,12 @@ async function serverFacts() {
 }
 
 const absolute = (path) => new URL(path, document.baseURI).href;
-const faultText = (error) => (error.name === "Error" ? error.message : `${error.name}: ${error.message}`);
+
+/** What is wrong, with the name of the decoder's error where it is one. */
+function faultText({ name, message }) {
+  const isPlain = name === "Error" || name === "SourceError" || name === "AccessError";
+  return isPlain ? message : `${name}: ${message}`;
+}
 
 /** Files and folders may be dropped anywhere. */
 function takeDrops(page) {

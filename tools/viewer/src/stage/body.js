@@ -12,7 +12,7 @@ const HEAD_WIDTH = [0.045, 0.075];
 const LINE = 0.0055; // radius of a line between markers
 const MARKER = 0.019;
 const MOST_LENGTH = 0.75; // of the figure: what is longer is no bone, but the way to a reference
-const CHOSEN = 1.55; // how much larger a chosen point is
+const CHOSEN = [1.55, 0.026]; // how much larger a chosen point is, and its least radius
 
 /** What is drawn of a clip in one frame. */
 export class Body {
@@ -110,7 +110,7 @@ export class Body {
       const isThere = !Number.isNaN(places[k]);
       if (isThere) for (let axis = 0; axis < 3; axis++) this.last[k + axis] = places[k + axis];
       const from = isThere ? places : this.last;
-      const grown = ofBalls[point] * (chosen.includes(point) ? CHOSEN : isThere ? 1 : 0.7);
+      const grown = radiusOf(ofBalls[point], isThere, chosen.includes(point));
       const isAnywhere = !Number.isNaN(from[k]);
       setBall(balls, point, from[k] || 0, from[k + 1] || 0, from[k + 2] || 0, isAnywhere ? grown : 0);
       const rgb = isThere ? this.#colors[point] : gone;
@@ -133,6 +133,11 @@ export class Body {
     }
     this.group.removeFromParent();
   }
+}
+
+function radiusOf(radius, isThere, isChosen) {
+  if (isChosen) return Math.max(CHOSEN[0] * radius, CHOSEN[1]);
+  return isThere ? radius : 0.7 * radius;
 }
 
 const within = (value, least, most) => Math.max(least, Math.min(most, value));

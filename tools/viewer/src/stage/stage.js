@@ -1,19 +1,20 @@
 // The three-dimensional picture: watches the store, and draws what it says.
 
 import { Actor } from "./actor.js";
-import { Labels, nearest, project } from "./labels.js";
+import { Labels, project } from "./labels.js";
 import { boundsOf, gridOf } from "./framing.js";
 import { FIGURE, upOf } from "./axes.js";
 import { themeOf, roundUp } from "./colors.js";
 import { Contacts, Trails } from "./marks.js";
-import { PointErrors, alike, byNumber, bySide, palette } from "./painting.js";
+import { Painter } from "./painter.js";
+import { PointErrors } from "./painting.js";
+import { listenToPointer } from "./pointer.js";
 import { View } from "./view.js";
 
 const GHOST = 0.5; // opacity of a figure that is laid over another
 const FAR = 1.2; // a clip goes farther than so many figures: the camera follows
 const ASIDE = 1.15; // units of the picture between figures side by side, at least
 const BETWEEN = 0.35; // radians: they stand side by side as seen from the front and a little beside
-const CLICK = 5; // pixels that a pointer may move in a click
 const PREFETCH = 3; // blocks, while playing
 const SOFT = 0.14; // part of its way that the camera follows in a picture
 
@@ -49,13 +50,14 @@ class Stage {
       return;
     }
     this.labels = new Labels(element);
+    this.painter = new Painter(this);
     this.trails = new Trails();
     this.contacts = new Contacts();
     this.view.world.scene.add(this.trails.mesh, this.contacts.mesh);
     this.view.afterDrawing = () => this.#afterDrawing();
     this.#watchTheme();
     this.#watchStore();
-    this.#listen(canvas);
+    listenToPointer(canvas, this);
   }
 
   #makeCanvas() {
@@ -83,9 +85,9 @@ class Stage {
     const change = () => {
       const chosen = store.get("theme"); // "light", "dark", or none
       this.theme = themeOf(chosen ? chosen === "dark" : dark.matches);
-      this.colors = palette(this.theme);
       this.view.world.paint(this.theme);
-      this.#paint();
+      this.painter.useTheme(this.theme);
+      this.painter.paint();
       this.view.ask();
     };
     dark.addEventListener("change", change);
@@ -101,10 +103,22 @@ class Stage {
       this.#relook();
       if (this.compared?.body) this.#look("fit");
     });
-    store.watch(["colors", "errors", "selection"], () => this.#paint());
+    store.watch(["colors", "errors", "selection"], () => this.painter.paint());
     store.watch(["view"], () => this.#look(store.get("view").name));
     const drawn = ["frame", "colors", "errors", "selection", "trails", "contacts", "names", "follow", "playing"];
     store.watch(drawn, () => this.view.ask());
+  }
+
+  // For tests
+
+  async picture() {
+    const { stagePicture } = await import("./capture.js");
+    return stagePicture();
+  }
+
+  async film(options) {
+    const { recordVideo } = await import("./capture.js");
+    return recordVideo(this.page, options);
   }
 
   // Clips come and go
@@ -150,7 +164,7 @@ class Stage {
     this.#dropCompared();
     const { shown } = this;
     if (clip === null || shown === null || !shown.hasFigure) {
-      this.#paint();
+      this.painter.paint();
       this.view.ask();
       return;
     }
@@ -220,7 +234,7 @@ class Stage {
       view.world.scene.add(compared.build({ opacity: isOver ? GHOST : 1 }).group);
       this.pointErrors = new PointErrors(shown, compared);
     }
-    this.#paint();
+    this.painter.paint();
     view.ask();
   }
 
@@ -233,46 +247,6 @@ class Stage {
       "aria-label",
       clip ? `${clip.name}: ${clip.points.length} points, ${clip.nFrames} frames` : "Motion in three dimensions",
     );
-  }
-
-  // Colors
-
-  #paint() {
-    const { shown, compared, colors, theme } = this;
-    if (!shown?.body) return;
-    const { store } = this.page;
-    const chosen = store.get("selection");
-    const mode = store.get("colors");
-    this.isNumbers = (mode === "error" && compared !== null) || mode === "speed";
-    if (!this.isNumbers) {
-      shown.body.paint(bySide(shown.clip.points, colors), theme, chosen);
-      const isOver = store.get("layout") === "overlay";
-      const ofCompared = isOver ? alike(colors.ghost) : compared && bySide(compared.clip.points, colors);
-      compared?.body?.paint(ofCompared, theme, []);
-      this.labels.setScale(null);
-    }
-  }
-
-  /** Colors that change from frame to frame. */
-  #paintNumbers(frame) {
-    if (!this.isNumbers) return;
-    const { shown, compared, pointErrors, colors, theme } = this;
-    const { store } = this.page;
-    const chosen = store.get("selection");
-    if (store.get("colors") === "speed") {
-      const speeds = shown.speeds(frame, new Float32Array(shown.clip.points.length));
-      shown.body.paint(byNumber(speeds, this.usualSpeed, colors.gone), theme, chosen);
-      compared?.body?.paint(alike(colors.ghost), theme, []);
-      const unit = shown.clip.unitCm === null ? "units/s" : "m/s";
-      this.labels.setScale(["0", `${this.usualSpeed} ${unit}`]);
-      return;
-    }
-    if (!compared?.body || pointErrors === null) return;
-    pointErrors.measure();
-    const most = pointErrors.scaleEnd(store.get("errors"));
-    shown.body.paint(byNumber(pointErrors.ofShown, most, colors.center), theme, chosen);
-    compared.body.paint(byNumber(pointErrors.ofCompared, most, colors.center), theme, []);
-    this.labels.setScale(["0", `${roundTo(most / 2)}`, `${most} ${pointErrors.unit}`]);
   }
 
   // Pictures
@@ -289,7 +263,7 @@ class Stage {
       this.#follow(places);
     }
     if (compared?.body) compared.at(frame * this.pointErrors.step, ahead);
-    this.#paintNumbers(frame);
+    this.painter.paintNumbers(frame);
     if (places === null) {
       this.#tellFault(shown);
       return;
@@ -297,8 +271,8 @@ class Stage {
     const chosen = store.get("selection");
     const aside = this.#aside();
     const other = aside.map((x) => -x);
-    shown.body.move(places, { chosen, gone: this.colors.gone, offset: aside });
-    compared?.body?.move(compared.places, { gone: this.colors.gone, offset: other });
+    shown.body.move(places, { chosen, gone: this.painter.colors.gone, offset: aside });
+    compared?.body?.move(compared.places, { gone: this.painter.colors.gone, offset: other });
     this.trails.draw(shown, store.get("trails") ? trailed(store, shown) : [], frame, this.theme);
     this.contacts.draw(shown, frame, { floor: shown.floor, theme: this.theme, isOn: store.get("contacts") });
     for (const { mesh } of [this.trails, this.contacts]) mesh.position.set(...aside);
@@ -358,71 +332,19 @@ class Stage {
     const isOn = this.page.store.get("names");
     const { clientWidth: width, clientHeight: height } = this.element;
     if (isOn || this.labels.names.width > 1) {
-      const projected = isOn ? this.#projected() : null;
+      const projected = isOn ? this.projected() : null;
       const { skyLow } = this.theme;
       const color = this.theme === themeOf(true) ? "#dfe5ea" : "#2a3138";
       this.labels.drawNames(shown.clip.points, projected, { isOn, width, height, color, halo: skyLow });
     }
   }
 
-  #projected() {
+  /** Where the points are on the canvas, in pixels; the third number is their depth. */
+  projected() {
     const { clientWidth: width, clientHeight: height } = this.element;
     const places = this.shown.body.places;
     const out = new Float32Array(places.length);
     return project(places, this.view.eye.camera, { width, height, offset: this.#aside() }, out);
-  }
-
-  // The pointer
-
-  #listen(canvas) {
-    let down = null;
-    canvas.addEventListener("pointermove", (event) => event.buttons === 0 && this.#hover(event));
-    canvas.addEventListener("pointerleave", () => this.labels.setPoint(null));
-    canvas.addEventListener("pointerdown", (event) => {
-      down = event;
-      this.labels.setPoint(null);
-    });
-    canvas.addEventListener("pointerup", (event) => {
-      if (down === null) return;
-      const moved = Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY);
-      if (moved < CLICK && event.button === 0) this.#choose(event);
-      down = null;
-    });
-    canvas.addEventListener("dblclick", () => this.page.store.set({ view: { name: "fit" } }));
-  }
-
-  #pointAt(event) {
-    if (!this.shown?.body) return { point: -1 };
-    const box = this.view.canvas.getBoundingClientRect();
-    const x = event.clientX - box.left;
-    const y = event.clientY - box.top;
-    return { x, y, point: nearest(this.#projected(), x, y, event.pointerType === "touch" ? 28 : undefined) };
-  }
-
-  #hover(event) {
-    const { x, y, point } = this.#pointAt(event);
-    this.labels.setPoint(point < 0 ? null : { x, y, text: this.#nameOf(point) });
-  }
-
-  #nameOf(point) {
-    const { name } = this.shown.clip.points[point];
-    if (this.page.store.get("colors") !== "error" || this.pointErrors === null) return name;
-    const error = this.pointErrors.ofShown[point];
-    return Number.isFinite(error) ? `${name}: ${roundTo(error)} ${this.pointErrors.unit}` : name;
-  }
-
-  #choose(event) {
-    const { store } = this.page;
-    const { point } = this.#pointAt(event);
-    const chosen = store.get("selection");
-    const adds = event.shiftKey || event.ctrlKey || event.metaKey;
-    if (point < 0) {
-      if (!adds && chosen.length > 0) store.set({ selection: [] });
-      return;
-    }
-    const others = adds ? chosen.filter((one) => one !== point) : [];
-    const isOff = chosen.includes(point) && (adds || chosen.length === 1);
-    store.set({ selection: isOff ? others : [...others, point] });
   }
 }
 
@@ -440,5 +362,3 @@ function whyNoFigure({ nFrames, name }) {
   if (nFrames === 0) return `${name} has no frames.`;
   return `${name} has no figure: its channels do not say where anything is. Its curves are below.`;
 }
-
-const roundTo = (value) => Number(value.toPrecision(3));
