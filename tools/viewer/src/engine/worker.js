@@ -32,8 +32,9 @@ const METHODS = {
     });
   },
 
-  async open(where, { name, salvage = false }) {
-    const file = await openFile(where, { name, salvage });
+  async open(where, options) {
+    const { name } = options;
+    const file = await openFile(where, options);
     const id = ++nFiles;
     files.set(id, file);
     return { id, name, size: file.size, nClips: file.nClips, damage: file.damage };
