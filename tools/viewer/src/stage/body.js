@@ -8,10 +8,10 @@ const TAPER = 0.6;
 const THIN = 0.006; // least and greatest radius, in units of the picture
 const THICK = 0.044;
 const HEAD = /head/i;
-const HEAD_WIDTH = [0.045, 0.075];
+const HEAD_WIDTH = [0.04, 0.075];
 const LINE = 0.0055; // radius of a line between markers
 const MARKER = 0.019;
-const MOST_LENGTH = 0.75; // of the figure: what is longer is no bone, but the way to a reference
+const HEAD_LENGTH = 0.08; // at least
 const CHOSEN = [1.55, 0.026]; // how much larger a chosen point is, and its least radius
 
 /** What is drawn of a clip in one frame. */
@@ -23,17 +23,18 @@ export class Body {
   #colors = [];
 
   /**
-   * @param {{points: object[], bones: number[][], isMarkers: boolean}} clip
+   * @param {{points: object[], isMarkers: boolean}} clip
+   * @param {{bones: number[][], loose: Set<number>}} anatomy see anatomy.js
    * @param {Float32Array} places of some frame, in units of the picture, from which lengths come
    * @param {{opacity?: number}} look
    */
-  constructor(clip, places, look = {}) {
+  constructor(clip, { bones, loose }, places, look = {}) {
     this.clip = clip;
     this.group = new Group();
     this.places = new Float32Array(clip.points.length * 3).fill(NaN);
     this.last = new Float32Array(clip.points.length * 3).fill(NaN); // where points were seen last
-    const bones = clip.bones.filter((bone) => clip.isMarkers || isBone(bone, places));
-    const heads = clip.isMarkers ? [] : headsOf(bones, clip.points);
+    this.loose = loose;
+    const heads = clip.isMarkers ? [] : headsOf(bones, clip.points, places);
     this.bones = [...bones.filter((bone) => !heads.includes(bone)), ...heads];
     this.nHeads = heads.length;
     this.#bones = solids(boneShape(), this.bones.length - heads.length, look);
@@ -72,7 +73,8 @@ export class Body {
         ofBalls[b] = Math.max(ofBalls[b], (HEAD.test(points[b].name) ? 0.3 : 0.6) * radius);
       });
     }
-    this.#radii = { ofBones, ofBalls: ofBalls.map((radius) => Math.max(radius, THIN)) };
+    const isDrawn = (point) => !this.loose.has(point);
+    this.#radii = { ofBones, ofBalls: ofBalls.map((radius, point) => (isDrawn(point) ? Math.max(radius, THIN) : 0)) };
   }
 
   radius(point) {
@@ -147,12 +149,8 @@ function distance(places, a, b) {
 }
 
 /** Bones that lead to a head and no further. */
-function headsOf(bones, points) {
+function headsOf(bones, points, places) {
   const starts = new Set(bones.map(([a]) => a));
-  return bones.filter(([, b]) => HEAD.test(points[b].name) && !starts.has(b)).slice(0, 1);
-}
-
-function isBone([a, b], places) {
-  const length = distance(places, a, b);
-  return !(length > MOST_LENGTH * 1.7) && length !== 0;
+  const isLong = (a, b) => distance(places, a, b) > HEAD_LENGTH;
+  return bones.filter(([a, b]) => HEAD.test(points[b].name) && !starts.has(b) && isLong(a, b)).slice(0, 1);
 }

@@ -8,14 +8,15 @@ const NEAR_ZERO = [-0.015, 0.06]; // of the figure's size: the floor is at 0 the
 /**
  * @param {Float32Array[]} frames x, y, z of each point, in units of the file
  * @param {number} up axis
+ * @param {Set<number>} loose points that do not count
  * @returns {{size: number, floor: number}} of the figure along its longest side, and height of the
  *   floor, in units of the file; size 0 where there is no figure
  */
-export function measured(frames, up) {
+export function measured(frames, up, loose = new Set()) {
   const sizes = [];
   const lowest = [];
   for (const places of frames) {
-    const { least, most } = boundsOf(places);
+    const { least, most } = boundsOf(places, loose);
     if (least[0] > most[0]) continue;
     sizes.push(Math.max(...most.map((x, k) => x - least[k])));
     lowest.push(least[up]);
@@ -26,10 +27,12 @@ export function measured(frames, up) {
   return { size, floor };
 }
 
-/** Least and most of x, y and z, without points that are nowhere. */
-export function boundsOf(places, least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity]) {
+/** Least and most of x, y and z, without points that are nowhere or do not count. */
+export function boundsOf(places, loose = new Set()) {
+  const least = [Infinity, Infinity, Infinity];
+  const most = [-Infinity, -Infinity, -Infinity];
   for (let k = 0; k < places.length; k += 3) {
-    if (Number.isNaN(places[k])) continue;
+    if (Number.isNaN(places[k]) || loose.has(k / 3)) continue;
     for (let axis = 0; axis < 3; axis++) {
       least[axis] = Math.min(least[axis], places[k + axis]);
       most[axis] = Math.max(most[axis], places[k + axis]);

@@ -21,6 +21,8 @@ export class Labels {
   }
 
   setNote(text) {
+    if (text === this.noteText) return;
+    this.noteText = text;
     this.note.hidden = text === "";
     this.note.textContent = text;
   }

@@ -10,6 +10,7 @@ const FOOT = /foot|toe|heel|ankle|ball|(?:^|[:_ ])[lr](?:hee|toe|ank|mt5|mt1)$/i
 const HIGH = 0.075; // of the figure above the floor
 const FAST = 0.28; // of the figure, a second
 const MOST_FEET = 24;
+const APART = 0.13; // of rings: of points that are nearer one has a ring
 
 export class Trails {
   constructor() {
@@ -76,10 +77,13 @@ export class Contacts {
     const speeds = actor.speeds(frame, new Float32Array(clip.points.length));
     const perUnit = axes.scale / ((clip.unitCm ?? 100) / 100); // units of the picture for a meter
     const color = new Color();
+    const taken = [];
     clip.points.forEach(({ name, side }, point) => {
       const k = 3 * point;
       if (!FOOT.test(name) || this.mesh.count >= MOST_FEET || Number.isNaN(places[k])) return;
       if (places[k + 1] - floor > HIGH * 1.7 || speeds[point] * perUnit > FAST * 1.7) return;
+      if (taken.some(([x, z]) => Math.hypot(x - places[k], z - places[k + 2]) < APART)) return;
+      taken.push([places[k], places[k + 2]]);
       const index = this.mesh.count++;
       const array = this.mesh.instanceMatrix.array;
       array.fill(0, 16 * index, 16 * index + 16);

@@ -2,7 +2,7 @@
 
 import { Actor } from "./actor.js";
 import { Labels, project } from "./labels.js";
-import { boundsOf, gridOf } from "./framing.js";
+import { gridOf } from "./framing.js";
 import { FIGURE, upOf } from "./axes.js";
 import { themeOf, roundUp } from "./colors.js";
 import { Contacts, Trails } from "./marks.js";
@@ -212,7 +212,8 @@ class Stage {
     const { clip, size, axes, floor } = this.shown;
     const grid = gridOf(size, clip.unitCm);
     this.view.world.lay({ floor, minor: grid.minor * axes.scale, major: grid.major * axes.scale });
-    this.labels.setNote(`Grid ${grid.text}`);
+    this.gridText = `Grid ${grid.text}`;
+    this.labels.setNote(this.gridText);
   }
 
   #followIfFar() {
@@ -294,8 +295,10 @@ class Stage {
 
   /** Light and floor go with the figure, and the camera where it is to follow. */
   #follow(places) {
-    const { least, most } = boundsOf(places);
-    if (least[0] > most[0]) return;
+    const { least, most } = this.shown.bounds(places);
+    const isEmpty = least[0] > most[0];
+    this.labels.setNote(isEmpty ? "No point is seen in this frame" : this.gridText);
+    if (isEmpty) return;
     const middle = least.map((x, k) => (x + most[k]) / 2);
     this.view.world.goWith(middle[0], middle[2]);
     if (this.page.store.get("follow") && this.middle) {
@@ -314,7 +317,7 @@ class Stage {
     if (!shown?.body) return;
     const frame = this.page.store.get("frame");
     const now = shown.at(frame, 1);
-    const figure = now ? boundsOf(now) : shown.extent();
+    const figure = now ? shown.bounds(now) : shown.extent();
     const isFit = name === "fit";
     const box = isFit || this.page.store.get("follow") ? figure : shown.extent();
     const aside = this.#aside().map(Math.abs);
