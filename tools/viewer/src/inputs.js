@@ -150,7 +150,8 @@ async function converted(files) {
   for (const file of files) body.append("file", file, file.name);
   const response = await fetch(absolute("convert"), { method: "POST", body });
   const answer = await response.json().catch(() => ({}));
-  if (!response.ok) throw new Error(answer.error?.message ?? `the server answers ${response.status}`);
+  if (!response.ok)
+    throw new Error(answer.error?.message ?? `the server answers ${response.status}`);
   return answer;
 }
 

@@ -58,5 +58,13 @@ class WholeFile {
 const whole = async (blob) => new Uint8Array(await blob.arrayBuffer());
 
 function rowOf({ name, nFrames, rate, signals }, bytes) {
-  return { index: 0, name, nFrames, rate, codecs: [], nChannels: signals[0].channels.length, bytes };
+  return {
+    index: 0,
+    name,
+    nFrames,
+    rate,
+    codecs: [],
+    nChannels: signals[0].channels.length,
+    bytes,
+  };
 }

@@ -93,7 +93,8 @@ export class Actor {
   extent() {
     const out = new Float32Array(this.places.length);
     const boxes = this.samples.map((sample) => this.bounds(this.axes.apply(sample, out)));
-    const ends = (name, choose) => [0, 1, 2].map((k) => choose(...boxes.map((box) => box[name][k])));
+    const ends = (name, choose) =>
+      [0, 1, 2].map((k) => choose(...boxes.map((box) => box[name][k])));
     return { least: ends("least", Math.min), most: ends("most", Math.max) };
   }
 
@@ -157,7 +158,13 @@ export class Actor {
     const factor = (rateOf(this.clip) / (high - low)) * ((this.clip.unitCm ?? 100) / 100);
     for (let point = 0; point < out.length; point++) {
       const k = 3 * point;
-      out[point] = factor * Math.hypot(after[k] - before[k], after[k + 1] - before[k + 1], after[k + 2] - before[k + 2]);
+      out[point] =
+        factor *
+        Math.hypot(
+          after[k] - before[k],
+          after[k + 1] - before[k + 1],
+          after[k + 2] - before[k + 2],
+        );
     }
     return out;
   }

@@ -12,13 +12,22 @@ const MOST_LENGTH = 0.75; // of the figure
  */
 export function anatomyOf({ points, bones, isMarkers }, samples) {
   if (isMarkers) return { bones, loose: new Set() };
-  const lengths = bones.map(([a, b]) => samples.map((places) => distance(places, a, b)).filter(Number.isFinite));
+  const lengths = bones.map(([a, b]) =>
+    samples.map((places) => distance(places, a, b)).filter(Number.isFinite),
+  );
   const steady = bones.map((_, i) => isSteady(lengths[i]));
-  const size = sizeOf(bones.filter((_, i) => steady[i]), samples);
+  const size = sizeOf(
+    bones.filter((_, i) => steady[i]),
+    samples,
+  );
   const kept = bones.filter((_, i) => steady[i] && !(Math.max(...lengths[i]) > MOST_LENGTH * size));
   const joined = new Set(kept.flat());
-  const isLoose = (point) => kept.length > 0 && !joined.has(point) && bones.some((bone) => bone.includes(point));
-  return { bones: kept, loose: new Set(points.flatMap((_, point) => (isLoose(point) ? [point] : []))) };
+  const isLoose = (point) =>
+    kept.length > 0 && !joined.has(point) && bones.some((bone) => bone.includes(point));
+  return {
+    bones: kept,
+    loose: new Set(points.flatMap((_, point) => (isLoose(point) ? [point] : []))),
+  };
 }
 
 function isSteady(lengths) {

@@ -41,7 +41,10 @@ export class Body {
     this.#heads = solids(headShape(), heads.length, look);
     this.#balls = solids(ballShape(), clip.points.length, look);
     for (const mesh of this.#meshes()) {
-      mesh.instanceColor = new InstancedBufferAttribute(new Float32Array(3 * mesh.instanceMatrix.count).fill(1), 3);
+      mesh.instanceColor = new InstancedBufferAttribute(
+        new Float32Array(3 * mesh.instanceMatrix.count).fill(1),
+        3,
+      );
       this.group.add(mesh);
     }
     this.#measure(places);
@@ -74,7 +77,10 @@ export class Body {
       });
     }
     const isDrawn = (point) => !this.loose.has(point);
-    this.#radii = { ofBones, ofBalls: ofBalls.map((radius, point) => (isDrawn(point) ? Math.max(radius, THIN) : 0)) };
+    this.#radii = {
+      ofBones,
+      ofBalls: ofBalls.map((radius, point) => (isDrawn(point) ? Math.max(radius, THIN) : 0)),
+    };
   }
 
   radius(point) {
@@ -89,7 +95,9 @@ export class Body {
     const color = new Color();
     const write = ([mesh, index], rgb) => mesh.instanceColor.setXYZ(index, rgb[0], rgb[1], rgb[2]);
     const special = color.set(theme.chosen).toArray();
-    this.#colors = this.clip.points.map((_, point) => (chosen.includes(point) ? special : colorOf(point)));
+    this.#colors = this.clip.points.map((_, point) =>
+      chosen.includes(point) ? special : colorOf(point),
+    );
     this.bones.forEach(([a, b], i) => write(this.#solid(i), this.#boneColor(a, b, colorOf)));
     this.#colors.forEach((rgb, point) => write([this.#balls, point], rgb));
     for (const mesh of this.#meshes()) mesh.instanceColor.needsUpdate = true;
@@ -114,7 +122,14 @@ export class Body {
       const from = isThere ? places : this.last;
       const grown = radiusOf(ofBalls[point], isThere, chosen.includes(point));
       const isAnywhere = !Number.isNaN(from[k]);
-      setBall(balls, point, from[k] || 0, from[k + 1] || 0, from[k + 2] || 0, isAnywhere ? grown : 0);
+      setBall(
+        balls,
+        point,
+        from[k] || 0,
+        from[k + 1] || 0,
+        from[k + 2] || 0,
+        isAnywhere ? grown : 0,
+      );
       const rgb = isThere ? this.#colors[point] : gone;
       if (rgb) this.#balls.instanceColor.setXYZ(point, rgb[0], rgb[1], rgb[2]);
     }
@@ -152,5 +167,7 @@ function distance(places, a, b) {
 function headsOf(bones, points, places) {
   const starts = new Set(bones.map(([a]) => a));
   const isLong = (a, b) => distance(places, a, b) > HEAD_LENGTH;
-  return bones.filter(([a, b]) => HEAD.test(points[b].name) && !starts.has(b) && isLong(a, b)).slice(0, 1);
+  return bones
+    .filter(([a, b]) => HEAD.test(points[b].name) && !starts.has(b) && isLong(a, b))
+    .slice(0, 1);
 }

@@ -78,7 +78,15 @@ function meanOf(points, places, side) {
   return count === 0 ? null : sum.map((x) => x / count);
 }
 
-const CM_NAMES = { 0.001: "0.01 mm", 0.01: "0.1 mm", 0.1: "1 mm", 1: "1 cm", 10: "10 cm", 100: "1 m", 1000: "10 m" };
+const CM_NAMES = {
+  0.001: "0.01 mm",
+  0.01: "0.1 mm",
+  0.1: "1 mm",
+  1: "1 cm",
+  10: "10 cm",
+  100: "1 m",
+  1000: "10 m",
+};
 
 /**
  * Lines of the floor: a tenth of the figure and ten times that, as round lengths.
@@ -90,9 +98,16 @@ const CM_NAMES = { 0.001: "0.01 mm", 0.01: "0.1 mm", 0.1: "1 mm", 1: "1 cm", 10:
 export function gridOf(size, unitCm) {
   const length = (size || 1) * (unitCm ?? 1);
   const major = 10 ** Math.floor(Math.log10(length) + 0.15);
-  const name = (value) => (unitCm === null ? `${round(value)} ${round(value) === 1 ? "unit" : "units"}` : (CM_NAMES[round(value)] ?? `${round(value)} cm`));
+  const name = (value) =>
+    unitCm === null
+      ? `${round(value)} ${round(value) === 1 ? "unit" : "units"}`
+      : (CM_NAMES[round(value)] ?? `${round(value)} cm`);
   const lengthOf = (value) => value / (unitCm ?? 1);
-  return { minor: lengthOf(major / 10), major: lengthOf(major), text: `${name(major / 10)} · ${name(major)}` };
+  return {
+    minor: lengthOf(major / 10),
+    major: lengthOf(major),
+    text: `${name(major / 10)} · ${name(major)}`,
+  };
 }
 
 const round = (value) => Number(value.toPrecision(6));

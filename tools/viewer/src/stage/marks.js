@@ -1,6 +1,13 @@
 // What motion leaves behind: trails of chosen points, and where feet stand.
 
-import { Color, Group, InstancedMesh, InstancedBufferAttribute, MeshBasicMaterial, RingGeometry } from "three";
+import {
+  Color,
+  Group,
+  InstancedMesh,
+  InstancedBufferAttribute,
+  MeshBasicMaterial,
+  RingGeometry,
+} from "three";
 import { rateOf } from "../timeline/clock.js";
 import { rodShape, setBone, solids } from "./instances.js";
 
@@ -49,7 +56,10 @@ export class Trails {
         const away = Math.abs(at - frame) / reach;
         const index = this.mesh.count++;
         setBone(this.mesh.instanceMatrix.array, index, before, 0, 1, at > frame ? 0.003 : 0.0058);
-        color.copy(near).lerp(far, away).toArray(this.mesh.instanceColor.array, 3 * index);
+        color
+          .copy(near)
+          .lerp(far, away)
+          .toArray(this.mesh.instanceColor.array, 3 * index);
       }
     }
     this.mesh.instanceMatrix.needsUpdate = true;
@@ -65,7 +75,10 @@ export class Contacts {
     const shape = new RingGeometry(0.055, 0.075, 32);
     shape.rotateX(-Math.PI / 2);
     this.mesh = new InstancedMesh(shape, material, MOST_FEET);
-    this.mesh.instanceColor = new InstancedBufferAttribute(new Float32Array(3 * MOST_FEET).fill(1), 3);
+    this.mesh.instanceColor = new InstancedBufferAttribute(
+      new Float32Array(3 * MOST_FEET).fill(1),
+      3,
+    );
     this.mesh.frustumCulled = false;
     this.mesh.count = 0;
   }

@@ -22,7 +22,8 @@ let stage = null;
 
 /** The stage of this page. @throws {Error} where nothing can be drawn */
 export function mounted() {
-  if (!stage?.view) throw new Error("there is no picture: this browser does not draw in three dimensions");
+  if (!stage?.view)
+    throw new Error("there is no picture: this browser does not draw in three dimensions");
   return stage;
 }
 
@@ -46,7 +47,9 @@ class Stage {
       this.view = new View(canvas, () => this.#beforeDrawing());
     } catch {
       canvas.remove();
-      this.#fault("This browser does not draw in three dimensions (no WebGL). Curves and numbers work all the same.");
+      this.#fault(
+        "This browser does not draw in three dimensions (no WebGL). Curves and numbers work all the same.",
+      );
       return;
     }
     this.labels = new Labels(element);
@@ -105,7 +108,17 @@ class Stage {
     });
     store.watch(["colors", "errors", "selection"], () => this.painter.paint());
     store.watch(["view"], () => this.#look(store.get("view").name));
-    const drawn = ["frame", "colors", "errors", "selection", "trails", "contacts", "names", "follow", "playing"];
+    const drawn = [
+      "frame",
+      "colors",
+      "errors",
+      "selection",
+      "trails",
+      "contacts",
+      "names",
+      "follow",
+      "playing",
+    ];
     store.watch(drawn, () => this.view.ask());
   }
 
@@ -170,7 +183,12 @@ class Stage {
     }
     const actor = new Actor(this.page.engine, clip, () => this.view.ask());
     const isGood = await this.#prepared(actor);
-    if (!isGood || !actor.hasFigure || this.page.store.get("compared") !== clip || this.shown !== shown) {
+    if (
+      !isGood ||
+      !actor.hasFigure ||
+      this.page.store.get("compared") !== clip ||
+      this.shown !== shown
+    ) {
       actor.close();
       return;
     }
@@ -230,7 +248,8 @@ class Stage {
     view.world.scene.add(shown.build({ opacity: 1 }).group);
     this.pointErrors = null;
     if (compared !== null) {
-      const ratio = shown.clip.unitCm && compared.clip.unitCm ? compared.clip.unitCm / shown.clip.unitCm : 1;
+      const ratio =
+        shown.clip.unitCm && compared.clip.unitCm ? compared.clip.unitCm / shown.clip.unitCm : 1;
       compared.place(upOf(compared.clip, this.page.store.get("up")), shown.axes.scale * ratio);
       view.world.scene.add(compared.build({ opacity: isOver ? GHOST : 1 }).group);
       this.pointErrors = new PointErrors(shown, compared);
@@ -246,7 +265,9 @@ class Stage {
     if (noFigure || !clip) this.labels.setNote("");
     this.view.canvas.setAttribute(
       "aria-label",
-      clip ? `${clip.name}: ${clip.points.length} points, ${clip.nFrames} frames` : "Motion in three dimensions",
+      clip
+        ? `${clip.name}: ${clip.points.length} points, ${clip.nFrames} frames`
+        : "Motion in three dimensions",
     );
   }
 
@@ -275,7 +296,11 @@ class Stage {
     shown.body.move(places, { chosen, gone: this.painter.colors.gone, offset: aside });
     compared?.body?.move(compared.places, { gone: this.painter.colors.gone, offset: other });
     this.trails.draw(shown, store.get("trails") ? trailed(store, shown) : [], frame, this.theme);
-    this.contacts.draw(shown, frame, { floor: shown.floor, theme: this.theme, isOn: store.get("contacts") });
+    this.contacts.draw(shown, frame, {
+      floor: shown.floor,
+      theme: this.theme,
+      isOn: store.get("contacts"),
+    });
     for (const { mesh } of [this.trails, this.contacts]) mesh.position.set(...aside);
   }
 
@@ -338,7 +363,13 @@ class Stage {
       const projected = isOn ? this.projected() : null;
       const { skyLow } = this.theme;
       const color = this.theme === themeOf(true) ? "#dfe5ea" : "#2a3138";
-      this.labels.drawNames(shown.clip.points, projected, { isOn, width, height, color, halo: skyLow });
+      this.labels.drawNames(shown.clip.points, projected, {
+        isOn,
+        width,
+        height,
+        color,
+        halo: skyLow,
+      });
     }
   }
 
@@ -358,7 +389,9 @@ const ENDS = /hand|wrist|foot|toe|ankle|head/i;
 function trailed(store, { clip }) {
   const chosen = store.get("selection");
   if (chosen.length > 0) return chosen.slice(0, MOST_TRAILS);
-  return clip.points.flatMap(({ name }, point) => (ENDS.test(name) ? [point] : [])).slice(0, MOST_TRAILS);
+  return clip.points
+    .flatMap(({ name }, point) => (ENDS.test(name) ? [point] : []))
+    .slice(0, MOST_TRAILS);
 }
 
 function whyNoFigure({ nFrames, name }) {
