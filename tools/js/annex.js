@@ -2,6 +2,7 @@
 // models that files may name without having them.
 
 import { Unsupported } from "./errors.js";
+import { Missing } from "./missing.js";
 
 let reader = null;
 const files = new Map();
@@ -9,7 +10,8 @@ const documents = new Map();
 
 /**
  * Says where the annex comes from. A program in Node gives the reader of annex-node.js; a browser
- * fetches the files that it wants first, and gives a function that looks them up.
+ * fetches the files that it wants first, and gives a function that looks them up; or it gives that
+ * of annex-url.js, which fetches them when they are wanted, for all that reads asynchronously.
  *
  * @param {(name: string) => Uint8Array} read the bytes of an annex file, such as "wavelets.json"
  */
@@ -31,7 +33,8 @@ export function annexBytes(name) {
     let bytes;
     try {
       bytes = reader(name);
-    } catch {
+    } catch (error) {
+      if (error instanceof Missing) throw error;
       throw new Unsupported(`the annex ${name} is needed and cannot be read`);
     }
     files.set(name, bytes);

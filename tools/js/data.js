@@ -69,7 +69,8 @@ function segmentHead(reader, signal) {
   return newSegment(signal, { firstFrame, nFrames, lead, tail, flags });
 }
 
-function newSegment(signal, { firstFrame, nFrames, lead, tail, flags }) {
+/** A segment without its bytes. */
+export function newSegment(signal, { firstFrame, nFrames, lead, tail, flags }) {
   return {
     signal: signal.index,
     firstFrame,

@@ -18,6 +18,9 @@ export class Refused extends MczError {}
 /** A number is beyond a limit of SPEC.md, "Limits and profiles". */
 export class LimitExceeded extends Refused {}
 
+/** The bytes of a file could not be had: its server, or what holds them, did not give them. */
+export class AccessError extends MczError {}
+
 /** The file may be right, but needs something that this decoder does not have. */
 export class Unsupported extends MczError {
   get exitCode() {

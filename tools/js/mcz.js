@@ -11,7 +11,12 @@ import { decodeSignal, takeColumns } from "./signals.js";
 import { restoreClip, restoreSkeleton } from "./sources.js";
 
 export { setAnnex } from "./annex.js";
-export { LimitExceeded, MczError, Refused, Unsupported } from "./errors.js";
+export { annexFrom } from "./annex-url.js";
+export { AccessError, LimitExceeded, MczError, Refused, Unsupported } from "./errors.js";
+export { fromBlob, fromBytes } from "./from-bytes.js";
+export { fromUrl } from "./from-url.js";
+export { open } from "./open.js";
+export { analogValues } from "./recording.js";
 
 /**
  * @typedef {object} Options

@@ -16,6 +16,17 @@ const FRESH_BIT = 0x80;
 const INDEX_FLAGS = { [KIND_SEGMENT]: 128, [KIND_FRAME]: 64, [KIND_NUMBERED]: 32 };
 
 /**
+ * The kind of the packet that a segment is, as an index says it; 0 of a closed DATA.
+ *
+ * @param {number} indexFlags
+ * @returns {{kind: number, bit: number}} `bit` is not one of the flags of the segment itself
+ */
+export function packetOf(indexFlags) {
+  const kind = [KIND_SEGMENT, KIND_FRAME, KIND_NUMBERED].find((k) => indexFlags & INDEX_FLAGS[k]);
+  return kind === undefined ? { kind: 0, bit: 0 } : { kind, bit: INDEX_FLAGS[kind] };
+}
+
+/**
  * Reads the packets of an open DATA and adds their segments to the signals of the clip.
  *
  * @param {Uint8Array} bytes the file
@@ -98,4 +109,55 @@ function u64Bytes(value) {
   view.setUint32(0, value % 2 ** 32, true);
   view.setUint32(4, Math.floor(value / 2 ** 32), true);
   return out;
+}
+
+/** Bytes before the body of a packet that its head may have. */
+export const MOST_HEAD = 1 + 8 + 8 + 2;
+const CHECK_SIZE = 2;
+const MOST_SEQUENCE = 8; // bytes of a sequence number
+
+/**
+ * The checked body of a packet that an index names.
+ *
+ * @param {Uint8Array} bytes up to the end of the packet, from {@link MOST_HEAD} bytes before its
+ *   body on, or fewer where the file begins
+ * @param {import("./data.js").Segment} segment as the index has it
+ * @returns {Uint8Array}
+ * @throws {Refused}
+ */
+export function indexedBody(bytes, { packet, offset, size, firstFrame, fresh }) {
+  const begin = bytes.length - CHECK_SIZE - size;
+  const what = `the packet at ${offset}`;
+  const body = bytes.subarray(begin, begin + size);
+  const number = packet === KIND_NUMBERED ? u64Bytes(firstFrame) : new Uint8Array(0);
+  const reader = new ByteReader(bytes, what, begin + size);
+  checkBody(reader, reader.u16(), crc32(number, 0, number.length, crc32(body)));
+  const kind = packet | (fresh ? FRESH_BIT : 0);
+  if (packet !== KIND_SEGMENT && !hasHead(bytes.subarray(0, begin), kind, size)) {
+    reader.refuse("it is not as the index says");
+  }
+  return body;
+}
+
+/** Whether some bytes end with the head of such a packet, whatever its number in its DATA. */
+function hasHead(bytes, kind, length) {
+  for (let size = 1; size <= MOST_SEQUENCE; size++) {
+    const start = bytes.length - CHECK_SIZE - varintSize(length) - size - 1;
+    if (start < 0) return false;
+    const reader = new ByteReader(bytes, "packet", start);
+    const last = bytes[start + size];
+    const isNumber = last < 0x80 && bytes.subarray(start + 1, start + size).every((b) => b > 0x7f);
+    if (reader.u8() !== kind || !isNumber) continue;
+    reader.skip(size);
+    if (bytes[bytes.length - CHECK_SIZE - 1] > 0x7f || reader.varint() !== length) continue;
+    const check = crc32(bytes, start, reader.at);
+    if (reader.left === CHECK_SIZE && reader.u16() === (check & 0xffff)) return true;
+  }
+  return false;
+}
+
+function varintSize(value) {
+  let size = 1;
+  for (let rest = value; rest >= 128; rest = Math.floor(rest / 128)) size++;
+  return size;
 }

@@ -34,7 +34,10 @@ const BASE_PROFILE = 0;
  *
  * @typedef {object} MczFile
  * @property {number} size bytes of the file
+ * @property {Uint8Array} head payload of HEAD
  * @property {object} limits of its profile
+ * @property {object[]} shared where SKEL, MODL and SRCE lie, the first of each id: type, id, offset,
+ *   length
  * @property {Map<string, import("./skel.js").Skeleton>} skeletons by id
  * @property {Map<string, {kind: number, data: Uint8Array}>} models by id
  * @property {Map<string, {format: number, data: Uint8Array}>} templates by id, inflated
@@ -66,6 +69,8 @@ class Walk {
     this.at = SIGNATURE_SIZE;
     this.file = {
       size: bytes.length,
+      head: null,
+      shared: [],
       limits: profile(BASE_PROFILE),
       skeletons: new Map(),
       models: new Map(),
@@ -81,9 +86,6 @@ class Walk {
     this.attachment = null; // the attachment of which a part came last, until it is complete
     this.index = null; // the INDX that came last, until its FOOT
     this.endOfFoot = 0; // of the last FOOT
-    // For INDX: what the file has so far.
-    this.head = null;
-    this.shared = [];
     this.copied = new Map(); // the chunks so far that a COPY may have, by offset
   }
 
@@ -111,7 +113,7 @@ class Walk {
     const chunk = this.chunk();
     if (chunk.type !== "HEAD") this.refuse(`${chunk.type} where HEAD is due`);
     this.file.limits = readHead(chunk.payload);
-    this.head = chunk.payload;
+    this.file.head = chunk.payload;
     this.at = chunk.end;
   }
 
@@ -221,7 +223,7 @@ class Walk {
     if (map.has(key)) return;
     map.set(key, read(id));
     const { type, offset, payload } = chunk;
-    this.shared.push({ type, id, offset, length: payload.length });
+    this.file.shared.push({ type, id, offset, length: payload.length });
   }
 
   /** Each MODL counts, also one that is repeated. */
@@ -301,10 +303,10 @@ class Walk {
   }
 
   readIndex(chunk) {
-    const { attachments, aliases, clips } = this.file;
+    const { head, shared, attachments, aliases, clips } = this.file;
     const found = {
-      head: this.head,
-      shared: this.shared,
+      head,
+      shared,
       attachments: [...attachments.values()],
       aliases: [...aliases.values()],
       clips: [...clips.values()],

@@ -25,7 +25,8 @@ export const SOURCE_FORMAT_NAMES = [...SOURCE_FORMATS.values()].map((format) => 
  * @throws {Refused}
  */
 export function checkSourceFormat(format, template, of, what) {
-  if (format !== template.format) {
+  const isRead = template.format !== null; // who reads by ranges checks the others later
+  if (isRead && format !== template.format) {
     throw new Refused(`${what}: source format ${format}, that of its SRCE is ${template.format}`);
   }
   const known = SOURCE_FORMATS.get(format);

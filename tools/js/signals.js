@@ -52,14 +52,57 @@ const MOST_BESIDE = 2 * profile(0).segmentBytes;
  * @throws {Refused | Unsupported}
  */
 export function decodeSignal(clip, signal, { from, to, dropped, room }) {
+  const opened = openSignal(clip, signal);
+  const needed = segmentsOf(opened, { from, to, dropped, room });
+  return decodeSegments(opened, needed, { from, to, dropped });
+}
+
+/**
+ * A signal whose header was read.
+ *
+ * @typedef {{clip: object, signal: object, layout: object, decoder: object}} OpenSignal
+ */
+
+/**
+ * @param {import("./clip.js").Clip} clip
+ * @param {import("./clip.js").Signal} signal of it
+ * @returns {OpenSignal} checked as far as it can be without streams
+ * @throws {Refused | Unsupported}
+ */
+export function openSignal(clip, signal) {
   const layout = signalLayout(clip, signal);
-  const decoder = openDecoder(signal, layout);
+  return { clip, signal, layout, decoder: openDecoder(signal, layout) };
+}
+
+/**
+ * The segments that frames are decoded from.
+ *
+ * @param {OpenSignal} opened
+ * @param {{from: number, to: number, dropped: number, room: object}} request as of
+ *   {@link decodeSignal}
+ * @returns {import("./data.js").Segment[]}
+ * @throws {Refused}
+ */
+export function segmentsOf({ signal, decoder }, { from, to, dropped, room }) {
   if (dropped >= signal.nResolutions) {
     throw new Refused(`signal ${signal.name}: ${dropped} of ${signal.nResolutions} resolutions`);
   }
   const wanted = { from: signal.skip + from, to: signal.skip + to };
   takeRoom(wanted, signal, room);
-  const needed = neededSegments(signal.segments, wanted, decoder.alone === true);
+  return neededSegments(signal.segments, wanted, decoder.alone === true);
+}
+
+/**
+ * Decodes frames from segments that have their payloads.
+ *
+ * @param {OpenSignal} opened
+ * @param {import("./data.js").Segment[]} needed those of {@link segmentsOf}
+ * @param {{from: number, to: number, dropped: number}} request
+ * @returns {DecodedSignal}
+ * @throws {Refused | Unsupported}
+ */
+export function decodeSegments({ clip, signal, layout, decoder }, needed, { from, to, dropped }) {
+  const wanted = { from: signal.skip + from, to: signal.skip + to };
   const segments = needed.map((segment) => withStreams(segment, signal, dropped));
   const decoded = segments.length > 0 ? decoder.decode(segments, { dropped, ...wanted }) : null;
 

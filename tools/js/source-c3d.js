@@ -39,13 +39,11 @@ const WITH_OUTPUTS = 5;
  * @throws {Refused}
  */
 export function restoreC3d(source, signals, n, firstNumber, maxBytes) {
-  const template = readTemplate(source.template.data, source.format);
-  const detail = readC3dDetail(source.detail, template);
+  const { template, detail, head } = c3dLayout(source);
   const file = new File(template, signals, n, maxBytes);
   const first = n > 0 ? firstNumber : BigInt(detail.first);
   const sameLength = n === detail.nFrames;
 
-  const head = filledHead(template, detail);
   const data = file.section();
   const rotations = file.rotations();
   const out = new ByteWriter(maxBytes, "a restored C3D file");
@@ -76,6 +74,19 @@ export function restoreC3d(source, signals, n, firstNumber, maxBytes) {
     }
   }
   return out.content();
+}
+
+/**
+ * What a source says of its file beside the data.
+ *
+ * @param {object} source of CLIP: format, template.data, detail
+ * @returns {{template: object, detail: object, head: Uint8Array}} `head` with its fields
+ * @throws {Refused}
+ */
+export function c3dLayout(source) {
+  const template = readTemplate(source.template.data, source.format);
+  const detail = readC3dDetail(source.detail, template);
+  return { template, detail, head: filledHead(template, detail) };
 }
 
 /** Zero bytes from a size to the next multiple of a block. */

@@ -62,7 +62,7 @@ function licences() {
 }
 
 const script = await bundled("src/main.js", { format: "esm", plugins: [workers] });
-const style = await bundled("src/style.css", { loader: { ".css": "css" } });
+const style = await bundled("src/page.css", { loader: { ".css": "css" } });
 const fill = {
   policy: policy(script, style),
   style: `<style>${style}</style>`,

@@ -11,6 +11,7 @@ import { mountTimeline } from "./timeline/timeline.js";
 const store = new Store(initial());
 const engine = new Engine();
 const page = { store, engine };
+globalThis.mczViewer = page; // for tests, and for the curious
 
 mountStage(document.getElementById("stage"), page);
 mountTimeline(document.getElementById("timeline"), page);

@@ -1,0 +1,105 @@
+// Skeletons, models and templates of a file that is read by ranges. Parsers ask for them as for
+// entries of a Map; one that is not read yet is Missing.
+
+import { hex } from "./bytes.js";
+import { wellKnownModel } from "./bases.js";
+import { Refused, Unsupported } from "./errors.js";
+import { Missing, supplied } from "./missing.js";
+import { checkSourceFormat } from "./registry.js";
+import { sha256 } from "./sha256.js";
+import { readModel, readTemplate } from "./shared.js";
+import { readSkeleton } from "./skel.js";
+
+const ID_SIZE = 16;
+const MOST_SKELETONS = 256; // that are kept
+
+export class SharedChunks {
+  /**
+   * @param {import("./ranges.js").Ranges} ranges
+   * @param {import("./directory.js").Directory} directory
+   * @param {object} limits of the profile
+   * @param {number} inflateLimit bytes that a template may inflate to
+   */
+  constructor(ranges, directory, limits, inflateLimit) {
+    this.ranges = ranges;
+    this.directory = directory;
+    this.limits = limits;
+    this.inflateLimit = inflateLimit;
+    this.read = new Map(); // by type and id
+    const has = (type) => (id) => directory.shared.has(`${type} ${id}`);
+    this.skeletons = { has: has("SKEL"), get: (id) => this.skeleton(id) };
+    this.templates = { has: has("SRCE"), get: (id) => this.template(id) };
+    this.clips = new Map(); // the names of others are in the directory
+  }
+
+  skeleton(id) {
+    return this.found("SKEL", id, (payload) => {
+      while (this.read.size >= MOST_SKELETONS) this.read.delete(this.read.keys().next().value);
+      return () => readSkeleton(payload, bytesOfHex(id), this);
+    });
+  }
+
+  /** A template of which only the id is known: `format` and `data` are read when they are needed. */
+  template(id) {
+    return this.directory.shared.has(`SRCE ${id}`) ? { id, format: null, data: null } : undefined;
+  }
+
+  /**
+   * Reads the template of a source.
+   *
+   * @param {{format: number, template: object}} source of a clip or skeleton; is given the template
+   * @param {"clip" | "skeleton"} of
+   * @throws {Refused}
+   */
+  async loadTemplate(source, of) {
+    if (source.template.data !== null) return;
+    const { id } = source.template;
+    const payload = await this.payload("SRCE", id);
+    const template = await supplied(() => readTemplate(payload, this.limits, this.inflateLimit));
+    checkSourceFormat(source.format, template, of, `SRCE ${id}`);
+    source.template = template;
+  }
+
+  /**
+   * How a clip finds models: those that lie before it, and those that everybody knows.
+   *
+   * @param {number} offset of CLIP
+   * @returns {(id: string) => {kind: number, data: Uint8Array}}
+   */
+  modelFinder(offset) {
+    return (id) => {
+      const place = this.directory.shared.get(`MODL ${id}`);
+      const isBefore = place !== undefined && place.offset < offset;
+      const model = isBefore
+        ? this.found("MODL", id, (payload) => () => readModel(payload))
+        : wellKnownModel(id);
+      if (!model) throw new Unsupported(`model ${id}, which the file does not have`);
+      return model;
+    };
+  }
+
+  found(type, id, parser) {
+    const key = `${type} ${id}`;
+    if (this.read.has(key)) return this.read.get(key);
+    if (!this.directory.shared.has(key)) return undefined;
+    throw new Missing(key, async () => {
+      const payload = await this.payload(type, id);
+      const parsed = await supplied(parser(payload));
+      this.read.set(key, parsed);
+    });
+  }
+
+  /** The payload of a chunk, of which the id is told by its hash. */
+  async payload(type, id) {
+    const place = this.directory.shared.get(`${type} ${id}`);
+    const payload = await this.ranges.payload(place, this.limits.payloadBytes);
+    if (hex(sha256(payload).subarray(0, ID_SIZE)) !== id) {
+      throw new Refused(`${type} at ${place.offset}: its id is not ${id}`);
+    }
+    return payload;
+  }
+}
+
+function bytesOfHex(text) {
+  return Uint8Array.from(text.match(/../g), (pair) => parseInt(pair, 16));
+}

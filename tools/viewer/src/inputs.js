@@ -1,0 +1,188 @@
+// Which files the page has: those of its server, those within it, those that people choose or drop.
+
+import { embeddedAnnex, fromBase64, servedAnnex } from "./engine/annex.js";
+import { droppedFiles, gathered } from "./inputs/files.js";
+
+const ACCEPT = ".mcz,.bvh,.amc,.asf,.c3d";
+const isMcz = (name) => /\.mcz$/i.test(name);
+
+/** Opens what the page was made for, and takes what is dropped on it. */
+export async function openFirst(page) {
+  takeDrops(page);
+  const embedded = document.getElementById("embedded");
+  try {
+    if (embedded !== null) await openEmbedded(page, JSON.parse(embedded.textContent));
+    else if (location.protocol.startsWith("http")) await openServed(page);
+  } catch (error) {
+    tell(page, faultText(error), true);
+  }
+  if (page.store.get("files").length === 0 && page.store.get("message") === null) {
+    tell(page, "Open a motion file, or drop one here: .mcz, .bvh, .amc with its .asf, .c3d");
+  }
+}
+
+/** Lets people choose files, which are opened. */
+export function chooseFiles(page) {
+  const input = document.createElement("input");
+  input.type = "file";
+  input.multiple = true;
+  input.accept = ACCEPT;
+  input.addEventListener("change", () => openAll(page, [...input.files]));
+  input.click();
+}
+
+/**
+ * Opens a file, and adds it to the list.
+ *
+ * @param {object} where `{ url }`, `{ blob, skeleton }` or `{ bytes }`
+ * @param {{name: string, url?: string}} about `url` where it is served
+ * @returns {Promise<object>} the entry of `files`
+ * @throws {Error} with the name and message of the decoder's
+ */
+export async function addFile({ store, engine }, where, { name, url = null }) {
+  const opened = await openedStrictlyOrNot({ store, engine }, where, name);
+  const file = { ...opened, name, url };
+  store.set({ files: [...store.get("files"), file] });
+  return file;
+}
+
+async function openedStrictlyOrNot(page, where, name) {
+  try {
+    return await page.engine.open(where, { name });
+  } catch (error) {
+    if (!isMcz(name) || error.name === "AccessError") throw error;
+    let opened;
+    try {
+      opened = await page.engine.open(where, { name, salvage: true });
+    } catch {
+      throw error; // what is wrong, not what could not be saved
+    }
+    tell(page, `${name} is damaged: ${error.message}. What is whole is shown.`, true);
+    return opened;
+  }
+}
+
+/** Shows a clip of a file. What was asked for last counts. */
+export async function showClip(page, fileId, index) {
+  const clip = await page.engine.clip(fileId, index);
+  const { store } = page;
+  const before = store.get("message");
+  const stays = before?.isFault && store.get("shown") === null;
+  store.set({
+    shown: clip,
+    compared: null,
+    errors: null,
+    frame: 0,
+    playing: false,
+    selection: [],
+    message: stays ? before : null,
+  });
+  return clip;
+}
+
+/** Says something to the user. */
+export function tell({ store }, text, isFault = false) {
+  store.set({ message: { text, isFault } });
+}
+
+/** Opens files that were chosen or dropped, and shows the first. */
+export async function openAll(page, files) {
+  const wanted = gathered(files);
+  if (wanted.length === 0) {
+    tell(page, "Nothing there that is a motion file: .mcz, .bvh, .amc with its .asf, .c3d", true);
+    return;
+  }
+  let shown = false;
+  for (const { file, skeleton } of wanted) {
+    try {
+      const opened = await openOne(page, file, skeleton);
+      if (!shown && opened.nClips > 0) {
+        await showClip(page, opened.id, 0);
+        shown = true;
+      }
+    } catch (error) {
+      tell(page, `${file.name}: ${faultText(error)}`, true);
+    }
+  }
+}
+
+async function openOne(page, file, skeleton) {
+  const { server } = Object.fromEntries([["server", page.store.get("server")]]);
+  if (isMcz(file.name)) return addFile(page, { blob: file }, { name: file.name });
+  if (server?.canConvert) {
+    const { url, name } = await converted(skeleton ? [file, skeleton] : [file]);
+    return addFile(page, { url: absolute(url) }, { name, url });
+  }
+  return addFile(page, { blob: file, skeleton }, { name: file.name });
+}
+
+/** Has the server make an .mcz of a file of another format. */
+async function converted(files) {
+  const body = new FormData();
+  for (const file of files) body.append("file", file, file.name);
+  const response = await fetch(absolute("convert"), { method: "POST", body });
+  const answer = await response.json().catch(() => ({}));
+  if (!response.ok) throw new Error(answer.error ?? answer.message ?? `the server answers ${response.status}`);
+  return answer;
+}
+
+async function openEmbedded(page, { files, annex = {}, diff = null }) {
+  page.engine.setAnnex(await embeddedAnnex(annex));
+  const opened = [];
+  for (const { name, base64 } of files) {
+    opened.push(await addFile(page, { bytes: fromBase64(base64) }, { name }));
+  }
+  await showFirst(page, opened, diff !== null);
+}
+
+async function openServed(page) {
+  const [api, annex] = await Promise.all([serverFacts(), servedAnnex(document.baseURI)]);
+  page.engine.setAnnex(annex);
+  if (api === null) return;
+  page.store.set({ server: api });
+  new EventSource(absolute("alive")); // the server ends when nobody listens any more
+  const opened = [];
+  for (const { name, url } of api.files) {
+    try {
+      opened.push(await addFile(page, { url: absolute(url) }, { name, url }));
+      if (opened.length === 1) await showFirst(page, opened, false);
+    } catch (error) {
+      tell(page, `${name}: ${faultText(error)}`, true);
+    }
+  }
+  if (api.diff) await showFirst(page, opened, true);
+}
+
+/** The first clip; of two files that are compared, the first clip of each. */
+async function showFirst(page, opened, compares) {
+  const [first, second] = opened.filter(({ nClips }) => nClips > 0);
+  if (first === undefined) return;
+  await showClip(page, first.id, 0);
+  if (compares && second !== undefined) {
+    page.store.set({ compared: await page.engine.clip(second.id, 0) });
+  }
+}
+
+async function serverFacts() {
+  const response = await fetch(absolute("api.json")).catch(() => null);
+  return response?.ok ? response.json() : null;
+}
+
+const absolute = (path) => new URL(path, document.baseURI).href;
+const faultText = (error) => (error.name === "Error" ? error.message : `${error.name}: ${error.message}`);
+
+/** Files and folders may be dropped anywhere. */
+function takeDrops(page) {
+  document.addEventListener("dragover", (event) => {
+    event.preventDefault();
+    document.body.classList.add("is-dropping");
+  });
+  document.addEventListener("dragleave", (event) => {
+    if (event.relatedTarget === null) document.body.classList.remove("is-dropping");
+  });
+  document.addEventListener("drop", async (event) => {
+    event.preventDefault();
+    document.body.classList.remove("is-dropping");
+    openAll(page, await droppedFiles(event.dataTransfer));
+  });
+}

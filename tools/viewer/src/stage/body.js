@@ -1,0 +1,124 @@
+// A figure: bones and joints, or markers, as solids.
+
+import { Color, Group, InstancedBufferAttribute } from "three";
+import { ballShape, boneShape, setBall, setBone, solids } from "./instances.js";
+
+const WIDTH = 0.105; // radius of a bone over its length
+const THIN = 0.007; // least and greatest radius, in units of the picture
+const THICK = 0.042;
+const LINE = 0.0045; // radius of a line between markers
+const MARKER = 0.0145;
+const MOST_LENGTH = 0.75; // of the figure: what is longer is no bone, but the way to a reference
+const CHOSEN = 1.55; // how much larger a chosen point is
+
+/** What is drawn of a clip in one frame. */
+export class Body {
+  #bones;
+  #balls;
+  #radii; // of bones, then of balls
+  #colors = [];
+
+  /**
+   * @param {{points: object[], bones: number[][], isMarkers: boolean}} clip
+   * @param {Float32Array} places of some frame, in units of the picture, from which lengths come
+   * @param {{opacity?: number}} look
+   */
+  constructor(clip, places, look = {}) {
+    this.clip = clip;
+    this.group = new Group();
+    this.places = new Float32Array(clip.points.length * 3).fill(NaN);
+    this.last = new Float32Array(clip.points.length * 3).fill(NaN); // where points were seen last
+    this.bones = clip.bones.filter((bone) => clip.isMarkers || isBone(bone, places));
+    this.#bones = solids(boneShape(), this.bones.length, look);
+    this.#balls = solids(ballShape(), clip.points.length, look);
+    for (const mesh of [this.#bones, this.#balls]) {
+      mesh.instanceColor = new InstancedBufferAttribute(new Float32Array(3 * mesh.instanceMatrix.count).fill(1), 3);
+      this.group.add(mesh);
+    }
+    this.#measure(places);
+  }
+
+  #measure(places) {
+    const { points, isMarkers } = this.clip;
+    const ofBones = this.bones.map(([a, b]) => {
+      if (isMarkers) return LINE;
+      return Math.max(THIN, Math.min(THICK, WIDTH * distance(places, a, b)));
+    });
+    const ofBalls = points.map(() => (isMarkers ? MARKER : 0));
+    if (!isMarkers) {
+      this.bones.forEach(([a, b], i) => {
+        ofBalls[a] = Math.max(ofBalls[a], 0.62 * ofBones[i]);
+        ofBalls[b] = Math.max(ofBalls[b], 0.58 * ofBones[i]);
+      });
+    }
+    this.#radii = { ofBones, ofBalls: ofBalls.map((radius) => Math.max(radius, THIN)) };
+  }
+
+  radius(point) {
+    return this.#radii.ofBalls[point];
+  }
+
+  /**
+   * @param {(point: number) => number[]} colorOf red, green, blue of each point
+   * @param {number[]} chosen points
+   */
+  paint(colorOf, theme, chosen) {
+    const color = new Color();
+    const write = (mesh, index, rgb) => mesh.instanceColor.setXYZ(index, rgb[0], rgb[1], rgb[2]);
+    const special = color.set(theme.chosen).toArray();
+    this.#colors = this.clip.points.map((_, point) => (chosen.includes(point) ? special : colorOf(point)));
+    this.bones.forEach(([a, b], i) => write(this.#bones, i, this.#boneColor(a, b, colorOf)));
+    this.#colors.forEach((rgb, point) => write(this.#balls, point, rgb));
+    this.#bones.instanceColor.needsUpdate = true;
+    this.#balls.instanceColor.needsUpdate = true;
+  }
+
+  /** A bone belongs to the point it leads to; a line between markers of two sides to neither. */
+  #boneColor(a, b, colorOf) {
+    const { points, isMarkers } = this.clip;
+    if (!isMarkers || points[a].side === points[b].side) return colorOf(b);
+    return colorOf(points[a].side === "center" ? a : b);
+  }
+
+  /** Moves the figure to where its points are; `offset` moves it aside. */
+  move(places, { chosen = [], gone, offset = 0 }) {
+    this.places.set(places);
+    const balls = this.#balls.instanceMatrix.array;
+    const bones = this.#bones.instanceMatrix.array;
+    const { ofBalls, ofBones } = this.#radii;
+    for (let point = 0; point < ofBalls.length; point++) {
+      const k = 3 * point;
+      const isThere = !Number.isNaN(places[k]);
+      if (isThere) for (let axis = 0; axis < 3; axis++) this.last[k + axis] = places[k + axis];
+      const from = isThere ? places : this.last;
+      const grown = ofBalls[point] * (chosen.includes(point) ? CHOSEN : isThere ? 1 : 0.7);
+      const isAnywhere = !Number.isNaN(from[k]);
+      setBall(balls, point, from[k] || 0, from[k + 1] || 0, from[k + 2] || 0, isAnywhere ? grown : 0);
+      const rgb = isThere ? this.#colors[point] : gone;
+      if (rgb) this.#balls.instanceColor.setXYZ(point, rgb[0], rgb[1], rgb[2]);
+    }
+    this.bones.forEach(([a, b], i) => setBone(bones, i, places, a, b, ofBones[i]));
+    this.#balls.instanceColor.needsUpdate = true;
+    this.#balls.instanceMatrix.needsUpdate = true;
+    this.#bones.instanceMatrix.needsUpdate = true;
+    this.group.position.x = offset;
+  }
+
+  dispose() {
+    for (const mesh of [this.#bones, this.#balls]) {
+      mesh.geometry.dispose();
+      mesh.material.dispose();
+      mesh.dispose();
+    }
+    this.group.removeFromParent();
+  }
+}
+
+function distance(places, a, b) {
+  return Math.hypot(...[0, 1, 2].map((k) => places[3 * a + k] - places[3 * b + k]));
+}
+
+function isBone([a, b], places) {
+  const length = distance(places, a, b);
+  return !(length > MOST_LENGTH * 1.7) && length !== 0;
+}

@@ -1,0 +1,93 @@
+// What motion leaves behind: trails of chosen points, and where feet stand.
+
+import { Color, Group, InstancedMesh, InstancedBufferAttribute, MeshBasicMaterial, RingGeometry } from "three";
+import { rateOf } from "../timeline/clock.js";
+import { rodShape, setBone, solids } from "./instances.js";
+
+const SECONDS = 1.5; // of a trail, before the frame and after it
+const MOST = 1200; // pieces of all trails
+const FOOT = /foot|toe|heel|ankle|ball|(?:^|[:_ ])[lr](?:hee|toe|ank|mt5|mt1)$/i;
+const HIGH = 0.075; // of the figure above the floor
+const FAST = 0.28; // of the figure, a second
+const MOST_FEET = 24;
+
+export class Trails {
+  constructor() {
+    this.mesh = solids(rodShape(), MOST);
+    this.mesh.castShadow = false;
+    this.mesh.instanceColor = new InstancedBufferAttribute(new Float32Array(3 * MOST).fill(1), 3);
+    this.mesh.count = 0;
+  }
+
+  /** @param {number[]} points @param {import("./actor.js").Actor} actor */
+  draw(actor, points, frame, theme) {
+    this.mesh.count = 0;
+    if (points.length === 0) return;
+    const { clip, poses, axes } = actor;
+    const reach = Math.round(SECONDS * rateOf(clip));
+    const from = Math.max(0, Math.floor(frame) - reach);
+    const to = Math.min(clip.nFrames - 1, Math.floor(frame) + reach);
+    const step = Math.max(1, Math.ceil(((to - from) * points.length) / MOST));
+    const out = new Float32Array(clip.points.length * 3);
+    const before = new Float32Array(6);
+    const near = new Color(theme.chosen);
+    const far = new Color(theme.gone);
+    const color = new Color();
+    for (const point of points) {
+      before.fill(NaN);
+      for (let at = from; at <= to && this.mesh.count < MOST; at += step) {
+        const raw = poses.held(at);
+        if (raw === null) {
+          before.fill(NaN);
+          continue;
+        }
+        axes.apply(raw, out);
+        before.copyWithin(0, 3);
+        before.set(out.subarray(3 * point, 3 * point + 3), 3);
+        if (Number.isNaN(before[0]) || Number.isNaN(before[3])) continue;
+        const away = Math.abs(at - frame) / reach;
+        const index = this.mesh.count++;
+        setBone(this.mesh.instanceMatrix.array, index, before, 0, 1, at > frame ? 0.0022 : 0.0042);
+        color.copy(near).lerp(far, away).toArray(this.mesh.instanceColor.array, 3 * index);
+      }
+    }
+    this.mesh.instanceMatrix.needsUpdate = true;
+    this.mesh.instanceColor.needsUpdate = true;
+  }
+}
+
+/** Rings on the floor below feet that stand. */
+export class Contacts {
+  constructor() {
+    this.group = new Group();
+    const material = new MeshBasicMaterial({ transparent: true, opacity: 0.85, depthWrite: false });
+    const shape = new RingGeometry(0.055, 0.075, 32);
+    shape.rotateX(-Math.PI / 2);
+    this.mesh = new InstancedMesh(shape, material, MOST_FEET);
+    this.mesh.instanceColor = new InstancedBufferAttribute(new Float32Array(3 * MOST_FEET).fill(1), 3);
+    this.mesh.frustumCulled = false;
+    this.mesh.count = 0;
+  }
+
+  draw(actor, frame, { floor, theme, isOn }) {
+    this.mesh.count = 0;
+    if (!isOn || actor.size === 0) return;
+    const { clip, places, axes } = actor;
+    const speeds = actor.speeds(frame, new Float32Array(clip.points.length));
+    const perUnit = axes.scale / ((clip.unitCm ?? 100) / 100); // units of the picture for a meter
+    const color = new Color();
+    clip.points.forEach(({ name, side }, point) => {
+      const k = 3 * point;
+      if (!FOOT.test(name) || this.mesh.count >= MOST_FEET || Number.isNaN(places[k])) return;
+      if (places[k + 1] - floor > HIGH * 1.7 || speeds[point] * perUnit > FAST * 1.7) return;
+      const index = this.mesh.count++;
+      const array = this.mesh.instanceMatrix.array;
+      array.fill(0, 16 * index, 16 * index + 16);
+      for (const at of [0, 5, 10, 15]) array[16 * index + at] = 1;
+      array.set([places[k], floor + 0.004, places[k + 2]], 16 * index + 12);
+      color.set(theme[side]).toArray(this.mesh.instanceColor.array, 3 * index);
+    });
+    this.mesh.instanceMatrix.needsUpdate = true;
+    this.mesh.instanceColor.needsUpdate = true;
+  }
+}

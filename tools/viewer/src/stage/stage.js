@@ -1,0 +1,436 @@
+// The three-dimensional picture: watches the store, and draws what it says.
+
+import { Actor } from "./actor.js";
+import { Labels, nearest, project } from "./labels.js";
+import { boundsOf, gridOf } from "./framing.js";
+import { FIGURE, upOf } from "./axes.js";
+import { themeOf, roundUp } from "./colors.js";
+import { Contacts, Trails } from "./marks.js";
+import { PointErrors, alike, byNumber, bySide, palette } from "./painting.js";
+import { View } from "./view.js";
+
+const GHOST = 0.42; // opacity of a figure that is laid over another
+const FAR = 4.2; // a clip goes farther than so many figures: the camera follows
+const ASIDE = 1.15; // units of the picture between figures side by side, at least
+const CLICK = 5; // pixels that a pointer may move in a click
+const PREFETCH = 3; // blocks, while playing
+const SOFT = 0.14; // part of its way that the camera follows in a picture
+
+let stage = null;
+
+/** The stage of this page. @throws {Error} where nothing can be drawn */
+export function mounted() {
+  if (!stage?.view) throw new Error("there is no picture: this browser does not draw in three dimensions");
+  return stage;
+}
+
+/** @param {HTMLElement} element of the page */
+export function mountStage(element, page) {
+  stage = new Stage(element, page);
+  return stage;
+}
+
+class Stage {
+  constructor(element, page) {
+    this.element = element;
+    this.page = page;
+    this.view = null;
+    this.shown = null; // actors
+    this.compared = null;
+    this.pointErrors = null;
+    this.usualSpeed = 1;
+    const canvas = this.#makeCanvas();
+    try {
+      this.view = new View(canvas, () => this.#beforeDrawing());
+    } catch {
+      canvas.remove();
+      this.#fault("This browser does not draw in three dimensions (no WebGL). Curves and numbers work all the same.");
+      return;
+    }
+    this.labels = new Labels(element);
+    this.trails = new Trails();
+    this.contacts = new Contacts();
+    this.view.world.scene.add(this.trails.mesh, this.contacts.mesh);
+    this.view.afterDrawing = () => this.#afterDrawing();
+    this.#watchTheme();
+    this.#watchStore();
+    this.#listen(canvas);
+  }
+
+  #makeCanvas() {
+    const canvas = document.createElement("canvas");
+    canvas.tabIndex = 0;
+    canvas.setAttribute("role", "img");
+    this.element.append(canvas);
+    canvas.setAttribute("aria-label", "Motion in three dimensions");
+    return canvas;
+  }
+
+  #fault(text) {
+    const old = this.element.querySelector(".stage-fault");
+    old?.remove();
+    if (text === "") return;
+    const fault = document.createElement("p");
+    fault.className = "stage-fault";
+    fault.textContent = text;
+    this.element.append(fault);
+  }
+
+  #watchTheme() {
+    const dark = matchMedia("(prefers-color-scheme: dark)");
+    const change = () => {
+      this.theme = themeOf(dark.matches);
+      this.colors = palette(this.theme);
+      this.view.world.paint(this.theme);
+      this.#paint();
+      this.view.ask();
+    };
+    dark.addEventListener("change", change);
+    change();
+  }
+
+  #watchStore() {
+    const { store } = this.page;
+    store.watch(["shown"], () => this.#show(store.get("shown")));
+    store.watch(["compared"], () => this.#compare(store.get("compared")));
+    store.watch(["up"], () => this.shown && this.#settle({ reframes: true }));
+    store.watch(["layout"], () => this.#relook());
+    store.watch(["colors", "errors", "selection"], () => this.#paint());
+    store.watch(["view"], () => this.#look(store.get("view").name));
+    const drawn = ["frame", "colors", "errors", "selection", "trails", "contacts", "names", "follow", "playing"];
+    store.watch(drawn, () => this.view.ask());
+  }
+
+  // Clips come and go
+
+  async #show(clip) {
+    this.shown?.close();
+    this.shown = null;
+    this.#dropCompared();
+    this.labels.setPoint(null);
+    if (clip === null) {
+      this.#describe();
+      this.view.ask();
+      return;
+    }
+    const actor = new Actor(this.page.engine, clip, () => this.view.ask());
+    if (!(await this.#prepared(actor)) || this.page.store.get("shown") !== clip) {
+      actor.close();
+      return;
+    }
+    this.shown = actor;
+    this.#describe();
+    if (actor.hasFigure) {
+      this.#settle({ reframes: true, atOnce: true });
+      if (actor.samples.length < actor.clip.nFrames) this.#refine(actor);
+    }
+    const compared = this.page.store.get("compared");
+    if (compared !== null) this.#compare(compared);
+    this.view.draw();
+  }
+
+  async #prepared(actor) {
+    try {
+      await actor.prepare();
+      return true;
+    } catch (error) {
+      this.page.store.set({ message: { text: `${error.name}: ${error.message}`, isFault: true } });
+      return false;
+    }
+  }
+
+  async #compare(clip) {
+    this.#dropCompared();
+    const { shown } = this;
+    if (clip === null || shown === null || !shown.hasFigure) {
+      this.#paint();
+      this.view.ask();
+      return;
+    }
+    const actor = new Actor(this.page.engine, clip, () => this.view.ask());
+    const isGood = await this.#prepared(actor);
+    if (!isGood || !actor.hasFigure || this.page.store.get("compared") !== clip || this.shown !== shown) {
+      actor.close();
+      return;
+    }
+    this.compared = actor;
+    this.#relook();
+  }
+
+  #dropCompared() {
+    this.compared?.close();
+    this.compared = null;
+    this.pointErrors = null;
+  }
+
+  /** A long clip is looked at further, once it is seen. */
+  async #refine(actor) {
+    if (actor.samples.length > 20 && actor.clip.nFrames <= 3000) return;
+    await actor.lookFurther();
+    if (this.shown !== actor) return;
+    const before = actor.floor;
+    actor.place(this.up, actor.axes.scale);
+    if (Math.abs(actor.floor - before) > 0.01) this.#layFloor();
+    this.#followIfFar();
+    this.view.ask();
+  }
+
+  /** Axes, size and floor of the clip that is shown, and its figure. */
+  #settle({ reframes = false, atOnce = false } = {}) {
+    const { shown } = this;
+    this.up = upOf(shown.clip, this.page.store.get("up"));
+    shown.place(this.up);
+    this.#layFloor();
+    this.usualSpeed = roundUp(shown.usualSpeed());
+    this.#relook();
+    this.#followIfFar();
+    if (reframes) this.#look(this.page.store.get("view").name, atOnce);
+  }
+
+  #layFloor() {
+    const { clip, size, axes, floor } = this.shown;
+    const grid = gridOf(size, clip.unitCm);
+    this.view.world.lay({ floor, minor: grid.minor * axes.scale, major: grid.major * axes.scale });
+    this.labels.setNote(`Grid ${grid.text}`);
+  }
+
+  #followIfFar() {
+    const { least, most } = this.shown.extent();
+    const far = Math.max(most[0] - least[0], most[2] - least[2]);
+    this.isFar = far > FAR * FIGURE;
+    this.isLong = this.isFar;
+  }
+
+  /** Figures anew: how they look depends on how they are compared. */
+  #relook() {
+    const { shown, compared, view } = this;
+    if (shown === null || !shown.hasFigure) return;
+    const isOver = compared !== null && this.page.store.get("layout") === "overlay";
+    view.world.scene.add(shown.build({ opacity: 1 }).group);
+    this.pointErrors = null;
+    if (compared !== null) {
+      const ratio = shown.clip.unitCm && compared.clip.unitCm ? compared.clip.unitCm / shown.clip.unitCm : 1;
+      compared.place(upOf(compared.clip, this.page.store.get("up")), shown.axes.scale * ratio);
+      view.world.scene.add(compared.build({ opacity: isOver ? GHOST : 1 }).group);
+      this.pointErrors = new PointErrors(shown, compared);
+    }
+    this.#paint();
+    view.ask();
+  }
+
+  #describe() {
+    const { clip } = this.shown ?? {};
+    const noFigure = clip && !this.shown.hasFigure;
+    this.#fault(noFigure ? whyNoFigure(clip) : "");
+    if (noFigure || !clip) this.labels.setNote("");
+    this.view.canvas.setAttribute(
+      "aria-label",
+      clip ? `${clip.name}: ${clip.points.length} points, ${clip.nFrames} frames` : "Motion in three dimensions",
+    );
+  }
+
+  // Colors
+
+  #paint() {
+    const { shown, compared, colors, theme } = this;
+    if (!shown?.body) return;
+    const { store } = this.page;
+    const chosen = store.get("selection");
+    const mode = store.get("colors");
+    this.isNumbers = (mode === "error" && compared !== null) || mode === "speed";
+    if (!this.isNumbers) {
+      shown.body.paint(bySide(shown.clip.points, colors), theme, chosen);
+      const isOver = store.get("layout") === "overlay";
+      const ofCompared = isOver ? alike(colors.ghost) : compared && bySide(compared.clip.points, colors);
+      compared?.body?.paint(ofCompared, theme, []);
+      this.labels.setScale(null);
+    }
+  }
+
+  /** Colors that change from frame to frame. */
+  #paintNumbers(frame) {
+    if (!this.isNumbers) return;
+    const { shown, compared, pointErrors, colors, theme } = this;
+    const { store } = this.page;
+    const chosen = store.get("selection");
+    if (store.get("colors") === "speed") {
+      const speeds = shown.speeds(frame, new Float32Array(shown.clip.points.length));
+      shown.body.paint(byNumber(speeds, this.usualSpeed, colors.gone), theme, chosen);
+      compared?.body?.paint(alike(colors.ghost), theme, []);
+      const unit = shown.clip.unitCm === null ? "units/s" : "m/s";
+      this.labels.setScale(["0", `${this.usualSpeed} ${unit}`]);
+      return;
+    }
+    if (!compared?.body || pointErrors === null) return;
+    pointErrors.measure();
+    const most = pointErrors.scaleEnd(store.get("errors"));
+    shown.body.paint(byNumber(pointErrors.ofShown, most, colors.center), theme, chosen);
+    compared.body.paint(byNumber(pointErrors.ofCompared, most, colors.center), theme, []);
+    this.labels.setScale(["0", `${roundTo(most / 2)}`, `${most} ${pointErrors.unit}`]);
+  }
+
+  // Pictures
+
+  #beforeDrawing() {
+    const { shown, compared } = this;
+    const { store } = this.page;
+    if (!shown?.body) return;
+    const frame = store.get("frame");
+    const ahead = store.get("playing") ? PREFETCH : 1;
+    const places = shown.at(frame, ahead);
+    if (places !== null) {
+      if (shown.clip.isMarkers) shown.findLast(frame);
+      this.#follow(places);
+    }
+    if (compared?.body) compared.at(frame * this.pointErrors.step, ahead);
+    this.#paintNumbers(frame);
+    if (places === null) {
+      this.#tellFault(shown);
+      return;
+    }
+    const chosen = store.get("selection");
+    const side = this.#aside();
+    shown.body.move(places, { chosen, gone: this.colors.gone, offset: -side / 2 });
+    compared?.body?.move(compared.places, { gone: this.colors.gone, offset: side / 2 });
+    this.trails.draw(shown, store.get("trails") ? trailed(store, shown) : [], frame, this.theme);
+    this.contacts.draw(shown, frame, { floor: shown.floor, theme: this.theme, isOn: store.get("contacts") });
+    this.trails.mesh.position.x = this.contacts.mesh.position.x = -side / 2;
+  }
+
+  /** How far figures stand apart. */
+  #aside() {
+    if (!this.compared?.body || this.page.store.get("layout") !== "side") return 0;
+    return ASIDE;
+  }
+
+  #tellFault({ poses }) {
+    const { fault } = poses;
+    if (fault === null || fault === this.told) return;
+    this.told = fault;
+    this.page.store.set({ message: { text: `${fault.name}: ${fault.message}`, isFault: true } });
+  }
+
+  /** Light and floor go with the figure, and the camera where it is to follow. */
+  #follow(places) {
+    const { least, most } = boundsOf(places);
+    if (least[0] > most[0]) return;
+    const middle = least.map((x, k) => (x + most[k]) / 2);
+    this.view.world.goWith(middle[0], middle[2]);
+    const follows = this.page.store.get("follow") || this.isFar;
+    if (follows && this.middle) {
+      const soft = this.page.store.get("playing") ? SOFT : 1;
+      const way = middle.map((x, k) => (x - this.middle[k]) * (k === 1 ? soft * 0.3 : soft));
+      this.view.eye.shift(...way);
+      this.middle = this.middle.map((x, k) => x + way[k]);
+      if (Math.hypot(...way) > 1e-4 && soft < 1) this.view.ask();
+    } else {
+      this.middle = middle;
+    }
+  }
+
+  #look(name, atOnce = false) {
+    const { shown, view } = this;
+    if (!shown?.body) return;
+    const frame = this.page.store.get("frame");
+    const now = shown.at(frame, 1);
+    const figure = now ? boundsOf(now) : shown.extent();
+    const isFit = name === "fit";
+    const box = isFit || this.isFar || this.page.store.get("follow") ? figure : shown.extent();
+    const side = this.#aside();
+    const least = [box.least[0] - side / 2, Math.min(box.least[1], shown.floor), box.least[2]];
+    const most = [box.most[0] + side / 2, box.most[1], box.most[2]];
+    if (!least.every(Number.isFinite)) return;
+    this.middle = figure.least.map((x, k) => (x + figure.most[k]) / 2);
+    view.eye.look({ least, most }, { name, facing: shown.facing, atOnce });
+  }
+
+  #afterDrawing() {
+    const { shown, view } = this;
+    if (!shown?.body) return;
+    const isOn = this.page.store.get("names");
+    const { clientWidth: width, clientHeight: height } = this.element;
+    if (isOn || this.labels.names.width > 1) {
+      const projected = isOn ? this.#projected() : null;
+      const { skyLow } = this.theme;
+      const color = this.theme === themeOf(true) ? "#dfe5ea" : "#2a3138";
+      this.labels.drawNames(shown.clip.points, projected, { isOn, width, height, color, halo: skyLow });
+    }
+  }
+
+  #projected() {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    const places = this.shown.body.places;
+    const out = new Float32Array(places.length);
+    return project(places, this.view.eye.camera, { width, height, offset: -this.#aside() / 2 }, out);
+  }
+
+  // The pointer
+
+  #listen(canvas) {
+    let down = null;
+    canvas.addEventListener("pointermove", (event) => event.buttons === 0 && this.#hover(event));
+    canvas.addEventListener("pointerleave", () => this.labels.setPoint(null));
+    canvas.addEventListener("pointerdown", (event) => {
+      down = event;
+      this.labels.setPoint(null);
+    });
+    canvas.addEventListener("pointerup", (event) => {
+      if (down === null) return;
+      const moved = Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY);
+      if (moved < CLICK && event.button === 0) this.#choose(event);
+      down = null;
+    });
+    canvas.addEventListener("dblclick", () => this.page.store.set({ view: { name: "fit" } }));
+  }
+
+  #pointAt(event) {
+    if (!this.shown?.body) return { point: -1 };
+    const box = this.view.canvas.getBoundingClientRect();
+    const x = event.clientX - box.left;
+    const y = event.clientY - box.top;
+    return { x, y, point: nearest(this.#projected(), x, y, event.pointerType === "touch" ? 28 : undefined) };
+  }
+
+  #hover(event) {
+    const { x, y, point } = this.#pointAt(event);
+    this.labels.setPoint(point < 0 ? null : { x, y, text: this.#nameOf(point) });
+  }
+
+  #nameOf(point) {
+    const { name } = this.shown.clip.points[point];
+    if (this.page.store.get("colors") !== "error" || this.pointErrors === null) return name;
+    const error = this.pointErrors.ofShown[point];
+    return Number.isFinite(error) ? `${name}: ${roundTo(error)} ${this.pointErrors.unit}` : name;
+  }
+
+  #choose(event) {
+    const { store } = this.page;
+    const { point } = this.#pointAt(event);
+    const chosen = store.get("selection");
+    const adds = event.shiftKey || event.ctrlKey || event.metaKey;
+    if (point < 0) {
+      if (!adds && chosen.length > 0) store.set({ selection: [] });
+      return;
+    }
+    const others = adds ? chosen.filter((one) => one !== point) : [];
+    const isOff = chosen.includes(point) && (adds || chosen.length === 1);
+    store.set({ selection: isOff ? others : [...others, point] });
+  }
+}
+
+const MOST_TRAILS = 8;
+const ENDS = /hand|wrist|foot|toe|ankle|head/i;
+
+/** The points that leave a trail: the chosen ones, else hands and feet. */
+function trailed(store, { clip }) {
+  const chosen = store.get("selection");
+  if (chosen.length > 0) return chosen.slice(0, MOST_TRAILS);
+  return clip.points.flatMap(({ name }, point) => (ENDS.test(name) ? [point] : [])).slice(0, MOST_TRAILS);
+}
+
+function whyNoFigure({ nFrames, name }) {
+  if (nFrames === 0) return `${name} has no frames.`;
+  return `${name} has no figure: its channels do not say where anything is. Its curves are below.`;
+}
+
+const roundTo = (value) => Number(value.toPrecision(3));
