@@ -3,7 +3,7 @@
 import { compareClip, fileOf } from "./actions.js";
 import { chooseFiles } from "../inputs.js";
 import { button, choice, facts, fill, later, make, put, toggle } from "../ui/dom.js";
-import { count, distance, figure, size, summary } from "../ui/text.js";
+import { count, distance, figure, frameNumber, size, summary } from "../ui/text.js";
 import { post, served } from "./server.js";
 
 const MOST_OPTIONS = 400;
@@ -30,7 +30,7 @@ function mountChooser(section, page) {
   const clips = make("select", { id: "compare-clip" });
   const note = make("p", { class: "quiet" });
   const stop = button({ label: "Stop comparing", shown: "Stop", onClick: () => compareClip(page, null) });
-  const swap = button({ label: "Show the other one, compare with this", shown: "Swap", onClick: () => swapped(store) });
+  const swap = button({ label: "Swap the two clips", shown: "Swap", onClick: () => swapped(store) });
   const open = button({ label: "Open a file", shown: "Open a file…", onClick: () => chooseFiles(page) });
   const clipField = make("label", { class: "field" }, make("span", {}, "Clip"), clips);
   put(
@@ -133,10 +133,11 @@ function fillNumbers(section, store) {
   }
   const unitCm = errors.unit === "cm" ? 1 : null;
   const { mean, max, frame, point } = errors.total;
+  const number = (of) => count(frameNumber(shown, of ?? 0));
   const jump = (toFrame, toPoint) => store.set({ playing: false, frame: toFrame, selection: [toPoint] });
   const place = button({
-    label: `Go to frame ${frame}, ${shown.points[point]?.name ?? ""}`,
-    shown: `frame ${count(frame ?? 0)}, ${shown.points[point]?.name ?? ""}`,
+    label: `Go to frame ${number(frame)}, ${shown.points[point]?.name ?? ""}`,
+    shown: `frame ${number(frame)}, ${shown.points[point]?.name ?? ""}`,
     class: "link",
     onClick: () => jump(frame, point),
   });
@@ -148,7 +149,7 @@ function fillNumbers(section, store) {
       ["Where", max > 0 ? place : "nowhere"],
       ["Points", `${count(errors.byPoint.length)} of the same names`],
     ]),
-    max > 0 && worstTable(errors, { unitCm, jump }),
+    max > 0 && worstTable(errors, { unitCm, jump, number }),
   );
 }
 
@@ -157,13 +158,13 @@ function sizes(shown, compared) {
   return `${size(compared.bytes)} against ${size(shown.bytes)}: ${figure((100 * compared.bytes) / shown.bytes, 3)} %`;
 }
 
-function worstTable(errors, { unitCm, jump }) {
+function worstTable(errors, { unitCm, jump, number }) {
   const worst = errors.byPoint.filter(({ max }) => max > 0).sort((a, b) => b.max - a.max);
   const rows = worst.slice(0, MOST_POINTS).map(({ point, name, mean, max, frame }) =>
     make(
       "tr",
       {},
-      make("th", { scope: "row" }, button({ label: `Go to ${name} in frame ${frame}`, shown: name || "(no name)", class: "link", onClick: () => jump(frame, point) })),
+      make("th", { scope: "row" }, button({ label: `Go to ${name} in frame ${number(frame)}`, shown: name || "(no name)", class: "link", onClick: () => jump(frame, point) })),
       make("td", {}, distance(mean, unitCm)),
       make("td", {}, distance(max, unitCm)),
     ),

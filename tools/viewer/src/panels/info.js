@@ -2,7 +2,7 @@
 
 import { fileOf } from "./actions.js";
 import { choice, facts, fill, make, put } from "../ui/dom.js";
-import { count, counted, duration, figure, secondsOf, size } from "../ui/text.js";
+import { count, counted, duration, figure, frameNumber, secondsOf, size } from "../ui/text.js";
 
 const AXES = ["x", "y", "z"];
 const MOST_ROWS = 200;
@@ -87,7 +87,7 @@ function signalFacts({ signals }) {
 }
 
 function damageFacts(clip, file) {
-  const lost = (clip.lost ?? []).map(([from, to]) => `${count(from)} to ${count(to - 1)}`);
+  const lost = (clip.lost ?? []).map(([from, to]) => `${count(frameNumber(clip, from))} to ${count(frameNumber(clip, to - 1))}`);
   const damage = file?.damage;
   const lines = Array.isArray(damage) ? damage : damage ? [damage] : [];
   return [

@@ -31,9 +31,9 @@ class Joints {
       make(
         "div",
         { class: "buttons" },
-        button({ label: "Select the left points", shown: "Left", onClick: () => this.#side("left") }),
-        button({ label: "Select the right points", shown: "Right", onClick: () => this.#side("right") }),
-        button({ label: "Select no point", shown: "None", onClick: () => this.#select([]) }),
+        button({ label: "Left points: select them", shown: "Left", onClick: () => this.#side("left") }),
+        button({ label: "Right points: select them", shown: "Right", onClick: () => this.#side("right") }),
+        button({ label: "None: no point is selected", shown: "None", onClick: () => this.#select([]) }),
       ),
       this.tree.element,
       this.status,

@@ -1,4 +1,3 @@
-<<<<<<< HEAD
 // What stands around the picture: bar, clips, details, messages.
 
 import { chooseFiles } from "../inputs.js";
@@ -30,19 +29,4 @@ export function mountPanels(document, page) {
   mountMessage(document.getElementById("message"), page);
   mountKeys(document, { layout, help });
   watchErrors(page);
-=======
-// A stub: the panels come from elsewhere.
-
-import { chooseFiles } from "../inputs.js";
-
-export function mountPanels(document, page) {
-  const button = document.createElement("button");
-  button.textContent = "Open…";
-  button.addEventListener("click", () => chooseFiles(page));
-  document.getElementById("bar").append(button);
-  page.store.watch(["message"], (store) => {
-    const message = store.get("message");
-    document.getElementById("message").textContent = message?.text ?? "";
-  });
->>>>>>> viewer
 }

@@ -53,7 +53,7 @@ class Quality {
       make("div", { class: "field" }, make("label", { for: "quality-slider" }, "Value"), make("div", { class: "dial" }, this.slider, this.number)),
       this.unitField,
       this.meaning,
-      make("div", { class: "buttons" }, button({ label: "Code the clip so", shown: "Code it", onClick: () => this.#encode() }), button({ label: "Forget the tries", shown: "Clear", onClick: () => this.#clear() })),
+      make("div", { class: "buttons" }, button({ shown: "Code it", onClick: () => this.#encode() }), button({ label: "Clear: forget the tries", shown: "Clear", onClick: () => this.#clear() })),
     );
     this.note = make("p", { class: "quiet" });
     put(panel, this.note, this.controls, this.result, this.plot.element);

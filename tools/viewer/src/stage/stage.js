@@ -78,15 +78,16 @@ class Stage {
 
   #watchTheme() {
     const dark = matchMedia("(prefers-color-scheme: dark)");
+    const { store } = this.page;
     const change = () => {
-      this.theme = themeOf(dark.matches);
+      this.theme = themeOf(store.get("theme") === null ? dark.matches : store.get("theme") === "dark");
       this.colors = palette(this.theme);
       this.view.world.paint(this.theme);
       this.#paint();
       this.view.ask();
     };
     dark.addEventListener("change", change);
-    change();
+    store.watch(["theme"], change);
   }
 
   #watchStore() {

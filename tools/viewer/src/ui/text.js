@@ -59,6 +59,10 @@ export function duration(seconds) {
   return hours === "00" ? `${Number(minutes)}:${rest}` : `${Number(hours)}:${minutes}:${rest}`;
 }
 
+/** The number of a frame as the file counts them: many begin at 1. */
+export const frameNumber = ({ firstFrame }, frame) =>
+  (Number.isSafeInteger(firstFrame) ? firstFrame : 1) + Math.floor(frame);
+
 /** Seconds of a clip, or null where nothing says how long a frame is. */
 export const secondsOf = ({ nFrames, rate }) => (rate ? nFrames / rate : null);
 

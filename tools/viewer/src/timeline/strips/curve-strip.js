@@ -86,6 +86,10 @@ export class CurveStrip {
       .join("; ");
   }
 
+  legendClass(k) {
+    return `curve-${(k % 6) + 1}`;
+  }
+
   /** Names of the curves in their colors. */
   legend() {
     const { series } = this.source;
@@ -93,7 +97,7 @@ export class CurveStrip {
     return make(
       "ul",
       { class: "legend", "aria-hidden": "true" },
-      series.map(({ label }, k) => make("li", { class: `curve-${(k % 6) + 1}`, title: label }, label)),
+      series.map(({ label }, k) => make("li", { class: this.legendClass(k), title: label }, label)),
     );
   }
 }

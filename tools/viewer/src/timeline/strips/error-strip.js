@@ -1,6 +1,6 @@
 // Error over time: mean and greatest, with peaks to go to.
 
-import { distance, figure } from "../../ui/text.js";
+import { count, distance, frameNumber } from "../../ui/text.js";
 import { CurveStrip } from "./curve-strip.js";
 import { scaleOf } from "./paint.js";
 import { peaksOf } from "./ranges.js";
@@ -31,6 +31,10 @@ export class ErrorStrip extends CurveStrip {
     return k === 0 ? colors.fault : colors.accent;
   }
 
+  legendClass(k) {
+    return k === 0 ? "fault" : "accent";
+  }
+
   peaks(window = this.shared.window()) {
     const { from, to } = whole(window, this.errors.max.length);
     const apart = ((to - from) * 24) / Math.max(1, this.shared.width());
@@ -54,7 +58,7 @@ export class ErrorStrip extends CurveStrip {
     store.set({ playing: false, frame, selection: point >= 0 ? [point] : [] });
     const { name } = this.clip.points[point] ?? {};
     const text = distance(this.errors.max[frame], this.errors.unit === "cm" ? 1 : null);
-    if (name !== undefined) store.set({ message: { text: `Frame ${frame}: ${name}, ${text}`, isFault: false } });
+    if (name !== undefined) store.set({ message: { text: `Frame ${count(frameNumber(this.clip, frame))}: ${name}, ${text}`, isFault: false } });
   }
 
   key({ key }) {
@@ -76,7 +80,7 @@ export class ErrorStrip extends CurveStrip {
     const name = this.clip.points[total.point]?.name ?? "";
     return (
       `Mean ${distance(total.mean, unitCm)}, greatest ${distance(total.max, unitCm)} ` +
-      `in frame ${figure(total.frame, 9)}, ${name}. Enter goes to the greatest, n and p to peaks.`
+      `in frame ${count(frameNumber(this.clip, total.frame))}, ${name}. Enter goes to the greatest, n and p to peaks.`
     );
   }
 }

@@ -1,7 +1,7 @@
 // Marks in time: events with their labels, feet that stand, frames that are lost.
 
 import { later } from "../../ui/dom.js";
-import { count, counted, printable } from "../../ui/text.js";
+import { count, counted, frameNumber, printable } from "../../ui/text.js";
 import { Contacts, runsOf } from "./contacts.js";
 import { label, paintGround } from "./paint.js";
 import { whole } from "./window.js";
@@ -114,9 +114,9 @@ export class MarksStrip {
     const { lost = [] } = this.clip;
     const events = this.events
       .slice(0, 20)
-      .map((e) => `${[e.context, e.label].filter(Boolean).join(" ")} at ${count(e.frame)}`);
+      .map((e) => `${[e.context, e.label].filter(Boolean).join(" ")} at ${count(frameNumber(this.clip, e.frame))}`);
     const standing = this.#feet.map(({ name, runs }) => `${name} ${counted(runs.length, "contact")}`);
-    const lostText = lost.slice(0, 20).map(([from, to]) => `frames ${count(from)} to ${count(to - 1)} are lost`);
+    const lostText = lost.slice(0, 20).map(([from, to]) => `frames ${count(frameNumber(this.clip, from))} to ${count(frameNumber(this.clip, to - 1))} are lost`);
     const text = [...events, ...standing, ...lostText].join("; ");
     return printable(`${text || "Nothing is marked."} n and p go to events.`, 2000);
   }

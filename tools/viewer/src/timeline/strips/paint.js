@@ -1,6 +1,6 @@
 // What strips draw on their canvases.
 
-import { count, figure } from "../../ui/text.js";
+import { count, figure, frameNumber } from "../../ui/text.js";
 import { niceStep } from "./window.js";
 
 /** Boundaries of segments, lightly, and frames that are lost, hatched. */
@@ -98,18 +98,21 @@ export function label(context, text, x, y, colors, color = colors.quiet) {
 }
 
 /** Frames, and seconds where the rate is known, along the top. */
-export function paintRuler({ context, width, height, from, to, x, colors }, rate) {
+export function paintRuler({ context, width, height, from, to, x, colors }, clip) {
+  const { rate } = clip;
   context.font = "10px system-ui, sans-serif";
   context.textBaseline = "middle";
   context.strokeStyle = colors.line;
   const step = Math.max(1, niceStep(to - from, width / 90));
   context.beginPath();
-  for (let frame = Math.ceil(from / step) * step; frame < to; frame += step) {
+  const first = frameNumber(clip, 0);
+  for (let frame = Math.ceil((from + first) / step) * step - first; frame < to; frame += step) {
+    if (frame < from) continue;
     const at = Math.round(x(frame)) + 0.5;
     context.moveTo(at, height - 5);
     context.lineTo(at, height);
     const seconds = rate ? ` · ${figure(frame / rate, 3)} s` : "";
-    label(context, `${count(frame)}${seconds}`, at + 4, height / 2, colors);
+    label(context, `${count(frameNumber(clip, frame))}${seconds}`, at + 4, height / 2, colors);
   }
   context.lineWidth = 1;
   context.strokeStyle = colors.quiet;

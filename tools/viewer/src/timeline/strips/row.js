@@ -2,6 +2,7 @@
 
 import { inNextPicture, make, put } from "../../ui/dom.js";
 import { sized } from "../../ui/canvas.js";
+import { count, frameNumber } from "../../ui/text.js";
 import { moved, zoomed } from "./window.js";
 
 const CLICK = 4; // pixels that a pointer may move and still have clicked
@@ -46,14 +47,15 @@ export class Row {
   /** Tells the value of the frame, or of the one below the pointer. */
   say() {
     const { store } = this.shared.page;
-    const nFrames = store.get("shown")?.nFrames ?? 0;
+    const clip = store.get("shown") ?? { nFrames: 0 };
+    const { nFrames } = clip;
     const frame = Math.floor(this.shared.hovered() ?? store.get("frame"));
     const text = this.painter.valueAt(Math.max(0, Math.min(nFrames - 1, frame)));
     if (this.value.textContent !== text) this.value.textContent = text;
     this.canvas.setAttribute("aria-label", `${this.name}. ${this.painter.describe()}`);
     this.canvas.setAttribute("aria-valuemax", String(Math.max(0, nFrames - 1)));
     this.canvas.setAttribute("aria-valuenow", String(frame));
-    this.canvas.setAttribute("aria-valuetext", `frame ${frame}${text ? `, ${text}` : ""}`);
+    this.canvas.setAttribute("aria-valuetext", `frame ${count(frameNumber(clip, frame))}${text ? `, ${text}` : ""}`);
   }
 
   #listen() {

@@ -2,6 +2,7 @@
 
 import { palette } from "../../ui/canvas.js";
 import { button, fill, inNextPicture, make, put, toggle } from "../../ui/dom.js";
+import { frameNumber } from "../../ui/text.js";
 import { popover } from "../../ui/popover.js";
 import { CurveStrip } from "./curve-strip.js";
 import { ErrorStrip } from "./error-strip.js";
@@ -178,10 +179,11 @@ class Strips {
 
   #ruler() {
     const painter = {
-      paint: (view) => paintRuler(view, this.#clip?.rate),
+      paint: (view) => this.#clip && paintRuler(view, this.#clip),
       describe: () => {
         const { from, to } = this.#window;
-        return `Frames ${Math.floor(from)} to ${Math.ceil(to) - 1} are shown. Plus and minus zoom, Shift and arrows move.`;
+        const number = (frame) => frameNumber(this.#clip ?? {}, frame);
+        return `Frames ${number(from)} to ${number(Math.ceil(to) - 1)} are shown. Plus and minus zoom, Shift and arrows move.`;
       },
       valueAt: () => "",
       load() {},
