@@ -1,6 +1,6 @@
 // Which files the page has: those of its server, those within it, those that people choose or drop.
 
-import { embeddedAnnex, fromBase64, servedAnnex } from "./engine/annex.js";
+import { embeddedAnnex, fromBase64 } from "./engine/annex.js";
 import { droppedFiles, gathered } from "./inputs/files.js";
 
 const ACCEPT = ".mcz,.bvh,.amc,.asf,.c3d";
@@ -136,8 +136,8 @@ async function openEmbedded(page, { files, annex = {}, diff = null }) {
 }
 
 async function openServed(page) {
-  const [api, annex] = await Promise.all([serverFacts(), servedAnnex(document.baseURI)]);
-  page.engine.setAnnex(annex);
+  page.engine.setAnnex(absolute("annex/"));
+  const api = await serverFacts();
   if (api === null) return;
   page.store.set({ server: api });
   new EventSource(absolute("alive")); // the server ends when nobody listens any more

@@ -18,6 +18,7 @@ export class OpenClip {
   #reader;
   #places;
   #cuts;
+  #pending = new Map(); // blocks that are being read
 
   /** @param {object} reader a clip of mcz-file.js, or of a reader of another format */
   constructor(reader, { fileId, index }) {
@@ -87,8 +88,14 @@ export class OpenClip {
 
   async #block(signal, from, to) {
     const key = `${this.key}:${signal}:${from}`;
-    const held = cache.get(key);
+    const held = cache.get(key) ?? this.#pending.get(key);
     if (held !== undefined) return held;
+    const reading = this.#read(signal, from, to, key).finally(() => this.#pending.delete(key));
+    this.#pending.set(key, reading);
+    return reading;
+  }
+
+  async #read(signal, from, to, key) {
     const block = await this.#reader.read(signal, from, to);
     const kept = { values: numbers(block.values), mask: block.mask };
     cache.set(key, kept, kept.values.byteLength + (kept.mask?.byteLength ?? 0));

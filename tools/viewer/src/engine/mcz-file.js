@@ -1,95 +1,102 @@
-// An .mcz, opened: what its clips are, and their values.
+// An .mcz, opened: what its clips are, and their values. Of a file that is served or on a disk only
+// what is needed is read.
 
-import { codecLabel } from "../../../js/codecs.js";
-import { Room, decodedLimit } from "../../../js/limits.js";
-import { readFile } from "../../../js/read.js";
-import { sourceFormatLabel } from "../../../js/registry.js";
-import { decodeSignal } from "../../../js/signals.js";
-import { sources } from "../../../js/mcz.js";
+import { analogValues, fromBlob, fromBytes, fromUrl, open } from "../../../js/mcz.js";
 
-/** @param {{blob?: Blob, bytes?: Uint8Array, url?: string, headers?: object}} where */
-export async function openMcz(where) {
-  const bytes = await bytesOf(where);
-  const file = readFile(bytes);
-  const clips = [...file.clips.values()];
+const ANALOG = "analog"; // the signal whose values are words, which the source says the meaning of
+
+/**
+ * @param {{blob?: Blob, bytes?: Uint8Array, url?: string, headers?: object}} where
+ * @param {{salvage?: boolean}} options
+ */
+export async function openMcz(where, { salvage = false } = {}) {
+  const file = await open(sourceOf(where), { salvage });
   return {
-    size: bytes.length,
-    nClips: clips.length,
-    damage: [],
-    rows: (from, to) => clips.slice(from, to).map((clip, i) => rowOf(clip, from + i)),
-    clip: async (index) => readerOf(clips[index], bytes, file),
+    size: file.size,
+    nClips: file.clips.length,
+    damage: [...file.damage],
+    rows: (from, to) => file.clips.slice(from, to),
+    clip: async (index) => clipOf(file, await file.clip(index)),
   };
 }
 
-async function bytesOf({ blob, bytes, url, headers }) {
-  if (bytes) return bytes;
-  if (blob) return new Uint8Array(await blob.arrayBuffer());
-  const response = await fetch(url, { headers });
-  if (!response.ok) throw new Error(`${url}: ${response.status} ${response.statusText}`);
-  return new Uint8Array(await response.arrayBuffer());
+function sourceOf({ blob, bytes, url, headers }) {
+  if (bytes) return fromBytes(bytes);
+  return blob ? fromBlob(blob) : fromUrl(url, { headers });
 }
 
-function rateOf({ numerator, denominator }) {
-  return numerator === 0 ? null : numerator / denominator;
-}
-
-const bytesOfSignal = ({ segments }) =>
-  segments.reduce((sum, { payload }) => sum + payload.length, 0);
-
-function rowOf({ name, nFrames, frameRate, signals, skeleton }, index) {
-  return {
-    index,
-    name,
-    nFrames,
-    rate: rateOf(frameRate),
-    codecs: [...new Set(signals.map(({ codec }) => codecLabel(codec)))],
-    nChannels: skeleton.channels.length,
-    bytes: signals.reduce((sum, signal) => sum + bytesOfSignal(signal), 0),
-  };
-}
-
-function readerOf(clip, bytes, file) {
-  const { name, nFrames, skeleton, source, quality, numbers } = clip;
-  const limit = decodedLimit(file.size);
+async function clipOf(file, clip) {
+  const { name, nFrames, skeleton, rate, origin, firstFrame } = clip;
+  const segments = clip.signals.map((_, signal) => segmentsOf(clip.segments(signal), nFrames));
+  const recording = await known(() => clip.recording());
+  const channels = (signal) => signal.channels.map((channel, i) => ({ ...channel, ...unitOf(signal, recording, i) }));
   return {
     name,
     nFrames,
     skeleton,
-    rate: rateOf(clip.frameRate),
-    metadata: [...clip.metadata],
-    source: source && { path: source.path, format: sourceFormatLabel(source.format) },
-    quality: quality ?? [],
-    firstFrame: Number(numbers[0].number),
-    lost: [],
-    events: [],
-    signals: clip.signals.map((signal) => ({
-      name: signal.name,
-      codec: codecLabel(signal.codec),
-      channels: signal.channels,
-      ownChannels: signal.ownChannels,
-      samplesPerFrame: signal.samplesPerFrame,
-      nResolutions: signal.nResolutions,
-      bytes: bytesOfSignal(signal),
-      segments: segmentsOf(signal, nFrames),
+    rate,
+    firstFrame,
+    source: origin,
+    metadata: [...((await known(() => file.metadata(clip.index))) ?? clip.metadata)],
+    quality: (await known(() => clip.quality())) ?? [],
+    lost: clip.lost ?? gapsIn(segments[0] ?? [], nFrames),
+    events: eventsOf(recording, { rate, firstFrame }),
+    signals: clip.signals.map((signal, i) => ({
+      ...signal,
+      channels: channels(signal),
+      segments: segments[i],
     })),
-    async read(index, from, to) {
-      const room = new Room(limit);
-      const { values, mask } = decodeSignal(clip, clip.signals[index], { from, to, dropped: 0, room });
-      return { values, mask };
+    async read(signal, from, to) {
+      const { values, mask } = await clip.read({ signal, frames: [from, to] });
+      const isWords = clip.signals[signal].name === ANALOG && recording?.analog?.length > 0;
+      return { values: isWords ? analogValues(recording, values) : values, mask };
     },
-    async sourceBytes() {
-      const found = sources(bytes).find(({ path }) => path === source?.path);
-      return found?.bytes ?? null;
-    },
+    sourceBytes: () => clip.source(),
   };
 }
 
-/** Frames of the clip that each segment has. */
-function segmentsOf({ segments, skip }, nFrames) {
+/** What is only told is left out where it is damaged. */
+async function known(ask) {
+  try {
+    return await ask();
+  } catch {
+    return null;
+  }
+}
+
+function unitOf({ name, channels }, recording, i) {
+  const isAnalog = name === ANALOG && recording?.analog?.length === channels.length;
+  return isAnalog ? { unit: recording.analog[i].unit } : {};
+}
+
+/** Frames that each segment has of those that are shown. */
+function segmentsOf(segments, nFrames) {
   return segments
-    .map(({ firstFrame, nFrames: n }) => [
-      Math.max(0, firstFrame - skip),
-      Math.min(nFrames, firstFrame + n - skip),
-    ])
+    .map(({ firstFrame, nFrames: n }) => [Math.max(0, firstFrame), Math.min(nFrames, firstFrame + n)])
     .filter(([from, to]) => to > from);
+}
+
+/** Frames that no segment has: what is lost of a damaged file. */
+export function gapsIn(segments, nFrames) {
+  const gaps = [];
+  let due = 0;
+  for (const [from, to] of segments) {
+    if (from > due) gaps.push([due, from]);
+    due = Math.max(due, to);
+  }
+  if (due < nFrames) gaps.push([due, nFrames]);
+  return gaps;
+}
+
+/** Events at their frames; time 0 is that of frame number 1. */
+function eventsOf(recording, { rate, firstFrame }) {
+  if (!recording || !rate) return [];
+  return recording.events.map(({ label, time, context, subject, description }) => ({
+    frame: Math.round(time * rate) + 1 - firstFrame,
+    label,
+    context,
+    subject,
+    description,
+    time,
+  }));
 }

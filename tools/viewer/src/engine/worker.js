@@ -1,7 +1,7 @@
 // The worker: files, clips and numbers, asked for by messages { id, method, args }, answered by
 // { id, result }, { id, error } and, on the way, { id, progress }.
 
-import { setAnnex } from "../../../js/annex.js";
+import { annexFrom, setAnnex } from "../../../js/mcz.js";
 import { curvesOf } from "./curves.js";
 import { errorsBetween } from "./distances.js";
 import { OpenClip } from "./clip.js";
@@ -12,7 +12,12 @@ const clips = new Map();
 let nFiles = 0;
 
 const METHODS = {
+  /** Tables by name, or the address of the folder where they are. */
   setAnnex(tables) {
+    if (typeof tables === "string") {
+      setAnnex(annexFrom(tables));
+      return;
+    }
     setAnnex((name) => {
       if (!tables.has(name)) throw new Error(`no ${name}`);
       return tables.get(name);

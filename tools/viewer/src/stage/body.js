@@ -3,11 +3,14 @@
 import { Color, Group, InstancedBufferAttribute } from "three";
 import { ballShape, boneShape, setBall, setBone, solids } from "./instances.js";
 
-const WIDTH = 0.105; // radius of a bone over its length
-const THIN = 0.007; // least and greatest radius, in units of the picture
-const THICK = 0.042;
-const LINE = 0.0045; // radius of a line between markers
-const MARKER = 0.0145;
+const WIDTH = 0.073; // radius of a bone of length 1; shorter ones are thicker for their length
+const TAPER = 0.6;
+const THIN = 0.006; // least and greatest radius, in units of the picture
+const THICK = 0.044;
+const HEAD = /head/i;
+const HEAD_WIDTH = [0.045, 0.075];
+const LINE = 0.0055; // radius of a line between markers
+const MARKER = 0.019;
 const MOST_LENGTH = 0.75; // of the figure: what is longer is no bone, but the way to a reference
 const CHOSEN = 1.55; // how much larger a chosen point is
 
@@ -40,15 +43,19 @@ export class Body {
 
   #measure(places) {
     const { points, isMarkers } = this.clip;
+    const starts = new Set(this.bones.map(([a]) => a));
     const ofBones = this.bones.map(([a, b]) => {
       if (isMarkers) return LINE;
-      return Math.max(THIN, Math.min(THICK, WIDTH * distance(places, a, b)));
+      const length = distance(places, a, b);
+      if (HEAD.test(points[b].name) && !starts.has(b)) return within(0.45 * length, ...HEAD_WIDTH);
+      return within(WIDTH * length ** TAPER, THIN, Math.min(THICK, 0.3 * length));
     });
     const ofBalls = points.map(() => (isMarkers ? MARKER : 0));
     if (!isMarkers) {
       this.bones.forEach(([a, b], i) => {
-        ofBalls[a] = Math.max(ofBalls[a], 0.62 * ofBones[i]);
-        ofBalls[b] = Math.max(ofBalls[b], 0.58 * ofBones[i]);
+        const radius = Math.min(ofBones[i], THICK);
+        ofBalls[a] = Math.max(ofBalls[a], 0.66 * radius);
+        ofBalls[b] = Math.max(ofBalls[b], (HEAD.test(points[b].name) ? 0.3 : 0.6) * radius);
       });
     }
     this.#radii = { ofBones, ofBalls: ofBalls.map((radius) => Math.max(radius, THIN)) };
@@ -113,6 +120,8 @@ export class Body {
     this.group.removeFromParent();
   }
 }
+
+const within = (value, least, most) => Math.max(least, Math.min(most, value));
 
 function distance(places, a, b) {
   return Math.hypot(...[0, 1, 2].map((k) => places[3 * a + k] - places[3 * b + k]));

@@ -11,7 +11,7 @@ const LIGHT = {
   skyLow: "#fbfcfd",
   ground: "#eef1f4",
   grid: "#7d8a97",
-  shadow: 0.3,
+  shadow: 0.42,
   ambient: 1.75,
   sun: 2.1,
 };
@@ -27,7 +27,7 @@ const DARK = {
   skyLow: "#222a33",
   ground: "#1a2027",
   grid: "#7f8e9d",
-  shadow: 0.5,
+  shadow: 0.6,
   ambient: 1.35,
   sun: 2.0,
 };

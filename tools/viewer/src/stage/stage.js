@@ -10,7 +10,7 @@ import { PointErrors, alike, byNumber, bySide, palette } from "./painting.js";
 import { View } from "./view.js";
 
 const GHOST = 0.42; // opacity of a figure that is laid over another
-const FAR = 4.2; // a clip goes farther than so many figures: the camera follows
+const FAR = 1.7; // a clip goes farther than so many figures: the camera follows
 const ASIDE = 1.15; // units of the picture between figures side by side, at least
 const CLICK = 5; // pixels that a pointer may move in a click
 const PREFETCH = 3; // blocks, while playing
@@ -198,8 +198,7 @@ class Stage {
   #followIfFar() {
     const { least, most } = this.shown.extent();
     const far = Math.max(most[0] - least[0], most[2] - least[2]);
-    this.isFar = far > FAR * FIGURE;
-    this.isLong = this.isFar;
+    if (far > FAR * FIGURE) this.page.store.set({ follow: true });
   }
 
   /** Figures anew: how they look depends on how they are compared. */
@@ -317,8 +316,7 @@ class Stage {
     if (least[0] > most[0]) return;
     const middle = least.map((x, k) => (x + most[k]) / 2);
     this.view.world.goWith(middle[0], middle[2]);
-    const follows = this.page.store.get("follow") || this.isFar;
-    if (follows && this.middle) {
+    if (this.page.store.get("follow") && this.middle) {
       const soft = this.page.store.get("playing") ? SOFT : 1;
       const way = middle.map((x, k) => (x - this.middle[k]) * (k === 1 ? soft * 0.3 : soft));
       this.view.eye.shift(...way);
@@ -336,7 +334,7 @@ class Stage {
     const now = shown.at(frame, 1);
     const figure = now ? boundsOf(now) : shown.extent();
     const isFit = name === "fit";
-    const box = isFit || this.isFar || this.page.store.get("follow") ? figure : shown.extent();
+    const box = isFit || this.page.store.get("follow") ? figure : shown.extent();
     const side = this.#aside();
     const least = [box.least[0] - side / 2, Math.min(box.least[1], shown.floor), box.least[2]];
     const most = [box.most[0] + side / 2, box.most[1], box.most[2]];
