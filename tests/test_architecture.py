@@ -36,7 +36,7 @@ ALLOWED = {
     "motion": GROUND | {"skeleton", "source"},
     "kinematics": MODEL,
     "angles": MODEL,
-    "metrics": MODEL | {"angles", "kinematics"},
+    "metrics": MODEL | {"angles", "joint_errors", "kinematics"},
     "poses": MODEL | {"kinematics", "units"},
     "bjontegaard": GROUND,
     "joint_errors": MODEL | {"kinematics"},
@@ -63,10 +63,11 @@ ALLOWED = {
     | {"recovery", "jobs", "metrics", "queries", "reading", "writing", "conversion", "tables"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "dask": JOINT | {"jobs", "reading", "writing", "editing"},
+    "viewing": JOINT | {"annexes", "metrics", "editing", "reading", "retargeting", "writing", ""},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
-    | {"bags", "jobs", "dask"}
+    | {"bags", "jobs", "dask", "viewing"}
     | DOORS,
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,

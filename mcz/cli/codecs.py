@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +12,7 @@ from mcz.cli.options import json_option
 
 if TYPE_CHECKING:
     from mcz.codecs.contract import Codec
-    from mcz.codecs.parameters import Parameter
 
-DEFAULT_IN_HELP = re.compile("(.+); default:? (.+)")  # of what a preset or the clip decides
 WIDEST = 44  # characters of a line of the meaning
 
 
@@ -28,10 +25,11 @@ def command(names: tuple[str, ...], as_json: bool) -> Exit:
     mcz encode --codec NAME --param KEY=VALUE sets one.
     """
     from mcz.codecs import CODECS, DEFAULT, by_name
+    from mcz.codecs.listing import document
 
     codecs = [by_name(name) for name in names] or list(CODECS.values())
     if as_json:
-        print_json({"default": DEFAULT, "codecs": [_document(codec) for codec in codecs]})
+        print_json({"default": DEFAULT, "codecs": [document(codec) for codec in codecs]})
         return Exit.FINE
     if names:
         for number, codec in enumerate(codecs):
@@ -39,36 +37,6 @@ def command(names: tuple[str, ...], as_json: bool) -> Exit:
     else:
         echo(*_overview(codecs, DEFAULT))
     return Exit.FINE
-
-
-def _document(codec: Codec) -> dict[str, Any]:
-    return {
-        "name": codec.name,
-        "id": codec.id,
-        "version": codec.version,
-        "lossless": codec.lossless,
-        "positions": codec.positions,
-        "live": codec.live is not None,
-        "quality": codec.dial.parameter if codec.dial else None,
-        "parameters": [_facts(parameter) for parameter in _parameters(codec)],
-    }
-
-
-def _parameters(codec: Codec) -> tuple[Parameter, ...]:
-    from mcz.codecs.parameters import TARGETS
-
-    return (*(p for p in codec.parameters if not p.inner), *(TARGETS if codec.dial else ()))
-
-
-def _facts(parameter: Parameter) -> dict[str, Any]:
-    found = DEFAULT_IN_HELP.fullmatch(parameter.help)
-    decided, meaning = (found[2], found[1]) if found else (None, parameter.help)
-    return {
-        "name": parameter.name,
-        "default": decided if parameter.default is None else parameter.default,
-        "range": parameter.range,
-        "meaning": meaning,
-    }
 
 
 def _overview(codecs: list[Codec], default: str) -> Iterator[str]:
@@ -84,11 +52,13 @@ def _overview(codecs: list[Codec], default: str) -> Iterator[str]:
 
 
 def _lines(codec: Codec) -> Iterator[str]:
+    from mcz.codecs.listing import facts_of, parameters_of
+
     kind = "lossless" if codec.lossless else "lossy"
     dial = f"; {codec.dial.parameter} trades quality for size" if codec.dial else ""
     yield f"{codec.name} (codec {codec.id}, {kind}){dial}"
     rows = [["parameter", "default", "range", "meaning"]]
-    for facts in map(_facts, _parameters(codec)):
+    for facts in map(facts_of, parameters_of(codec)):
         default = "none" if facts["default"] is None else text_of(facts["default"])
         first, *rest = _wrapped(facts["meaning"])
         rows.append([facts["name"], default, facts["range"], first])

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import inf
 from pathlib import PurePath
@@ -26,10 +26,8 @@ from mcz.cli.common import (
 )
 from mcz.cli.diff_lines import lines_of
 from mcz.cli.options import UNITS, decoded_option, json_option, up_option, where_option
-from mcz.errors import MczError
 
 if TYPE_CHECKING:
-    from mcz.metrics import Comparison
     from mcz.motion import Motion
     from mcz.reading.file import File
 
@@ -160,12 +158,6 @@ class _Wanted:
             None if motion.skeleton.up_axis else self.up,
         )
 
-    def feet_of(self, motion: Motion) -> tuple[str, ...] | bool:
-        """What ``mcz.compare`` is to find contacts of; by default only where names say so."""
-        from mcz.kinematics.feet import feet_of
-
-        return self.feet or self.contacts or bool(feet_of(motion.skeleton))
-
 
 @dataclass(frozen=True, slots=True)
 class _Loaded:
@@ -274,7 +266,7 @@ def _compared(
     left: _Side, right: _Side, a: str | None, b: str | None, wanted: _Wanted
 ) -> dict[str, Any]:
     """The document of one pair of motions."""
-    import mcz
+    from mcz.metrics.document import difference
 
     one, other = left.load(a), right.load(b)
     if one.motion.n_frames != other.motion.n_frames:
@@ -283,84 +275,13 @@ def _compared(
             f"{other.motion.n_frames}; --frames A:B chooses what both have"
         )
     with about(f"{left.path}, {right.path}"):
-        found = mcz.compare(
+        document = difference(
             one.motion,
             other.motion,
+            start=one.start,
             shell_cm=wanted.shell_cm,
-            contacts=wanted.feet_of(one.motion) if one.motion.skeleton.joints else False,
+            contacts=wanted.feet or wanted.contacts or None,
+            by_joint=wanted.by_joint,
+            contact_list=wanted.contacts,
         )
-    entries = _in_clip(found.entries(), one.start)
-    document: dict[str, Any] = {"name_a": one.motion.name, "name_b": other.motion.name, **entries}
-    document["feet"] = _feet(found)
-    if wanted.by_joint:
-        document["by_joint"] = [_in_clip(each.entries(), one.start) for each in found.by_joint]
-    if wanted.contacts:
-        slides = () if found.sliding is None else found.sliding.slides
-        document["contact_list"] = [
-            asdict(slide) | {"first": slide.first + one.start} for slide in slides
-        ]
-    document["equal_joints"] = _equal_joints(one.motion, other.motion)
-    document["joints"] = _by_joints(one.motion, other.motion, found, one.start)
-    document |= {"notes": list(found.notes), "ratios_a": one.ratios, "ratios_b": other.ratios}
-    return document
-
-
-def _in_clip(entries: Mapping[str, Any], start: int) -> dict[str, Any]:
-    """Figures with their frames counted from the first of the clip, not of what was cut."""
-    return {
-        key: value + start if key.endswith("_frame") and value is not None else value
-        for key, value in entries.items()
-    }
-
-
-def _feet(found: Comparison) -> dict[str, Any] | None:
-    """What contacts were looked for with; None where none were."""
-    if found.sliding is None:
-        return None
-    contacts = found.sliding.contacts
-    return {
-        "joints": list(contacts.joints),
-        "up_axis": contacts.up_axis,
-        "up_guessed": contacts.up_guessed,
-        "frame_rate": contacts.frame_rate,
-        "rate_assumed": contacts.rate_assumed,
-    }
-
-
-def _equal_joints(a: Motion, b: Motion) -> list[str]:
-    """The joints of the same name whose channels are the same in every bit of every frame."""
-    if any(motion.signals[0].channels is not None for motion in (a, b)):
-        return []
-    theirs = {name: joint for joint, name in enumerate(b.skeleton.addresses())}
-    found = []
-    for joint, name in enumerate(a.skeleton.addresses()):
-        kinds = [channel.kind for channel in a.skeleton.joints[joint].channels]
-        other = theirs.get(name)
-        if other is None or not kinds:
-            continue
-        if kinds != [channel.kind for channel in b.skeleton.joints[other].channels]:
-            continue
-        both = ((a, a.skeleton.columns(joint)), (b, b.skeleton.columns(other)))
-        bits = [
-            motion.signals[0].masked()[:, list(columns)].astype("<f8").tobytes()
-            for motion, columns in both
-        ]
-        found += [name] if bits[0] == bits[1] else []
-    return found
-
-
-def _by_joints(a: Motion, b: Motion, found: Comparison, start: int) -> dict[str, Any] | None:
-    """The distances of joints of the same names, of skeletons whose points are not alike."""
-    from mcz.joint_errors import joint_errors
-    from mcz.kinematics import point_set
-
-    if found.points is not None and point_set(a.skeleton) == point_set(b.skeleton):
-        return None
-    try:
-        errors = joint_errors(a, b)
-    except MczError:  # no kinematics, as the notes say
-        return None
-    document = errors.document()
-    if errors.frame is not None:
-        document["frame"] = errors.frame + start
-    return document
+    return document | {"ratios_a": one.ratios, "ratios_b": other.ratios}

@@ -34,6 +34,7 @@ COMMANDS = (
     "extract",
     "replace",
     "diff",
+    "view",
     "stream",
     "bench",
     "train",

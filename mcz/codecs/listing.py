@@ -1,0 +1,42 @@
+"""What the codecs are and what each lets a caller set, as documents of JSON."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from mcz.codecs.contract import Codec
+from mcz.codecs.parameters import TARGETS, Parameter
+
+DEFAULT_IN_HELP = re.compile("(.+); default:? (.+)")  # of what a preset or the clip decides
+
+
+def document(codec: Codec) -> dict[str, Any]:
+    """What ``mcz codecs --json`` says of a codec; its keys are stable."""
+    return {
+        "name": codec.name,
+        "id": codec.id,
+        "version": codec.version,
+        "lossless": codec.lossless,
+        "positions": codec.positions,
+        "live": codec.live is not None,
+        "quality": codec.dial.parameter if codec.dial else None,
+        "parameters": [facts_of(parameter) for parameter in parameters_of(codec)],
+    }
+
+
+def parameters_of(codec: Codec) -> tuple[Parameter, ...]:
+    """The parameters that a caller is told of, and the targets where it has a dial."""
+    return (*(p for p in codec.parameters if not p.inner), *(TARGETS if codec.dial else ()))
+
+
+def facts_of(parameter: Parameter) -> dict[str, Any]:
+    """Name, default, range and meaning of a parameter."""
+    found = DEFAULT_IN_HELP.fullmatch(parameter.help)
+    decided, meaning = (found[2], found[1]) if found else (None, parameter.help)
+    return {
+        "name": parameter.name,
+        "default": decided if parameter.default is None else parameter.default,
+        "range": parameter.range,
+        "meaning": meaning,
+    }

@@ -1,0 +1,107 @@
+"""How far one motion is from another: the document of JSON that ``mcz diff`` has of a pair."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from mcz.errors import MczError
+from mcz.joint_errors import joint_errors
+from mcz.kinematics import SHELL_CM, point_set
+from mcz.kinematics.feet import feet_of
+from mcz.metrics.comparing import compare
+from mcz.metrics.comparison import Comparison
+from mcz.motion import Motion
+
+
+def difference(
+    a: Motion,
+    b: Motion,
+    *,
+    start: int = 0,
+    shell_cm: float = SHELL_CM,
+    contacts: Sequence[int | str] | bool | None = None,
+    by_joint: bool = False,
+    contact_list: bool = False,
+) -> dict[str, Any]:
+    """The figures of ``b`` against ``a``, the original; docs/scripts.md has the keys.
+
+    ``start`` is the first frame of both in their clips, from which frames are counted. ``contacts``
+    as ``compare`` takes them; None: of feet where names say so. ``by_joint`` and ``contact_list``
+    add those lists. Raises MotionError for motions of different length.
+    """
+    if contacts is None:
+        contacts = bool(feet_of(a.skeleton))
+    found = compare(a, b, shell_cm=shell_cm, contacts=contacts if a.skeleton.joints else False)
+    entries = _in_clip(found.entries(), start)
+    document: dict[str, Any] = {"name_a": a.name, "name_b": b.name, **entries}
+    document["feet"] = _feet(found)
+    if by_joint:
+        document["by_joint"] = [_in_clip(each.entries(), start) for each in found.by_joint]
+    if contact_list:
+        slides = () if found.sliding is None else found.sliding.slides
+        document["contact_list"] = [
+            asdict(slide) | {"first": slide.first + start} for slide in slides
+        ]
+    document["equal_joints"] = _equal_joints(a, b)
+    document["joints"] = _by_joints(a, b, found, start)
+    return document | {"notes": list(found.notes)}
+
+
+def _in_clip(entries: Mapping[str, Any], start: int) -> dict[str, Any]:
+    """Figures with their frames counted from the first of the clip, not of what was cut."""
+    return {
+        key: value + start if key.endswith("_frame") and value is not None else value
+        for key, value in entries.items()
+    }
+
+
+def _feet(found: Comparison) -> dict[str, Any] | None:
+    """What contacts were looked for with; None where none were."""
+    if found.sliding is None:
+        return None
+    contacts = found.sliding.contacts
+    return {
+        "joints": list(contacts.joints),
+        "up_axis": contacts.up_axis,
+        "up_guessed": contacts.up_guessed,
+        "frame_rate": contacts.frame_rate,
+        "rate_assumed": contacts.rate_assumed,
+    }
+
+
+def _equal_joints(a: Motion, b: Motion) -> list[str]:
+    """The joints of the same name whose channels are the same in every bit of every frame."""
+    if any(motion.signals[0].channels is not None for motion in (a, b)):
+        return []
+    theirs = {name: joint for joint, name in enumerate(b.skeleton.addresses())}
+    found = []
+    for joint, name in enumerate(a.skeleton.addresses()):
+        kinds = [channel.kind for channel in a.skeleton.joints[joint].channels]
+        other = theirs.get(name)
+        if other is None or not kinds:
+            continue
+        if kinds != [channel.kind for channel in b.skeleton.joints[other].channels]:
+            continue
+        both = ((a, a.skeleton.columns(joint)), (b, b.skeleton.columns(other)))
+        bits = [
+            motion.signals[0].masked()[:, list(columns)].astype("<f8").tobytes()
+            for motion, columns in both
+        ]
+        found += [name] if bits[0] == bits[1] else []
+    return found
+
+
+def _by_joints(a: Motion, b: Motion, found: Comparison, start: int) -> dict[str, Any] | None:
+    """The distances of joints of the same names, of skeletons whose points are not alike."""
+    if found.points is not None and point_set(a.skeleton) == point_set(b.skeleton):
+        return None
+    try:
+        errors = joint_errors(a, b)
+    except MczError:  # no kinematics, as the notes say
+        return None
+    document = errors.document()
+    if errors.frame is not None:
+        document["frame"] = errors.frame + start
+    return document

@@ -1,0 +1,38 @@
+"""The page: where it is, what it may do, and the place in it for files."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from mcz.errors import AccessError, FormatError
+from mcz.viewing.building import built
+from mcz.viewing.shelf import Say
+
+PACKAGED = Path(__file__).with_name("viewer.html")  # in a wheel that was built with it
+PLACE = "<!-- mcz:embedded -->"
+POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy" content="([^"<>]*)"')
+
+
+class Page:
+    """The text of the page, and ``policy``, what browsers let it do."""
+
+    def __init__(self, text: str, name: str = "the page") -> None:
+        before, found, after = text.partition(PLACE)
+        policy = POLICY.search(before)
+        if not found or PLACE in after or policy is None:
+            raise FormatError(f"{name}: it is no page of the viewer of this version")
+        self.text, self.before, self.after, self.policy = text, before, after, policy[1]
+
+
+def page(say: Say | None = None) -> Page:
+    """The page of this installation; in a source checkout it is built where that is due.
+
+    ``say`` is told what takes time. Raises AccessError where there is none; the message says how
+    one is made.
+    """
+    path = PACKAGED if PACKAGED.is_file() else built(say or (lambda line: None))
+    try:
+        return Page(path.read_text("utf-8"), str(path))
+    except OSError as error:
+        raise AccessError(f"{path}: {error.strerror}") from None

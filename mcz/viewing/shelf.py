@@ -1,0 +1,322 @@
+"""The files of a server: each as an ``.mcz``, the given ones as they are, others when asked for."""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path, PurePosixPath
+from threading import Lock, RLock
+from typing import Any, BinaryIO, Protocol
+
+from mcz.container.source import ByteSource
+from mcz.errors import AccessError, LimitError, MczError, OptionError
+from mcz.formats import FORMATS
+from mcz.reading.file import reached
+from mcz.viewing.contents import Contents, FarAway, OnDisk
+
+Say = Callable[[str], None]
+Make = Callable[[BinaryIO], None]  # writes an .mcz
+
+MOST_RESULTS = 16  # files made of a clip in view: the oldest goes when there is one more
+MOST_UPLOADS = 256  # files that the page gave
+MCZ = ".mcz"
+
+
+class Shelved(Protocol):
+    """A file on the shelf: ``kind`` is the format of what was given, such as "mcz" or "bvh"."""
+
+    name: str
+    kind: str
+
+    @property
+    def size(self) -> int | None:
+        """Bytes of the ``.mcz``; None while it is not made."""
+        ...
+
+    def target(self) -> str:
+        """What ``mcz.open`` takes; it is made first. Raises MczError where that cannot be."""
+        ...
+
+    def open(self) -> Contents:
+        """Its bytes; raises as ``target`` does."""
+        ...
+
+
+class Stored:
+    """An ``.mcz`` on this machine."""
+
+    def __init__(self, name: str, path: Path, kind: str = "mcz") -> None:
+        self.name, self.kind, self.path = name, kind, path
+
+    @property
+    def size(self) -> int | None:
+        try:
+            return self.path.stat().st_size
+        except OSError:
+            return None
+
+    def target(self) -> str:
+        return str(self.path)
+
+    def open(self) -> Contents:
+        return OnDisk(self.path)
+
+
+class Remote:
+    """An ``.mcz`` behind a URL, opened when it is first asked for."""
+
+    kind = "mcz"
+
+    def __init__(self, url: str) -> None:
+        self.name = PurePosixPath(url.partition("?")[0]).name or url
+        self._url, self._tag = url, f'"{secrets.token_hex(8)}"'
+        self._source: ByteSource | None = None
+        self._lock = Lock()
+
+    @property
+    def size(self) -> int | None:
+        return None if self._source is None else self._source.size
+
+    def target(self) -> str:
+        return self._url
+
+    def open(self) -> Contents:
+        with self._lock:
+            if self._source is None:
+                self._source = reached(self._url)
+        return FarAway(self._source, self._tag)
+
+
+class Made:
+    """An ``.mcz`` that is made of ``source`` when it is first asked for, and when that changes."""
+
+    def __init__(self, shelf: Shelf, name: str, kind: str, source: Path, make: Make) -> None:
+        self.name, self.kind = name, kind
+        self._shelf, self._source, self._make = shelf, source, make
+        self._lock = Lock()
+        self._stored: Stored | None = None
+        self._error: MczError | None = None
+        self._made_of: object = None
+
+    @property
+    def size(self) -> int | None:
+        return None if self._stored is None else self._stored.size
+
+    def target(self) -> str:
+        with self._lock:
+            now = _state(self._source)
+            if self._made_of != now:
+                self._run()
+                self._made_of = now
+        if self._error is not None:
+            raise self._error
+        assert self._stored is not None
+        return self._stored.target()
+
+    def _run(self) -> None:
+        before, self._stored, self._error = self._stored, None, None
+        try:
+            self._stored = Stored(self.name, self._shelf.write(self._make))
+        except MczError as error:
+            if self.name not in str(error):
+                error.args = (f"{self._source}: {error}",)
+            self._error = error
+            self._shelf.say(str(error))
+        if before is not None:
+            with suppress(OSError):
+                before.path.unlink()
+
+    def open(self) -> Contents:
+        return OnDisk(self.target())
+
+
+def _state(path: Path) -> object:
+    """What changes when a file does; raises AccessError where there is none."""
+    try:
+        found = path.stat()
+    except OSError as error:
+        raise AccessError(f"{path}: {error.strerror}") from None
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+class Shelf:
+    """Files by number, and the temporary folder of those that were made, gone with ``close``.
+
+    ``said`` is what files do not say themselves: arguments of ``mcz.encode`` such as ``unit``.
+    ``say`` is told, in a line, of what could not be made. ``salvage``: damaged files are read.
+    """
+
+    def __init__(
+        self,
+        said: Mapping[str, Any] | None = None,
+        say: Say | None = None,
+        *,
+        salvage: bool = False,
+    ) -> None:
+        self.said, self.salvage = dict(said or {}), salvage
+        self.say: Say = say or (lambda line: None)
+        self._folder: Path | None = None
+        self._files: dict[int, Shelved] = {}
+        self._n_given = self._n_uploads = self._next = self._n_written = 0
+        self._results: deque[int] = deque()
+        self._lock = RLock()
+        self._is_closed = False
+
+    def __getitem__(self, number: int) -> Shelved:
+        """The file of that number; raises KeyError."""
+        with self._lock:
+            return self._files[number]
+
+    def given(self) -> list[tuple[int, Shelved]]:
+        """The files that were there from the beginning, with their numbers."""
+        with self._lock:
+            return list(self._files.items())[: self._n_given]
+
+    def give(self, file: Shelved) -> None:
+        """Add a file that is there from the beginning."""
+        with self._lock:
+            self._n_given += 1
+            self._add(file)
+
+    def _add(self, file: Shelved) -> int:
+        number, self._next = self._next, self._next + 1
+        self._files[number] = file
+        return number
+
+    def upload(self, name: str, kind: str, make: Make) -> tuple[int, Stored]:
+        """Make an ``.mcz`` of what the page gave; raises LimitError where it gave too much."""
+        with self._lock:
+            if self._n_uploads >= MOST_UPLOADS:
+                raise LimitError(f"{MOST_UPLOADS} files were given already; start mcz view anew")
+            self._n_uploads += 1
+        stored = Stored(name, self.write(make), kind)
+        with self._lock:
+            return self._add(stored), stored
+
+    def result(self, name: str, make: Make) -> tuple[int, Stored]:
+        """Make an ``.mcz`` of a clip in view; one of ``MOST_RESULTS`` before it goes."""
+        stored = Stored(name, self.write(make))
+        with self._lock:
+            number = self._add(stored)
+            self._results.append(number)
+            while len(self._results) > MOST_RESULTS:
+                old = self._files.pop(self._results.popleft())
+                assert isinstance(old, Stored)
+                with suppress(OSError):
+                    old.path.unlink()
+        return number, stored
+
+    def write(self, make: Make) -> Path:
+        """A new file of the temporary folder, written by ``make``."""
+        with self._lock:
+            path = self.folder() / f"{self._n_written}{MCZ}"
+            self._n_written += 1
+        try:
+            with path.open("xb+") as stream:
+                make(stream)
+        except BaseException:
+            with suppress(OSError):
+                path.unlink()
+            raise
+        return path
+
+    def folder(self) -> Path:
+        """The temporary folder, which nobody else can read; raises OptionError once closed."""
+        with self._lock:
+            if self._is_closed:
+                raise OptionError("the viewer is closed")
+            if self._folder is None:
+                self._folder = Path(tempfile.mkdtemp(prefix="mcz-view-"))
+            return self._folder
+
+    def spare_folder(self) -> Path:
+        """A new folder below the temporary one, for files that are made into an ``.mcz``."""
+        return Path(tempfile.mkdtemp(dir=self.folder(), prefix="given-"))
+
+    def close(self) -> None:
+        """Take away the temporary folder; what still writes into it finds it gone."""
+        with self._lock:
+            self._is_closed = True
+            folder, self._folder = self._folder, None
+        for _ in range(10):
+            if folder is None or not folder.exists():
+                return
+            shutil.rmtree(folder, ignore_errors=True)
+            if folder.exists():
+                time.sleep(0.05)
+
+
+def put(shelf: Shelf, path: str) -> None:
+    """Put a file, a folder or a URL on the shelf; raises AccessError or OptionError.
+
+    Of a folder these are its ``.mcz`` files, and one archive of all its other motion files.
+    """
+    if "://" in path:
+        if not path.partition("?")[0].lower().endswith(MCZ):
+            raise OptionError(f"{path}: of files far away only those called .mcz can be seen")
+        shelf.give(Remote(path))
+        return
+    place = Path(path)
+    if place.is_dir():
+        _put_folder(shelf, place)
+        return
+    if not place.is_file():
+        text = "not a file" if place.exists() else "no such file"
+        raise AccessError(f"{path or repr(path)}: {text}")
+    kind = kind_of(place)
+    if kind == "mcz":
+        shelf.give(Stored(place.name, place))
+    else:
+        shelf.give(Made(shelf, place.name, kind, place, lambda out: encode(place, out, shelf.said)))
+
+
+def kind_of(path: Path) -> str:
+    """The format of a file by its suffix; raises OptionError for one that cannot be shown."""
+    suffix = path.suffix.lower()
+    known = {MCZ: "mcz"} | {s: f.name for f in reversed(FORMATS.values()) for s in f.suffixes}
+    if known.get(suffix, "asf") == "asf":
+        shown = " ".join(s for s, name in sorted(known.items()) if name != "asf")
+        raise OptionError(f"{path}: its suffix is none of {shown}")
+    return known[suffix]
+
+
+def encode(source: Path, out: BinaryIO, said: Mapping[str, Any]) -> None:
+    """Write ``source`` as an ``.mcz``, fast."""
+    from mcz.writing.file import encode
+
+    skeleton = said.get("skeleton") if source.suffix.lower() == ".amc" else None
+    encode(source, out, **{**said, "skeleton": skeleton})
+
+
+def _put_folder(shelf: Shelf, folder: Path) -> None:
+    from mcz.editing.folders import files_below, motion_files
+
+    paths, _ = files_below(folder, None)
+    for path in paths:
+        if path.suffix.lower() == MCZ:
+            shelf.give(Stored(path.relative_to(folder).as_posix(), path))
+    motions, _ = motion_files(paths)
+    if motions:
+        name = folder.resolve().name or "motions"
+        shelf.give(Made(shelf, name, "folder", folder, lambda out: pack(folder, out, shelf)))
+    elif not shelf.given():
+        raise OptionError(f"{folder}: there is no motion file in it")
+
+
+def pack(folder: Path, out: BinaryIO, shelf: Shelf) -> None:
+    """Write all motion files below ``folder`` as one ``.mcz``; what cannot be read is said."""
+    from mcz import threads
+    from mcz.editing.archive import pack
+
+    said = {key: value for key, value in shelf.said.items() if key != "skeleton"}
+    report = pack(folder, out, jobs=threads.processors(), copies=False, **said)
+    for outcome in report.outcomes:
+        if outcome.result == "failed":
+            shelf.say(outcome.message)
+    if not any(outcome.result == "parsed" for outcome in report.outcomes):
+        raise OptionError(f"{folder}: none of its motion files can be read")

@@ -1,0 +1,22 @@
+"""What a server has to give, as the answers to requests need it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mcz.viewing.page import Page
+from mcz.viewing.shelf import Shelf
+from mcz.viewing.visitors import Visitors
+from mcz.viewing.work import Work
+
+
+@dataclass(slots=True)
+class Site:
+    """The page, files and tasks below ``token``; ``port`` is that of the server."""
+
+    page: Page
+    shelf: Shelf
+    work: Work
+    visitors: Visitors
+    token: str
+    port: int = 0

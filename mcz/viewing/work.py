@@ -1,0 +1,242 @@
+"""What the server does for the page: converts, codes anew, compares, exports."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
+from functools import cache, partial
+from itertools import islice
+from pathlib import Path
+from threading import BoundedSemaphore, Lock
+from typing import Any, BinaryIO
+
+from mcz.codecs.parameters import Dial
+from mcz.errors import MczError, OptionError
+from mcz.motion import Motion
+from mcz.reading.clip import Clip
+from mcz.reading.file import File
+from mcz.reading.file import open as mcz_open
+from mcz.reading.source_files import with_facts
+from mcz.viewing.multipart import Readable, boundary_of, save_files
+from mcz.viewing.requests import Refused, object_of, params_of, text_of
+from mcz.viewing.shelf import Shelf, Shelved, encode, kind_of, pack
+
+MOST_POSTED = 2**30  # bytes of the files that the page may give at once
+MOST_WAITING = 8  # requests that wait for their turn
+MOST_HELD, HELD_BYTES = 2, 2**28  # decoded motions that are at hand, and bytes of each at most
+RATIOS = ("cr_source", "cr_float32", "cr_40B")
+OWN_BASES = "basis"  # the one parameter that may name a file
+
+
+class Work:
+    """The tasks of a server, one at a time: each of them uses all processors by itself."""
+
+    most_posted = MOST_POSTED
+
+    def __init__(self, shelf: Shelf) -> None:
+        self._shelf = shelf
+        self._turn, self._waiting = Lock(), BoundedSemaphore(MOST_WAITING)
+        self._held: deque[tuple[object, Motion]] = deque(maxlen=MOST_HELD)
+
+    @contextmanager
+    def turn(self, is_gone: Callable[[], bool] = lambda: False) -> Iterator[None]:
+        """Wait until it is one's turn; Refused where many wait, or nobody wants it any longer."""
+        if not self._waiting.acquire(blocking=False):
+            raise Refused(503, "too much is asked for at once")
+        try:
+            with self._turn:
+                if is_gone():
+                    raise Refused(499, "nobody waits for the answer")
+                yield
+        finally:
+            self._waiting.release()
+
+    def document(self) -> dict[str, Any]:
+        """What the page is told first: ``api.json``."""
+        from mcz import __version__
+
+        files = [
+            {"name": file.name, "size": file.size, "url": url_of(number), "kind": file.kind}
+            for number, file in self._shelf.given()
+        ]
+        return {
+            "version": __version__,
+            "files": files,
+            "salvage": self._shelf.salvage,
+            "codecs": lossy_codecs(),
+            "canEncode": True,
+            "canConvert": True,
+            "canGlb": glb_writer() is not None,
+        }
+
+    def convert(self, stream: Readable, size: int, content_type: str) -> dict[str, Any]:
+        """Make an ``.mcz`` of the files of a form; of several motions one archive."""
+        boundary = boundary_of(content_type)
+        folder = self._shelf.spare_folder()
+        try:
+            paths = save_files(stream, size, boundary, folder)
+            motions = [path for path in paths if path.suffix.lower() != ".asf"]
+            for path in motions:
+                kind_of(path)
+            if not motions:
+                raise Refused(400, "there is no motion file among what was given")
+            with self.turn():
+                return self._converted(folder, motions)
+        except OSError as error:
+            raise Refused(507, f"the files could not be kept: {error.strerror}") from None
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _converted(self, folder: Path, motions: list[Path]) -> dict[str, Any]:
+        one = motions[0]
+        if len(motions) == 1:
+            name, kind = one.name, kind_of(one)
+            make = partial(encode, one, said=self._shelf.said)
+        else:
+            name, kind = f"{len(motions)} files", "folder"
+            make = partial(pack, folder, shelf=self._shelf)
+        try:
+            number, stored = self._shelf.upload(name, kind, make)
+        except MczError as error:
+            error.args = (str(error).replace(f"{folder}{os.sep}", ""),)  # which nobody knows
+            raise
+        return {"url": url_of(number), "name": name, "size": stored.size}
+
+    def encode(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """Code a clip anew with a codec and its parameters; say what that makes of it."""
+        from mcz.codecs import by_name
+        from mcz.reading.sizes import clip_sizes
+        from mcz.writing.file import write
+
+        codec, params = text_of(asked, "codec"), params_of(asked)
+        by_name(codec).options(params)
+        refuse_files(params)
+        motion = with_facts(self._motion(asked), None, asked.get("unit") or None)
+        quality: dict[str, str] = {}
+
+        def make(out: BinaryIO) -> None:
+            written = write(motion, out, codec, **params)
+            quality.update(written.clips[0].quality or {})
+
+        began = time.monotonic()
+        number, stored = self._shelf.result(f"{motion.name} ({codec})", make)
+        seconds = time.monotonic() - began
+        with mcz_open(stored.target()) as file:
+            payload = clip_sizes(file.container, file.only_clip()).payload
+        return {
+            "url": url_of(number),
+            "name": stored.name,
+            "size": stored.size,
+            "payload": payload,
+            "quality": quality,
+            "seconds": round(seconds, 3),
+        }
+
+    def diff(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """How far one clip is from another, as ``mcz diff --by-joint --json`` says it."""
+        from mcz.metrics.document import difference
+        from mcz.reading.report import clip_ratios
+
+        sides = [object_of(asked, key) for key in "ab"]
+        ratios = []
+        for side in sides:
+            with self._opened(side) as (file, clip):
+                found = clip_ratios(file, clip)
+                ratios.append({key: found[key] for key in RATIOS})
+        document = difference(self._motion(sides[0]), self._motion(sides[1]), by_joint=True)
+        document |= {"ratios_a": ratios[0], "ratios_b": ratios[1]}
+        names = [self._file(side).name for side in sides]
+        return {"a": names[0], "b": names[1], "clips": [document]}
+
+    def glb(self, asked: Mapping[str, Any]) -> bytes:
+        """A clip as the bytes of a GLB."""
+        writer = glb_writer()
+        if writer is None:
+            raise Refused(501, "this version writes no GLB")
+        return writer(self._motion(asked))
+
+    def _file(self, asked: Mapping[str, Any]) -> Shelved:
+        match = re.fullmatch(r"files/([0-9]{1,9})", text_of(asked, "url"))
+        try:
+            return self._shelf[int(match[1]) if match else -1]
+        except KeyError:
+            raise Refused(404, "there is no such file, or no longer") from None
+
+    @contextmanager
+    def _opened(self, asked: Mapping[str, Any]) -> Iterator[tuple[File, Clip]]:
+        """The file and the clip, by name or by its place in the file, that are asked for."""
+        wanted = asked.get("clip")
+        with mcz_open(self._file(asked).target(), salvage=self._shelf.salvage) as file:
+            if isinstance(wanted, int) and not isinstance(wanted, bool):
+                if not 0 <= wanted < len(file):
+                    raise Refused(404, f"the file has {len(file)} clips, not {wanted}")
+                yield file, next(islice(file, wanted, None))
+            elif wanted is None or isinstance(wanted, str):
+                yield file, file.clips.get(wanted or "") or file.only_clip(wanted)
+            else:
+                raise Refused(400, "clip is neither a name nor a number")
+
+    def _motion(self, asked: Mapping[str, Any]) -> Motion:
+        """The motion of a clip; those that were decoded last are at hand."""
+        file = self._file(asked)
+        with closing(file.open()) as contents:
+            key = (asked["url"], contents.tag, asked.get("clip"))
+        for held, motion in self._held:
+            if held == key:
+                return motion
+        with self._opened(asked) as (_, clip):
+            motion = clip.motion()
+        if sum(signal.values.nbytes for signal in motion.signals) <= HELD_BYTES:
+            self._held.append((key, motion))
+        return motion
+
+
+def url_of(number: int) -> str:
+    """Where the file of a number is, relative to the page."""
+    return f"files/{number}"
+
+
+@cache
+def lossy_codecs() -> list[dict[str, Any]]:
+    """What a slider needs to know: the lossy codecs, their parameters, and the range of the dial.
+
+    The keys are those of ``mcz codecs --json``, and ``dial``.
+    """
+    from mcz.codecs import CODECS
+    from mcz.codecs.listing import document
+
+    return [
+        document(codec) | {"dial": dial_of(codec.dial)}
+        for codec in CODECS.values()
+        if not codec.lossless
+    ]
+
+
+def dial_of(dial: Dial | None) -> dict[str, Any] | None:
+    """The one parameter that trades quality for size, and between what it may lie."""
+    if dial is None:
+        return None
+    return {
+        "parameter": dial.parameter,
+        "low": dial.low,
+        "high": dial.high,
+        "rises": dial.rises,
+        "whole": dial.whole,
+    }
+
+
+def refuse_files(params: Mapping[str, Any]) -> None:
+    """Raise OptionError for a parameter that names a file of this machine, not one of ours."""
+    name = params.get(OWN_BASES)
+    if isinstance(name, str) and not re.fullmatch(r"[a-z0-9_]{1,40}", name):
+        raise OptionError(f"{OWN_BASES}: the page cannot name files of this machine")
+
+
+def glb_writer() -> Callable[[Motion], bytes] | None:
+    """What writes a motion as GLB; None where this version has no such thing."""
+    return None
