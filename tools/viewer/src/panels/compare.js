@@ -182,10 +182,11 @@ function mountDiff(section, store) {
     const carried = store.get("diff");
     section.hidden = !store.get("compared") || !(carried || (a && b && store.get("server")));
     if (section.hidden) return;
-    if (carried) return void showDiff(section, carried);
+    if (carried) return void showDiff(section, carried, store.get("shown"));
     abort = new AbortController();
     try {
-      showDiff(section, await post("diff", { a, b }, { signal: abort.signal }));
+      const found = await post("diff", { a, b }, { signal: abort.signal });
+      showDiff(section, found, store.get("shown"));
     } catch (error) {
       if (error.name !== "AbortError") fill(section, title(), make("p", { class: "quiet" }, error.message));
     }
@@ -213,13 +214,15 @@ const NAMES = new Map([
   ["mismatched_points", ["Mismatched points", ""]],
 ]);
 
-function showDiff(section, { clips = [] }) {
+function showDiff(section, { clips = [] }, shown) {
+  const number = (frame) => count(frameNumber(shown, frame));
   const found = clips[0] ?? {};
   const hasCm = typeof found.mean_position_error_cm === "number";
   const rows = [...NAMES].map(([key, [name, unit]]) => {
     if (hasCm && unit === "units") return null;
     const value = Object.hasOwn(found, key) ? found[key] : null;
     if (value === null || typeof value === "object") return null;
+    if (key.endsWith("_frame")) return [name, number(value)];
     return [name, typeof value === "number" ? `${figure(value)} ${unit}`.trim() : value];
   });
   const ratio = (side) => found[`ratios_${side}`]?.cr_source;

@@ -56,7 +56,7 @@ class Quality {
       make("div", { class: "buttons" }, button({ shown: "Code it", onClick: () => this.#encode() }), button({ label: "Clear: forget the tries", shown: "Clear", onClick: () => this.#clear() })),
     );
     this.note = make("p", { class: "quiet" });
-    put(panel, this.note, this.controls, this.result, this.plot.element);
+    put(panel, this.note, this.controls, this.plot.element, this.result);
     this.codec.addEventListener("change", () => this.#fillDials());
     this.dial.addEventListener("change", () => this.#setDial());
     this.unit.addEventListener("change", () => this.encode());

@@ -1,5 +1,6 @@
 // The curves that are shown, as a table: a row a frame.
 
+import { frameNumber } from "../../ui/text.js";
 import { errorSource } from "./sources.js";
 
 const PIECE = 4096; // frames that are asked for at a time
@@ -21,7 +22,7 @@ export async function csvOf(engine, clip, sources, errors) {
     const columns = [];
     for (const source of all) columns.push(...(await rows(source, from, to)));
     for (let f = from; f < to; f++) {
-      const line = [f, ...(clip.rate ? [Number((f / clip.rate).toFixed(6))] : [])];
+      const line = [frameNumber(clip, f), ...(clip.rate ? [Number((f / clip.rate).toFixed(6))] : [])];
       for (const { most } of columns) line.push(Number.isNaN(most[f - from]) ? "" : plain(most[f - from]));
       lines.push(line.join(","));
     }

@@ -8,6 +8,7 @@ import { Tracks } from "./tracks.js";
 
 const MOST_POINTS = 4;
 const MOST_CURVES = 6;
+const MOST_SOURCES = 100;
 const AXES = ["x", "y", "z"];
 
 /** The sources of a clip for selected points; speed of the first point where none is selected. */
@@ -18,16 +19,32 @@ export function sourcesOf(engine, clip, selection) {
     const tracks = new Tracks(engine, clip, points);
     sources.push(speed(clip, tracks), ...points.map((point) => position(engine, clip, point)));
   }
-  const { signals = [] } = clip;
-  signals.forEach((signal, index) => {
-    const channels = index === 0 ? ofJoints(clip, points) : signal.channels.map((_, column) => column);
-    for (let at = 0; at < channels.length; at += MOST_CURVES) {
-      const columns = channels.slice(at, at + MOST_CURVES);
-      sources.push(ofSignal(engine, clip, { signal, index, columns, isAll: channels.length <= MOST_CURVES }));
-      if (sources.length > 100) break;
+  const signals = (clip.signals ?? []).map((signal, index) => ({ signal, index }));
+  signals.sort((a, b) => isDull(a.signal) - isDull(b.signal)); // others keep their order
+  for (const { signal, index } of signals) {
+    const all = index === 0 ? ofJoints(clip, points) : signal.channels.map((_, column) => column);
+    const groups = grouped(all, ({ unit }) => unit, signal.channels);
+    for (const columns of groups) {
+      sources.push(ofSignal(engine, clip, { signal, index, columns, isAll: groups.length === 1 }));
+      if (sources.length > MOST_SOURCES) return sources;
     }
-  });
+  }
   return sources;
+}
+
+/** What a camera system says of its markers comes after what was measured. */
+const isDull = ({ name }) => /^residuals?$/i.test(name);
+
+/** Columns that follow each other and have the same unit, at most `MOST_CURVES` together. */
+function grouped(columns, keyOf, channels) {
+  const groups = [];
+  for (const column of columns) {
+    const last = groups.at(-1);
+    const isLike = last && keyOf(channels[last[0]]) === keyOf(channels[column]);
+    if (isLike && last.length < MOST_CURVES) last.push(column);
+    else groups.push([column]);
+  }
+  return groups;
 }
 
 /** Columns of the channels that the joints of these points have; of none those of the first. */
