@@ -180,7 +180,7 @@ function mountDiff(section, store) {
     abort?.abort();
     const [a, b] = [served(store, store.get("shown")), served(store, store.get("compared"))];
     const carried = store.get("diff");
-    section.hidden = !store.get("compared") || !(carried || (a && b && store.get("server")));
+    section.hidden = !store.get("compared") || !(carried || (a && b && store.get("server")?.canEncode));
     if (section.hidden) return;
     if (carried) return void showDiff(section, carried, store.get("shown"));
     abort = new AbortController();

@@ -13,7 +13,7 @@ export function mountInfo(panel, { store }) {
   const up = choice({
     name: "up",
     legend: "Up axis",
-    choices: [["file", "As the file says"], ...AXES.map((axis, k) => [String(k), axis])],
+    choices: [["file", "The file's"], ...AXES.map((axis, k) => [String(k), axis])],
     value: "file",
     onChange: (value) => store.set({ up: value === "file" ? null : Number(value) }),
   });
@@ -105,6 +105,7 @@ function rowsOf(value, depth = 0) {
   const entries = value instanceof Map || isPairs(value) ? [...value] : Object.entries(value);
   const rows = entries.slice(0, MOST_ROWS).map(([key, held]) => {
     const name = Array.isArray(value) && !isPairs(value) ? `${Number(key) + 1}` : words(key);
+    if (/size$|bytes$/i.test(key) && Number.isSafeInteger(held)) return [name, size(held)];
     if (held === null || typeof held !== "object") return [name, described(held)];
     if (ArrayBuffer.isView(held)) return [name, `${counted(held.length, "number")}`];
     if (Array.isArray(held) && held.every((x) => x === null || typeof x !== "object")) {

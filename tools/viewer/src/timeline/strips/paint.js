@@ -47,6 +47,8 @@ export function paintCourse({ context, x }, course, y, { color, width = 1.25, al
   const { least, most, from, to } = course;
   const n = least.length;
   const step = (to - from) / n;
+  // Where a frame has many pixels, its value stands in the middle of them, as the playhead does.
+  const shift = step < 1 ? (1 - step) / 2 : 0;
   context.save();
   context.globalAlpha = alpha;
   context.strokeStyle = context.fillStyle = color;
@@ -59,7 +61,7 @@ export function paintCourse({ context, x }, course, y, { color, width = 1.25, al
   const bridge = Math.max(1, Math.ceil(1 / step));
   for (let i = 0; i < n; i++) {
     if (Number.isNaN(least[i])) continue;
-    const at = x(from + (i + 0.5) * step);
+    const at = x(from + (i + 0.5) * step + shift);
     if (isOpen && i - last <= bridge) context.lineTo(at, y(most[i]));
     else context.moveTo(at, y(most[i]));
     if (most[i] !== least[i]) context.lineTo(at, y(least[i]));
