@@ -23,7 +23,7 @@ const CODECS = [
 ];
 const encode = (body, held) => {
   asked.push(body);
-  const bytes = readFileSync(fixture("walk-small.mcz"));
+  const bytes = readFileSync(fixture("bvh-small.mcz"));
   held.push({ name: "walk (mrdwt)", bytes, isHidden: true });
   const payload = Math.round(3000 / (1 + Object.values(body.params)[0]));
   return { url: `files/${held.length - 1}`, name: "walk (mrdwt)", size: bytes.length, payload, quality: {}, seconds: 0.1 };

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { MIDDLE, PHONE, WIDE, axe, launch, open, settled, shown } from "./helpers/browser.js";
+import { MIDDLE, PHONE, USUAL, axe, launch, open, settled, shown } from "./helpers/browser.js";
 import { fixture } from "./helpers/fixtures.js";
 import { serve } from "./helpers/server.js";
 
@@ -80,11 +80,11 @@ test("points: a tree, selected by keys; searched; left and right", async () => {
   await settled(page);
   assert.deepEqual(await chosen(), ["lfoot"]);
   await page.locator(".strip", { hasText: "Speed of lfoot" }).waitFor();
-  await page.click("text=Left");
+  await page.click("button[aria-label^=Left]");
   assert.match(await page.textContent("#panel-joints > p"), /^1[0-9] of 31/);
   await page.fill('[aria-label="Search points"]', "rtoes");
   await page.waitForFunction(() => document.querySelectorAll("#panel-joints .tree-row").length === 1);
-  await page.click("text=None");
+  await page.click("button[aria-label^=None]");
   await settled(page);
   assert.deepEqual(await chosen(), []);
   assert.deepEqual(await axe(page), []);
@@ -132,7 +132,7 @@ test("panels give room by keys, and come back", async () => {
   const before = await width();
   await page.keyboard.press("b");
   await page.keyboard.press("i");
-  assert.equal(await width(), WIDE.width);
+  assert.equal(await width(), USUAL.width);
   await page.keyboard.press("b");
   await page.keyboard.press("i");
   assert.equal(await width(), before);

@@ -214,7 +214,7 @@ export class Tree {
 
   /** Goes to the next row that begins with what is typed. */
   #type(letter) {
-    if ([...letter].length !== 1 || letter === " ") return false;
+    if (!/^[\p{L}\p{N}\p{P}\p{S}]$/u.test(letter) || "/?".includes(letter)) return false;
     const now = performance.now();
     this.#typed = (now - this.#typedAt < TYPING_MS ? this.#typed : "") + letter.toLowerCase();
     this.#typedAt = now;

@@ -13,6 +13,7 @@ const ARGS = [
   "--disable-dev-shm-usage",
 ];
 export const WIDE = { width: 1440, height: 900 };
+export const USUAL = { width: 1100, height: 720 }; // all panels are open
 export const MIDDLE = { width: 1024, height: 700 };
 export const PHONE = { width: 390, height: 844 };
 
@@ -24,7 +25,7 @@ export const launch = () =>
  *
  * `page.faults` are errors of the console and dialogs; `page.strays` requests to other origins.
  */
-export async function open(browser, url, { viewport = WIDE, theme = "light", isEmpty = false, ...more } = {}) {
+export async function open(browser, url, { viewport = USUAL, theme = "light", isEmpty = false, ...more } = {}) {
   const context = await browser.newContext({ viewport, colorScheme: theme, acceptDownloads: true, ...more });
   const page = await context.newPage();
   page.faults = [];

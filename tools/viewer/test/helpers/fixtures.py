@@ -61,6 +61,7 @@ def main(folder: Path, is_all: bool) -> None:
         (folder / name).write_bytes(data)
     mcz.encode(folder / "walk.c3d", folder / "markers.mcz")
     mcz.encode(folder / "walk.bvh", folder / "bvh.mcz")
+    mcz.encode(folder / "walk.bvh", folder / "bvh-small.mcz", codec="mrdwt", params={"T_g": 2.0})
     parts = ["walks/slow", "walks/fast", "runs/a", "runs/b", "stand"]
     archive(folder / "folders.mcz", [replace(cut(motion, 30), name=name) for name in parts])
 

@@ -49,9 +49,12 @@ export class Row {
     const { store } = this.shared.page;
     const clip = store.get("shown") ?? { nFrames: 0 };
     const { nFrames } = clip;
-    const frame = Math.floor(this.shared.hovered() ?? store.get("frame"));
-    const text = this.painter.valueAt(Math.max(0, Math.min(nFrames - 1, frame)));
-    if (this.value.textContent !== text) this.value.textContent = text;
+    const valueOf = (frame) => this.painter.valueAt(Math.max(0, Math.min(nFrames - 1, Math.floor(frame))));
+    const frame = Math.floor(store.get("frame"));
+    const text = valueOf(frame);
+    const hovered = this.shared.hovered();
+    const seen = hovered === null ? text : valueOf(hovered);
+    if (this.value.textContent !== seen) this.value.textContent = seen;
     this.canvas.setAttribute("aria-label", `${this.name}. ${this.painter.describe()}`);
     this.canvas.setAttribute("aria-valuemax", String(Math.max(0, nFrames - 1)));
     this.canvas.setAttribute("aria-valuenow", String(frame));
@@ -115,6 +118,7 @@ export class Row {
     if (!this.painter.key?.(event) && !this.#move(event)) return;
     event.preventDefault();
     event.stopPropagation();
+    this.shared.hover(null);
   }
 
   #move({ key, shiftKey }) {
