@@ -111,8 +111,8 @@ export class Parameters {
     return this.continued(group, name, true).flatMap(({ dims, data }) => {
       const width = (dims.length > 0 ? dims[0] : 1) || 1;
       const rows = [];
-      for (let at = 0; at < data.length; at += width) rows.push(trimmed(data.subarray(at, at + width)));
-      return rows;
+      for (let at = 0; at < data.length; at += width) rows.push(data.subarray(at, at + width));
+      return rows.map(trimmed);
     });
   }
 
@@ -173,7 +173,7 @@ function readSection(bytes, start, order, head) {
     const number = (bytes[at + 1] << 24) >> 24;
     const after = at + 2 + Math.abs(size);
     if (size === 0 || after + 2 > stop) break;
-    const name = latin1(bytes.subarray(at + 2, after)).replace(/^[ \0]+|[ \0]+$/g, "").toUpperCase();
+    const name = nameOf(bytes.subarray(at + 2, after));
     if (number >= 0) entries.push({ number, name, parameter: parameterAt(bytes, after + 2, stop) });
     else if (!groups.has(-number)) groups.set(-number, name);
     const step = order.word(bytes, after);
@@ -186,6 +186,10 @@ function readSection(bytes, start, order, head) {
     if (parameter !== null && groups.has(number) && !found.has(key)) found.set(key, parameter);
   }
   return new Parameters(order, found);
+}
+
+function nameOf(bytes) {
+  return latin1(bytes).replace(/^[ \0]+|[ \0]+$/g, "").toUpperCase();
 }
 
 /** The parameter whose type stands at an offset; null where it does not fit its section. */

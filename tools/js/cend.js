@@ -17,30 +17,35 @@ const HASH_SIZE = 32;
  *
  * @param {Uint8Array} payload of CEND
  * @param {import("./clip.js").Clip} clip with all its segments
+ * @param {boolean} [salvage] the clip may lack segments
  * @returns {ClipEnd}
  * @throws {Refused}
  */
-export function readClipEnd(payload, clip) {
+export function readClipEnd(payload, clip, salvage = false) {
   const reader = new ByteReader(payload, `CEND of ${clip.name}`);
   const nFrames = reader.varint();
   const sourceSha256 = reader.optional(() => reader.take(HASH_SIZE));
   const valueSha256 = reader.counted(() => reader.take(HASH_SIZE));
   reader.rest();
-  if (!clip.open && nFrames !== clip.nFrames) {
-    reader.refuse(`${nFrames} frames, ${clip.nFrames} in CLIP`);
-  }
+  if (!salvage) checkFrames(reader, nFrames, clip);
   if ((sourceSha256 !== null) !== (clip.source !== null)) {
     reader.refuse("the hash of a source, or none, where CLIP says otherwise");
   }
   if (valueSha256.length !== clip.signals.length) {
     reader.refuse(`${valueSha256.length} hashes of ${clip.signals.length} signals`);
   }
+  return { nFrames, sourceSha256, valueSha256 };
+}
+
+function checkFrames(reader, nFrames, clip) {
+  if (!clip.open && nFrames !== clip.nFrames) {
+    reader.refuse(`${nFrames} frames, ${clip.nFrames} in CLIP`);
+  }
   for (const { name, skip, spare, due } of clip.signals) {
     if (due !== skip + nFrames + spare) {
       reader.refuse(`${skip} + ${nFrames} + ${spare} frames, ${due} stored of ${name}`);
     }
   }
-  return { nFrames, sourceSha256, valueSha256 };
 }
 
 /**

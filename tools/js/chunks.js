@@ -68,6 +68,26 @@ export function checkSignature(bytes) {
  * @throws {Refused | Unsupported}
  */
 export function readChunk(bytes, offset, payloadLimit) {
+  const { type, ancillary, open, length, reader } = readHeader(bytes, offset);
+  if (open) return { type, ancillary, open, offset, payload: null, end: null };
+  within(length, payloadLimit, `bytes of ${type} at ${offset}`);
+  const payload = reader.take(length);
+  const crcAt = reader.at;
+  if (reader.u32() !== crc32(bytes, offset, crcAt)) reader.refuse("the crc is wrong");
+  if (!ancillary && !(type in FLAGS_OF)) throw new Unsupported(`critical chunks ${type}`);
+  return { type, ancillary, open, offset, payload, end: reader.at };
+}
+
+/**
+ * Reads the header of a chunk.
+ *
+ * @param {Uint8Array} bytes
+ * @param {number} offset where the chunk begins
+ * @returns {{type: string, ancillary: boolean, open: boolean, length: number | null,
+ *   reader: ByteReader}} `length` of the payload, null of an open DATA; the reader is behind it
+ * @throws {Refused}
+ */
+export function readHeader(bytes, offset) {
   const reader = new ByteReader(bytes, "chunk", offset);
   const type = String.fromCharCode(...reader.take(4));
   if (!/^[A-Za-z]{4}$/.test(type)) reader.refuse("a chunk type is four letters");
@@ -83,17 +103,29 @@ export function readChunk(bytes, offset, payloadLimit) {
   }
   checkFlags(type, flags, reader);
   const ancillary = (flags & FLAG_ANCILLARY) !== 0;
-  if (allOnes && type === "DATA") {
-    return { type, ancillary, open: true, offset, payload: null, end: null };
-  }
+  if (allOnes && type === "DATA") return { type, ancillary, open: true, length: null, reader };
   reader.at = lengthAt;
-  const length = reader.u64();
-  within(length, payloadLimit, `bytes of ${type} at ${offset}`);
-  const payload = reader.take(length);
-  const crcAt = reader.at;
-  if (reader.u32() !== crc32(bytes, offset, crcAt)) reader.refuse("the crc is wrong");
-  if (!ancillary && !(type in FLAGS_OF)) throw new Unsupported(`critical chunks ${type}`);
-  return { type, ancillary, open: false, offset, payload, end: reader.at };
+  return { type, ancillary, open: false, length: reader.u64(), reader };
+}
+
+/**
+ * A whole chunk of one of the types that have no flags.
+ *
+ * @param {string} type
+ * @param {Uint8Array} payload
+ * @returns {Uint8Array}
+ */
+export function buildChunk(type, payload) {
+  const bytes = new Uint8Array(FRAMING_SIZE + payload.length);
+  const view = new DataView(bytes.buffer);
+  for (let i = 0; i < 4; i++) bytes[i] = type.charCodeAt(i);
+  view.setUint32(8, payload.length % 2 ** 32, true);
+  view.setUint32(12, Math.floor(payload.length / 2 ** 32), true);
+  view.setUint16(6, crc32(bytes, 8, 16, crc32(bytes, 0, 6)) & 0xffff, true);
+  bytes.set(payload, HEADER_SIZE);
+  const crcAt = HEADER_SIZE + payload.length;
+  view.setUint32(crcAt, crc32(bytes, 0, crcAt), true);
+  return bytes;
 }
 
 /** `header_check`: the CRC-32 of the header without the two bytes of the check itself. */

@@ -51,6 +51,7 @@ const GROUPS_LISTED = 3;
  * @property {number} nResolutions
  * @property {import("./data.js").Segment[]} segments as far as they were read, in frame order
  * @property {number} due the stored frame that the next segment begins with
+ * @property {boolean} [mayLack] or with a later one, since the file is damaged
  */
 
 /**

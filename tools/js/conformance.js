@@ -1,6 +1,7 @@
 // The command of conformance/README.md: an MCZ file on standard input, its arrays or its source
 // files on standard output. With --serve many requests, each with its own answer. Before these,
-// --decoded-limit N sets another limit of what is decoded than SPEC.md has, for tests.
+// --decoded-limit N sets another limit of what is decoded than SPEC.md has, for tests. For tests,
+// too: --ranges reads the file by ranges, --salvage what a damaged one still holds.
 
 import { readFileSync, readSync, writeSync } from "node:fs";
 
@@ -8,7 +9,7 @@ import { readAnnex } from "./annex-node.js";
 import { bytesOf } from "./cend.js";
 import { CODEC_NAMES } from "./codecs.js";
 import { VERSION } from "./head.js";
-import { MczError, decode, setAnnex, sources } from "./mcz.js";
+import { MczError, decode, fromBytes, open, setAnnex, sources } from "./mcz.js";
 import { SOURCE_FORMAT_NAMES } from "./registry.js";
 
 const CAPABILITIES = {
@@ -22,46 +23,75 @@ const STDOUT = 1;
 const OK = 0;
 const FAILED = 2;
 
-function main(words) {
+async function main(words) {
   setAnnex(readAnnex);
   const limits = {};
   if (words[0] === "--decoded-limit") limits.decodedLimit = Number(words.splice(0, 2)[1]);
   if (words.includes("--serve")) {
-    serve(limits);
+    await serve(limits);
     return OK;
   }
   if (words.includes("--capabilities")) {
     write([line(CAPABILITIES)]);
     return OK;
   }
-  const { exit, parts } = answer(words, new Uint8Array(readFileSync(STDIN)), limits);
+  const { exit, parts } = await answer(words, new Uint8Array(readFileSync(STDIN)), limits);
   write(parts);
   return exit;
 }
 
 /** Answers requests until the input ends. */
-function serve(limits) {
+async function serve(limits) {
   const input = new Input();
   for (let request = input.line(); request !== null; request = input.line()) {
     const { arguments: words, bytes } = JSON.parse(request);
-    const { exit, parts } = answer(words, input.take(bytes), limits);
+    const { exit, parts } = await answer(words, input.take(bytes), limits);
     const size = parts.reduce((sum, part) => sum + part.length, 0);
     write([line({ exit, bytes: size }), ...parts]);
   }
 }
 
 /** The exit code and the output that a request is answered with; reasons go to standard error. */
-function answer(words, bytes, limits) {
+async function answer(words, bytes, limits) {
   try {
-    const parts = words.includes("--source")
-      ? listSources(sources(bytes, limits))
-      : listArrays(decode(bytes, { ...parse(words), ...limits }));
-    return { exit: OK, parts };
+    return { exit: OK, parts: await respond(words, bytes, limits) };
   } catch (error) {
     const known = error instanceof MczError;
     process.stderr.write(known ? `${error.message}\n` : `${error.stack}\n`);
     return { exit: known ? error.exitCode : FAILED, parts: [] };
   }
+}
+
+async function respond(words, bytes, limits) {
+  if (words.includes("--source")) return listSources(sources(bytes, limits));
+  const options = parse(words);
+  if (options.salvage === undefined) return listArrays(decode(bytes, { ...options, ...limits }));
+  const { salvage } = options;
+  const file = await open(fromBytes(bytes), { salvage, limit: limits.decodedLimit });
+  return listArrays(await decodeByRanges(file, options));
+}
+
+/** The clips of an open file, as {@link decode} gives them. */
+async function decodeByRanges(file, { clip: name, frames, joints, resolution = 0 }) {
+  const clips = [];
+  for (const { index } of name === undefined ? file.clips : [file.clips[file.clips.indexOf(name)]]) {
+    const clip = await file.clip(index);
+    const signals = [];
+    for (const { index: signal, ownChannels, nResolutions } of clip.signals) {
+      if (joints && ownChannels) continue;
+      const dropped = signal === 0 ? resolution : Math.min(resolution, nResolutions - 1);
+      const request = { signal, frames, joints, resolution: dropped };
+      signals.push(await clip.read(request).catch((error) => passed(file, error)));
+    }
+    clips.push({ name: clip.name, signals: signals.filter((signal) => signal !== null) });
+  }
+  return clips;
+}
+
+/** Of a damaged file, what can be had of other signals counts. */
+function passed({ salvage }, error) {
+  if (salvage && error instanceof MczError) return null;
+  throw error;
 }
 
 /** The options of {@link decode} that the command line asks for. */
@@ -71,6 +101,8 @@ function parse(words) {
   while (rest.length > 0) {
     const word = rest.shift();
     if (word === "--post-filter") options.postFilter = true;
+    else if (word === "--ranges") options.salvage = false;
+    else if (word === "--salvage") options.salvage = true;
     else if (word === "--clip") options.clip = rest.shift();
     else if (word === "--frames") options.frames = rest.shift().split(":").map(Number);
     else if (word === "--joints") options.joints = rest.shift().split(",").map(Number);
@@ -174,4 +206,4 @@ function patiently(work) {
   }
 }
 
-process.exitCode = main(process.argv.slice(2));
+process.exitCode = await main(process.argv.slice(2));

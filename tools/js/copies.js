@@ -2,6 +2,7 @@
 
 import { ByteReader, sameBytes } from "./bytes.js";
 import { FRAMING_SIZE } from "./chunks.js";
+import { Refused } from "./errors.js";
 import { within } from "./limits.js";
 import { decoded } from "./shared.js";
 
@@ -14,11 +15,28 @@ export const COPIED = new Set(["HEAD", "SKEL", "MODL", "SRCE", "ALIA", "CLIP", "
  * @param {import("./chunks.js").Chunk} chunk the COPY
  * @param {Map<number, import("./chunks.js").Chunk>} before chunks of {@link COPIED}, by offset
  * @param {number} fileBytes bytes of the whole file
- * @throws {import("./errors.js").Refused}
+ * @throws {Refused}
  */
-export function checkCopies({ offset, payload }, before, fileBytes) {
-  const content = readContent(payload, fileBytes);
-  const reader = new ByteReader(content, "COPY, decoded");
+export function checkCopies(chunk, before, fileBytes) {
+  for (const { offset, type, payload } of copiesIn(chunk, fileBytes)) {
+    const there = before.get(offset);
+    if (!there || there.type !== type || !sameBytes(there.payload, payload)) {
+      throw new Refused(`COPY at ${chunk.offset}: no ${type} at ${offset} is as its copy says`);
+    }
+  }
+}
+
+/**
+ * What a COPY says, in file order.
+ *
+ * @param {import("./chunks.js").Chunk} chunk the COPY
+ * @param {number} limit bytes of all copies
+ * @returns {{offset: number, type: string, payload: Uint8Array}[]} where each chunk begins
+ * @throws {Refused}
+ */
+export function copiesIn({ offset, payload }, limit) {
+  const reader = new ByteReader(readContent(payload, limit), "COPY, decoded");
+  const copies = [];
   let end = 0; // of the chunk that was copied last
   while (reader.left > 0) {
     const start = offset - reader.varint();
@@ -27,18 +45,16 @@ export function checkCopies({ offset, payload }, before, fileBytes) {
     if (!COPIED.has(type)) reader.refuse(`a copy of a chunk ${type}`);
     const stop = start + FRAMING_SIZE + copy.length;
     if (start < end || stop > offset) reader.refuse(`a copy of ${type} at ${start} out of order`);
-    const chunk = before.get(start);
-    if (!chunk || chunk.type !== type || !sameBytes(chunk.payload, copy)) {
-      reader.refuse(`no ${type} at ${start} is as its copy says`);
-    }
     end = stop;
+    copies.push({ offset: start, type, payload: copy });
   }
+  return copies;
 }
 
-function readContent(payload, fileBytes) {
+function readContent(payload, limit) {
   const reader = new ByteReader(payload, "COPY");
   const encoding = reader.u8();
   const size = reader.varint();
-  within(size, fileBytes, "bytes of copies");
+  within(size, limit, "bytes of copies");
   return decoded(encoding, reader.rest(), size, "COPY");
 }

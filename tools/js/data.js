@@ -112,7 +112,8 @@ function checkSegment(segment, signal, limits) {
   const { firstFrame, nFrames, nRows, lead, tail } = segment;
   const what = `segment at frame ${firstFrame} of ${signal.name}`;
   if (nFrames === 0) throw new Refused(`${what}: no frames`);
-  if (firstFrame !== signal.due) throw new Refused(`${what}: frame ${signal.due} is due`);
+  const isDue = firstFrame === signal.due || (signal.mayLack && firstFrame > signal.due);
+  if (!isDue) throw new Refused(`${what}: frame ${signal.due} is due`);
   if (lead > firstFrame) throw new Refused(`${what}: a lead of ${lead}`);
   if (firstFrame === 0 && !segment.fresh) throw new Refused(`${what}: it does not start fresh`);
   count(firstFrame + nFrames + tail, `${what}: its end`);
@@ -183,7 +184,7 @@ export function takeStreams({ payload, tableAt, flags }, signal) {
  */
 export function addSegment(signal, segment) {
   signal.segments.push(segment);
-  signal.due += segment.nFrames;
+  signal.due = segment.firstFrame + segment.nFrames;
 }
 
 /**

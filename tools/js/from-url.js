@@ -162,7 +162,8 @@ class RemoteFile {
     }
     this.stats.bytes += bytes.length;
     if (bytes.length > size) this.refuse(`${size} bytes are asked for, ${bytes.length} came`);
-    if (bytes.length < size) throw this.passing({ message: `${bytes.length} of ${size} bytes came` });
+    const message = `${bytes.length} of ${size} bytes came`;
+    if (bytes.length < size) throw this.passing({ message });
     return bytes;
   }
 

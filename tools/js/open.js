@@ -18,6 +18,7 @@ import { apply, readRecords } from "./metadata.js";
 import { supplied } from "./missing.js";
 import { openClip } from "./ranged-clip.js";
 import { Ranges, payloadIn } from "./ranges.js";
+import { salvaged } from "./salvage.js";
 import { SharedChunks } from "./shared-chunks.js";
 import { walked } from "./walked.js";
 
@@ -36,8 +37,12 @@ const MOST_INDEX = 2 ** 29; // bytes of an INDX chunk
  */
 export async function open(source, { salvage = false, limit } = {}) {
   const ranges = new Ranges(await source);
-  const directory = await directoryOf(ranges, limit);
-  return new MczFile(ranges, directory, limit ?? decodedLimit(ranges.size));
+  const most = limit ?? decodedLimit(ranges.size);
+  if (salvage) {
+    const found = await salvaged(ranges, most);
+    return new MczFile(found.ranges, found.directory, most, true);
+  }
+  return new MczFile(ranges, await directoryOf(ranges, most), most, false);
 }
 
 async function directoryOf(ranges, limit) {
@@ -88,18 +93,19 @@ async function compareHead(ranges, head) {
 
 /** An open file. */
 export class MczFile {
-  constructor(ranges, directory, limit) {
+  constructor(ranges, directory, limit, salvage) {
     this.ranges = ranges;
     this.directory = directory;
     this.decodedLimit = limit;
     this.limits = readHead(directory.head);
-    this.shared = new SharedChunks(ranges, directory, this.limits, limit);
+    this.shared = new SharedChunks(ranges, directory, this.limits, limit, salvage);
+    this.salvage = salvage;
     this.records = null;
     /** Bytes of the file. */
     this.size = ranges.size;
     /** The clips in file order: see clip-list.js. */
     this.clips = clipList(directory);
-    /** What is lost of a damaged file, in words. */
+    /** What is lost of a damaged file that is salvaged: see damage.js. */
     this.damage = directory.damage ?? [];
   }
 

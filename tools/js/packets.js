@@ -39,14 +39,43 @@ export function packetOf(indexFlags) {
  */
 export function readPackets(bytes, start, clip, limits, found) {
   const reader = new ByteReader(bytes, `open DATA of ${clip.name}`, start);
-  let frameIsDue = false; // a segment of signal 0 has come in this DATA
-  for (let sequence = 0; ; sequence++) {
-    const packet = readHead(reader, sequence, limits);
+  const packets = new Packets(clip, limits);
+  for (;;) {
+    const segment = packets.next(reader, 0);
+    if (segment === null) return reader.at;
+    found(segment);
+  }
+}
+
+/** The packets of an open DATA, one after the other. */
+export class Packets {
+  /**
+   * @param {import("./clip.js").Clip} clip whose signals are given the segments
+   * @param {object} limits of the profile
+   */
+  constructor(clip, limits) {
+    this.clip = clip;
+    this.limits = limits;
+    this.sequence = 0;
+    this.frameIsDue = false; // a segment of signal 0 has come in this DATA
+  }
+
+  /**
+   * Reads the next packet.
+   *
+   * @param {ByteReader} reader at the packet
+   * @param {number} base where the bytes of the reader begin in the file
+   * @returns {import("./data.js").Segment | null} null at the end packet
+   * @throws {Refused}
+   */
+  next(reader, base) {
+    const { clip, limits } = this;
+    const packet = readHead(reader, this.sequence, limits);
     if (packet.kind === KIND_END) {
       checkEnd(reader, packet);
-      return reader.at;
+      return null;
     }
-    const offset = reader.at;
+    const offset = base + reader.at;
     const body = reader.take(packet.length);
     const check = reader.u16();
     let segment;
@@ -54,15 +83,16 @@ export function readPackets(bytes, start, clip, limits, found) {
       checkBody(reader, check, crc32(body));
       segment = readSegment(body, clip, limits);
       if (segment.fresh !== packet.fresh) reader.refuse("packet and segment differ on freshness");
-      frameIsDue ||= segment.signal === 0;
     } else {
-      segment = readFrame(reader, packet, body, check, clip, frameIsDue, limits);
+      segment = readFrame(reader, packet, body, check, clip, this.frameIsDue, limits);
     }
+    this.frameIsDue ||= segment.signal === 0;
     segment.offset = offset;
     segment.size = packet.length;
     segment.indexFlags |= INDEX_FLAGS[packet.kind];
     addSegment(clip.signals[segment.signal], segment);
-    found(segment);
+    this.sequence++;
+    return segment;
   }
 }
 

@@ -5,14 +5,16 @@ import { frameNumbers, readClip } from "./clip.js";
 import { codecLabel } from "./codecs.js";
 import { FRAMING_SIZE, HEADER_SIZE } from "./chunks.js";
 import { addSegment, frameSegment, readSegment, takeStreams } from "./data.js";
-import { Refused, Unsupported } from "./errors.js";
-import { Room } from "./limits.js";
+import { Refused } from "./errors.js";
+import { Room, decodedBytes } from "./limits.js";
+import { lostFrames, storedFrames } from "./losses.js";
 import { supplied } from "./missing.js";
 import { MOST_HEAD, indexedBody } from "./packets.js";
 import { readQuality } from "./qual.js";
 import { payloadIn } from "./ranges.js";
 import { c3dRecording } from "./recording.js";
 import { sourceFormatLabel } from "./registry.js";
+import { salvageSignal } from "./salvaged-signal.js";
 import { decodeSegments, openSignal, segmentsOf, takeColumns } from "./signals.js";
 import { restoreClip } from "./sources.js";
 
@@ -35,12 +37,22 @@ export async function openClip(file, index, row) {
   const ahead = place.offset + place.length + AHEAD;
   const payload = await file.ranges.payload(place, file.limits.payloadBytes, ahead);
   const clip = await supplied(() => readClip(payload, place.offset, file.shared));
-  compare(clip, row);
+  if (!file.salvage) compare(clip, row);
+  clip.declared = clip.nFrames;
   clip.nFrames = row.nFrames;
   clip.findModel = file.shared.modelFinder(place.offset);
-  clip.numbers = frameNumbers(clip);
+  clip.numbers = numbersOf(clip, file.salvage);
   for (const segment of row.segments()) addSegment(clip.signals[segment.signal], segment);
   return new RangedClip(file, index, row, clip);
+}
+
+function numbersOf(clip, salvage) {
+  try {
+    return frameNumbers(clip);
+  } catch (error) {
+    if (!salvage) throw error;
+    return [{ frame: 0, number: 1n }]; // they may speak of frames that are lost
+  }
 }
 
 function compare(clip, row) {
@@ -83,6 +95,7 @@ export class RangedClip {
     this.row = row;
     this.clip = clip;
     this.opened = new Map(); // signals whose headers were read
+    this.chains = new Map(); // of a damaged file: signals with a part of their segments
     this.index = index;
     this.name = clip.name;
     this.nFrames = clip.nFrames;
@@ -166,9 +179,12 @@ export class RangedClip {
     if (clip.source === null) return null;
     await this.file.shared.loadTemplate(clip.source, "clip");
     const { sourceSha256 } = await this.end();
+    if (clip.signals.some((of) => lostFrames(of.segments, this.stored(of)).length > 0)) {
+      throw new Refused(`clip ${this.name} has lost frames, and its source with them`);
+    }
     const signals = [];
     for (const signal of clip.signals) {
-      signals.push(await this.decode(signal, { from: 0, to: clip.nFrames, dropped: 0 }));
+      signals.push(await this.decodeStrictly(signal, { from: 0, to: clip.nFrames, dropped: 0 }));
     }
     const { numbers } = clip;
     const maxBytes = this.file.decodedLimit;
@@ -244,12 +260,38 @@ export class RangedClip {
   }
 
   async decode(signal, request) {
+    if (this.file.salvage) return this.decodeSalvaged(signal, request);
+    return this.decodeStrictly(signal, request);
+  }
+
+  /** The frames that are there; what their segments are is known from a walk through the file. */
+  async decodeSalvaged(signal, request) {
+    new Room(this.file.decodedLimit).take(bytesOf(request, signal));
+    return salvageSignal(signal, request, this.stored(signal), (segments, from, to) => {
+      const chain = this.chain(signal, segments);
+      return this.decodeStrictly(chain, { ...request, from, to });
+    });
+  }
+
+  /** The stored frames of a signal; Infinity where its clip was cut off and does not say it. */
+  stored({ skip, spare }) {
+    return storedFrames(this.clip, skip + spare, this.row.end !== null);
+  }
+
+  /** The signal with these segments alone. */
+  chain(signal, segments) {
+    const key = segments[0];
+    if (!this.chains.has(key)) this.chains.set(key, { ...signal, segments });
+    return this.chains.get(key);
+  }
+
+  async decodeStrictly(signal, request) {
     const opened = await this.open(signal);
     const room = new Room(this.file.decodedLimit);
     const needed = segmentsOf(opened, { ...request, room });
     const segments = await this.load(signal, needed);
     const isWhole = request.from === 0 && request.to === this.nFrames && request.dropped === 0;
-    if (isWhole) await this.end();
+    if (isWhole && !this.file.salvage) await this.end();
     return supplied(() => decodeSegments(opened, segments, request));
   }
 
@@ -263,6 +305,7 @@ export class RangedClip {
   async end() {
     if (!this.clip.end) {
       const { end } = this.row;
+      if (end === null) throw new Refused(`clip ${this.name} has no CEND`);
       const payload = await this.file.ranges.payload(end, this.file.limits.payloadBytes);
       this.clip.end = readClipEnd(payload, this.clip);
     }
@@ -279,7 +322,8 @@ export class RangedClip {
       const payload = packet ? indexedBody(parts[i], segment) : payloadIn(parts[i], place);
       const reading = { ...signal, due: firstFrame };
       if (packet > 1) return { ...frameSegment(payload, fresh, reading, limits), offset };
-      const signals = this.clip.signals.map((other) => (other === signal ? reading : other));
+      const signals = [...this.clip.signals];
+      signals[signal.index] = reading;
       const found = readSegment(payload, { ...this.clip, signals }, limits);
       const fields = ["signal", "nFrames", "lead", "tail", "flags"];
       if (fields.some((field) => found[field] !== segment[field])) {
@@ -288,6 +332,10 @@ export class RangedClip {
       return { ...found, offset };
     });
   }
+}
+
+function bytesOf({ from, to }, { samplesPerFrame, channels }) {
+  return decodedBytes((to - from) * samplesPerFrame, channels.length);
 }
 
 /** Where the bytes of a segment lie, with what checks them. */

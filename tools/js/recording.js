@@ -144,7 +144,8 @@ function eventsOf(parameters, head) {
   const dims = parameters.get("EVENT", "TIMES")?.dims ?? [];
   if (dims.length > 1 && dims[0] === 2) {
     // Minutes and seconds; some files hold seconds alone.
-    times = Array.from({ length: times.length >> 1 }, (_, i) => 60 * times[2 * i] + times[2 * i + 1]);
+    const pairs = times;
+    times = Array.from({ length: pairs.length >> 1 }, (_, i) => 60 * pairs[2 * i] + pairs[2 * i + 1]);
   }
   times = times.slice(0, parameters.count("EVENT", "USED") ?? times.length);
   if (times.length === 0) return eventsOfHeader(parameters.order, head);

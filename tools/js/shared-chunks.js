@@ -19,16 +19,18 @@ export class SharedChunks {
    * @param {import("./directory.js").Directory} directory
    * @param {object} limits of the profile
    * @param {number} inflateLimit bytes that a template may inflate to
+   * @param {boolean} salvage what is named may be lost
    */
-  constructor(ranges, directory, limits, inflateLimit) {
+  constructor(ranges, directory, limits, inflateLimit, salvage) {
     this.ranges = ranges;
     this.directory = directory;
     this.limits = limits;
     this.inflateLimit = inflateLimit;
     this.read = new Map(); // by type and id
-    const has = (type) => (id) => directory.shared.has(`${type} ${id}`);
-    this.skeletons = { has: has("SKEL"), get: (id) => this.skeleton(id) };
-    this.templates = { has: has("SRCE"), get: (id) => this.template(id) };
+    this.salvage = salvage;
+    const has = (id) => salvage || directory.shared.has(`SKEL ${id}`);
+    this.skeletons = { has, get: (id) => this.skeleton(id) };
+    this.templates = { get: (id) => this.template(id) };
     this.clips = new Map(); // the names of others are in the directory
   }
 
@@ -39,9 +41,10 @@ export class SharedChunks {
     });
   }
 
-  /** A template of which only the id is known: `format` and `data` are read when they are needed. */
+  /** A template of which only the id is known: the rest of it is read when it is needed. */
   template(id) {
-    return this.directory.shared.has(`SRCE ${id}`) ? { id, format: null, data: null } : undefined;
+    const isThere = this.salvage || this.directory.shared.has(`SRCE ${id}`);
+    return isThere ? { id, format: null, data: null } : undefined;
   }
 
   /**
@@ -69,7 +72,7 @@ export class SharedChunks {
   modelFinder(offset) {
     return (id) => {
       const place = this.directory.shared.get(`MODL ${id}`);
-      const isBefore = place !== undefined && place.offset < offset;
+      const isBefore = place !== undefined && (this.salvage || place.offset < offset);
       const model = isBefore
         ? this.found("MODL", id, (payload) => () => readModel(payload))
         : wellKnownModel(id);
@@ -92,6 +95,7 @@ export class SharedChunks {
   /** The payload of a chunk, of which the id is told by its hash. */
   async payload(type, id) {
     const place = this.directory.shared.get(`${type} ${id}`);
+    if (place === undefined) throw new Refused(`${type} ${id} is lost`);
     const payload = await this.ranges.payload(place, this.limits.payloadBytes);
     if (hex(sha256(payload).subarray(0, ID_SIZE)) !== id) {
       throw new Refused(`${type} at ${place.offset}: its id is not ${id}`);

@@ -4,11 +4,13 @@ import { embeddedAnnex, fromBase64 } from "./engine/annex.js";
 import { droppedFiles, gathered } from "./inputs/files.js";
 
 const ACCEPT = ".mcz,.bvh,.amc,.asf,.c3d";
+const places = new Map(); // of opened files, to open them again
 const isMcz = (name) => /\.mcz$/i.test(name);
 
 /** Opens what the page was made for, and takes what is dropped on it. */
 export async function openFirst(page) {
   takeDrops(page);
+  page.engine.onDamage = (clip, error) => salvage(page, clip.fileId, error);
   const embedded = document.getElementById("embedded");
   try {
     if (embedded !== null) await openEmbedded(page, JSON.parse(embedded.textContent));
@@ -42,6 +44,7 @@ export function chooseFiles(page) {
 export async function addFile({ store, engine }, where, { name, url = null }) {
   const opened = await openedStrictlyOrNot({ store, engine }, where, name);
   const file = { ...opened, name, url };
+  places.set(file.id, where);
   store.set({ files: [...store.get("files"), file] });
   return file;
 }
@@ -59,6 +62,26 @@ async function openedStrictlyOrNot(page, where, name) {
     }
     tell(page, `${name} is damaged: ${error.message}. What is whole is shown.`, true);
     return opened;
+  }
+}
+
+/** Opens a file again whose damage was not seen at first; what is shown of it is shown anew. */
+async function salvage(page, id, fault) {
+  const { store, engine } = page;
+  const where = places.get(id);
+  const file = store.get("files").find((one) => one.id === id);
+  places.delete(id);
+  if (where === undefined || file === undefined || file.damage.length > 0) return;
+  try {
+    const opened = await engine.open(where, { name: file.name, salvage: true });
+    const files = store.get("files").map((one) => (one.id === id ? { ...one, ...opened } : one));
+    const anew = async (clip) => (clip?.fileId === id ? engine.clip(opened.id, clip.index) : clip);
+    const shown = await anew(store.get("shown"));
+    const compared = await anew(store.get("compared"));
+    store.set({ files, shown, compared, errors: null });
+    tell(page, `${file.name} is damaged: ${fault.message}. What is whole is shown.`, true);
+  } catch {
+    tell(page, `${file.name}: ${faultText(fault)}`, true);
   }
 }
 
@@ -107,7 +130,7 @@ export async function openAll(page, files) {
 }
 
 async function openOne(page, file, skeleton) {
-  const { server } = Object.fromEntries([["server", page.store.get("server")]]);
+  const server = page.store.get("server");
   if (isMcz(file.name)) return addFile(page, { blob: file }, { name: file.name });
   if (server?.canConvert) {
     const { url, name } = await converted(skeleton ? [file, skeleton] : [file]);

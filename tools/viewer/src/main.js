@@ -13,7 +13,7 @@ const engine = new Engine();
 const page = { store, engine };
 globalThis.mczViewer = page; // for tests, and for the curious
 
-mountStage(document.getElementById("stage"), page);
+page.stage = mountStage(document.getElementById("stage"), page);
 mountTimeline(document.getElementById("timeline"), page);
 mountPanels(document, page);
 await openFirst(page);

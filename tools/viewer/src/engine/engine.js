@@ -7,6 +7,9 @@ export class Engine {
   #waiting = new Map();
   #nCalls = 0;
 
+  /** Called with a clip and what is wrong with it, when that shows as its frames are decoded. */
+  onDamage = () => {};
+
   constructor() {
     const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
     this.#worker = new Worker(address);
@@ -31,11 +34,11 @@ export class Engine {
   }
 
   positions(clip, from, to) {
-    return this.#call("positions", [clip.key, from, to]);
+    return this.#ofClip(clip, this.#call("positions", [clip.key, from, to]));
   }
 
   curves(clip, wanted) {
-    return this.#call("curves", [clip.key, wanted]);
+    return this.#ofClip(clip, this.#call("curves", [clip.key, wanted]));
   }
 
   errors(shown, compared, onProgress) {
@@ -48,6 +51,15 @@ export class Engine {
 
   close(id) {
     return this.#call("close", [id]);
+  }
+
+  async #ofClip(clip, call) {
+    try {
+      return await call;
+    } catch (error) {
+      if (error.name === "Refused") this.onDamage(clip, error);
+      throw error;
+    }
   }
 
   #call(method, args, onProgress = null) {

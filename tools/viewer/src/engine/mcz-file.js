@@ -14,7 +14,7 @@ export async function openMcz(where, { salvage = false } = {}) {
   return {
     size: file.size,
     nClips: file.clips.length,
-    damage: [...file.damage],
+    damage: file.damage.map(({ text }) => text),
     rows: (from, to) => file.clips.slice(from, to),
     clip: async (index) => clipOf(file, await file.clip(index)),
   };
@@ -39,7 +39,7 @@ async function clipOf(file, clip) {
     source: origin,
     metadata: [...((await known(() => file.metadata(clip.index))) ?? clip.metadata)],
     quality: (await known(() => clip.quality())) ?? [],
-    lost: clip.lost ?? gapsIn(segments[0] ?? [], nFrames),
+    lost: lostFrames(file.damage, clip, segments[0] ?? []),
     events: eventsOf(recording, { rate, firstFrame }),
     signals: clip.signals.map((signal, i) => ({
       ...signal,
@@ -76,7 +76,28 @@ function segmentsOf(segments, nFrames) {
     .filter(([from, to]) => to > from);
 }
 
-/** Frames that no segment has: what is lost of a damaged file. */
+/** Frames of the motion that a damaged file has lost: those that no segment has, and those it tells. */
+function lostFrames(damage, { name, nFrames, signals }, segments) {
+  const told = damage.filter(
+    ({ clip, signal, frames }) => clip === name && frames !== null && signal === signals[0].name,
+  );
+  const all = [...gapsIn(segments, nFrames), ...told.map(({ frames }) => frames)];
+  const within = all.map(([from, to]) => [Math.max(0, from), Math.min(nFrames, to)]);
+  return joined(within.filter(([from, to]) => to > from).sort((a, b) => a[0] - b[0]));
+}
+
+/** Ranges that touch, as one; they are in order. */
+function joined(ranges) {
+  const out = [];
+  for (const [from, to] of ranges) {
+    const last = out.at(-1);
+    if (last !== undefined && from <= last[1]) last[1] = Math.max(last[1], to);
+    else out.push([from, to]);
+  }
+  return out;
+}
+
+/** Frames that no segment has. */
 export function gapsIn(segments, nFrames) {
   const gaps = [];
   let due = 0;

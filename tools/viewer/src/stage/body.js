@@ -1,7 +1,7 @@
 // A figure: bones and joints, or markers, as solids.
 
 import { Color, Group, InstancedBufferAttribute } from "three";
-import { ballShape, boneShape, setBall, setBone, solids } from "./instances.js";
+import { ballShape, boneShape, headShape, setBall, setBone, solids } from "./instances.js";
 
 const WIDTH = 0.073; // radius of a bone of length 1; shorter ones are thicker for their length
 const TAPER = 0.6;
@@ -17,6 +17,7 @@ const CHOSEN = 1.55; // how much larger a chosen point is
 /** What is drawn of a clip in one frame. */
 export class Body {
   #bones;
+  #heads;
   #balls;
   #radii; // of bones, then of balls
   #colors = [];
@@ -31,23 +32,36 @@ export class Body {
     this.group = new Group();
     this.places = new Float32Array(clip.points.length * 3).fill(NaN);
     this.last = new Float32Array(clip.points.length * 3).fill(NaN); // where points were seen last
-    this.bones = clip.bones.filter((bone) => clip.isMarkers || isBone(bone, places));
-    this.#bones = solids(boneShape(), this.bones.length, look);
+    const bones = clip.bones.filter((bone) => clip.isMarkers || isBone(bone, places));
+    const heads = clip.isMarkers ? [] : headsOf(bones, clip.points);
+    this.bones = [...bones.filter((bone) => !heads.includes(bone)), ...heads];
+    this.nHeads = heads.length;
+    this.#bones = solids(boneShape(), this.bones.length - heads.length, look);
+    this.#heads = solids(headShape(), heads.length, look);
     this.#balls = solids(ballShape(), clip.points.length, look);
-    for (const mesh of [this.#bones, this.#balls]) {
+    for (const mesh of this.#meshes()) {
       mesh.instanceColor = new InstancedBufferAttribute(new Float32Array(3 * mesh.instanceMatrix.count).fill(1), 3);
       this.group.add(mesh);
     }
     this.#measure(places);
   }
 
+  #meshes() {
+    return [this.#bones, this.#heads, this.#balls];
+  }
+
+  /** The solid of a bone: which one of which kind. */
+  #solid(i) {
+    const nBones = this.bones.length - this.nHeads;
+    return i < nBones ? [this.#bones, i] : [this.#heads, i - nBones];
+  }
+
   #measure(places) {
     const { points, isMarkers } = this.clip;
-    const starts = new Set(this.bones.map(([a]) => a));
-    const ofBones = this.bones.map(([a, b]) => {
+    const ofBones = this.bones.map(([a, b], i) => {
       if (isMarkers) return LINE;
       const length = distance(places, a, b);
-      if (HEAD.test(points[b].name) && !starts.has(b)) return within(0.45 * length, ...HEAD_WIDTH);
+      if (i >= this.bones.length - this.nHeads) return within(0.42 * length, ...HEAD_WIDTH);
       return within(WIDTH * length ** TAPER, THIN, Math.min(THICK, 0.3 * length));
     });
     const ofBalls = points.map(() => (isMarkers ? MARKER : 0));
@@ -71,13 +85,12 @@ export class Body {
    */
   paint(colorOf, theme, chosen) {
     const color = new Color();
-    const write = (mesh, index, rgb) => mesh.instanceColor.setXYZ(index, rgb[0], rgb[1], rgb[2]);
+    const write = ([mesh, index], rgb) => mesh.instanceColor.setXYZ(index, rgb[0], rgb[1], rgb[2]);
     const special = color.set(theme.chosen).toArray();
     this.#colors = this.clip.points.map((_, point) => (chosen.includes(point) ? special : colorOf(point)));
-    this.bones.forEach(([a, b], i) => write(this.#bones, i, this.#boneColor(a, b, colorOf)));
-    this.#colors.forEach((rgb, point) => write(this.#balls, point, rgb));
-    this.#bones.instanceColor.needsUpdate = true;
-    this.#balls.instanceColor.needsUpdate = true;
+    this.bones.forEach(([a, b], i) => write(this.#solid(i), this.#boneColor(a, b, colorOf)));
+    this.#colors.forEach((rgb, point) => write([this.#balls, point], rgb));
+    for (const mesh of this.#meshes()) mesh.instanceColor.needsUpdate = true;
   }
 
   /** A bone belongs to the point it leads to; a line between markers of two sides to neither. */
@@ -88,10 +101,9 @@ export class Body {
   }
 
   /** Moves the figure to where its points are; `offset` moves it aside. */
-  move(places, { chosen = [], gone, offset = 0 }) {
+  move(places, { chosen = [], gone, offset = [0, 0, 0] }) {
     this.places.set(places);
     const balls = this.#balls.instanceMatrix.array;
-    const bones = this.#bones.instanceMatrix.array;
     const { ofBalls, ofBones } = this.#radii;
     for (let point = 0; point < ofBalls.length; point++) {
       const k = 3 * point;
@@ -104,15 +116,17 @@ export class Body {
       const rgb = isThere ? this.#colors[point] : gone;
       if (rgb) this.#balls.instanceColor.setXYZ(point, rgb[0], rgb[1], rgb[2]);
     }
-    this.bones.forEach(([a, b], i) => setBone(bones, i, places, a, b, ofBones[i]));
+    this.bones.forEach(([a, b], i) => {
+      const [mesh, index] = this.#solid(i);
+      setBone(mesh.instanceMatrix.array, index, places, a, b, ofBones[i]);
+    });
     this.#balls.instanceColor.needsUpdate = true;
-    this.#balls.instanceMatrix.needsUpdate = true;
-    this.#bones.instanceMatrix.needsUpdate = true;
-    this.group.position.x = offset;
+    for (const mesh of this.#meshes()) mesh.instanceMatrix.needsUpdate = true;
+    this.group.position.set(...offset);
   }
 
   dispose() {
-    for (const mesh of [this.#bones, this.#balls]) {
+    for (const mesh of this.#meshes()) {
       mesh.geometry.dispose();
       mesh.material.dispose();
       mesh.dispose();
@@ -125,6 +139,12 @@ const within = (value, least, most) => Math.max(least, Math.min(most, value));
 
 function distance(places, a, b) {
   return Math.hypot(...[0, 1, 2].map((k) => places[3 * a + k] - places[3 * b + k]));
+}
+
+/** Bones that lead to a head and no further. */
+function headsOf(bones, points) {
+  const starts = new Set(bones.map(([a]) => a));
+  return bones.filter(([, b]) => HEAD.test(points[b].name) && !starts.has(b)).slice(0, 1);
 }
 
 function isBone([a, b], places) {

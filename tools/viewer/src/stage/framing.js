@@ -87,7 +87,7 @@ const CM_NAMES = { 0.001: "0.01 mm", 0.01: "0.1 mm", 0.1: "1 mm", 1: "1 cm", 10:
 export function gridOf(size, unitCm) {
   const length = (size || 1) * (unitCm ?? 1);
   const major = 10 ** Math.floor(Math.log10(length) + 0.15);
-  const name = (value) => (unitCm === null ? `${round(value)} units` : (CM_NAMES[round(value)] ?? `${round(value)} cm`));
+  const name = (value) => (unitCm === null ? `${round(value)} ${round(value) === 1 ? "unit" : "units"}` : (CM_NAMES[round(value)] ?? `${round(value)} cm`));
   const lengthOf = (value) => value / (unitCm ?? 1);
   return { minor: lengthOf(major / 10), major: lengthOf(major), text: `${name(major / 10)} · ${name(major)}` };
 }

@@ -1,6 +1,6 @@
 // Many solids of one shape, whose matrices are written as numbers.
 
-import { CapsuleGeometry, DynamicDrawUsage, InstancedMesh, LatheGeometry, MeshStandardMaterial, SphereGeometry, Vector2 } from "three";
+import { CapsuleGeometry, DynamicDrawUsage, InstancedMesh, LatheGeometry, MeshLambertMaterial, SphereGeometry, Vector2 } from "three";
 
 /** A bone of length 1 along y and radius 1: thick near its start, thin at its end. */
 export function boneShape() {
@@ -19,13 +19,19 @@ export function boneShape() {
   return new LatheGeometry(outline, 14);
 }
 
+/** A head: an egg of length 1 along y and radius 1. */
+export function headShape() {
+  const shape = new SphereGeometry(1, 20, 16);
+  shape.scale(1, 0.55, 1);
+  shape.translate(0, 0.55, 0);
+  return shape;
+}
+
 export const ballShape = () => new SphereGeometry(1, 20, 14);
 export const rodShape = () => new CapsuleGeometry(1, 1, 2, 8);
 
 export function solids(shape, count, { opacity = 1 } = {}) {
-  const material = new MeshStandardMaterial({
-    roughness: 0.62,
-    metalness: 0,
+  const material = new MeshLambertMaterial({
     transparent: opacity < 1,
     opacity,
     depthWrite: opacity === 1,

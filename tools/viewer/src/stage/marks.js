@@ -47,7 +47,7 @@ export class Trails {
         if (Number.isNaN(before[0]) || Number.isNaN(before[3])) continue;
         const away = Math.abs(at - frame) / reach;
         const index = this.mesh.count++;
-        setBone(this.mesh.instanceMatrix.array, index, before, 0, 1, at > frame ? 0.0022 : 0.0042);
+        setBone(this.mesh.instanceMatrix.array, index, before, 0, 1, at > frame ? 0.003 : 0.0058);
         color.copy(near).lerp(far, away).toArray(this.mesh.instanceColor.array, 3 * index);
       }
     }

@@ -9,9 +9,10 @@ import { Contacts, Trails } from "./marks.js";
 import { PointErrors, alike, byNumber, bySide, palette } from "./painting.js";
 import { View } from "./view.js";
 
-const GHOST = 0.42; // opacity of a figure that is laid over another
-const FAR = 1.7; // a clip goes farther than so many figures: the camera follows
+const GHOST = 0.5; // opacity of a figure that is laid over another
+const FAR = 1.2; // a clip goes farther than so many figures: the camera follows
 const ASIDE = 1.15; // units of the picture between figures side by side, at least
+const BETWEEN = 0.35; // radians: they stand side by side as seen from the front and a little beside
 const CLICK = 5; // pixels that a pointer may move in a click
 const PREFETCH = 3; // blocks, while playing
 const SOFT = 0.14; // part of its way that the camera follows in a picture
@@ -80,7 +81,8 @@ class Stage {
     const dark = matchMedia("(prefers-color-scheme: dark)");
     const { store } = this.page;
     const change = () => {
-      this.theme = themeOf(store.get("theme") === null ? dark.matches : store.get("theme") === "dark");
+      const chosen = store.get("theme"); // "light", "dark", or none
+      this.theme = themeOf(chosen ? chosen === "dark" : dark.matches);
       this.colors = palette(this.theme);
       this.view.world.paint(this.theme);
       this.#paint();
@@ -95,7 +97,10 @@ class Stage {
     store.watch(["shown"], () => this.#show(store.get("shown")));
     store.watch(["compared"], () => this.#compare(store.get("compared")));
     store.watch(["up"], () => this.shown && this.#settle({ reframes: true }));
-    store.watch(["layout"], () => this.#relook());
+    store.watch(["layout"], () => {
+      this.#relook();
+      if (this.compared?.body) this.#look("fit");
+    });
     store.watch(["colors", "errors", "selection"], () => this.#paint());
     store.watch(["view"], () => this.#look(store.get("view").name));
     const drawn = ["frame", "colors", "errors", "selection", "trails", "contacts", "names", "follow", "playing"];
@@ -128,6 +133,7 @@ class Stage {
     const compared = this.page.store.get("compared");
     if (compared !== null) this.#compare(compared);
     this.view.draw();
+    this.firstPicture ??= performance.now(); // ms since the page was asked for
   }
 
   async #prepared(actor) {
@@ -289,18 +295,20 @@ class Stage {
       return;
     }
     const chosen = store.get("selection");
-    const side = this.#aside();
-    shown.body.move(places, { chosen, gone: this.colors.gone, offset: -side / 2 });
-    compared?.body?.move(compared.places, { gone: this.colors.gone, offset: side / 2 });
+    const aside = this.#aside();
+    const other = aside.map((x) => -x);
+    shown.body.move(places, { chosen, gone: this.colors.gone, offset: aside });
+    compared?.body?.move(compared.places, { gone: this.colors.gone, offset: other });
     this.trails.draw(shown, store.get("trails") ? trailed(store, shown) : [], frame, this.theme);
     this.contacts.draw(shown, frame, { floor: shown.floor, theme: this.theme, isOn: store.get("contacts") });
-    this.trails.mesh.position.x = this.contacts.mesh.position.x = -side / 2;
+    for (const { mesh } of [this.trails, this.contacts]) mesh.position.set(...aside);
   }
 
-  /** How far figures stand apart. */
+  /** How far the figure that is shown stands aside; the other one stands as far on the other side. */
   #aside() {
-    if (!this.compared?.body || this.page.store.get("layout") !== "side") return 0;
-    return ASIDE;
+    if (!this.compared?.body || this.page.store.get("layout") !== "side") return [0, 0, 0];
+    const angle = this.shown.facing + BETWEEN;
+    return [(-ASIDE / 2) * Math.cos(angle), 0, (ASIDE / 2) * Math.sin(angle)];
   }
 
   #tellFault({ poses }) {
@@ -335,9 +343,10 @@ class Stage {
     const figure = now ? boundsOf(now) : shown.extent();
     const isFit = name === "fit";
     const box = isFit || this.page.store.get("follow") ? figure : shown.extent();
-    const side = this.#aside();
-    const least = [box.least[0] - side / 2, Math.min(box.least[1], shown.floor), box.least[2]];
-    const most = [box.most[0] + side / 2, box.most[1], box.most[2]];
+    const aside = this.#aside().map(Math.abs);
+    const least = box.least.map((x, k) => x - aside[k]);
+    const most = box.most.map((x, k) => x + aside[k]);
+    least[1] = Math.min(least[1], shown.floor);
     if (!least.every(Number.isFinite)) return;
     this.middle = figure.least.map((x, k) => (x + figure.most[k]) / 2);
     view.eye.look({ least, most }, { name, facing: shown.facing, atOnce });
@@ -360,7 +369,7 @@ class Stage {
     const { clientWidth: width, clientHeight: height } = this.element;
     const places = this.shown.body.places;
     const out = new Float32Array(places.length);
-    return project(places, this.view.eye.camera, { width, height, offset: -this.#aside() / 2 }, out);
+    return project(places, this.view.eye.camera, { width, height, offset: this.#aside() }, out);
   }
 
   // The pointer

@@ -63,7 +63,8 @@ export class View {
     const movesOn = this.eye.step(begun);
     this.renderer.render(this.world.scene, this.eye.camera);
     this.afterDrawing();
-    this.took = performance.now() - begun;
+    this.took = performance.now() - begun; // ms of script
+    this.count = (this.count ?? 0) + 1;
     if (movesOn) this.ask();
   }
 }

@@ -58,7 +58,7 @@ export class World {
     this.sun = new DirectionalLight("#ffffff", 1);
     this.#makeShadow();
     this.grid = new Mesh(new PlaneGeometry(2 * REACH, 2 * REACH), gridMaterial());
-    this.shadow = new Mesh(new PlaneGeometry(4 * SHADOW, 4 * SHADOW), new ShadowMaterial({ opacity: 0.25 }));
+    this.shadow = new Mesh(new PlaneGeometry(2 * SHADOW, 2 * SHADOW), new ShadowMaterial({ opacity: 0.25 }));
     for (const plane of [this.grid, this.shadow]) plane.rotation.x = -Math.PI / 2;
     this.grid.renderOrder = -2;
     this.shadow.renderOrder = -1;
