@@ -75,6 +75,7 @@ if TYPE_CHECKING:
     from mcz.retargeting.retargeting import retarget
     from mcz.retargeting.selection import select
     from mcz.tables import to_pandas, to_xarray
+    from mcz.viewing.showing import View, view
     from mcz.writing.file import encode, write
     from mcz.writing.npz import to_npz
 
@@ -148,6 +149,7 @@ _HOMES = {
     "mcz.retargeting.selection": ("select",),
     "mcz.live.generators": ("LiveReader", "stream_decode", "stream_encode"),
     "mcz.live.reader_with_losses": ("StreamSummary",),
+    "mcz.viewing.showing": ("View", "view"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -199,6 +201,7 @@ __all__ = [
     "StreamSummary",
     "TruncatedError",
     "UnsupportedError",
+    "View",
     "Window",
     "WorkerError",
     "accelerations",
@@ -250,6 +253,7 @@ __all__ = [
     "unpack",
     "velocities",
     "verify",
+    "view",
     "write",
 ]
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz import brief
+from mcz.displays import html_of
 from mcz.errors import MotionError
 from mcz.numbers import Grid, GridKind, ordinals_of
 from mcz.numbers.blocks import grid_blocks as grid_blocks
@@ -251,6 +252,7 @@ class Motion:
     frame_numbers: NDArray[np.int64] | None = None
 
     __repr__ = brief.motion_text
+    _repr_html_ = html_of
 
     def __post_init__(self) -> None:
         if not self.signals:

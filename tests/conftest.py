@@ -23,6 +23,8 @@ settings.register_profile("full", max_examples=1000, deadline=None, print_blob=T
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "dev"))
 
 DATA = os.environ.get("MCZ_DATA", "")
+# No test builds the page of mcz view: this one does nothing, but has a place for files.
+os.environ["MCZ_VIEWER_PAGE"] = str(Path(__file__).with_name("viewing") / "page.html")
 
 # A shell's background jobs ignore interrupts, and so would the commands that tests interrupt.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:

@@ -19,7 +19,7 @@ PACKAGE = Path(mcz.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # What a part may import; a part is the first name after ``mcz.``. Each may import itself.
-GROUND = {"brief", "errors", "schema", "numbers", "threads"}
+GROUND = {"brief", "displays", "errors", "schema", "numbers", "threads"}
 MODEL = GROUND | {"motion", "skeleton", "source"}
 # Where motion, codec and container meet: what each of the doors below needs of the layers.
 JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
@@ -28,6 +28,7 @@ ALLOWED = {
     "jit": set(),
     "interrupts": set(),
     "brief": set(),
+    "displays": set(),
     "errors": set(),
     "schema": {"errors"},
     "numbers": {"brief", "errors", "schema"},
@@ -63,7 +64,7 @@ ALLOWED = {
     | {"recovery", "jobs", "metrics", "queries", "reading", "writing", "conversion", "tables"},
     "live": JOINT | {"interrupts", "reading", "writing"},
     "dask": JOINT | {"jobs", "reading", "writing", "editing"},
-    "viewing": JOINT | {"annexes", "metrics", "editing", "reading", "retargeting", "writing", ""},
+    "viewing": JOINT | {"annexes", "metrics", "editing", "reading", "retargeting", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
@@ -73,6 +74,7 @@ ALLOWED = {
     "bench": JOINT | {"angles", "bjontegaard", "metrics", ""} | DOORS,
     "": MODEL
     | {"bags", "kinematics", "metrics", "poses", "datasets", "retargeting", "tables"}
+    | {"viewing"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it

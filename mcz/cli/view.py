@@ -1,77 +1,181 @@
-"""``mcz view``: motions in the browser, or in a page that can be sent around."""
+"""``mcz view``: motions in the browser, or in one page that can be sent around."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import EXIT_CODES, Exit, echo, print_json, say, to_rate
-from mcz.cli.options import UNITS, json_option, salvage_option, up_option
+from mcz.cli.common import (
+    EXIT_CODES,
+    Exit,
+    Failure,
+    about,
+    check_new,
+    echo,
+    plural,
+    print_json,
+    say,
+    to_bytes,
+    to_rate,
+)
+from mcz.cli.options import (
+    EFFORTS,
+    UNITS,
+    clips_option,
+    decoded_option,
+    force_option,
+    json_option,
+    param_option,
+    salvage_option,
+    threads_option,
+    up_option,
+    where_option,
+)
+from mcz.cli.terminal import say_json
 
 if TYPE_CHECKING:
-    pass
+    from mcz.viewing.embedding import PageWritten
+    from mcz.viewing.shelf import Shelf
+
+SAID = ("skeleton", "rate", "unit", "up")  # what a file may not say itself
+OF_PAGE = ("clips", "where", "codec", "effort", "params", "max_decoded", "most", "force")
+OF_SERVER = ("no_browser", "keep", "host", "port")
+LOOPBACK = "127.0.0.1"
 
 
-@click.command(short_help="Motions in the browser.", epilog=EXIT_CODES)
+@click.command(short_help="Motions in the browser, or in a page to mail.", epilog=EXIT_CODES)
 @click.argument(
     "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(readable=False)
+)
+@click.option(
+    "-o", "--output", metavar="OUT.html", help="Write one page that holds the files and the player."
 )
 @click.option("--no-browser", is_flag=True, help="Print the address, and open nothing.")
 @click.option("--keep", is_flag=True, help="Stay when the last page is closed, until Ctrl-C.")
 @click.option(
     "--host",
-    default="127.0.0.1",
     metavar="NAME",
-    help="Of this machine alone: 127.0.0.1, localhost or ::1.",
+    default=LOOPBACK,
+    help="A name of this machine's own: 127.0.0.1, localhost or ::1.",
 )
-@click.option("--port", default=0, type=click.IntRange(0, 65535), help="Default: one that is free.")
+@click.option(
+    "--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Default: any free one."
+)
 @click.option(
     "--skeleton",
     metavar="FILE.asf",
     type=click.Path(readable=False),
-    help="The ASF of an AMC, or none.",
+    help="The ASF of an AMC, or none. Default: found as mcz encode finds it.",
 )
 @click.option(
     "--rate", metavar="R", callback=to_rate, help="Frames a second of a file that does not say."
 )
-@click.option("--unit", type=click.Choice(UNITS), help="Length unit of the source.")
-@up_option("Axis of the source that points up.")
+@click.option("--unit", type=click.Choice(UNITS), help="Length unit of a file that says none.")
+@up_option("Axis that points up, of a file that does not say.")
 @salvage_option
+@clips_option
+@where_option
+@click.option("--codec", metavar="NAME", help="With -o: code the clips so. Default: as they are.")
+@click.option("--effort", type=click.Choice(EFFORTS), help="With -o: a lossless codec.")
+@param_option
+@click.option(
+    "--max-size",
+    "most",
+    metavar="BYTES",
+    callback=to_bytes,
+    help="With -o: the most that the page may have (80M, 2G). Default: 50M.",
+)
+@decoded_option
+@force_option
+@threads_option
 @json_option
-def command(files: tuple[str, ...], **options: Any) -> Exit:
-    """Show motions in the browser."""
-    return _serve(files, **options)
+def command(files: tuple[str, ...], output: str | None, as_json: bool, **options: Any) -> Exit:
+    """Show motions in the browser: .mcz, .bvh, .amc, .c3d, folders of them, URLs of an .mcz.
 
+    A server on this machine serves the page and the files to this machine alone, at an address
+    that nobody can guess. It ends some seconds after its last page was closed, and at Ctrl-C.
 
-def _serve(
-    files: tuple[str, ...],
-    no_browser: bool,
-    keep: bool,
-    host: str,
-    port: int,
-    salvage: bool,
-    as_json: bool,
-    **said: Any,
-) -> Exit:
-    from mcz.viewing.page import page
-    from mcz.viewing.server import Server
+    With -o one page is written, which needs neither a server nor a network: of an archive the clips
+    that --clip and --where take, coded anew with --codec. Several files are compared, the first
+    being the original.
+    """
+    _check_use(output, options)
     from mcz.viewing.shelf import Shelf, put
 
-    shelf = Shelf(said, say, salvage=salvage)
-    for path in files:
-        put(shelf, path)
-    with Server(page(say), shelf, host=host, port=port) as server:
+    def told(line: str) -> None:
         if as_json:
-            print_json({"url": server.url})
+            say_json({"note": line})
+        else:
+            say(line)
+
+    said = {key: options[key] for key in SAID}
+    shelf = Shelf(said, told, salvage=options["salvage"])
+    try:
+        for path in files:
+            with about(path):
+                put(shelf, path)
+        if output is not None:
+            return _write(shelf, output, as_json, {key: options[key] for key in OF_PAGE})
+        return _serve(shelf, as_json, **{key: options[key] for key in OF_SERVER})
+    finally:
+        shelf.close()
+
+
+def _check_use(output: str | None, options: dict[str, Any]) -> None:
+    """Raise Failure for options of a page without -o, and of a server with it."""
+    if output == "-":
+        raise Failure("a page is written to a file, not to standard output", Exit.USAGE)
+    if output is not None:
+        usual = {"no_browser": False, "keep": False, "host": LOOPBACK, "port": 0}
+        other, why = [key for key in OF_SERVER if options[key] != usual[key]], "without -o"
+    else:
+        other, why = [key for key in OF_PAGE if options[key]], "with -o OUT.html"
+    if other:
+        shown = {"clips": "clip", "params": "param", "most": "max-size"}.get(other[0], other[0])
+        raise Failure(f"--{shown.replace('_', '-')} is taken {why}", Exit.USAGE)
+
+
+def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str, port: int) -> Exit:
+    from mcz.viewing.browser import show
+    from mcz.viewing.page import page
+    from mcz.viewing.server import Server
+
+    with Server(page(shelf.say), shelf, host=host, port=port) as server:
+        if as_json:
+            print_json({"url": server.url, "files": server.site.work.files()})
         else:
             echo(server.url)
-        if not no_browser:
-            import webbrowser
-
-            webbrowser.open(server.url)
+        if not no_browser and not show(server.url):
+            shelf.say("there is no browser to open; the address above is for one on this machine")
         try:
             server.site.visitors.wait(for_ever=keep)
         except KeyboardInterrupt:
-            say("closed")
+            return Exit.FINE  # that is how it is ended
     return Exit.FINE
+
+
+def _write(shelf: Shelf, output: str, as_json: bool, options: dict[str, Any]) -> Exit:
+    from pathlib import Path
+
+    from mcz.viewing.embedding import MOST_BYTES, Wanted, write_page
+    from mcz.viewing.page import page
+
+    force, most = options.pop("force"), options.pop("most") or MOST_BYTES
+    if "://" not in output:
+        check_new(Path(output), force)
+    with about(output, *(file.source for _, file in shelf.given())):
+        found = write_page(
+            page(shelf.say), shelf, output, Wanted(**options), most=most, force=force
+        )
+    if as_json:
+        print_json({"output": output, **asdict(found)})
+    else:
+        echo(*_lines(output, found))
+    return Exit.FINE
+
+
+def _lines(output: str, found: PageWritten) -> list[str]:
+    files = (f"  {f.name}: {plural(f.n_clips, 'clip')}, {f.size:,} bytes" for f in found.files)
+    return [f"{output}: {found.size:,} bytes, the player {found.player_size:,} of them", *files]

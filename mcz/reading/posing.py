@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.displays import html_of
 from mcz.skeleton import Joints, joint_list
 
 if TYPE_CHECKING:
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 class Posed:
     """What a Clip has of ``mcz.poses``, which has the conventions and is imported on use."""
+
+    _repr_html_ = html_of
 
     @property
     def _clip(self) -> Decoded:

@@ -59,6 +59,27 @@ def counterparts(names: Sequence[str], pairs: Mapping[str, str] | None = None) -
     return [found[number] for number in range(len(names))]
 
 
+def sides_of(names: Sequence[str]) -> list[str]:
+    """Of every joint "left" or "right" as its name says, "" where it does not.
+
+    A mere letter before or after a word says it where the name with the other letter is there, or
+    the word is a part of the body. ``names`` are those of all joints.
+    """
+    known = dict.fromkeys(names, 0)
+    return [_side(name, known) for name in names]
+
+
+def _side(name: str, names: Mapping[str, int]) -> str:
+    for pattern in (_WORD, _LETTER, _PREFIX, _SUFFIX):
+        match = pattern.search(name)
+        if match is None:
+            continue
+        plain = pattern in (_WORD, _LETTER) or _BODY.match(name, match.end())
+        if plain or any(other in names for other in _swapped(pattern, name)):
+            return "left" if match[0][0] in "Ll" else "right"
+    return ""
+
+
 def _given(numbers: Mapping[str, int], pairs: Mapping[str, str]) -> dict[int, int]:
     found: dict[int, int] = {}
     for one, other in pairs.items():

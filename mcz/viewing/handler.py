@@ -84,11 +84,12 @@ class Handler(BaseHTTPRequestHandler):
         check_sender(self.headers, self._site.port)
         if self.command != "POST" and self.headers.get("Content-Length", "0") != "0":
             raise Refused(400, "a request for something posts nothing")
-        before, token, path = (*self.path.partition("?")[0].split("/", 2), "", "\0", "\0")[:3]
-        known = self._site.token.encode()
-        if before or not compare_digest(token.encode("utf-8", "replace"), known):
+        before, *below = self.path.partition("?")[0].split("/", 2)
+        token = below[0] if below else ""
+        known = compare_digest(token.encode("utf-8", "replace"), self._site.token.encode())
+        if before or not known or len(below) != 2:
             raise Refused(404, "there is nothing here")
-        return path
+        return below[1]
 
     # What is there to get ---------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from mcz.viewing.building import built
 from mcz.viewing.shelf import Say
 
 PACKAGED = Path(__file__).with_name("viewer.html")  # in a wheel that was built with it
+OTHER = "MCZ_VIEWER_PAGE"  # an environment variable: a page to be taken in place of ours
 PLACE = "<!-- mcz:embedded -->"
 POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy" content="([^"<>]*)"')
 
@@ -31,8 +33,13 @@ def page(say: Say | None = None) -> Page:
     ``say`` is told what takes time. Raises AccessError where there is none; the message says how
     one is made.
     """
-    path = PACKAGED if PACKAGED.is_file() else built(say or (lambda line: None))
+    if other := os.environ.get(OTHER):
+        path = Path(other)
+    else:
+        path = PACKAGED if PACKAGED.is_file() else built(say or (lambda line: None))
     try:
         return Page(path.read_text("utf-8"), str(path))
     except OSError as error:
         raise AccessError(f"{path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise FormatError(f"{path}: it is no page") from None

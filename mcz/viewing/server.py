@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import secrets
 import socket
 import sys
 from contextlib import suppress
 from http.server import ThreadingHTTPServer
+from socketserver import TCPServer
 from threading import BoundedSemaphore, Thread
 from types import TracebackType
 from typing import Any
@@ -34,6 +36,7 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
     block_on_close = False
     request_queue_size = 64
+    allow_reuse_address = os.name == "posix"  # elsewhere others could take the port, too
 
     def __init__(
         self,
@@ -42,13 +45,19 @@ class Server(ThreadingHTTPServer):
         *,
         host: str = "127.0.0.1",
         port: int = 0,
-        grace: float = GRACE,
+        grace: float | None = None,
     ) -> None:
         if host not in HOSTS:
             text = f"the page is served to this machine alone: one of {', '.join(HOSTS)}"
             raise OptionError(f"{host}: {text}")
         self.address_family = socket.AF_INET6 if ":" in HOSTS[host] else socket.AF_INET
-        self.site = Site(page, shelf, Work(shelf), Visitors(grace), secrets.token_urlsafe(24))
+        self.site = Site(
+            page,
+            shelf,
+            Work(shelf),
+            Visitors(GRACE if grace is None else grace),
+            secrets.token_urlsafe(24),
+        )
         self._free = BoundedSemaphore(MOST_CONNECTIONS)
         try:
             super().__init__((HOSTS[host], port), Handler)
@@ -64,12 +73,8 @@ class Server(ThreadingHTTPServer):
 
     def server_bind(self) -> None:
         """Without asking a name server what this machine is called."""
-        self.socket.bind(self.server_address)
-        self.server_address = self.socket.getsockname()
-        self.server_name, self.server_port = (
-            str(self.server_address[0]),
-            int(self.server_address[1]),
-        )
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = "mcz", int(self.server_address[1])
 
     def __enter__(self) -> Server:
         return self

@@ -32,6 +32,7 @@ class Shelved(Protocol):
 
     name: str
     kind: str
+    source: str  # the path or URL of what was given
 
     @property
     def size(self) -> int | None:
@@ -51,7 +52,7 @@ class Stored:
     """An ``.mcz`` on this machine."""
 
     def __init__(self, name: str, path: Path, kind: str = "mcz") -> None:
-        self.name, self.kind, self.path = name, kind, path
+        self.name, self.kind, self.path, self.source = name, kind, path, str(path)
 
     @property
     def size(self) -> int | None:
@@ -74,7 +75,7 @@ class Remote:
 
     def __init__(self, url: str) -> None:
         self.name = PurePosixPath(url.partition("?")[0]).name or url
-        self._url, self._tag = url, f'"{secrets.token_hex(8)}"'
+        self.source, self._tag = url, f'"{secrets.token_hex(8)}"'
         self._source: ByteSource | None = None
         self._lock = Lock()
 
@@ -83,12 +84,12 @@ class Remote:
         return None if self._source is None else self._source.size
 
     def target(self) -> str:
-        return self._url
+        return self.source
 
     def open(self) -> Contents:
         with self._lock:
             if self._source is None:
-                self._source = reached(self._url)
+                self._source = reached(self.source)
         return FarAway(self._source, self._tag)
 
 
@@ -97,7 +98,8 @@ class Made:
 
     def __init__(self, shelf: Shelf, name: str, kind: str, source: Path, make: Make) -> None:
         self.name, self.kind = name, kind
-        self._shelf, self._source, self._make = shelf, source, make
+        self.source = str(source)
+        self._shelf, self._make = shelf, make
         self._lock = Lock()
         self._stored: Stored | None = None
         self._error: MczError | None = None
@@ -109,7 +111,7 @@ class Made:
 
     def target(self) -> str:
         with self._lock:
-            now = _state(self._source)
+            now = _state(Path(self.source))
             if self._made_of != now:
                 self._run()
                 self._made_of = now
@@ -124,7 +126,7 @@ class Made:
             self._stored = Stored(self.name, self._shelf.write(self._make))
         except MczError as error:
             if self.name not in str(error):
-                error.args = (f"{self._source}: {error}",)
+                error.args = (f"{self.source}: {error}",)
             self._error = error
             self._shelf.say(str(error))
         if before is not None:
@@ -262,11 +264,11 @@ def put(shelf: Shelf, path: str) -> None:
         shelf.give(Remote(path))
         return
     place = Path(path)
-    if place.is_dir():
+    if path and place.is_dir():
         _put_folder(shelf, place)
         return
-    if not place.is_file():
-        text = "not a file" if place.exists() else "no such file"
+    if not (path and place.is_file()):
+        text = "not a file" if path and place.exists() else "no such file"
         raise AccessError(f"{path or repr(path)}: {text}")
     kind = kind_of(place)
     if kind == "mcz":

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from functools import cache, partial
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from threading import BoundedSemaphore, Lock
@@ -58,15 +59,10 @@ class Work:
 
     def document(self) -> dict[str, Any]:
         """What the page is told first: ``api.json``."""
-        from mcz import __version__
-
-        files = [
-            {"name": file.name, "size": file.size, "url": url_of(number), "kind": file.kind}
-            for number, file in self._shelf.given()
-        ]
         return {
-            "version": __version__,
-            "files": files,
+            "version": import_module("mcz").__version__,
+            "files": self.files(),
+            "diff": len(self._shelf.given()) == 2,
             "salvage": self._shelf.salvage,
             "codecs": lossy_codecs(),
             "canEncode": True,
@@ -74,37 +70,43 @@ class Work:
             "canGlb": glb_writer() is not None,
         }
 
+    def files(self) -> list[dict[str, Any]]:
+        """The files that were given; the size of one that is not made yet is None."""
+        return [
+            {"name": file.name, "size": file.size, "url": url_of(number), "kind": file.kind}
+            for number, file in self._shelf.given()
+        ]
+
     def convert(self, stream: Readable, size: int, content_type: str) -> dict[str, Any]:
         """Make an ``.mcz`` of the files of a form; of several motions one archive."""
         boundary = boundary_of(content_type)
         folder = self._shelf.spare_folder()
         try:
             paths = save_files(stream, size, boundary, folder)
-            motions = [path for path in paths if path.suffix.lower() != ".asf"]
-            for path in motions:
-                kind_of(path)
-            if not motions:
-                raise Refused(400, "there is no motion file among what was given")
             with self.turn():
-                return self._converted(folder, motions)
+                return self._converted(folder, paths)
         except OSError as error:
             raise Refused(507, f"the files could not be kept: {error.strerror}") from None
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
-
-    def _converted(self, folder: Path, motions: list[Path]) -> dict[str, Any]:
-        one = motions[0]
-        if len(motions) == 1:
-            name, kind = one.name, kind_of(one)
-            make = partial(encode, one, said=self._shelf.said)
-        else:
-            name, kind = f"{len(motions)} files", "folder"
-            make = partial(pack, folder, shelf=self._shelf)
-        try:
-            number, stored = self._shelf.upload(name, kind, make)
         except MczError as error:
             error.args = (str(error).replace(f"{folder}{os.sep}", ""),)  # which nobody knows
             raise
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _converted(self, folder: Path, paths: list[Path]) -> dict[str, Any]:
+        motions = [path for path in paths if path.suffix.lower() != ".asf"]
+        if not motions:
+            raise Refused(400, "there is no motion file among what was given")
+        kinds = [kind_of(path) for path in motions]
+        if "mcz" in kinds:
+            raise OptionError("an .mcz needs no converting; the page reads it")
+        if len(motions) == 1:
+            name, kind = motions[0].name, kinds[0]
+            make = partial(encode, motions[0], said=self._shelf.said)
+        else:
+            name, kind = f"{len(motions)} files", "folder"
+            make = partial(pack, folder, shelf=self._shelf)
+        number, stored = self._shelf.upload(name, kind, make)
         return {"url": url_of(number), "name": name, "size": stored.size}
 
     def encode(self, asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -116,7 +118,8 @@ class Work:
         codec, params = text_of(asked, "codec"), params_of(asked)
         by_name(codec).options(params)
         refuse_files(params)
-        motion = with_facts(self._motion(asked), None, asked.get("unit") or None)
+        unit = None if asked.get("unit") is None else text_of(asked, "unit")
+        motion = with_facts(self._motion(asked), None, unit)
         quality: dict[str, str] = {}
 
         def make(out: BinaryIO) -> None:
@@ -158,7 +161,9 @@ class Work:
         writer = glb_writer()
         if writer is None:
             raise Refused(501, "this version writes no GLB")
-        return writer(self._motion(asked))
+        rate = asked.get("rate")
+        found: bytes = writer(self._motion(asked), rate=rate).data
+        return found
 
     def _file(self, asked: Mapping[str, Any]) -> Shelved:
         match = re.fullmatch(r"files/([0-9]{1,9})", text_of(asked, "url"))
@@ -191,6 +196,8 @@ class Work:
                 return motion
         with self._opened(asked) as (_, clip):
             motion = clip.motion()
+        unit = self._shelf.said.get("unit") if motion.skeleton.unit_cm is None else None
+        motion = with_facts(motion, None, unit)
         if sum(signal.values.nbytes for signal in motion.signals) <= HELD_BYTES:
             self._held.append((key, motion))
         return motion
@@ -237,6 +244,10 @@ def refuse_files(params: Mapping[str, Any]) -> None:
         raise OptionError(f"{OWN_BASES}: the page cannot name files of this machine")
 
 
-def glb_writer() -> Callable[[Motion], bytes] | None:
+def glb_writer() -> Callable[..., Any] | None:
     """What writes a motion as GLB; None where this version has no such thing."""
-    return None
+    try:
+        writer: Callable[..., Any] = import_module("mcz.conversion.scenes").to_glb
+    except ModuleNotFoundError:
+        return None
+    return writer

@@ -303,6 +303,7 @@ TWICE = [
     ("split", "a.mcz", "x", "--by", "name", "--by", "codec"),
     ("diff", "a.mcz", "b.mcz", "--frames", "0:1", "--frames", "0:2"),
     ("extract", "a.mcz", "b.mcz", "--resolution", "1", "--resolution", "2"),
+    ("view", "a.mcz", "--port", "1", "--port", "2"),
     ("stream", "encode", "--name", "a", "--name", "b"),
     ("stream", "decode", "a.mcz", "--lost", "hold", "--lost", "linear"),
     ("train", "a.bvh", "-o", "x", "-o", "y"),

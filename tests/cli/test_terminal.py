@@ -82,6 +82,13 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
         "extract": [[str(file), f"{out}.mcz"], [str(file), f"{out}2.mcz", "--joints", STEERING]],
         "replace": [[str(file), f"{out}.mcz", "--joint", STEERING, "--values", str(file)]],
         "diff": [[str(file), str(file)], [str(file), odd]],
+        "view": [
+            [str(file), "-o", f"{out}.html"],
+            [str(file), "-o", f"{out}2.html", "--clip", STEERING],
+            [str(file), "-o", f"{out}3.html", "--max-size", "9"],
+            [odd],
+            [str(file.parent / f"note{STEERING}.bvh"), "-o", f"{out}4.html"],
+        ],
         "stream": [["decode", str(file)], ["encode", "--skeleton", odd]],
         "bench": [[odd]],
         "train": [[odd, "-o", str(out)]],

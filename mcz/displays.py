@@ -1,0 +1,15 @@
+"""How a notebook shows a motion: the one place where what lies below calls what lies above.
+
+By its name, and only when somebody asks: a Motion knows nothing of pages.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+
+def html_of(moving: Any) -> str:
+    """A small player of a Motion or Clip: HTML of at most 300 kB, see ``mcz.viewing.player``."""
+    text: str = import_module("mcz.viewing.player").player(moving)
+    return text

@@ -1,0 +1,200 @@
+"""One page that holds player, decoder and files: it opens from a disk, and can be mailed."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+from mcz.brief import brief
+from mcz.codecs import by_name, chosen
+from mcz.errors import LimitError, MczError
+from mcz.metrics.document import difference
+from mcz.reading.file import File
+from mcz.reading.file import open as mcz_open
+from mcz.viewing.page import Page
+from mcz.viewing.shelf import Shelf, Shelved
+from mcz.viewing.tables import deflated, tables_for
+from mcz.writing.atomic import replacing
+
+MOST_BYTES = 50 * 2**20  # of a page, unless more is asked for: what mail and browsers take
+MOST_COMPARED = 32  # pairs of clips whose figures are put into the page; it finds the rest itself
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """What of the files is put into a page: these clips, coded anew where a codec is named."""
+
+    clips: Sequence[str] = ()
+    where: str | None = None
+    codec: str | None = None
+    effort: str | None = None
+    params: Mapping[str, Any] | None = None
+    max_decoded: int | None = None
+
+    @property
+    def is_coded(self) -> bool:
+        return bool(self.codec or self.effort or self.params)
+
+    @property
+    def is_cut(self) -> bool:
+        return bool(self.clips) or self.where is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Embedded:
+    """A file in a page: its name, its bytes as they are, the number of its clips."""
+
+    name: str
+    size: int
+    n_clips: int
+
+    __repr__ = brief
+
+
+@dataclass(frozen=True, slots=True)
+class PageWritten:
+    """A page that was written: its bytes, those of the player alone, and the files in it."""
+
+    size: int
+    player_size: int
+    files: tuple[Embedded, ...]
+
+    __repr__ = brief
+
+
+def write_page(
+    page: Page,
+    shelf: Shelf,
+    target: Any,
+    wanted: Wanted,
+    *,
+    most: int = MOST_BYTES,
+    force: bool = False,
+) -> PageWritten:
+    """Write ``page`` with the files of ``shelf`` in it.
+
+    The page is whole under the target's name, or not there. Raises LimitError where it would have
+    more than ``most`` bytes, and MczError for files that cannot be read, cut or coded so.
+    """
+    given = [file for _, file in shelf.given()]
+    inputs = [file.source for file in given]
+    with replacing(target, force=force, inputs=inputs) as stream, ExitStack() as stack:
+        held, left = {}, most
+        for number, file in enumerate(given):
+            data = _bytes_of(file, shelf, wanted, left)
+            left -= len(data) * 4 // 3
+            held[number] = data, stack.enter_context(_file(data))
+        files = [file for _, file in held.values()]
+        document: dict[str, Any] = {
+            "files": [
+                {"name": given[number].name, "base64": base64.b64encode(data).decode()}
+                for number, (data, _) in held.items()
+            ],
+            "annex": deflated(set().union(*map(tables_for, files))),
+        }
+        if len(files) > 1:
+            document["diffs"] = list(_differences(files, [file.name for file in given]))
+            document["diff"] = document["diffs"][0]
+        whole = (page.before + element(document) + page.after).encode()
+        if len(whole) > most:
+            raise _too_large(given[-1].name, most)
+        stream.write(whole)
+        told = (Embedded(given[n].name, file.size, len(file)) for n, (_, file) in held.items())
+        return PageWritten(len(whole), len(page.text.encode()), tuple(told))
+
+
+def element(document: Mapping[str, Any]) -> str:
+    """The element that holds a document; no text in it is markup, and nothing in it runs."""
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="embedded">{text}</script>'
+
+
+def _too_large(name: str, most: int) -> LimitError:
+    return LimitError(
+        f"{name}: the page would have more than {most:,} bytes; --clip takes some clips alone, "
+        "--codec lossy makes them smaller, --max-size allows more"
+    )
+
+
+def _file(data: bytes) -> File:
+    """The file in ``data``, in salvage where it is damaged."""
+    try:
+        return mcz_open(data)
+    except MczError:
+        return mcz_open(data, salvage=True)
+
+
+def _bytes_of(file: Shelved, shelf: Shelf, wanted: Wanted, most: int) -> bytes:
+    """The bytes of an ``.mcz`` that is put into the page; raises LimitError beyond ``most``."""
+    target = file.target()
+    if wanted.is_coded:
+        return _coded(target, shelf, wanted)
+    if wanted.is_cut:
+        return _cut(target, shelf, wanted)
+    contents = file.open()
+    try:
+        if contents.size * 4 // 3 > most:
+            raise _too_large(file.name, most)
+        return b"".join(contents.pieces(0, contents.size))
+    finally:
+        contents.close()
+
+
+def _cut(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
+    """Some clips of a file, copied as they are stored."""
+    from mcz.editing.extraction import extract
+
+    out = io.BytesIO()
+    extract(
+        target,
+        out,
+        clip=wanted.clips or None,
+        where=wanted.where,
+        salvage=shelf.salvage,
+        max_decoded=wanted.max_decoded,
+        copies=False,
+    )
+    return out.getvalue()
+
+
+def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
+    """The clips that are wanted, coded anew."""
+    from mcz.container.writer import Writer
+    from mcz.reading.source_files import with_facts
+    from mcz.writing.names import name_skeleton
+    from mcz.writing.tuning import write_tuned
+
+    codec = by_name(chosen(wanted.codec, wanted.effort))
+    out = io.BytesIO()
+    with mcz_open(target, salvage=shelf.salvage, max_decoded=wanted.max_decoded) as file:
+        writer = Writer(out, profile=file.container.profile)
+        for clip in file.chosen(wanted.clips or None, wanted.where):
+            motion = clip.motion()
+            unit = shelf.said.get("unit") if motion.skeleton.unit_cm is None else None
+            motion = with_facts(motion, None, unit)
+            name_skeleton(writer, motion.skeleton)
+            write_tuned(writer, motion, codec, wanted.params or {})
+        writer.finish()
+    return out.getvalue()
+
+
+def _differences(files: Sequence[File], names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Of every other file against the first what ``mcz diff --by-joint --json`` says."""
+    first, *others = files
+    for other, name in zip(others, names[1:], strict=True):
+        pairs = [(one, one) for one in first.clips if one in other.clips]
+        if len(first) == len(other) == 1:
+            pairs = [(next(iter(first.clips)), next(iter(other.clips)))]
+        found, notes = [], []
+        for a, b in pairs[:MOST_COMPARED]:
+            try:
+                motions = first.clips[a].motion(), other.clips[b].motion()
+                found.append(difference(*motions, by_joint=True))
+            except MczError as error:
+                notes.append(f"{a}: {error}")
+        yield {"a": names[0], "b": name, "clips": found, "notes": notes}

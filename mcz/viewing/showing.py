@@ -1,0 +1,156 @@
+"""``mcz.view``: motions from Python, in a notebook or in the browser."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import sys
+from collections.abc import Sequence
+from fractions import Fraction
+from types import TracebackType
+from typing import Any, BinaryIO
+
+from mcz.errors import OptionError
+from mcz.motion import Motion
+from mcz.reading.clip import Clip
+from mcz.viewing.browser import show
+from mcz.viewing.page import page
+from mcz.viewing.player import player
+from mcz.viewing.server import Server
+from mcz.viewing.shelf import Shelf, Stored, put
+
+_OPEN: set[View] = set()  # those that are served, whether anybody keeps them or not
+
+
+class View:
+    """What ``view`` shows: players in a notebook, or a server, whose page is at ``url``.
+
+    ``url`` is None in a notebook. ``close`` ends the server, as leaving the context does, and as
+    the end of the process does.
+    """
+
+    def __init__(self, server: Server | None, players: Sequence[str] = ()) -> None:
+        self._server, self._players = server, players
+        self.url = None if server is None else server.url
+        if server is not None:
+            _OPEN.add(self)
+
+    def __repr__(self) -> str:
+        return "<View in a notebook>" if self.url is None else f"<View at {self.url}>"
+
+    def _repr_html_(self) -> str | None:
+        """The players; None where a page is served."""
+        return None if self.url is not None else "\n".join(self._players)
+
+    def __enter__(self) -> View:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the server, if it is not ended yet."""
+        if self in _OPEN and self._server is not None:
+            _OPEN.discard(self)
+            self._server.close()
+
+
+def view(
+    *things: Any,
+    skeleton: str | os.PathLike[str] | None = None,
+    rate: Fraction | float | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+    salvage: bool = False,
+    browser: bool = True,
+    port: int = 0,
+) -> View:
+    """Show motions: each a Motion, a Clip, or a path or URL as ``mcz view`` takes it.
+
+    In a notebook the result displays as a small player of each. Elsewhere a server on this machine
+    shows them on a page, which is opened in the browser unless ``browser`` is False, until the
+    result is closed. ``skeleton``, ``rate``, ``unit`` and ``up`` say what files do not;
+    ``salvage``: files may be damaged. Raises MczError for what cannot be read, and AccessError
+    where this installation has no page or the ``port`` cannot be had.
+    """
+    if not things:
+        raise OptionError("there is nothing to view: give a Motion, a Clip or a path")
+    said = {"skeleton": skeleton, "rate": rate, "unit": unit, "up": up}
+    if in_notebook():
+        return View(None, [_player_of(thing, said, salvage) for thing in things])
+    shelf = Shelf(said, _tell, salvage=salvage)
+    try:
+        for thing in things:
+            _give(shelf, thing)
+        server = Server(page(_tell), shelf, port=port)
+    except BaseException:
+        shelf.close()
+        raise
+    shown = View(server)
+    if browser:
+        show(server.url)
+    return shown
+
+
+def in_notebook() -> bool:
+    """Whether this process is the kernel of a notebook."""
+    module = sys.modules.get("IPython")
+    shell = module.get_ipython() if module is not None else None
+    return getattr(shell, "kernel", None) is not None
+
+
+def _tell(line: str) -> None:
+    sys.stderr.write(f"mcz: {line}\n")
+
+
+def _player_of(thing: Any, said: dict[str, Any], salvage: bool) -> str:
+    """A player of a Motion or Clip, or of a file; of an ``.mcz`` that is one of its first clip."""
+    from mcz.reading.file import open
+    from mcz.reading.read import read
+
+    if isinstance(thing, Motion | Clip):
+        return player(thing)
+    if not ("://" in str(thing) or str(thing).lower().endswith(".mcz")):
+        return player(read(thing, **said))
+    with open(thing, salvage=salvage) as file:
+        for clip in file:
+            return player(clip)
+    raise OptionError(f"{thing}: it has no clip")
+
+
+def _give(shelf: Shelf, thing: Any) -> None:
+    if isinstance(thing, Motion):
+        shelf.give(Stored(thing.name, shelf.write(lambda out: _write(thing, out))))
+    elif isinstance(thing, Clip):
+        shelf.give(Stored(thing.name, shelf.write(lambda out: _copy(thing, out))))
+    else:
+        put(shelf, os.fspath(thing))
+
+
+def _write(motion: Motion, out: BinaryIO) -> None:
+    from mcz.writing.file import write
+
+    write(motion, out)
+
+
+def _copy(clip: Clip, out: BinaryIO) -> None:
+    """The clip as it is stored; decoded and coded without loss where its file has no path."""
+    from mcz.editing.extraction import extract
+
+    target = clip.container.source.target
+    if target is None:
+        _write(clip.motion(), out)
+    else:
+        salvage = clip.container.salvage
+        extract(target, out, clip=clip.name, salvage=salvage, max_decoded=2**53, copies=False)
+
+
+@atexit.register
+def _close_all() -> None:
+    for shown in list(_OPEN):
+        shown.close()

@@ -1,0 +1,61 @@
+"""The annexes that a decoder needs for a file, so that a page carries these alone."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Iterable
+
+from mcz.annexes import annex_bytes
+from mcz.codecs.basis_models import name_of
+from mcz.errors import MczError
+from mcz.reading.file import File
+from mcz.reading.sizes import models_used
+
+ALWAYS = ("words.bin",)  # the names of joints are packed with them
+BASES = "pca_start.json"  # how models of bases are coded
+TABLES = {
+    "raw": (),
+    "lossless": ("lossless_start.json",),
+    "mrdwt": ("wavelet_start.json",),
+    "qbc": ("qbc_start.json",),
+    "pca": (BASES,),
+    "dwt": ("wavelet_start.json",),
+    "awt": ("wavelet_start.json",),
+    "lsdt-frame": ("frame_start.json", BASES),
+    "lsdt-clip": ("window_start.json", BASES),
+    "mdtt": ("window_start.json", BASES),
+    "pca-rdo": ("window_start.json", BASES),
+    "online": ("online_start.json", BASES),
+    "best": ("best_start.json", "lossless_start.json"),
+    "posewave": ("posewave_start.json",),
+    "fast": ("fast_counts.json",),
+}
+
+
+def tables_for(file: File) -> set[str]:
+    """The names of the annexes that decoding any clip of ``file`` may need."""
+    from mcz.codecs import CODECS
+
+    names = {id_: name for name, id_ in CODECS.names().items()}
+    found = set(ALWAYS)
+    for row in file.container.directory.clips.values():
+        for signal in row.signals:
+            found.update(TABLES.get(names.get(signal.codec, ""), ()))
+    for clip in file:
+        try:
+            models = {id_ for signal in clip.signals for id_ in models_used(signal)}
+        except MczError:  # a damaged clip, which the decoder cannot read either
+            continue
+        found.update(f"bases_{name}.bin" for id_ in models if (name := name_of(id_)))
+    return found
+
+
+def deflated(names: Iterable[str]) -> dict[str, str]:
+    """These annexes by name, each raw deflate in base64."""
+    found = {}
+    for name in sorted(names):
+        packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+        data = packer.compress(annex_bytes(name)) + packer.flush()
+        found[name] = base64.b64encode(data).decode()
+    return found

@@ -1,0 +1,273 @@
+"""``mcz view`` and ``mcz.view`` from start to end: when they end, and what they leave."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Thread
+from types import SimpleNamespace
+from urllib.parse import urlsplit
+
+import pytest
+
+import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
+from mcz.errors import AccessError, OptionError
+from mcz.viewing import browser, showing
+from mcz.viewing.visitors import Visitors
+
+Call = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Call:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = int(run(cli, "mcz", [str(word) for word in arguments]))
+        return code, *capsys.readouterr()
+
+    return call
+
+
+@pytest.fixture(autouse=True)
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for temporary files, of which none may be left."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    return folder
+
+
+@contextmanager
+def started(*words: object) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """``mcz view`` in a process of its own, and the address that it says."""
+    command = [sys.executable, "-m", "mcz.cli.main", "view", *map(str, words), "--no-browser"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    try:
+        yield process, process.stdout.readline().strip()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def get(url: str, path: str) -> bytes:
+    at = urlsplit(url)
+    connection = http.client.HTTPConnection(at.netloc, timeout=30)
+    connection.request("GET", at.path + path)
+    data = connection.getresponse().read()
+    connection.close()
+    return data
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_a_signal_ends_it_and_nothing_is_left(
+    samples: Path, temporary: Path, number: int, code: int
+) -> None:
+    with started(samples / "walk.bvh") as (process, url):
+        assert get(url, "files/0").startswith(b"\x89MCZ")
+        assert len(list(temporary.iterdir())) == 1
+        process.send_signal(number)
+        assert process.wait(20) == code
+        assert not list(temporary.iterdir())
+
+
+def test_it_ends_with_its_pages(
+    samples: Path, temporary: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A page that comes back in time goes on; when none does, all is over."""
+    monkeypatch.setattr("mcz.viewing.server.GRACE", 0.2)
+    seen: list[str] = []
+
+    def visit(url: str) -> bool:
+        def pages() -> None:
+            at = urlsplit(url)
+            for _ in range(2):
+                connection = http.client.HTTPConnection(at.netloc, timeout=30)
+                connection.request("GET", at.path + "alive")
+                response = connection.getresponse()
+                seen.append(response.headers["Content-Type"])
+                get(url, "files/0")
+                response.close()
+                connection.close()
+
+        Thread(target=pages).start()
+        return True
+
+    monkeypatch.setattr(browser, "show", visit)
+    code, out, errors = call("view", samples / "walk.bvh")
+    assert (code, errors) == (0, "")
+    assert out.startswith("http://127.0.0.1:")
+    assert seen == ["text/event-stream"] * 2
+    assert not list(temporary.iterdir())
+
+
+def test_without_a_browser_the_address_is_said(
+    samples: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(Visitors, "wait", lambda self, for_ever: None)
+    code, out, errors = call("view", samples / "walk.bvh", "--json")
+    document = json.loads(out)
+    assert code == 0
+    assert document["files"] == [
+        {"name": "walk.bvh", "size": None, "url": "files/0", "kind": "bvh"}
+    ]
+    assert "no browser" in json.loads(errors)["note"]
+    assert call("view", samples / "walk.bvh", "--no-browser", "--host", "::1")[1].startswith(
+        "http://[::1]:"
+    )
+
+
+def test_visitors_may_come_back() -> None:
+    visitors = Visitors(30.0)
+    waiting = Thread(target=visitors.wait)
+    waiting.start()
+    with visitors:
+        pass
+    with visitors:  # within the time of grace
+        waiting.join(0.05)
+        assert waiting.is_alive()
+    assert visitors.stay(0.0)
+    visitors.close()
+    waiting.join(10)
+    assert not waiting.is_alive()
+    assert not visitors.stay(30.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("none.bvh",), 1, "none.bvh: no such file"),
+        (("walk.asf",), 2, "its suffix is none of"),
+        (("walk.bvh", "--host", "0.0.0.0"), 2, "this machine alone"),
+        (("walk.bvh", "--port", "99999"), 2, "99999"),
+        (("walk.bvh", "--codec", "lossy"), 2, "--codec is taken with -o"),
+        (("walk.bvh", "--clip", "walk"), 2, "--clip is taken with -o"),
+        (("walk.bvh", "--force"), 2, "--force is taken with -o"),
+        (("walk.bvh", "-o", "x.html", "--keep"), 2, "--keep is taken without -o"),
+        (("walk.bvh", "-o", "x.html", "--no-browser"), 2, "--no-browser is taken without"),
+        (("walk.bvh", "-o", "-"), 2, "not to standard output"),
+        ((), 2, "FILE"),
+    ],
+)
+def test_wrong_use(
+    samples: Path,
+    call: Call,
+    monkeypatch: pytest.MonkeyPatch,
+    words: tuple[str, ...],
+    code: int,
+    said: str,
+) -> None:
+    monkeypatch.chdir(samples)
+    found, out, errors = call("view", *words)
+    assert (found, out) == (code, "")
+    assert said in errors
+    assert errors.count("\n") == 1
+
+
+def test_an_installation_without_page_says_so(
+    samples: Path, call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MCZ_VIEWER_PAGE", str(tmp_path / "none.html"))
+    code, _, errors = call("view", samples / "walk.bvh", "--no-browser")
+    assert (code, "none.html: No such file" in errors) == (1, True)
+    (tmp_path / "none.html").write_bytes(b"\xff\xfe")
+    assert "it is no page" in call("view", samples / "walk.bvh", "--no-browser")[2]
+
+
+# From Python ---------------------------------------------------------------------
+
+
+def test_view_serves_motions_clips_and_files(samples: Path, temporary: Path) -> None:
+    motion = mcz.read(samples / "walk.bvh")
+    mcz.write(motion, samples.parent / "one.mcz", "mrdwt")
+    with mcz.open(samples.parent / "one.mcz") as file:
+        clip = file["walk"]
+        given = (motion, clip, samples / "walk.c3d")
+        with mcz.view(*given, browser=False) as shown:
+            assert repr(shown) == f"<View at {shown.url}>"
+            assert shown._repr_html_() is None
+            assert shown.url is not None
+            with mcz.open(get(shown.url, "files/0")) as served:
+                assert (served["walk"].values[:] == motion.values).all()
+            with mcz.open(get(shown.url, "files/1")) as served:
+                assert served["walk"].codec == "mrdwt"
+            assert get(shown.url, "files/2").startswith(b"\x89MCZ")
+    shown.close()
+    assert not showing._OPEN
+    assert not list(temporary.iterdir())
+    with pytest.raises(OSError):
+        get(shown.url, "api.json")
+
+
+def test_a_clip_of_a_stream_is_served(samples: Path, tmp_path: Path) -> None:
+    mcz.encode(samples / "walk.bvh", tmp_path / "a.mcz")
+    with (
+        (tmp_path / "a.mcz").open("rb") as stream,
+        mcz.open(stream) as file,
+        mcz.view(file["walk"], browser=False) as shown,
+    ):
+        assert shown.url is not None
+        with mcz.open(get(shown.url, "files/0")) as served:
+            assert served["walk"].n_frames == 240
+
+
+def test_view_opens_the_browser(samples: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(showing, "show", opened.append)
+    with mcz.view(samples / "walk.bvh") as shown:
+        assert opened == [shown.url]
+
+
+def test_what_cannot_be_viewed(samples: Path, temporary: Path) -> None:
+    with pytest.raises(OptionError, match="nothing to view"):
+        mcz.view()
+    with pytest.raises(AccessError):
+        mcz.view(mcz.read(samples / "walk.bvh"), samples / "none.bvh")
+    assert not list(temporary.iterdir())
+
+
+def test_a_notebook_gets_players(samples: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kernel = SimpleNamespace(get_ipython=lambda: SimpleNamespace(kernel=object()))
+    monkeypatch.setitem(sys.modules, "IPython", kernel)  # type: ignore[arg-type]
+    mcz.encode(samples / "walk.bvh", samples.parent / "nb.mcz")
+    shown = mcz.view(mcz.read(samples / "walk.bvh"), samples.parent / "nb.mcz")
+    assert shown.url is None
+    assert repr(shown) == "<View in a notebook>"
+    html = shown._repr_html_()
+    assert html is not None
+    assert html.count("<iframe ") == 2
+    shown.close()
+
+
+def test_a_terminal_of_ipython_is_no_notebook(monkeypatch: pytest.MonkeyPatch) -> None:
+    for shell in (None, SimpleNamespace()):
+        module = SimpleNamespace(get_ipython=lambda shell=shell: shell)
+        monkeypatch.setitem(sys.modules, "IPython", module)  # type: ignore[arg-type]
+        assert not showing.in_notebook()
+
+
+def test_the_browser_is_that_of_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
+    import webbrowser
+
+    opened: list[str] = []
+
+    def open_(url: str) -> bool:
+        opened.append(url)
+        return True
+
+    monkeypatch.setattr(webbrowser, "open", open_)
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert browser.show("http://x/")
+    assert opened == ["http://x/"]

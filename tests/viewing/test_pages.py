@@ -1,0 +1,216 @@
+"""Pages that hold files: what is in them, what may not be, and what the decoder needs."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import shutil
+import subprocess
+import zlib
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+import mcz
+from mcz.annexes import annex_bytes
+from mcz.cli.common import run
+from mcz.cli.main import cli
+from mcz.codecs import CODECS
+from mcz.viewing.embedding import element
+from mcz.viewing.page import page
+from mcz.viewing.tables import TABLES, tables_for
+from tests.motions import smooth
+
+ROOT = Path(mcz.__file__).parents[1]
+Call = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Call:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = int(run(cli, "mcz", ["view", *map(str, arguments)]))
+        return code, *capsys.readouterr()
+
+    return call
+
+
+class Parsed(HTMLParser):
+    """The elements of a page, and what its embedded document says."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.policy = self.document = ""
+        self._within = False
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        given = dict(attrs)
+        if given.get("http-equiv") == "Content-Security-Policy":
+            self.policy = given["content"] or ""
+        self._within = given == {"type": "application/json", "id": "embedded"}
+
+    def handle_data(self, data: str) -> None:
+        if self._within:
+            self.document += data
+
+    def handle_endtag(self, tag: str) -> None:
+        self._within = False
+
+
+def embedded(path: Path) -> dict:
+    """What a page holds; it is otherwise as it was."""
+    text = path.read_text("utf-8")
+    found = Parsed(text)
+    assert found.policy == page().policy
+    assert found.tags == [*Parsed(page().text).tags[:-1], "script", "script"]
+    document = json.loads(found.document)
+    assert text == page().before + element(document) + page().after
+    return document
+
+
+def files_of(document: dict) -> list[mcz.File]:
+    return [mcz.open(base64.b64decode(file["base64"])) for file in document["files"]]
+
+
+def test_a_source_is_held_without_loss(samples: Path, tmp_path: Path, call: Call) -> None:
+    out = tmp_path / "take.html"
+    code, printed, errors = call(samples / "walk.bvh", "-o", out)
+    assert (code, errors) == (0, "")
+    document = embedded(out)
+    (file,) = files_of(document)
+    assert document["files"][0]["name"] == "walk.bvh"
+    assert file["walk"].source_bytes() == (samples / "walk.bvh").read_bytes()
+    assert f"{out.stat().st_size:,} bytes, the player {len(page().text):,} of them" in printed
+    assert f"walk.bvh: 1 clip, {file.size:,} bytes" in printed
+    assert "diff" not in document
+    assert document["annex"].keys() == {"words.bin", "fast_counts.json"}
+    for name, text in document["annex"].items():
+        assert zlib.decompress(base64.b64decode(text), -15) == annex_bytes(name)
+
+
+def test_an_mcz_is_held_as_it_is(samples: Path, tmp_path: Path, call: Call) -> None:
+    mcz.encode(samples / "walk.bvh", tmp_path / "a.mcz")
+    damaged = bytearray((tmp_path / "a.mcz").read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    (tmp_path / "b.mcz").write_bytes(damaged[:-100])
+    assert call(tmp_path / "a.mcz", tmp_path / "b.mcz", "-o", tmp_path / "x.html")[0] == 0
+    document = embedded(tmp_path / "x.html")
+    held = [base64.b64decode(file["base64"]) for file in document["files"]]
+    assert held == [(tmp_path / "a.mcz").read_bytes(), bytes(damaged[:-100])]
+    assert document["diff"]["clips"] or document["diff"]["notes"]
+
+
+def test_clips_are_copied(samples: Path, tmp_path: Path, call: Call) -> None:
+    mcz.pack(samples, tmp_path / "all.mcz")
+    with mcz.open(tmp_path / "all.mcz") as file:
+        names = list(file.clips)
+    out = tmp_path / "x.html"
+    assert call(tmp_path / "all.mcz", "-o", out, "--clip", names[1])[0] == 0
+    (one,) = files_of(embedded(out))
+    assert list(one.clips) == [names[1]]
+    words = ("-o", out, "--force", "--where", "source.format == 'c3d'")
+    assert call(tmp_path / "all.mcz", *words)[0] in (0, 2)
+    code, _, errors = call(tmp_path / "all.mcz", "-o", out, "--force", "--clip", "none")
+    assert (code, "none" in errors) == (2, True)
+    assert list(files_of(embedded(out))[0].clips)  # the page that was there still is
+
+
+def test_a_codec_makes_it_small_and_says_how_far_it_is(
+    samples: Path, tmp_path: Path, call: Call
+) -> None:
+    mcz.encode(samples / "walk.bvh", tmp_path / "a.mcz", unit="cm")
+    words = ("--codec", "mrdwt", "--param", "T_g=4", "-o", tmp_path / "x.html", "--json")
+    code, printed, _ = call(tmp_path / "a.mcz", *words)
+    assert code == 0
+    (file,) = files_of(embedded(tmp_path / "x.html"))
+    assert file["walk"].codec == "mrdwt"
+    assert file["walk"].quality["param.T_g"] == "4.0"
+    told = json.loads(printed)
+    assert told["size"] == (tmp_path / "x.html").stat().st_size
+    assert told["files"] == [{"name": "a.mcz", "size": file.size, "n_clips": 1}]
+    held = embedded(tmp_path / "x.html")["files"][0]["base64"]
+    (tmp_path / "b.mcz").write_bytes(base64.b64decode(held))
+    assert call(tmp_path / "a.mcz", tmp_path / "b.mcz", "-o", tmp_path / "y.html")[0] == 0
+    difference = embedded(tmp_path / "y.html")["diff"]
+    assert (difference["a"], difference["b"]) == ("a.mcz", "b.mcz")
+    (clip,) = difference["clips"]
+    record = float(file["walk"].quality["mean_position_error_cm"])
+    assert clip["mean_position_error_cm"] == pytest.approx(record)
+
+
+def test_a_page_that_is_too_large_is_not_written(samples: Path, tmp_path: Path, call: Call) -> None:
+    out = tmp_path / "x.html"
+    out.write_bytes(b"mine")
+    for words in (("--max-size", 15000), ("--max-size", 500)):
+        code, _, errors = call(samples / "walk.bvh", "-o", out, "--force", *words)
+        assert code == 1
+        assert "--max-size allows more" in errors
+        assert out.read_bytes() == b"mine"
+    code, _, errors = call(samples / "walk.bvh", "-o", out)
+    assert (code, "--force" in errors) == (2, True)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.html"]
+
+
+def test_an_input_is_no_page(samples: Path, tmp_path: Path, call: Call) -> None:
+    shutil.copy(samples / "walk.bvh", tmp_path)
+    before = (tmp_path / "walk.bvh").read_bytes()
+    code, _, errors = call(tmp_path / "walk.bvh", "-o", tmp_path / "walk.bvh", "--force")
+    assert (code, "it is the input itself" in errors) == (2, True)
+    assert (tmp_path / "walk.bvh").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "name", ["</script><script>alert(1)</script>", "<!--<script>", "]]>", "\u2028\u0000&lt;"]
+)
+def test_no_text_of_a_file_becomes_markup(name: str, tmp_path: Path, call: Call) -> None:
+    document = {"files": [{"name": name, "base64": ""}], name: name}
+    text = page().before + element(document) + page().after
+    found = Parsed(text)
+    assert json.loads(found.document) == document
+    assert found.tags.count("script") == 2
+    assert "<" not in element(document)[len("<script") : -len("</script>")]
+    safe = re.sub(r"[/\0]", "_", name)
+    mcz.write(smooth(4, name=name.replace("\0", "")), tmp_path / f"{safe}.mcz")
+    assert call(tmp_path / f"{safe}.mcz", "-o", tmp_path / "x.html")[0] == 0
+    assert embedded(tmp_path / "x.html")["files"][0]["name"] == f"{safe}.mcz"
+
+
+# Tables --------------------------------------------------------------------------
+
+
+def test_every_codec_has_its_tables() -> None:
+    assert TABLES.keys() == CODECS.names().keys()
+    for names in TABLES.values():
+        for name in names:
+            assert annex_bytes(name)
+
+
+def test_what_a_codec_needs_is_there(tmp_path: Path) -> None:
+    """The second decoder reads a file of every codec with the tables that a page would hold."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("no node")
+    from mcz.viewing.tables import deflated
+
+    motion = smooth(40)
+    documents = []
+    for number, name in enumerate(CODECS.names()):
+        mcz.write(motion, tmp_path / "a.mcz", name, force=True)
+        data = (tmp_path / "a.mcz").read_bytes()
+        with mcz.open(data) as file:
+            tables = deflated(tables_for(file))
+        document = {"files": [{"base64": base64.b64encode(data).decode()}], "annex": tables}
+        documents.append(tmp_path / f"{number}.json")
+        documents[-1].write_text(json.dumps(document))
+    script = ROOT / "tests" / "viewing" / "decode_page.mjs"
+    done = subprocess.run(
+        [node, str(script), *map(str, documents)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["40"] * len(documents)
