@@ -1,11 +1,19 @@
 // The worker: files, clips and numbers, asked for by messages { id, method, args }, answered by
 // { id, result }, { id, error } and, on the way, { id, progress }.
 
-import { annexFrom, setAnnex } from "../../../js/mcz.js";
+import { AccessError, LimitExceeded, Refused, Unsupported, annexFrom, setAnnex } from "../../../js/mcz.js";
 import { curvesOf } from "./curves.js";
 import { errorsBetween } from "./distances.js";
 import { OpenClip } from "./clip.js";
 import { openFile } from "./open.js";
+
+/** Names of errors, which the build shortens. */
+const NAMES = new Map([
+  [AccessError, "AccessError"],
+  [LimitExceeded, "LimitExceeded"],
+  [Refused, "Refused"],
+  [Unsupported, "Unsupported"],
+]);
 
 const files = new Map();
 const clips = new Map();
@@ -75,7 +83,7 @@ self.addEventListener("message", async ({ data: { id, method, args } }) => {
     const result = await METHODS[method](...args, progress);
     self.postMessage({ id, result }, buffersOf(result));
   } catch (error) {
-    const name = error.constructor?.name ?? error.name;
-    self.postMessage({ id, error: { name: error.name === "Error" ? name : error.name, message: error.message } });
+    const name = NAMES.get(error.constructor) ?? error.name;
+    self.postMessage({ id, error: { name, message: error.message } });
   }
 });
