@@ -1,9 +1,11 @@
-// A file of any format that is read here, by its name.
+// A file of any format that is read here: an .mcz by its first bytes, others by their names.
 
 import { readAmc } from "../inputs/acclaim.js";
 import { readBvh } from "../inputs/bvh.js";
 import { readC3d } from "../inputs/c3d.js";
 import { openMcz } from "./mcz-file.js";
+
+const SIGNATURE = [0x89, 0x4d, 0x43, 0x5a]; // of an .mcz
 
 const READERS = {
   bvh: ({ bytes }, name) => readBvh(bytes, name),
@@ -18,7 +20,7 @@ const READERS = {
  */
 export async function openFile(where, options) {
   const kind = options.name.slice(options.name.lastIndexOf(".") + 1).toLowerCase();
-  if (!Object.hasOwn(READERS, kind)) return openMcz(where, options);
+  if (!Object.hasOwn(READERS, kind) || (await isMcz(where))) return openMcz(where, options);
   const bytes = where.bytes ?? (await whole(where.blob));
   const skeleton = where.skeleton ? await whole(where.skeleton) : null;
   const clip = READERS[kind]({ bytes, skeleton }, options.name);
@@ -29,6 +31,13 @@ export async function openFile(where, options) {
     rows: () => [rowOf(clip, bytes.length)],
     clip: async () => clip,
   };
+}
+
+/** What a server or a page made of a file is an .mcz, and has the name of the file that was given. */
+async function isMcz({ url, bytes, blob }) {
+  if (url) return true;
+  const head = bytes ? bytes.subarray(0, 4) : await whole(blob.slice(0, 4));
+  return SIGNATURE.every((byte, k) => head[k] === byte);
 }
 
 const whole = async (blob) => new Uint8Array(await blob.arrayBuffer());
