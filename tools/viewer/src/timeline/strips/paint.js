@@ -114,7 +114,9 @@ export function paintRuler({ context, width, height, from, to, x, colors }, clip
     context.moveTo(at, height - 5);
     context.lineTo(at, height);
     const seconds = rate ? ` · ${figure(frame / rate, 3)} s` : "";
-    label(context, `${count(frameNumber(clip, frame))}${seconds}`, at + 4, height / 2, colors);
+    const text = `${count(frameNumber(clip, frame))}${seconds}`;
+    if (at + 4 + context.measureText(text).width > width) continue;
+    label(context, text, at + 4, height / 2, colors);
   }
   context.lineWidth = 1;
   context.strokeStyle = colors.quiet;
