@@ -8,6 +8,7 @@ are tools/fuzz/differential.py's.
 from __future__ import annotations
 
 import io
+import json
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
@@ -28,7 +29,7 @@ from mcz.cli import conformance
 from mcz.codecs import by_name
 from mcz.codecs.posewave import choices
 from mcz.container.writer import Writer
-from mcz.errors import OptionError
+from mcz.errors import MczError, OptionError
 from mcz.motion import Motion
 from mcz.writing.clip_writer import write_clip
 from tests.codecs.lossy import gapped, markers, rough, saved, wandering
@@ -178,6 +179,86 @@ def test_clips(codec: str, params: dict[str, Any], other: Server) -> None:
     for name, motion in motions:
         timed = replace(motion, frame_rate=motion.frame_rate or Fraction(60))  # a rate needs one
         check(saved(codec, timed, **params), other, name)
+
+
+Arrays = list[tuple[str, str, np.ndarray, np.ndarray]]  # clip, signal, values, mask
+
+
+def salvaged(data: bytes) -> Arrays:
+    """What this package salvages of a file of one clip."""
+    try:
+        with mcz.open(data, salvage=True) as file:
+            found: Arrays = []
+            for clip in file.clips.values():
+                for signal in clip.signals:
+                    values, mask = clip.read_masked(signal=signal.index)
+                    there = np.ones(values.shape, np.bool_) if mask is None else mask
+                    found.append((clip.name, signal.name, values, there))
+            return found
+    except MczError:
+        return []
+
+
+def salvaged_there(data: bytes, other: Server) -> Arrays:
+    """What the decoder in JavaScript salvages, which must not crash or hang."""
+    told = other.ask(["--salvage"], data, MOST_OUTPUT)
+    assert (told.code in (0, 1), told.fault) == (True, ""), told.errors
+    if told.code:
+        return []
+    line, _, content = told.output.partition(b"\n")
+    found: Arrays = []
+    for row in json.loads(line)["arrays"]:
+        size = row["bytes"]
+        array = np.frombuffer(content[:size], row["dtype"]).reshape(row["shape"])
+        content = content[size:]
+        if row["array"] == "values":
+            found.append((row["clip"], row["signal"], array, np.ones(array.shape, np.bool_)))
+        else:
+            found[-1] = (*found[-1][:3], array.astype(np.bool_))
+    return found
+
+
+def damaged(data: bytes, seed: int) -> bytes:
+    """``data`` with a bit turned, a stretch of zeros or of rubbish, a stretch or the end gone."""
+    rng = np.random.default_rng(seed)
+    at = int(rng.integers(8, len(data)))
+    size = int(rng.integers(1, 200))
+    here, behind = data[:at], data[at + size :]
+    flipped = here + bytes([data[at] ^ 1 << int(rng.integers(8))]) + data[at + 1 :]
+    kinds = flipped, here + bytes(size) + behind, here + rng.bytes(size) + data[at:], here + behind
+    return (*kinds, here)[seed % 5]
+
+
+def live_clip(segment_frames: int) -> bytes:
+    out = io.BytesIO()
+    motion = smooth(60)
+    params = {"step": 0.3, "segment_frames": segment_frames}
+    rate = Fraction(60)
+    writer = mcz.LiveWriter(out, motion.skeleton, "online", params, frame_rate=rate, name="a")
+    for row in motion.signals[0].values:
+        writer.push(row)
+    writer.close()
+    return out.getvalue()
+
+
+DAMAGED = ("raw", "lossless", "fast", "pca", "posewave", "lsdt-clip", "live")
+
+
+@pytest.mark.parametrize("codec", DAMAGED)
+def test_salvage(codec: str, other: Server) -> None:
+    """Both find the same in a damaged file."""
+    params = {"segment_frames": 16}
+    data = live_clip(7) if codec == "live" else saved(codec, smooth(90), copies=True, **params)
+    found = 0
+    for seed in range(40):
+        bad = damaged(data, seed)
+        mine, theirs = salvaged(bad), salvaged_there(bad, other)
+        for one, another in zip(mine, theirs, strict=True):
+            assert one[:2] == another[:2], seed
+            np.testing.assert_array_equal(one[2], another[2], f"{codec} {seed}")
+            np.testing.assert_array_equal(one[3], another[3], f"{codec} {seed}")
+            found += 1
+    assert found > 20
 
 
 @pytest.mark.parametrize("codec", POINTS)

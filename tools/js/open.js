@@ -10,6 +10,7 @@ import {
   readFoot,
 } from "./chunks.js";
 import { clipList } from "./clip-list.js";
+import { DecodedRuns } from "./decoded-runs.js";
 import { readIndex } from "./directory.js";
 import { Refused } from "./errors.js";
 import { readHead } from "./head.js";
@@ -101,6 +102,7 @@ export class MczFile {
     this.shared = new SharedChunks(ranges, directory, this.limits, limit, salvage);
     this.salvage = salvage;
     this.records = null;
+    this.decoded = new DecodedRuns();
     /** Bytes of the file. */
     this.size = ranges.size;
     /** The clips in file order: see clip-list.js. */

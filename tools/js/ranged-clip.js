@@ -5,6 +5,7 @@ import { frameNumbers, readClip } from "./clip.js";
 import { codecLabel } from "./codecs.js";
 import { FRAMING_SIZE, HEADER_SIZE } from "./chunks.js";
 import { addSegment, frameSegment, readSegment, takeStreams } from "./data.js";
+import { runsOf, runsWithin } from "./decoded-runs.js";
 import { Refused } from "./errors.js";
 import { Room, decodedBytes } from "./limits.js";
 import { lostFrames, storedFrames } from "./losses.js";
@@ -95,6 +96,7 @@ export class RangedClip {
     this.row = row;
     this.clip = clip;
     this.opened = new Map(); // signals whose headers were read
+    this.cut = new Map(); // signals in runs
     this.chains = new Map(); // of a damaged file: signals with a part of their segments
     this.index = index;
     this.name = clip.name;
@@ -261,7 +263,40 @@ export class RangedClip {
 
   async decode(signal, request) {
     if (this.file.salvage) return this.decodeSalvaged(signal, request);
-    return this.decodeStrictly(signal, request);
+    return this.decodeNear(signal, request);
+  }
+
+  /** Runs of frames, which are kept, and the part of them that is wanted. */
+  async decodeNear(signal, request) {
+    const { from, to, dropped } = request;
+    const { skip } = signal;
+    const { decoder } = await this.open(signal);
+    const isWhole = from === 0 && to === this.nFrames;
+    const runs = isWhole || from === to ? null : this.runs(signal, dropped, decoder.alone === true);
+    const near = runs && runsWithin(runs, skip + from, skip + to);
+    const shown = (run) => {
+      return { dropped, from: Math.max(0, run.from - skip), to: Math.min(this.nFrames, run.to - skip) };
+    };
+    const { decoded: kept } = this.file;
+    if (!near || !near.every((run) => kept.mayKeep(bytesOf(shown(run), signal)))) {
+      return this.decodeStrictly(signal, request);
+    }
+    new Room(this.file.decodedLimit).take(bytesOf(request, signal));
+    const parts = [];
+    for (const run of near) {
+      const own = shown(run);
+      const decode = () => this.decodeStrictly(signal, own);
+      parts.push({ ...own, decoded: await kept.get(run, bytesOf(own, signal), decode) });
+    }
+    return joined(parts, signal, request);
+  }
+
+  runs(signal, dropped, alone) {
+    const key = `${dropped} ${alone}`;
+    if (!this.cut.has(signal)) this.cut.set(signal, new Map());
+    const ofSignal = this.cut.get(signal);
+    if (!ofSignal.has(key)) ofSignal.set(key, runsOf(signal, alone));
+    return ofSignal.get(key);
   }
 
   /** The frames that are there; what their segments are is known from a walk through the file. */
@@ -269,7 +304,7 @@ export class RangedClip {
     new Room(this.file.decodedLimit).take(bytesOf(request, signal));
     return salvageSignal(signal, request, this.stored(signal), (segments, from, to) => {
       const chain = this.chain(signal, segments);
-      return this.decodeStrictly(chain, { ...request, from, to });
+      return this.decodeNear(chain, { ...request, from, to });
     });
   }
 
@@ -332,6 +367,25 @@ export class RangedClip {
       return { ...found, offset };
     });
   }
+}
+
+/** Wanted frames, cut out of what was decoded of neighboring runs. */
+function joined(parts, signal, { from, to }) {
+  const { samplesPerFrame, integer, channels } = signal;
+  const perFrame = samplesPerFrame * channels.length;
+  const size = (to - from) * perFrame;
+  const values = integer ? new BigInt64Array(size) : new Float64Array(size);
+  const anyMask = parts.some(({ decoded }) => decoded.mask !== null);
+  const mask = anyMask ? new Uint8Array(size).fill(1) : null;
+  for (const { from: first, to: end, decoded } of parts) {
+    const a = Math.max(from, first);
+    const b = Math.min(to, end);
+    const cut = (array) => array.subarray((a - first) * perFrame, (b - first) * perFrame);
+    values.set(cut(decoded.values), (a - from) * perFrame);
+    if (decoded.mask) mask.set(cut(decoded.mask), (a - from) * perFrame);
+  }
+  const nRows = (to - from) * samplesPerFrame;
+  return { signal, nRows, nChannels: channels.length, values, mask };
 }
 
 function bytesOf({ from, to }, { samplesPerFrame, channels }) {

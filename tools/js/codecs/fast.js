@@ -22,10 +22,12 @@ export const id = 14;
 export const name = "fast";
 export const version = 0;
 
-const N_SLOTS = 4096;
+const SLOT_BITS = 12;
+const N_SLOTS = 2 ** SLOT_BITS;
 const TWO_16 = 2 ** 16;
 const TWO_40 = 2 ** 40;
 const TWO_44 = 2 ** 44;
+const POWERS_OF_2 = Float64Array.from({ length: 64 }, (_, n) => 2 ** n);
 
 const CODEC = {
   name,
@@ -106,9 +108,9 @@ class Source {
 
   symbol(context) {
     const { counts, starts, symbols } = this.contexts[context];
-    const slot = this.x % N_SLOTS;
+    const slot = this.x & (N_SLOTS - 1); // the state is a u32
     const symbol = symbols[slot];
-    this.x = counts[symbol] * Math.floor(this.x / N_SLOTS) + slot - starts[symbol];
+    this.x = counts[symbol] * (this.x >>> SLOT_BITS) + slot - starts[symbol];
     if (this.x < TWO_16) {
       this.x = this.x * TWO_16 + this.byte(this.word) + 256 * this.byte(this.word + 1);
       this.word += 2;
@@ -118,16 +120,28 @@ class Source {
 
   /** A number of n bits; beyond 2^53 it is about that, and then of no use but to be refused. */
   take(n) {
+    if (n <= 24) return this.takeFew(n);
     let value = 0;
     for (let got = 0; got < n; ) {
       const from = this.bit & 7;
       const part = Math.min(8 - from, n - got);
       const byte = this.byte(this.data.length - 1 - (this.bit >> 3));
-      value += ((byte >> from) & ((1 << part) - 1)) * 2 ** got;
+      value += ((byte >> from) & ((1 << part) - 1)) * POWERS_OF_2[got];
       this.bit += part;
       got += part;
     }
     return value;
+  }
+
+  /** A number of at most 24 bits. */
+  takeFew(n) {
+    const at = this.data.length - 1 - (this.bit >> 3);
+    const from = this.bit & 7;
+    let word = this.byte(at);
+    if (from + n > 8) word |= (this.byte(at - 1) << 8) | (this.byte(at - 2) << 16);
+    if (from + n > 24) word |= this.byte(at - 3) << 24;
+    this.bit += n;
+    return (word >>> from) & ((1 << n) - 1);
   }
 
   takeBig(n) {
@@ -232,7 +246,7 @@ class GroupDecoder {
   signed(narrow, high, n) {
     const minus = this.source.take(1) === 1;
     if (narrow) {
-      const size = high * 2 ** n + this.source.take(n);
+      const size = high * POWERS_OF_2[n] + this.source.take(n);
       return minus ? 0 - size : size;
     }
     const size = (BigInt(high) << BigInt(n)) + this.source.takeBig(n);
@@ -249,7 +263,7 @@ class GroupDecoder {
   miss({ f, narrow }, q) {
     const { source } = this;
     const o = bits(f + 1) - 1;
-    const t = Math.max(0, 4 * o + (Math.floor((4 * f + 4) / 2 ** o) % 4) - q);
+    const t = Math.max(0, 4 * o + ((Math.floor((4 * f + 4) / POWERS_OF_2[o]) & 3)) - q);
     const k = clamp((t >> 2) - 7, 0, 44);
     const s = source.symbol(t < 28 ? t : 28 + (t % 4));
     if (s < 16) {

@@ -37,23 +37,28 @@ export function chooseFiles(page) {
  * Opens a file, and adds it to the list.
  *
  * @param {object} where `{ url }`, `{ blob, skeleton }` or `{ bytes }`
- * @param {{name: string, url?: string}} about `url` where it is served
+ * @param {{name: string, url?: string, salvage?: boolean, isLater?: boolean}} about `url` where it
+ *   is served; `isLater`: it is read when its clip is wanted, where it is read as a whole
  * @returns {Promise<object>} the entry of `files`
  * @throws {Error} with the name and message of the decoder's
  */
-export async function addFile({ store, engine }, where, { name, url = null }) {
-  const opened = await openedStrictlyOrNot({ store, engine }, where, name);
+export async function addFile({ store, engine }, where, { name, url = null, ...options }) {
+  const opened = options.salvage
+    ? await engine.open(where, { name, ...options })
+    : await openedStrictlyOrNot({ store, engine }, where, { name, ...options });
   const file = { ...opened, name, url };
   places.set(file.id, where);
   store.set({ files: [...store.get("files"), file] });
   return file;
 }
 
-async function openedStrictlyOrNot(page, where, name) {
+async function openedStrictlyOrNot(page, where, options) {
+  const { name } = options;
   try {
-    return await page.engine.open(where, { name });
+    return await page.engine.open(where, options);
   } catch (error) {
-    if (!isMcz(name) || error.name === "AccessError") throw error;
+    const isText = where.blob && !isMcz(name);
+    if (isText || error.name === "AccessError") throw error;
     let opened;
     try {
       opened = await page.engine.open(where, { name, salvage: true });
@@ -118,7 +123,7 @@ export async function openAll(page, files) {
   let shown = false;
   for (const { file, skeleton } of wanted) {
     try {
-      const opened = await openOne(page, file, skeleton);
+      const opened = await openOne(page, file, { skeleton, isLater: shown });
       if (!shown && opened.nClips > 0) {
         await showClip(page, opened.id, 0);
         shown = true;
@@ -129,14 +134,14 @@ export async function openAll(page, files) {
   }
 }
 
-async function openOne(page, file, skeleton) {
+async function openOne(page, file, { skeleton, isLater }) {
   const server = page.store.get("server");
   if (isMcz(file.name)) return addFile(page, { blob: file }, { name: file.name });
   if (server?.canConvert) {
     const { url, name } = await converted(skeleton ? [file, skeleton] : [file]);
     return addFile(page, { url: absolute(url) }, { name, url });
   }
-  return addFile(page, { blob: file, skeleton }, { name: file.name });
+  return addFile(page, { blob: file, skeleton }, { name: file.name, isLater });
 }
 
 /** Has the server make an .mcz of a file of another format. */
@@ -145,7 +150,8 @@ async function converted(files) {
   for (const file of files) body.append("file", file, file.name);
   const response = await fetch(absolute("convert"), { method: "POST", body });
   const answer = await response.json().catch(() => ({}));
-  if (!response.ok) throw new Error(answer.error ?? answer.message ?? `the server answers ${response.status}`);
+  if (!response.ok)
+    throw new Error(answer.error?.message ?? `the server answers ${response.status}`);
   return answer;
 }
 
@@ -155,7 +161,8 @@ async function openEmbedded(page, { files, annex = {}, diff = null }) {
   for (const { name, base64 } of files) {
     opened.push(await addFile(page, { bytes: fromBase64(base64) }, { name }));
   }
-  await showFirst(page, opened, diff !== null);
+  await showFirst(page, opened);
+  if (diff !== null) await compareSecond(page, opened);
 }
 
 async function openServed(page) {
@@ -163,27 +170,38 @@ async function openServed(page) {
   const api = await serverFacts();
   if (api === null) return;
   page.store.set({ server: api });
-  new EventSource(absolute("alive")); // the server ends when nobody listens any more
+  stayAlive(page);
   const opened = [];
   for (const { name, url } of api.files) {
     try {
-      opened.push(await addFile(page, { url: absolute(url) }, { name, url }));
-      if (opened.length === 1) await showFirst(page, opened, false);
+      const { salvage } = api;
+      opened.push(await addFile(page, { url: absolute(url) }, { name, url, salvage }));
+      if (opened.length === 1) await showFirst(page, opened);
     } catch (error) {
       tell(page, `${name}: ${faultText(error)}`, true);
     }
   }
-  if (api.diff) await showFirst(page, opened, true);
+  if (api.diff) await compareSecond(page, opened);
 }
 
-/** The first clip; of two files that are compared, the first clip of each. */
-async function showFirst(page, opened, compares) {
-  const [first, second] = opened.filter(({ nClips }) => nClips > 0);
-  if (first === undefined) return;
-  await showClip(page, first.id, 0);
-  if (compares && second !== undefined) {
-    page.store.set({ compared: await page.engine.clip(second.id, 0) });
-  }
+/** The server ends when nobody listens any more, and says so when it ends before. */
+function stayAlive(page) {
+  const alive = new EventSource(absolute("alive"));
+  alive.addEventListener("end", () => {
+    alive.close();
+    page.store.set({ server: null });
+    tell(page, "The server has ended. What is here can still be looked at.", true);
+  });
+}
+
+async function showFirst(page, [first]) {
+  if (first?.nClips > 0) await showClip(page, first.id, 0);
+}
+
+/** The first clips of two files are compared. */
+async function compareSecond(page, [first, second]) {
+  if (!(first?.nClips > 0 && second?.nClips > 0)) return;
+  page.store.set({ compared: await page.engine.clip(second.id, 0) });
 }
 
 async function serverFacts() {
@@ -192,7 +210,12 @@ async function serverFacts() {
 }
 
 const absolute = (path) => new URL(path, document.baseURI).href;
-const faultText = (error) => (error.name === "Error" ? error.message : `${error.name}: ${error.message}`);
+
+/** What is wrong, with the name of the decoder's error where it is one. */
+function faultText({ name, message }) {
+  const isPlain = name === "Error" || name === "SourceError" || name === "AccessError";
+  return isPlain ? message : `${name}: ${message}`;
+}
 
 /** Files and folders may be dropped anywhere. */
 function takeDrops(page) {

@@ -5,7 +5,10 @@
  * @returns {Promise<Map<string, Uint8Array>>}
  */
 export async function embeddedAnnex(tables) {
-  const inflated = Object.entries(tables).map(async ([name, text]) => [name, await inflate(fromBase64(text))]);
+  const inflated = Object.entries(tables).map(async ([name, text]) => [
+    name,
+    await inflate(fromBase64(text)),
+  ]);
   return new Map(await Promise.all(inflated));
 }
 

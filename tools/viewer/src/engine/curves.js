@@ -16,8 +16,12 @@ export async function curvesOf(clip, { columns, signal = 0, from, to, width }) {
   const range = new Range(columns.length, { from, to, width });
   for (let start = from; start < to; start += PIECE) {
     const end = Math.min(to, start + PIECE);
-    if (signal === "positions") addPositions(range, columns, await clip.positions(start, end), start, clip);
-    else await clip.overBlocks(signal, start, end, (block) => addBlock(range, columns, block, clip, signal));
+    if (signal === "positions")
+      addPositions(range, columns, await clip.positions(start, end), start, clip);
+    else
+      await clip.overBlocks(signal, start, end, (block) =>
+        addBlock(range, columns, block, clip, signal),
+      );
     await nextTurn();
   }
   return range.result();

@@ -14,14 +14,26 @@ function clipOf(mask = null) {
         const last = Math.min(N, first + 700);
         if (last <= from || first >= to) continue;
         const part = (array) => array && array.subarray(2 * first, 2 * last);
-        visit({ values: part(values), mask: part(mask), rowSize: 2, first, start: Math.max(first, from), end: Math.min(last, to) });
+        visit({
+          values: part(values),
+          mask: part(mask),
+          rowSize: 2,
+          first,
+          start: Math.max(first, from),
+          end: Math.min(last, to),
+        });
       }
     },
   };
 }
 
 test("least and most of the frames of each pixel", async () => {
-  const { least, most, width } = await curvesOf(clipOf(), { columns: [0, 1], from: 100, to: 4900, width: 48 });
+  const { least, most, width } = await curvesOf(clipOf(), {
+    columns: [0, 1],
+    from: 100,
+    to: 4900,
+    width: 48,
+  });
   assert.equal(width, 48);
   for (let pixel = 0; pixel < 48; pixel++) {
     const frames = Array.from({ length: 100 }, (_, i) => 100 + 100 * pixel + i);
@@ -36,9 +48,25 @@ test("least and most of the frames of each pixel", async () => {
 test("a pixel without a value is NaN, one with a missing value says so", async () => {
   const mask = new Uint8Array(2 * N).fill(1);
   for (let f = 150; f < 400; f++) mask[2 * f + 1] = 0;
-  const { least, gaps } = await curvesOf(clipOf(mask), { columns: [1], from: 0, to: 1000, width: 10 });
+  const { least, gaps } = await curvesOf(clipOf(mask), {
+    columns: [1],
+    from: 0,
+    to: 1000,
+    width: 10,
+  });
   assert.deepEqual([...gaps], [0, 1, 1, 1, 0, 0, 0, 0, 0, 0]);
-  assert.deepEqual([...least].map(Number.isNaN), [false, false, true, true, false, false, false, false, false, false]);
+  assert.deepEqual([...least].map(Number.isNaN), [
+    false,
+    false,
+    true,
+    true,
+    false,
+    false,
+    false,
+    false,
+    false,
+    false,
+  ]);
 });
 
 test("more pixels than frames: those between have nothing", async () => {

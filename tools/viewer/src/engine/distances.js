@@ -26,7 +26,15 @@ export async function errorsBetween(a, b, progress = () => {}) {
     const last = Math.min(b.nFrames, Math.round((to - 1) * step) + 1);
     const ofA = await a.positions(from, to);
     const ofB = await b.positions(first, last);
-    out.add(from, to, ofA, a.facts.points.length, (f) => Math.round(f * step) - first, ofB, b.facts.points.length);
+    out.add(
+      from,
+      to,
+      ofA,
+      a.facts.points.length,
+      (f) => Math.round(f * step) - first,
+      ofB,
+      b.facts.points.length,
+    );
     progress(to / nFrames);
     await nextTurn();
   }
@@ -128,7 +136,12 @@ class Distances {
     const sum = this.sums.reduce((total, x) => total + x, 0);
     const count = this.counts.reduce((total, x) => total + x, 0);
     const top = byPoint.reduce((best, one) => (one.max > best.max ? one : best), { max: -1 });
-    const total = { mean: count > 0 ? sum / count : NaN, max: top.max, frame: top.frame, point: top.point };
+    const total = {
+      mean: count > 0 ? sum / count : NaN,
+      max: top.max,
+      frame: top.frame,
+      point: top.point,
+    };
     const { mean, max, worst, pairs } = this;
     return { mean, max, worst, byPoint, pairs, total, unit: this.scales.unit };
   }

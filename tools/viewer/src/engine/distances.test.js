@@ -18,12 +18,21 @@ function clipOf(names, nFrames, at, { rate = 100, unitCm = 1 } = {}) {
 
 test("points are matched by name, repeated names in order", () => {
   const named = (text) => text.split("").map((name) => ({ name }));
-  assert.deepEqual(matched(named("abca"), named("xaba")), [[0, 1], [1, 2], [3, 3]]);
+  assert.deepEqual(matched(named("abca"), named("xaba")), [
+    [0, 1],
+    [1, 2],
+    [3, 3],
+  ]);
 });
 
 test("distances by frame and by point, in cm", async () => {
   const a = clipOf(["hip", "toe"], 600, (f, p) => [f, p, 0], { unitCm: 2 });
-  const b = clipOf(["toe", "hip"], 600, (f, p) => [2 * f, 2 * (1 - p), p === 0 && f === 77 ? 8 : 1], { unitCm: 1 });
+  const b = clipOf(
+    ["toe", "hip"],
+    600,
+    (f, p) => [2 * f, 2 * (1 - p), p === 0 && f === 77 ? 8 : 1],
+    { unitCm: 1 },
+  );
   const done = [];
   const found = await errorsBetween(a, b, (part) => done.push(part));
   assert.equal(found.unit, "cm");
@@ -37,7 +46,9 @@ test("distances by frame and by point, in cm", async () => {
 });
 
 test("other rates are compared at the same times; missing points do not count", async () => {
-  const a = clipOf(["a", "b"], 100, (f, p) => (p === 1 && f < 50 ? [NaN, NaN, NaN] : [f, 0, 0]), { rate: 100 });
+  const a = clipOf(["a", "b"], 100, (f, p) => (p === 1 && f < 50 ? [NaN, NaN, NaN] : [f, 0, 0]), {
+    rate: 100,
+  });
   const b = clipOf(["a", "b"], 50, (f) => [2 * f, 3, 0], { rate: 50 });
   const found = await errorsBetween(a, b);
   assert.equal(found.mean.length, 100);

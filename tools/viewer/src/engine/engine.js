@@ -14,7 +14,9 @@ export class Engine {
     const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
     this.#worker = new Worker(address);
     this.#worker.addEventListener("message", ({ data }) => this.#answer(data));
-    this.#worker.addEventListener("error", (event) => this.#fail(event.message || "the worker ended"));
+    this.#worker.addEventListener("error", (event) =>
+      this.#fail(event.message || "the worker ended"),
+    );
   }
 
   setAnnex(tables) {

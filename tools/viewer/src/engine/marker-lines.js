@@ -17,7 +17,9 @@ const HELEN_HAYES =
   "R.ANKLE-R.HEEL R.ANKLE-R.TOE R.HEEL-R.TOE L.ANKLE-L.HEEL L.ANKLE-L.TOE L.HEEL-L.TOE R.SHOULDER-L.SHOULDER " +
   "R.SHOULDER-R.ELBOW R.ELBOW-R.WRIST L.SHOULDER-L.ELBOW L.ELBOW-L.WRIST";
 
-const SETS = [FULL_BODY, CMU, HELEN_HAYES].map((text) => text.split(" ").map((line) => line.split("-")));
+const SETS = [FULL_BODY, CMU, HELEN_HAYES].map((text) =>
+  text.split(" ").map((line) => line.split("-")),
+);
 const LEAST = 4; // lines of a set that are there
 
 /**
@@ -38,7 +40,13 @@ export function markerLines(points) {
 /** "Kim:LASI" and "KimLASI" are both Kim's. */
 function parted(name) {
   const at = name.lastIndexOf(":");
-  return { subject: name.slice(0, at + 1), own: name.slice(at + 1).trim().toUpperCase() };
+  return {
+    subject: name.slice(0, at + 1),
+    own: name
+      .slice(at + 1)
+      .trim()
+      .toUpperCase(),
+  };
 }
 
 function linesOf(markers) {

@@ -29,7 +29,8 @@ async function clipOf(file, clip) {
   const { name, nFrames, skeleton, rate, origin, firstFrame } = clip;
   const segments = clip.signals.map((_, signal) => segmentsOf(clip.segments(signal), nFrames));
   const recording = await known(() => clip.recording());
-  const channels = (signal) => signal.channels.map((channel, i) => ({ ...channel, ...unitOf(signal, recording, i) }));
+  const channels = (signal) =>
+    signal.channels.map((channel, i) => ({ ...channel, ...unitOf(signal, recording, i) }));
   return {
     name,
     nFrames,
@@ -72,7 +73,10 @@ function unitOf({ name, channels }, recording, i) {
 /** Frames that each segment has of those that are shown. */
 function segmentsOf(segments, nFrames) {
   return segments
-    .map(({ firstFrame, nFrames: n }) => [Math.max(0, firstFrame), Math.min(nFrames, firstFrame + n)])
+    .map(({ firstFrame, nFrames: n }) => [
+      Math.max(0, firstFrame),
+      Math.min(nFrames, firstFrame + n),
+    ])
     .filter(([from, to]) => to > from);
 }
 

@@ -1,11 +1,10 @@
-// A file of any format that is read here: an .mcz by its first bytes, others by their names.
+// A file of any format that is read here. What comes from a server or out of the page is an .mcz,
+// whatever its name; what people choose is what its name says.
 
 import { readAmc } from "../inputs/acclaim.js";
 import { readBvh } from "../inputs/bvh.js";
 import { readC3d } from "../inputs/c3d.js";
 import { openMcz } from "./mcz-file.js";
-
-const SIGNATURE = [0x89, 0x4d, 0x43, 0x5a]; // of an .mcz
 
 const READERS = {
   bvh: ({ bytes }, name) => readBvh(bytes, name),
@@ -14,34 +13,58 @@ const READERS = {
 };
 
 /**
- * @param {object} where `{ url, headers }`, `{ blob }` or `{ bytes }`; of an AMC also `skeleton`, the
- *   blob of its ASF
- * @param {{name: string, salvage: boolean}} options
+ * @param {object} where `{ url, headers }` or `{ bytes }` of an .mcz, or `{ blob }`; of an AMC also
+ *   `skeleton`, the blob of its ASF
+ * @param {{name: string, salvage?: boolean, isLater?: boolean}} options `isLater`: a file that is
+ *   read as a whole is read when its clip is wanted
  */
 export async function openFile(where, options) {
   const kind = options.name.slice(options.name.lastIndexOf(".") + 1).toLowerCase();
-  if (!Object.hasOwn(READERS, kind) || (await isMcz(where))) return openMcz(where, options);
-  const bytes = where.bytes ?? (await whole(where.blob));
-  const skeleton = where.skeleton ? await whole(where.skeleton) : null;
-  const clip = READERS[kind]({ bytes, skeleton }, options.name);
-  return {
-    size: bytes.length,
-    nClips: 1,
-    damage: [],
-    rows: () => [rowOf(clip, bytes.length)],
-    clip: async () => clip,
-  };
+  if (!where.blob || !Object.hasOwn(READERS, kind)) return openMcz(where, options);
+  const file = new WholeFile(where, READERS[kind], options.name);
+  if (!options.isLater) await file.clip();
+  return file;
 }
 
-/** What a server or a page made of a file is an .mcz, and has the name of the file that was given. */
-async function isMcz({ url, bytes, blob }) {
-  if (url) return true;
-  const head = bytes ? bytes.subarray(0, 4) : await whole(blob.slice(0, 4));
-  return SIGNATURE.every((byte, k) => head[k] === byte);
+/** A file of one clip, which is held as long as somebody needs it, and then read again. */
+class WholeFile {
+  #read;
+  #held = null;
+  #row = null;
+
+  constructor({ blob, skeleton }, reader, name) {
+    Object.assign(this, { size: blob.size, nClips: 1, damage: [] });
+    this.#read = async () => {
+      const bytes = await whole(blob);
+      return reader({ bytes, skeleton: skeleton ? await whole(skeleton) : null }, name);
+    };
+  }
+
+  async clip() {
+    const held = this.#held?.deref();
+    if (held !== undefined) return held;
+    const clip = await this.#read();
+    this.#held = new WeakRef(clip);
+    this.#row ??= rowOf(clip, this.size);
+    return clip;
+  }
+
+  async rows() {
+    if (this.#row === null) await this.clip();
+    return [this.#row];
+  }
 }
 
 const whole = async (blob) => new Uint8Array(await blob.arrayBuffer());
 
 function rowOf({ name, nFrames, rate, signals }, bytes) {
-  return { index: 0, name, nFrames, rate, codecs: [], nChannels: signals[0].channels.length, bytes };
+  return {
+    index: 0,
+    name,
+    nFrames,
+    rate,
+    codecs: [],
+    nChannels: signals[0].channels.length,
+    bytes,
+  };
 }

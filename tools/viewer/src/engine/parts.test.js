@@ -21,7 +21,19 @@ test("what was used last stays", () => {
 });
 
 test("frames that no segment has", () => {
-  assert.deepEqual(gapsIn([[0, 10], [20, 30]], 40), [[10, 20], [30, 40]]);
+  assert.deepEqual(
+    gapsIn(
+      [
+        [0, 10],
+        [20, 30],
+      ],
+      40,
+    ),
+    [
+      [10, 20],
+      [30, 40],
+    ],
+  );
   assert.deepEqual(gapsIn([], 5), [[0, 5]]);
   assert.deepEqual(gapsIn([[0, 5]], 5), []);
 });
@@ -44,17 +56,34 @@ test("up is from feet to head", () => {
 test("blocks come as they are wanted, few at a time, and what is wanted may change", async () => {
   const asked = [];
   const engine = {
-    positions: (_, from, to) => new Promise((resolve) => asked.push({ from, to, answer: () => resolve(new Float32Array((to - from) * 3).fill(from)) })),
+    positions: (_, from, to) =>
+      new Promise((resolve) =>
+        asked.push({
+          from,
+          to,
+          answer: () => resolve(new Float32Array((to - from) * 3).fill(from)),
+        }),
+      ),
   };
   let arrivals = 0;
   const clip = { points: [{}], nFrames: 2000 };
   const poses = new Poses(engine, clip, () => arrivals++);
   assert.equal(poses.at(0, 3), null);
-  assert.deepEqual(asked.map(({ from }) => from), [0, 256]);
+  assert.deepEqual(
+    asked.map(({ from }) => from),
+    [0, 256],
+  );
   assert.equal(poses.at(1999, 1), null); // the blocks after 256 are not wanted any more
   asked[0].answer();
   await new Promise(setImmediate);
-  assert.deepEqual(asked.map(({ from, to }) => [from, to]), [[0, 256], [256, 512], [1792, 2000]]);
+  assert.deepEqual(
+    asked.map(({ from, to }) => [from, to]),
+    [
+      [0, 256],
+      [256, 512],
+      [1792, 2000],
+    ],
+  );
   asked[1].answer();
   asked[2].answer();
   await new Promise(setImmediate);

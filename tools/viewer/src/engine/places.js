@@ -105,7 +105,7 @@ export class Places {
     }
     const W = this.#W;
     if (parent < 0) W.set(M, 9 * j);
-    else multiply(W, M, this.#T, 9 * parent), W.set(this.#T, 9 * j);
+    else (multiply(W, M, this.#T, 9 * parent), W.set(this.#T, 9 * j));
   }
 
   /** The product of a joint's rotations, in M. */
@@ -120,8 +120,8 @@ export class Places {
       if (quaternion) quaternionRotation(quaternion, row, R);
       else rotation(axis, row[column] * this.radians, R);
       if (isFirst) M.set(R);
-      else if (this.intrinsic) multiply(M, R, T), M.set(T);
-      else multiply(R, M, T), M.set(T);
+      else if (this.intrinsic) (multiply(M, R, T), M.set(T));
+      else (multiply(R, M, T), M.set(T));
       isFirst = false;
     }
   }

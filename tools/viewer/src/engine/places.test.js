@@ -17,7 +17,14 @@ function numbers(seed) {
 function skeletonOf(seed, { intrinsic, angleUnit }) {
   const next = numbers(seed);
   const vector = () => [next() - 0.5, next() - 0.5, next() - 0.5];
-  const kinds = [[TX, TX + 1, TX + 2], [RX + 2, RX, RX + 1], [SX, SX + 2], [LENGTH], [QW, QW + 1, QW + 2, QW + 3], [0]];
+  const kinds = [
+    [TX, TX + 1, TX + 2],
+    [RX + 2, RX, RX + 1],
+    [SX, SX + 2],
+    [LENGTH],
+    [QW, QW + 1, QW + 2, QW + 3],
+    [0],
+  ];
   let firstColumn = 0;
   const joints = Array.from({ length: 9 }, (_, j) => {
     const chosen = kinds.filter(() => next() < 0.45).flat();
@@ -43,7 +50,9 @@ function expected(skeleton, values, mask, nFrames) {
   const slow = new Kinematics(skeleton);
   const n = skeleton.channels.length;
   return Array.from({ length: nFrames }, (_, f) => {
-    const row = Array.from({ length: n }, (_, c) => (mask && !mask[f * n + c] ? NaN : values[f * n + c]));
+    const row = Array.from({ length: n }, (_, c) =>
+      mask && !mask[f * n + c] ? NaN : values[f * n + c],
+    );
     return slow.pose(row).points.flat();
   }).flat();
 }
@@ -63,7 +72,12 @@ for (const intrinsic of [true, false]) {
         places.fill(values, seed % 2 ? mask : null, { nFrames, rowSize }, out);
         const right = expected(skeleton, values, seed % 2 ? mask : null, nFrames);
         assert.equal(out.length, right.length);
-        right.forEach((x, i) => assert.ok(Object.is(out[i], Math.fround(x)) || Math.abs(out[i] - x) < 1e-6, `${out[i]} ${x}`));
+        right.forEach((x, i) =>
+          assert.ok(
+            Object.is(out[i], Math.fround(x)) || Math.abs(out[i] - x) < 1e-6,
+            `${out[i]} ${x}`,
+          ),
+        );
       }
     });
   }

@@ -1,7 +1,14 @@
 // The worker: files, clips and numbers, asked for by messages { id, method, args }, answered by
 // { id, result }, { id, error } and, on the way, { id, progress }.
 
-import { AccessError, LimitExceeded, Refused, Unsupported, annexFrom, setAnnex } from "../../../js/mcz.js";
+import {
+  AccessError,
+  LimitExceeded,
+  Refused,
+  Unsupported,
+  annexFrom,
+  setAnnex,
+} from "../../../js/mcz.js";
 import { curvesOf } from "./curves.js";
 import { errorsBetween } from "./distances.js";
 import { OpenClip } from "./clip.js";
@@ -32,8 +39,9 @@ const METHODS = {
     });
   },
 
-  async open(where, { name, salvage = false }) {
-    const file = await openFile(where, { name, salvage });
+  async open(where, options) {
+    const { name } = options;
+    const file = await openFile(where, options);
     const id = ++nFiles;
     files.set(id, file);
     return { id, name, size: file.size, nClips: file.nClips, damage: file.damage };
@@ -73,7 +81,9 @@ function found(map, key, what) {
 /** The buffers of typed arrays that nobody here needs any more. */
 function buffersOf(result) {
   const values = ArrayBuffer.isView(result) ? [result] : Object.values(result ?? {});
-  const views = values.filter((value) => value instanceof Float32Array || value instanceof Int32Array);
+  const views = values.filter(
+    (value) => value instanceof Float32Array || value instanceof Int32Array,
+  );
   return views.map(({ buffer }) => buffer);
 }
 

@@ -16,10 +16,18 @@ const MOST_BONES = 4096;
  * @throws {SourceError} with the number of the line
  */
 export function readAmc(bytes, skeletonBytes, name) {
-  if (skeletonBytes === null) throw new SourceError("an AMC needs its ASF: choose or drop both together");
+  if (skeletonBytes === null)
+    throw new SourceError("an AMC needs its ASF: choose or drop both together");
   const skeleton = readAsf(textOf(skeletonBytes));
   const values = readFrames(textOf(bytes), skeleton);
-  return clipOf({ name: name.replace(/\.[^.]*$/, ""), skeleton, values, rate: null, format: "amc", path: name });
+  return clipOf({
+    name: name.replace(/\.[^.]*$/, ""),
+    skeleton,
+    values,
+    rate: null,
+    format: "amc",
+    path: name,
+  });
 }
 
 /** The words of each line, with its number; comments and empty lines are left out. */
@@ -39,7 +47,8 @@ const refuse = (number, message) => {
 function vector(words, number) {
   return [0, 1, 2].map((k) => {
     const value = numberOf(words[k] ?? "");
-    if (Number.isNaN(value)) refuse(number, `${shown(words[k] ?? "")}, where a number was expected`);
+    if (Number.isNaN(value))
+      refuse(number, `${shown(words[k] ?? "")}, where a number was expected`);
     return value;
   });
 }
@@ -60,7 +69,8 @@ export function readAsf(text) {
       for (const child of words.slice(1)) asf.links.push({ parent: words[0], child, number });
     }
   }
-  if (asf.bones.size === 0 && asf.section === "") refuse(1, "no :root or :bonedata section; not an ASF file");
+  if (asf.bones.size === 0 && asf.section === "")
+    refuse(1, "no :root or :bonedata section; not an ASF file");
   return skeletonOf({
     name: asf.name,
     intrinsic: false,
@@ -74,7 +84,8 @@ function readUnits(asf, key, words, number) {
   if (key === "length") asf.length = words[1] ?? "";
   if (key !== "angle") return;
   asf.angle = (words[1] ?? "").toLowerCase().slice(0, 3);
-  if (asf.angle !== "deg" && asf.angle !== "rad") refuse(number, `angle unit ${shown(words[1] ?? "")}`);
+  if (asf.angle !== "deg" && asf.angle !== "rad")
+    refuse(number, `angle unit ${shown(words[1] ?? "")}`);
 }
 
 function orderOf(word, number) {
@@ -92,7 +103,15 @@ function readRoot(root, key, words, number) {
 
 function readBone(asf, key, words, number) {
   if (key === "begin") {
-    asf.bone = { name: "", direction: [0, 0, 0], length: 0, axis: [0, 0, 0], order: "XYZ", dofs: [], parent: null };
+    asf.bone = {
+      name: "",
+      direction: [0, 0, 0],
+      length: 0,
+      axis: [0, 0, 0],
+      order: "XYZ",
+      dofs: [],
+      parent: null,
+    };
     return;
   }
   const { bone } = asf;
@@ -118,7 +137,8 @@ function jointsOf({ root, bones, links }) {
   const children = new Map();
   for (const { parent, child, number } of links) {
     const bone = bones.get(child);
-    if (!bone || (parent !== "root" && !bones.has(parent))) refuse(number, `${shown(parent)} ${shown(child)}: no such bone`);
+    if (!bone || (parent !== "root" && !bones.has(parent)))
+      refuse(number, `${shown(parent)} ${shown(child)}: no such bone`);
     if (bone.parent !== null) refuse(number, `bone ${shown(child)} has two parents`);
     bone.parent = parent;
     if (!children.has(parent)) children.set(parent, []);
@@ -129,20 +149,29 @@ function jointsOf({ root, bones, links }) {
   while (waiting.length > 0) {
     const { bone, parent } = waiting.pop();
     const tail = bone.direction.map((x) => x * bone.length);
-    const index = joints.push(jointOf(bone, parent, joints[parent].tails[0] ?? [0, 0, 0], [tail])) - 1;
-    for (const child of [...(children.get(bone.name) ?? [])].reverse()) waiting.push({ bone: child, parent: index });
+    const index =
+      joints.push(jointOf(bone, parent, joints[parent].tails[0] ?? [0, 0, 0], [tail])) - 1;
+    for (const child of [...(children.get(bone.name) ?? [])].reverse())
+      waiting.push({ bone: child, parent: index });
   }
   return joints;
 }
 
 function jointOf({ name, dofs, axis, order }, parent, offset, tails) {
-  const channels = dofs.map((dof) => (Object.hasOwn(KINDS, dof) ? { kind: KINDS[dof] } : { kind: 0, name: dof }));
+  const channels = dofs.map((dof) =>
+    Object.hasOwn(KINDS, dof) ? { kind: KINDS[dof] } : { kind: 0, name: dof },
+  );
   return { name, parent, offset, tails, axis, axisOrder: ORDERS.indexOf(order), channels };
 }
 
 /** Rows of all columns. A bone that a frame leaves out keeps the values of the frame before. */
 function readFrames(text, skeleton) {
-  const columns = new Map(skeleton.joints.map(({ name, firstColumn, channels }) => [name, { firstColumn, n: channels.length }]));
+  const columns = new Map(
+    skeleton.joints.map(({ name, firstColumn, channels }) => [
+      name,
+      { firstColumn, n: channels.length },
+    ]),
+  );
   const width = skeleton.channels.length;
   const rows = [];
   let row = null;
@@ -156,10 +185,12 @@ function readFrames(text, skeleton) {
     if (row === null) refuse(number, `${shown(words[0])} before the first frame`);
     const place = columns.get(words[0]);
     if (place === undefined) refuse(number, `bone ${shown(words[0])}, which the ASF does not have`);
-    if (words.length - 1 !== place.n) refuse(number, `${words.length - 1} values of ${place.n} of bone ${shown(words[0])}`);
+    if (words.length - 1 !== place.n)
+      refuse(number, `${words.length - 1} values of ${place.n} of bone ${shown(words[0])}`);
     for (let i = 0; i < place.n; i++) {
       const value = numberOf(words[i + 1]);
-      if (Number.isNaN(value)) refuse(number, `${shown(words[i + 1])}, where a number was expected`);
+      if (Number.isNaN(value))
+        refuse(number, `${shown(words[i + 1])}, where a number was expected`);
       row[place.firstColumn + i] = value;
     }
   }

@@ -24,12 +24,17 @@ const MOST_CHANNELS = 16384;
 export function readBvh(bytes, name) {
   const reader = new Reader(textOf(bytes));
   const joints = reader.hierarchy();
-  const { rate, values, declared } = reader.motion(joints.reduce((sum, { channels }) => sum + channels.length, 0));
+  const { rate, values, declared } = reader.motion(
+    joints.reduce((sum, { channels }) => sum + channels.length, 0),
+  );
   decidePositions(joints, values);
   const skeleton = skeletonOf({ intrinsic: true, joints });
   const clip = clipOf({ name: stem(name), skeleton, values, rate, format: "bvh", path: name });
   if (clip.nFrames !== declared) {
-    clip.metadata.push(["source-note", `${declared} frames are declared, ${clip.nFrames} are there`]);
+    clip.metadata.push([
+      "source-note",
+      `${declared} frames are declared, ${clip.nFrames} are there`,
+    ]);
   }
   return clip;
 }
@@ -53,12 +58,18 @@ class Reader {
   #refuse(message) {
     let line = 1;
     const end = Math.max(0, this.#word.lastIndex - 1);
-    for (let at = this.#text.indexOf("\n"); at >= 0 && at < end; at = this.#text.indexOf("\n", at + 1)) line++;
+    for (
+      let at = this.#text.indexOf("\n");
+      at >= 0 && at < end;
+      at = this.#text.indexOf("\n", at + 1)
+    )
+      line++;
     throw new SourceError(`line ${line}: ${message}`);
   }
 
   hierarchy() {
-    if (this.#next().toUpperCase() !== "HIERARCHY") this.#refuse("no HIERARCHY section at the start; not a BVH file");
+    if (this.#next().toUpperCase() !== "HIERARCHY")
+      this.#refuse("no HIERARCHY section at the start; not a BVH file");
     const joints = [];
     const open = []; // { joint, end }: joint -1 for an end site's parent
     for (;;) {
@@ -85,7 +96,11 @@ class Reader {
           if (joints.length === 0) this.#refuse("no joint");
           return joints;
         default:
-          this.#refuse(word === "" ? "the file ends in its HIERARCHY" : `${shown(word)} in the HIERARCHY section`);
+          this.#refuse(
+            word === ""
+              ? "the file ends in its HIERARCHY"
+              : `${shown(word)} in the HIERARCHY section`,
+          );
       }
     }
   }
@@ -101,7 +116,13 @@ class Reader {
       const { tails } = joints[above.index];
       return { isEnd: true, index: above.index, offset: (vector) => tails.push(vector) };
     }
-    const joint = { name: line.trim(), parent: above?.index ?? -1, offset: [0, 0, 0], tails: [], channels: [] };
+    const joint = {
+      name: line.trim(),
+      parent: above?.index ?? -1,
+      offset: [0, 0, 0],
+      tails: [],
+      channels: [],
+    };
     joints.push(joint);
     if (joints.length > MOST_JOINTS) this.#refuse(`more than ${MOST_JOINTS} joints`);
     return { isEnd: false, index: joints.length - 1, offset: (vector) => (joint.offset = vector) };
@@ -118,10 +139,12 @@ class Reader {
 
   #channels() {
     const word = this.#next();
-    if (!/^\d{1,6}$/.test(word) || Number(word) > MOST_CHANNELS) this.#refuse(`CHANNELS ${shown(word)}: not a count`);
+    if (!/^\d{1,6}$/.test(word) || Number(word) > MOST_CHANNELS)
+      this.#refuse(`CHANNELS ${shown(word)}: not a count`);
     return Array.from({ length: Number(word) }, () => {
       const name = this.#next();
-      if (name === "" || name === "{" || name === "}") this.#refuse("fewer channels than CHANNELS says");
+      if (name === "" || name === "{" || name === "}")
+        this.#refuse("fewer channels than CHANNELS says");
       const kind = KINDS[name.toLowerCase()] ?? 0;
       return kind === 0 ? { kind, name } : { kind };
     });
@@ -189,11 +212,19 @@ function decidePositions(joints, values) {
   let votes = 0;
   let column = 0;
   for (const joint of joints) {
-    const moved = joint.channels.flatMap(({ kind }, i) => (kind >= 1 && kind <= 3 ? [[kind - 1, column + i]] : []));
+    const moved = joint.channels.flatMap(({ kind }, i) =>
+      kind >= 1 && kind <= 3 ? [[kind - 1, column + i]] : [],
+    );
     column += joint.channels.length;
     if (moved.length === 0 || values.length === 0) continue;
     const isRoot = joint.parent < 0;
-    const { toOffset, toZero } = distances(moved, joint.offset, values, isRoot ? width : values.length, width);
+    const { toOffset, toZero } = distances(
+      moved,
+      joint.offset,
+      values,
+      isRoot ? width : values.length,
+      width,
+    );
     if (isRoot) joint.positionsAdd = !(toOffset < toZero);
     else {
       others.push(joint);

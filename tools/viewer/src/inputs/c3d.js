@@ -35,15 +35,25 @@ export function readC3d(bytes, name) {
     joints,
   });
   const { values, mask } = pointsOf(bytes, file, nFrames, order);
-  const clip = clipOf({ name: name.replace(/\.[^.]*$/, ""), skeleton, values, mask, rate: file.rate, format: "c3d", path: name });
+  const clip = clipOf({
+    name: name.replace(/\.[^.]*$/, ""),
+    skeleton,
+    values,
+    mask,
+    rate: file.rate,
+    format: "c3d",
+    path: name,
+  });
   return { ...clip, firstFrame: file.first };
 }
 
 function headOf(bytes) {
-  if (bytes.length < 2 * BLOCK || bytes[1] !== MAGIC) throw new SourceError("byte 0: not a C3D file");
+  if (bytes.length < 2 * BLOCK || bytes[1] !== MAGIC)
+    throw new SourceError("byte 0: not a C3D file");
   const start = (bytes[0] - 1) * BLOCK;
   const processor = bytes[start + 3];
-  if (![84, 85, 86].includes(processor)) throw new SourceError(`byte ${start + 3}: processor ${processor}`);
+  if (![84, 85, 86].includes(processor))
+    throw new SourceError(`byte ${start + 3}: processor ${processor}`);
   const order = new Order(processor);
   const parameters = findParameters(bytes, new Uint8Array(0), bytes.length, order);
   const scale = parameters.number("POINT", "SCALE") ?? order.float(bytes, 12);
@@ -83,7 +93,8 @@ function pointsOf(bytes, { size, stride, data, nPoints, scale }, nFrames, order)
   for (let frame = 0; frame < nFrames; frame++) {
     let at = data + frame * stride;
     for (let point = 0; point < nPoints; point++, at += 4 * size, out += 3) {
-      const word = (k) => (size === 4 ? order.float(bytes, at + 4 * k) : scale * signed(at + 2 * k));
+      const word = (k) =>
+        size === 4 ? order.float(bytes, at + 4 * k) : scale * signed(at + 2 * k);
       const isValid = size === 4 ? order.float(bytes, at + 12) >= 0 : signed(at + 6) >= 0;
       for (let k = 0; k < 3; k++) {
         values[out + k] = word(k);

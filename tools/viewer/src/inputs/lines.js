@@ -28,7 +28,7 @@ const NUMBER = /^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$/;
 /** The number that a word is; NaN where it is none. */
 export function numberOf(word) {
   const number = Number(word);
-  return word !== "" && (Number.isFinite(number) && NUMBER.test(word)) ? number : NaN;
+  return word !== "" && Number.isFinite(number) && NUMBER.test(word) ? number : NaN;
 }
 
 const DEGREES = 1;
@@ -70,11 +70,31 @@ export function clipOf({ name, skeleton, values, rate, format, path, mask = null
 }
 
 /** A skeleton as the decoder has them: columns counted, channels in one list. */
-export function skeletonOf({ name = "", intrinsic, unitCm = null, angleUnit = DEGREES, upAxis = 0, joints }) {
+export function skeletonOf({
+  name = "",
+  intrinsic,
+  unitCm = null,
+  angleUnit = DEGREES,
+  upAxis = 0,
+  joints,
+}) {
   let firstColumn = 0;
   const counted = joints.map((joint, index) => {
-    const channels = joint.channels.map((channel) => ({ name: "", unit: "", ...channel, joint: index }));
-    const out = { positionsAdd: true, axis: [0, 0, 0], axisOrder: 0, tails: [], ...joint, channels, firstColumn };
+    const channels = joint.channels.map((channel) => ({
+      name: "",
+      unit: "",
+      ...channel,
+      joint: index,
+    }));
+    const out = {
+      positionsAdd: true,
+      axis: [0, 0, 0],
+      axisOrder: 0,
+      tails: [],
+      ...joint,
+      channels,
+      firstColumn,
+    };
     firstColumn += channels.length;
     return out;
   });

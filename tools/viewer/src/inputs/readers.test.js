@@ -37,7 +37,10 @@ test("a BVH", async () => {
   const [hips, leg] = clip.skeleton.joints;
   assert.deepEqual([hips.name, leg.name, leg.parent, leg.firstColumn], ["Hips", "Left Leg", 0, 6]);
   assert.deepEqual(leg.tails, [[0, -3, 0]]);
-  assert.deepEqual(hips.channels.map(({ kind }) => kind), [1, 2, 3, 6, 4, 5]);
+  assert.deepEqual(
+    hips.channels.map(({ kind }) => kind),
+    [1, 2, 3, 6, 4, 5],
+  );
   const { values } = await clip.read(0, 1, 2);
   assert.deepEqual([...values], [10, 2, 3, 4, 5, 6, 7, 8, -0.9]);
 });
@@ -58,7 +61,11 @@ const FAULTS = [
 
 test("what is wrong with a BVH is told with its line", () => {
   for (const [text, message] of FAULTS) {
-    assert.throws(() => readBvh(bytes(text), "a.bvh"), (error) => error.name === "SourceError" && message.test(error.message), text.slice(0, 30));
+    assert.throws(
+      () => readBvh(bytes(text), "a.bvh"),
+      (error) => error.name === "SourceError" && message.test(error.message),
+      text.slice(0, 30),
+    );
   }
 });
 
@@ -92,11 +99,19 @@ const ASF = `:version 1.10
     thigh shin
   end
 `;
-const AMC = "#!x\n:FULLY-SPECIFIED\n:DEGREES\n1\nroot 1 2 3 4 5 6\nthigh 7 8\nshin 9\n2\nroot 0 0 0 0 0 0\nthigh 1 1\nshin 2\n";
+const AMC =
+  "#!x\n:FULLY-SPECIFIED\n:DEGREES\n1\nroot 1 2 3 4 5 6\nthigh 7 8\nshin 9\n2\nroot 0 0 0 0 0 0\nthigh 1 1\nshin 2\n";
 
 test("an AMC with its ASF", async () => {
   const clip = readAmc(bytes(AMC), bytes(ASF), "a.amc");
-  assert.deepEqual(clip.skeleton.joints.map(({ name, parent }) => [name, parent]), [["root", -1], ["thigh", 0], ["shin", 1]]);
+  assert.deepEqual(
+    clip.skeleton.joints.map(({ name, parent }) => [name, parent]),
+    [
+      ["root", -1],
+      ["thigh", 0],
+      ["shin", 1],
+    ],
+  );
   assert.deepEqual(clip.skeleton.joints[2].offset, [3, 0, 0]);
   assert.deepEqual(clip.skeleton.joints[2].tails, [[0, -4, 0]]);
   assert.equal(clip.skeleton.joints[1].axisOrder, 5);
@@ -107,10 +122,22 @@ test("an AMC with its ASF", async () => {
 
 test("what is wrong with an AMC or an ASF is told with its line", () => {
   assert.throws(() => readAmc(bytes(AMC), null, "a.amc"), /needs its ASF/);
-  assert.throws(() => readAmc(bytes(AMC.replace("shin 9", "fin 9")), bytes(ASF), "a"), /line 7: bone "fin"/);
-  assert.throws(() => readAmc(bytes(AMC.replace("shin 9", "shin")), bytes(ASF), "a"), /line 7: 0 values of 1/);
-  assert.throws(() => readAmc(bytes(AMC), bytes(ASF.replace("thigh shin", "thigh toe")), "a"), /line 28: "thigh" "toe": no such bone/);
-  assert.throws(() => readAmc(bytes(AMC), bytes(ASF.replace("angle deg", "angle turns")), "a"), /line 4: angle unit/);
+  assert.throws(
+    () => readAmc(bytes(AMC.replace("shin 9", "fin 9")), bytes(ASF), "a"),
+    /line 7: bone "fin"/,
+  );
+  assert.throws(
+    () => readAmc(bytes(AMC.replace("shin 9", "shin")), bytes(ASF), "a"),
+    /line 7: 0 values of 1/,
+  );
+  assert.throws(
+    () => readAmc(bytes(AMC), bytes(ASF.replace("thigh shin", "thigh toe")), "a"),
+    /line 28: "thigh" "toe": no such bone/,
+  );
+  assert.throws(
+    () => readAmc(bytes(AMC), bytes(ASF.replace("angle deg", "angle turns")), "a"),
+    /line 4: angle unit/,
+  );
   assert.throws(() => readAmc(bytes(AMC), bytes("hello"), "a"), /not an ASF file/);
 });
 
@@ -152,7 +179,10 @@ for (const processor of [84, 85, 86]) {
     test(`a C3D of processor ${processor}, ${floats ? "floats" : "integers"}`, async () => {
       const clip = readC3d(c3dOf({ floats, processor }), "a.c3d");
       assert.deepEqual([clip.nFrames, clip.rate, clip.firstFrame], [3, 100, 5]);
-      assert.deepEqual(clip.skeleton.joints.map(({ name }) => name), ["point 1", "point 2"]);
+      assert.deepEqual(
+        clip.skeleton.joints.map(({ name }) => name),
+        ["point 1", "point 2"],
+      );
       const { values, mask } = await clip.read(0, 1, 2);
       assert.deepEqual([...values], [16, 17, 18, 24, 25, 26]);
       assert.deepEqual([...mask], [1, 1, 1, 0, 0, 0]);
@@ -174,11 +204,16 @@ test("rates that frame times state with few digits", () => {
 
 test("each AMC gets its ASF", () => {
   const file = (name) => ({ name });
-  const found = gathered(["02.asf", "02_01.amc", "walk.bvh", "x.txt", "05.asf", "05_3.amc", "99_1.amc"].map(file));
-  assert.deepEqual(found.map((one) => [one.file.name, one.skeleton?.name ?? null]), [
-    ["02_01.amc", "02.asf"],
-    ["walk.bvh", null],
-    ["05_3.amc", "05.asf"],
-    ["99_1.amc", null],
-  ]);
+  const found = gathered(
+    ["02.asf", "02_01.amc", "walk.bvh", "x.txt", "05.asf", "05_3.amc", "99_1.amc"].map(file),
+  );
+  assert.deepEqual(
+    found.map((one) => [one.file.name, one.skeleton?.name ?? null]),
+    [
+      ["02_01.amc", "02.asf"],
+      ["walk.bvh", null],
+      ["05_3.amc", "05.asf"],
+      ["99_1.amc", null],
+    ],
+  );
 });

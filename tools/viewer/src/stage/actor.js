@@ -2,6 +2,7 @@
 
 import { Poses } from "../engine/poses.js";
 import { rateOf } from "../timeline/clock.js";
+import { anatomyOf } from "./anatomy.js";
 import { Axes, between } from "./axes.js";
 import { Body } from "./body.js";
 import { boundsOf, facing, measured, quantile, scaleOf } from "./framing.js";
@@ -34,7 +35,8 @@ export class Actor {
     if (this.poses.fault !== null) throw this.poses.fault;
     const there = Math.min(nFrames, this.poses.blockFrames);
     this.samples = this.#held(there, FIRST_SAMPLES);
-    if (nFrames > there && nFrames <= SMALL) await this.lookFurther();
+    const isNowhere = this.samples.every((places) => places.every(Number.isNaN));
+    if (nFrames > there && (nFrames <= SMALL || isNowhere)) await this.lookFurther();
   }
 
   #held(count, most) {
@@ -59,7 +61,8 @@ export class Actor {
 
   /** Decides about axes and size; `scale` of another clip that this one is compared with. */
   place(up, scale = null) {
-    const { size, floor } = measured(this.samples, up);
+    this.anatomy = anatomyOf(this.clip, this.samples);
+    const { size, floor } = measured(this.samples, up, this.anatomy.loose);
     this.size = size;
     this.axes = new Axes(up, scale ?? scaleOf(size));
     this.floor = floor * this.axes.scale;
@@ -72,7 +75,7 @@ export class Actor {
 
   build(look) {
     this.body?.dispose();
-    this.body = new Body(this.clip, this.#fullest(), look);
+    this.body = new Body(this.clip, this.anatomy, this.#fullest(), look);
     return this.body;
   }
 
@@ -89,9 +92,15 @@ export class Actor {
   /** The box of the samples, in units of the picture. */
   extent() {
     const out = new Float32Array(this.places.length);
-    let box = { least: [Infinity, Infinity, Infinity], most: [-Infinity, -Infinity, -Infinity] };
-    for (const sample of this.samples) box = boundsOf(this.axes.apply(sample, out), box.least, box.most);
-    return box;
+    const boxes = this.samples.map((sample) => this.bounds(this.axes.apply(sample, out)));
+    const ends = (name, choose) =>
+      [0, 1, 2].map((k) => choose(...boxes.map((box) => box[name][k])));
+    return { least: ends("least", Math.min), most: ends("most", Math.max) };
+  }
+
+  /** The box of the figure where it is in a frame. */
+  bounds(places) {
+    return boundsOf(places, this.anatomy.loose);
   }
 
   /**
@@ -149,7 +158,13 @@ export class Actor {
     const factor = (rateOf(this.clip) / (high - low)) * ((this.clip.unitCm ?? 100) / 100);
     for (let point = 0; point < out.length; point++) {
       const k = 3 * point;
-      out[point] = factor * Math.hypot(after[k] - before[k], after[k + 1] - before[k + 1], after[k + 2] - before[k + 2]);
+      out[point] =
+        factor *
+        Math.hypot(
+          after[k] - before[k],
+          after[k + 1] - before[k + 1],
+          after[k + 2] - before[k + 2],
+        );
     }
     return out;
   }

@@ -8,11 +8,11 @@ const TAPER = 0.6;
 const THIN = 0.006; // least and greatest radius, in units of the picture
 const THICK = 0.044;
 const HEAD = /head/i;
-const HEAD_WIDTH = [0.045, 0.075];
+const HEAD_WIDTH = [0.04, 0.075];
 const LINE = 0.0055; // radius of a line between markers
 const MARKER = 0.019;
-const MOST_LENGTH = 0.75; // of the figure: what is longer is no bone, but the way to a reference
-const CHOSEN = 1.55; // how much larger a chosen point is
+const HEAD_LENGTH = 0.08; // at least
+const CHOSEN = [1.55, 0.026]; // how much larger a chosen point is, and its least radius
 
 /** What is drawn of a clip in one frame. */
 export class Body {
@@ -23,24 +23,28 @@ export class Body {
   #colors = [];
 
   /**
-   * @param {{points: object[], bones: number[][], isMarkers: boolean}} clip
+   * @param {{points: object[], isMarkers: boolean}} clip
+   * @param {{bones: number[][], loose: Set<number>}} anatomy see anatomy.js
    * @param {Float32Array} places of some frame, in units of the picture, from which lengths come
    * @param {{opacity?: number}} look
    */
-  constructor(clip, places, look = {}) {
+  constructor(clip, { bones, loose }, places, look = {}) {
     this.clip = clip;
     this.group = new Group();
     this.places = new Float32Array(clip.points.length * 3).fill(NaN);
     this.last = new Float32Array(clip.points.length * 3).fill(NaN); // where points were seen last
-    const bones = clip.bones.filter((bone) => clip.isMarkers || isBone(bone, places));
-    const heads = clip.isMarkers ? [] : headsOf(bones, clip.points);
+    this.loose = loose;
+    const heads = clip.isMarkers ? [] : headsOf(bones, clip.points, places);
     this.bones = [...bones.filter((bone) => !heads.includes(bone)), ...heads];
     this.nHeads = heads.length;
     this.#bones = solids(boneShape(), this.bones.length - heads.length, look);
     this.#heads = solids(headShape(), heads.length, look);
     this.#balls = solids(ballShape(), clip.points.length, look);
     for (const mesh of this.#meshes()) {
-      mesh.instanceColor = new InstancedBufferAttribute(new Float32Array(3 * mesh.instanceMatrix.count).fill(1), 3);
+      mesh.instanceColor = new InstancedBufferAttribute(
+        new Float32Array(3 * mesh.instanceMatrix.count).fill(1),
+        3,
+      );
       this.group.add(mesh);
     }
     this.#measure(places);
@@ -72,7 +76,11 @@ export class Body {
         ofBalls[b] = Math.max(ofBalls[b], (HEAD.test(points[b].name) ? 0.3 : 0.6) * radius);
       });
     }
-    this.#radii = { ofBones, ofBalls: ofBalls.map((radius) => Math.max(radius, THIN)) };
+    const isDrawn = (point) => !this.loose.has(point);
+    this.#radii = {
+      ofBones,
+      ofBalls: ofBalls.map((radius, point) => (isDrawn(point) ? Math.max(radius, THIN) : 0)),
+    };
   }
 
   radius(point) {
@@ -87,7 +95,9 @@ export class Body {
     const color = new Color();
     const write = ([mesh, index], rgb) => mesh.instanceColor.setXYZ(index, rgb[0], rgb[1], rgb[2]);
     const special = color.set(theme.chosen).toArray();
-    this.#colors = this.clip.points.map((_, point) => (chosen.includes(point) ? special : colorOf(point)));
+    this.#colors = this.clip.points.map((_, point) =>
+      chosen.includes(point) ? special : colorOf(point),
+    );
     this.bones.forEach(([a, b], i) => write(this.#solid(i), this.#boneColor(a, b, colorOf)));
     this.#colors.forEach((rgb, point) => write([this.#balls, point], rgb));
     for (const mesh of this.#meshes()) mesh.instanceColor.needsUpdate = true;
@@ -110,9 +120,16 @@ export class Body {
       const isThere = !Number.isNaN(places[k]);
       if (isThere) for (let axis = 0; axis < 3; axis++) this.last[k + axis] = places[k + axis];
       const from = isThere ? places : this.last;
-      const grown = ofBalls[point] * (chosen.includes(point) ? CHOSEN : isThere ? 1 : 0.7);
+      const grown = radiusOf(ofBalls[point], isThere, chosen.includes(point));
       const isAnywhere = !Number.isNaN(from[k]);
-      setBall(balls, point, from[k] || 0, from[k + 1] || 0, from[k + 2] || 0, isAnywhere ? grown : 0);
+      setBall(
+        balls,
+        point,
+        from[k] || 0,
+        from[k + 1] || 0,
+        from[k + 2] || 0,
+        isAnywhere ? grown : 0,
+      );
       const rgb = isThere ? this.#colors[point] : gone;
       if (rgb) this.#balls.instanceColor.setXYZ(point, rgb[0], rgb[1], rgb[2]);
     }
@@ -135,6 +152,11 @@ export class Body {
   }
 }
 
+function radiusOf(radius, isThere, isChosen) {
+  if (isChosen) return Math.max(CHOSEN[0] * radius, CHOSEN[1]);
+  return isThere ? radius : 0.7 * radius;
+}
+
 const within = (value, least, most) => Math.max(least, Math.min(most, value));
 
 function distance(places, a, b) {
@@ -142,12 +164,10 @@ function distance(places, a, b) {
 }
 
 /** Bones that lead to a head and no further. */
-function headsOf(bones, points) {
+function headsOf(bones, points, places) {
   const starts = new Set(bones.map(([a]) => a));
-  return bones.filter(([, b]) => HEAD.test(points[b].name) && !starts.has(b)).slice(0, 1);
-}
-
-function isBone([a, b], places) {
-  const length = distance(places, a, b);
-  return !(length > MOST_LENGTH * 1.7) && length !== 0;
+  const isLong = (a, b) => distance(places, a, b) > HEAD_LENGTH;
+  return bones
+    .filter(([a, b]) => HEAD.test(points[b].name) && !starts.has(b) && isLong(a, b))
+    .slice(0, 1);
 }

@@ -57,7 +57,10 @@ export class Camera {
    */
   look({ least, most }, { name, facing = 0, atOnce = false }) {
     const middle = new Vector3(...least.map((x, k) => (x + most[k]) / 2));
-    const direction = name === "fit" ? this.#direction() : directionOf(VIEWS[name] ?? VIEWS["three-quarter"], facing);
+    const direction =
+      name === "fit"
+        ? this.#direction()
+        : directionOf(VIEWS[name] ?? VIEWS["three-quarter"], facing);
     const distance = this.#distance({ least, most }, direction) * MARGIN;
     const position = middle.clone().addScaledVector(direction, distance);
     this.touched = false;
@@ -160,7 +163,9 @@ export class Camera {
     const angle = Math.asin(Math.max(-1, Math.min(1, arm.y / arm.length())));
     const turned = Math.max(-1.5, Math.min(1.5, angle + y * TURN));
     const about = Math.atan2(arm.x, arm.z) + x * TURN;
-    camera.position.copy(controls.target).addScaledVector(directionOf([about, turned], 0), arm.length());
+    camera.position
+      .copy(controls.target)
+      .addScaledVector(directionOf([about, turned], 0), arm.length());
   }
 
   #zoom(factor) {

@@ -22,7 +22,10 @@ export function stagePicture() {
   const { view } = mounted();
   view.draw(); // what was drawn before need not be there any more
   return new Promise((resolve, reject) => {
-    view.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error("no picture"))), "image/png");
+    view.canvas.toBlob(
+      (blob) => (blob ? resolve(blob) : reject(new Error("no picture"))),
+      "image/png",
+    );
   });
 }
 
@@ -42,16 +45,27 @@ export function videoType() {
  */
 export async function recordVideo({ store }, options = {}) {
   const shown = store.get("shown");
-  const { from = 0, to = shown?.nFrames ?? 0, type = videoType(), onProgress = () => {}, signal } = options;
+  const {
+    from = 0,
+    to = shown?.nFrames ?? 0,
+    type = videoType(),
+    onProgress = () => {},
+    signal,
+  } = options;
   if (shown === null || to <= from) throw new Error("there is nothing to record");
   if (type === null) throw new Error("this browser does not record films");
   const { view } = mounted();
-  const recorder = new MediaRecorder(view.canvas.captureStream(PICTURES), { mimeType: type, videoBitsPerSecond: BITS });
+  const recorder = new MediaRecorder(view.canvas.captureStream(PICTURES), {
+    mimeType: type,
+    videoBitsPerSecond: BITS,
+  });
   const parts = [];
   recorder.addEventListener("dataavailable", ({ data }) => data.size > 0 && parts.push(data));
   const ended = new Promise((resolve, reject) => {
     recorder.addEventListener("stop", resolve);
-    recorder.addEventListener("error", ({ error }) => reject(error ?? new Error("the film was not recorded")));
+    recorder.addEventListener("error", ({ error }) =>
+      reject(error ?? new Error("the film was not recorded")),
+    );
   });
   const before = { frame: store.get("frame"), loop: store.get("loop"), playing: false };
   store.set({ playing: false });
@@ -75,7 +89,8 @@ function played(store, { from, to, shown, onProgress, signal }) {
       store.set({ frame });
       onProgress((frame - from) / Math.max(1, to - 1 - from));
       const isOver = frame >= to - 1 || signal?.aborted || store.get("shown") !== shown;
-      if (isOver) setTimeout(resolve, 120); // the last picture is to be in it
+      if (isOver)
+        setTimeout(resolve, 120); // the last picture is to be in it
       else requestAnimationFrame(step);
     };
     requestAnimationFrame(step);

@@ -8,14 +8,15 @@ const NEAR_ZERO = [-0.015, 0.06]; // of the figure's size: the floor is at 0 the
 /**
  * @param {Float32Array[]} frames x, y, z of each point, in units of the file
  * @param {number} up axis
+ * @param {Set<number>} loose points that do not count
  * @returns {{size: number, floor: number}} of the figure along its longest side, and height of the
  *   floor, in units of the file; size 0 where there is no figure
  */
-export function measured(frames, up) {
+export function measured(frames, up, loose = new Set()) {
   const sizes = [];
   const lowest = [];
   for (const places of frames) {
-    const { least, most } = boundsOf(places);
+    const { least, most } = boundsOf(places, loose);
     if (least[0] > most[0]) continue;
     sizes.push(Math.max(...most.map((x, k) => x - least[k])));
     lowest.push(least[up]);
@@ -26,10 +27,12 @@ export function measured(frames, up) {
   return { size, floor };
 }
 
-/** Least and most of x, y and z, without points that are nowhere. */
-export function boundsOf(places, least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity]) {
+/** Least and most of x, y and z, without points that are nowhere or do not count. */
+export function boundsOf(places, loose = new Set()) {
+  const least = [Infinity, Infinity, Infinity];
+  const most = [-Infinity, -Infinity, -Infinity];
   for (let k = 0; k < places.length; k += 3) {
-    if (Number.isNaN(places[k])) continue;
+    if (Number.isNaN(places[k]) || loose.has(k / 3)) continue;
     for (let axis = 0; axis < 3; axis++) {
       least[axis] = Math.min(least[axis], places[k + axis]);
       most[axis] = Math.max(most[axis], places[k + axis]);
@@ -75,7 +78,15 @@ function meanOf(points, places, side) {
   return count === 0 ? null : sum.map((x) => x / count);
 }
 
-const CM_NAMES = { 0.001: "0.01 mm", 0.01: "0.1 mm", 0.1: "1 mm", 1: "1 cm", 10: "10 cm", 100: "1 m", 1000: "10 m" };
+const CM_NAMES = {
+  0.001: "0.01 mm",
+  0.01: "0.1 mm",
+  0.1: "1 mm",
+  1: "1 cm",
+  10: "10 cm",
+  100: "1 m",
+  1000: "10 m",
+};
 
 /**
  * Lines of the floor: a tenth of the figure and ten times that, as round lengths.
@@ -87,9 +98,16 @@ const CM_NAMES = { 0.001: "0.01 mm", 0.01: "0.1 mm", 0.1: "1 mm", 1: "1 cm", 10:
 export function gridOf(size, unitCm) {
   const length = (size || 1) * (unitCm ?? 1);
   const major = 10 ** Math.floor(Math.log10(length) + 0.15);
-  const name = (value) => (unitCm === null ? `${round(value)} ${round(value) === 1 ? "unit" : "units"}` : (CM_NAMES[round(value)] ?? `${round(value)} cm`));
+  const name = (value) =>
+    unitCm === null
+      ? `${round(value)} ${round(value) === 1 ? "unit" : "units"}`
+      : (CM_NAMES[round(value)] ?? `${round(value)} cm`);
   const lengthOf = (value) => value / (unitCm ?? 1);
-  return { minor: lengthOf(major / 10), major: lengthOf(major), text: `${name(major / 10)} · ${name(major)}` };
+  return {
+    minor: lengthOf(major / 10),
+    major: lengthOf(major),
+    text: `${name(major / 10)} · ${name(major)}`,
+  };
 }
 
 const round = (value) => Number(value.toPrecision(6));

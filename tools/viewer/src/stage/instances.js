@@ -1,6 +1,14 @@
 // Many solids of one shape, whose matrices are written as numbers.
 
-import { CapsuleGeometry, DynamicDrawUsage, InstancedMesh, LatheGeometry, MeshLambertMaterial, SphereGeometry, Vector2 } from "three";
+import {
+  CapsuleGeometry,
+  DynamicDrawUsage,
+  InstancedMesh,
+  LatheGeometry,
+  MeshLambertMaterial,
+  SphereGeometry,
+  Vector2,
+} from "three";
 
 /** A bone of length 1 along y and radius 1: thick near its start, thin at its end. */
 export function boneShape() {

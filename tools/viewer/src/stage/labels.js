@@ -21,6 +21,8 @@ export class Labels {
   }
 
   setNote(text) {
+    if (text === this.noteText) return;
+    this.noteText = text;
     this.note.hidden = text === "";
     this.note.textContent = text;
   }
@@ -90,7 +92,9 @@ const v = new Vector3();
  */
 export function project(places, camera, { width, height, offset }, out) {
   for (let k = 0; k < places.length; k += 3) {
-    v.set(places[k] + offset[0], places[k + 1] + offset[1], places[k + 2] + offset[2]).project(camera);
+    v.set(places[k] + offset[0], places[k + 1] + offset[1], places[k + 2] + offset[2]).project(
+      camera,
+    );
     out[k] = ((v.x + 1) / 2) * width;
     out[k + 1] = ((1 - v.y) / 2) * height;
     out[k + 2] = v.z;

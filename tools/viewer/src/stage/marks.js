@@ -1,6 +1,13 @@
 // What motion leaves behind: trails of chosen points, and where feet stand.
 
-import { Color, Group, InstancedMesh, InstancedBufferAttribute, MeshBasicMaterial, RingGeometry } from "three";
+import {
+  Color,
+  Group,
+  InstancedMesh,
+  InstancedBufferAttribute,
+  MeshBasicMaterial,
+  RingGeometry,
+} from "three";
 import { rateOf } from "../timeline/clock.js";
 import { rodShape, setBone, solids } from "./instances.js";
 
@@ -10,6 +17,7 @@ const FOOT = /foot|toe|heel|ankle|ball|(?:^|[:_ ])[lr](?:hee|toe|ank|mt5|mt1)$/i
 const HIGH = 0.075; // of the figure above the floor
 const FAST = 0.28; // of the figure, a second
 const MOST_FEET = 24;
+const APART = 0.13; // of rings: of points that are nearer one has a ring
 
 export class Trails {
   constructor() {
@@ -48,7 +56,10 @@ export class Trails {
         const away = Math.abs(at - frame) / reach;
         const index = this.mesh.count++;
         setBone(this.mesh.instanceMatrix.array, index, before, 0, 1, at > frame ? 0.003 : 0.0058);
-        color.copy(near).lerp(far, away).toArray(this.mesh.instanceColor.array, 3 * index);
+        color
+          .copy(near)
+          .lerp(far, away)
+          .toArray(this.mesh.instanceColor.array, 3 * index);
       }
     }
     this.mesh.instanceMatrix.needsUpdate = true;
@@ -64,7 +75,10 @@ export class Contacts {
     const shape = new RingGeometry(0.055, 0.075, 32);
     shape.rotateX(-Math.PI / 2);
     this.mesh = new InstancedMesh(shape, material, MOST_FEET);
-    this.mesh.instanceColor = new InstancedBufferAttribute(new Float32Array(3 * MOST_FEET).fill(1), 3);
+    this.mesh.instanceColor = new InstancedBufferAttribute(
+      new Float32Array(3 * MOST_FEET).fill(1),
+      3,
+    );
     this.mesh.frustumCulled = false;
     this.mesh.count = 0;
   }
@@ -76,10 +90,13 @@ export class Contacts {
     const speeds = actor.speeds(frame, new Float32Array(clip.points.length));
     const perUnit = axes.scale / ((clip.unitCm ?? 100) / 100); // units of the picture for a meter
     const color = new Color();
+    const taken = [];
     clip.points.forEach(({ name, side }, point) => {
       const k = 3 * point;
       if (!FOOT.test(name) || this.mesh.count >= MOST_FEET || Number.isNaN(places[k])) return;
       if (places[k + 1] - floor > HIGH * 1.7 || speeds[point] * perUnit > FAST * 1.7) return;
+      if (taken.some(([x, z]) => Math.hypot(x - places[k], z - places[k + 2]) < APART)) return;
+      taken.push([places[k], places[k + 2]]);
       const index = this.mesh.count++;
       const array = this.mesh.instanceMatrix.array;
       array.fill(0, 16 * index, 16 * index + 16);

@@ -7,11 +7,18 @@ import { facing, gridOf, measured } from "./framing.js";
 test("whatever points up becomes y, and left stays left", () => {
   for (const up of [0, 1, 2]) {
     const axes = new Axes(up, 2);
-    const unit = (axis) => [...axes.apply(Float32Array.of(axis === 0, axis === 1, axis === 2), new Float32Array(3))];
+    const unit = (axis) => [
+      ...axes.apply(Float32Array.of(axis === 0, axis === 1, axis === 2), new Float32Array(3)),
+    ];
     assert.deepEqual(unit(up), [0, 2, 0]);
     const [x, y, z] = [0, 1, 2].map(unit);
-    const cross = x.map((_, k) => x[(k + 1) % 3] * y[(k + 2) % 3] - x[(k + 2) % 3] * y[(k + 1) % 3]);
-    assert.deepEqual(cross.map((c) => c / 2), z);
+    const cross = x.map(
+      (_, k) => x[(k + 1) % 3] * y[(k + 2) % 3] - x[(k + 2) % 3] * y[(k + 1) % 3],
+    );
+    assert.deepEqual(
+      cross.map((c) => c / 2),
+      z,
+    );
   }
 });
 
@@ -23,7 +30,10 @@ test("between frames; where the next is missing, the one before", () => {
 test("the floor is where feet are mostly, and 0 where it is nearly there", () => {
   const frame = (low) => Float32Array.of(0, low, 0, 0, low + 170, 0);
   const frames = (lows) => lows.map(frame);
-  assert.deepEqual(measured(frames([50, 50, 50, 51, 50, 90, 50, 50, 50, 50, 50]), 1), { size: 170, floor: 50 });
+  assert.deepEqual(measured(frames([50, 50, 50, 51, 50, 90, 50, 50, 50, 50, 50]), 1), {
+    size: 170,
+    floor: 50,
+  });
   assert.equal(measured(frames([3, 4, 3]), 1).floor, 0);
   assert.deepEqual(measured([Float32Array.of(NaN, NaN, NaN)], 1), { size: 0, floor: 0 });
 });

@@ -25,6 +25,9 @@ export function byNumber(numbers, most, nothing) {
   return (point) => out[point];
 }
 
+/** A number with three digits. */
+export const figureText = (value) => String(Number(value.toPrecision(3)));
+
 /** Distances of the points of two actors in one frame. */
 export class PointErrors {
   constructor(shown, compared) {
@@ -46,7 +49,8 @@ export class PointErrors {
     const b = this.compared.places;
     for (const [i, j] of this.pairs) {
       const distance =
-        this.factor * Math.hypot(a[3 * i] - b[3 * j], a[3 * i + 1] - b[3 * j + 1], a[3 * i + 2] - b[3 * j + 2]);
+        this.factor *
+        Math.hypot(a[3 * i] - b[3 * j], a[3 * i + 1] - b[3 * j + 1], a[3 * i + 2] - b[3 * j + 2]);
       this.ofShown[i] = this.ofCompared[j] = distance;
       if (distance > this.most) this.most = distance;
     }

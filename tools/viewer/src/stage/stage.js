@@ -1,19 +1,20 @@
 // The three-dimensional picture: watches the store, and draws what it says.
 
 import { Actor } from "./actor.js";
-import { Labels, nearest, project } from "./labels.js";
-import { boundsOf, gridOf } from "./framing.js";
+import { Labels, project } from "./labels.js";
+import { gridOf } from "./framing.js";
 import { FIGURE, upOf } from "./axes.js";
 import { themeOf, roundUp } from "./colors.js";
 import { Contacts, Trails } from "./marks.js";
-import { PointErrors, alike, byNumber, bySide, palette } from "./painting.js";
+import { Painter } from "./painter.js";
+import { PointErrors } from "./painting.js";
+import { listenToPointer } from "./pointer.js";
 import { View } from "./view.js";
 
 const GHOST = 0.5; // opacity of a figure that is laid over another
 const FAR = 1.2; // a clip goes farther than so many figures: the camera follows
 const ASIDE = 1.15; // units of the picture between figures side by side, at least
 const BETWEEN = 0.35; // radians: they stand side by side as seen from the front and a little beside
-const CLICK = 5; // pixels that a pointer may move in a click
 const PREFETCH = 3; // blocks, while playing
 const SOFT = 0.14; // part of its way that the camera follows in a picture
 
@@ -21,7 +22,8 @@ let stage = null;
 
 /** The stage of this page. @throws {Error} where nothing can be drawn */
 export function mounted() {
-  if (!stage?.view) throw new Error("there is no picture: this browser does not draw in three dimensions");
+  if (!stage?.view)
+    throw new Error("there is no picture: this browser does not draw in three dimensions");
   return stage;
 }
 
@@ -45,17 +47,20 @@ class Stage {
       this.view = new View(canvas, () => this.#beforeDrawing());
     } catch {
       canvas.remove();
-      this.#fault("This browser does not draw in three dimensions (no WebGL). Curves and numbers work all the same.");
+      this.#fault(
+        "This browser does not draw in three dimensions (no WebGL). Curves and numbers work all the same.",
+      );
       return;
     }
     this.labels = new Labels(element);
+    this.painter = new Painter(this);
     this.trails = new Trails();
     this.contacts = new Contacts();
     this.view.world.scene.add(this.trails.mesh, this.contacts.mesh);
     this.view.afterDrawing = () => this.#afterDrawing();
     this.#watchTheme();
     this.#watchStore();
-    this.#listen(canvas);
+    listenToPointer(canvas, this);
   }
 
   #makeCanvas() {
@@ -83,9 +88,9 @@ class Stage {
     const change = () => {
       const chosen = store.get("theme"); // "light", "dark", or none
       this.theme = themeOf(chosen ? chosen === "dark" : dark.matches);
-      this.colors = palette(this.theme);
       this.view.world.paint(this.theme);
-      this.#paint();
+      this.painter.useTheme(this.theme);
+      this.painter.paint();
       this.view.ask();
     };
     dark.addEventListener("change", change);
@@ -101,10 +106,32 @@ class Stage {
       this.#relook();
       if (this.compared?.body) this.#look("fit");
     });
-    store.watch(["colors", "errors", "selection"], () => this.#paint());
+    store.watch(["colors", "errors", "selection"], () => this.painter.paint());
     store.watch(["view"], () => this.#look(store.get("view").name));
-    const drawn = ["frame", "colors", "errors", "selection", "trails", "contacts", "names", "follow", "playing"];
+    const drawn = [
+      "frame",
+      "colors",
+      "errors",
+      "selection",
+      "trails",
+      "contacts",
+      "names",
+      "follow",
+      "playing",
+    ];
     store.watch(drawn, () => this.view.ask());
+  }
+
+  // For tests
+
+  async picture() {
+    const { stagePicture } = await import("./capture.js");
+    return stagePicture();
+  }
+
+  async film(options) {
+    const { recordVideo } = await import("./capture.js");
+    return recordVideo(this.page, options);
   }
 
   // Clips come and go
@@ -150,13 +177,18 @@ class Stage {
     this.#dropCompared();
     const { shown } = this;
     if (clip === null || shown === null || !shown.hasFigure) {
-      this.#paint();
+      this.painter.paint();
       this.view.ask();
       return;
     }
     const actor = new Actor(this.page.engine, clip, () => this.view.ask());
     const isGood = await this.#prepared(actor);
-    if (!isGood || !actor.hasFigure || this.page.store.get("compared") !== clip || this.shown !== shown) {
+    if (
+      !isGood ||
+      !actor.hasFigure ||
+      this.page.store.get("compared") !== clip ||
+      this.shown !== shown
+    ) {
       actor.close();
       return;
     }
@@ -198,7 +230,8 @@ class Stage {
     const { clip, size, axes, floor } = this.shown;
     const grid = gridOf(size, clip.unitCm);
     this.view.world.lay({ floor, minor: grid.minor * axes.scale, major: grid.major * axes.scale });
-    this.labels.setNote(`Grid ${grid.text}`);
+    this.gridText = `Grid ${grid.text}`;
+    this.labels.setNote(this.gridText);
   }
 
   #followIfFar() {
@@ -215,12 +248,13 @@ class Stage {
     view.world.scene.add(shown.build({ opacity: 1 }).group);
     this.pointErrors = null;
     if (compared !== null) {
-      const ratio = shown.clip.unitCm && compared.clip.unitCm ? compared.clip.unitCm / shown.clip.unitCm : 1;
+      const ratio =
+        shown.clip.unitCm && compared.clip.unitCm ? compared.clip.unitCm / shown.clip.unitCm : 1;
       compared.place(upOf(compared.clip, this.page.store.get("up")), shown.axes.scale * ratio);
       view.world.scene.add(compared.build({ opacity: isOver ? GHOST : 1 }).group);
       this.pointErrors = new PointErrors(shown, compared);
     }
-    this.#paint();
+    this.painter.paint();
     view.ask();
   }
 
@@ -231,48 +265,10 @@ class Stage {
     if (noFigure || !clip) this.labels.setNote("");
     this.view.canvas.setAttribute(
       "aria-label",
-      clip ? `${clip.name}: ${clip.points.length} points, ${clip.nFrames} frames` : "Motion in three dimensions",
+      clip
+        ? `${clip.name}: ${clip.points.length} points, ${clip.nFrames} frames`
+        : "Motion in three dimensions",
     );
-  }
-
-  // Colors
-
-  #paint() {
-    const { shown, compared, colors, theme } = this;
-    if (!shown?.body) return;
-    const { store } = this.page;
-    const chosen = store.get("selection");
-    const mode = store.get("colors");
-    this.isNumbers = (mode === "error" && compared !== null) || mode === "speed";
-    if (!this.isNumbers) {
-      shown.body.paint(bySide(shown.clip.points, colors), theme, chosen);
-      const isOver = store.get("layout") === "overlay";
-      const ofCompared = isOver ? alike(colors.ghost) : compared && bySide(compared.clip.points, colors);
-      compared?.body?.paint(ofCompared, theme, []);
-      this.labels.setScale(null);
-    }
-  }
-
-  /** Colors that change from frame to frame. */
-  #paintNumbers(frame) {
-    if (!this.isNumbers) return;
-    const { shown, compared, pointErrors, colors, theme } = this;
-    const { store } = this.page;
-    const chosen = store.get("selection");
-    if (store.get("colors") === "speed") {
-      const speeds = shown.speeds(frame, new Float32Array(shown.clip.points.length));
-      shown.body.paint(byNumber(speeds, this.usualSpeed, colors.gone), theme, chosen);
-      compared?.body?.paint(alike(colors.ghost), theme, []);
-      const unit = shown.clip.unitCm === null ? "units/s" : "m/s";
-      this.labels.setScale(["0", `${this.usualSpeed} ${unit}`]);
-      return;
-    }
-    if (!compared?.body || pointErrors === null) return;
-    pointErrors.measure();
-    const most = pointErrors.scaleEnd(store.get("errors"));
-    shown.body.paint(byNumber(pointErrors.ofShown, most, colors.center), theme, chosen);
-    compared.body.paint(byNumber(pointErrors.ofCompared, most, colors.center), theme, []);
-    this.labels.setScale(["0", `${roundTo(most / 2)}`, `${most} ${pointErrors.unit}`]);
   }
 
   // Pictures
@@ -289,7 +285,7 @@ class Stage {
       this.#follow(places);
     }
     if (compared?.body) compared.at(frame * this.pointErrors.step, ahead);
-    this.#paintNumbers(frame);
+    this.painter.paintNumbers(frame);
     if (places === null) {
       this.#tellFault(shown);
       return;
@@ -297,10 +293,14 @@ class Stage {
     const chosen = store.get("selection");
     const aside = this.#aside();
     const other = aside.map((x) => -x);
-    shown.body.move(places, { chosen, gone: this.colors.gone, offset: aside });
-    compared?.body?.move(compared.places, { gone: this.colors.gone, offset: other });
+    shown.body.move(places, { chosen, gone: this.painter.colors.gone, offset: aside });
+    compared?.body?.move(compared.places, { gone: this.painter.colors.gone, offset: other });
     this.trails.draw(shown, store.get("trails") ? trailed(store, shown) : [], frame, this.theme);
-    this.contacts.draw(shown, frame, { floor: shown.floor, theme: this.theme, isOn: store.get("contacts") });
+    this.contacts.draw(shown, frame, {
+      floor: shown.floor,
+      theme: this.theme,
+      isOn: store.get("contacts"),
+    });
     for (const { mesh } of [this.trails, this.contacts]) mesh.position.set(...aside);
   }
 
@@ -320,8 +320,10 @@ class Stage {
 
   /** Light and floor go with the figure, and the camera where it is to follow. */
   #follow(places) {
-    const { least, most } = boundsOf(places);
-    if (least[0] > most[0]) return;
+    const { least, most } = this.shown.bounds(places);
+    const isEmpty = least[0] > most[0];
+    this.labels.setNote(isEmpty ? "No point is seen in this frame" : this.gridText);
+    if (isEmpty) return;
     const middle = least.map((x, k) => (x + most[k]) / 2);
     this.view.world.goWith(middle[0], middle[2]);
     if (this.page.store.get("follow") && this.middle) {
@@ -340,7 +342,7 @@ class Stage {
     if (!shown?.body) return;
     const frame = this.page.store.get("frame");
     const now = shown.at(frame, 1);
-    const figure = now ? boundsOf(now) : shown.extent();
+    const figure = now ? shown.bounds(now) : shown.extent();
     const isFit = name === "fit";
     const box = isFit || this.page.store.get("follow") ? figure : shown.extent();
     const aside = this.#aside().map(Math.abs);
@@ -358,71 +360,25 @@ class Stage {
     const isOn = this.page.store.get("names");
     const { clientWidth: width, clientHeight: height } = this.element;
     if (isOn || this.labels.names.width > 1) {
-      const projected = isOn ? this.#projected() : null;
+      const projected = isOn ? this.projected() : null;
       const { skyLow } = this.theme;
       const color = this.theme === themeOf(true) ? "#dfe5ea" : "#2a3138";
-      this.labels.drawNames(shown.clip.points, projected, { isOn, width, height, color, halo: skyLow });
+      this.labels.drawNames(shown.clip.points, projected, {
+        isOn,
+        width,
+        height,
+        color,
+        halo: skyLow,
+      });
     }
   }
 
-  #projected() {
+  /** Where the points are on the canvas, in pixels; the third number is their depth. */
+  projected() {
     const { clientWidth: width, clientHeight: height } = this.element;
     const places = this.shown.body.places;
     const out = new Float32Array(places.length);
     return project(places, this.view.eye.camera, { width, height, offset: this.#aside() }, out);
-  }
-
-  // The pointer
-
-  #listen(canvas) {
-    let down = null;
-    canvas.addEventListener("pointermove", (event) => event.buttons === 0 && this.#hover(event));
-    canvas.addEventListener("pointerleave", () => this.labels.setPoint(null));
-    canvas.addEventListener("pointerdown", (event) => {
-      down = event;
-      this.labels.setPoint(null);
-    });
-    canvas.addEventListener("pointerup", (event) => {
-      if (down === null) return;
-      const moved = Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY);
-      if (moved < CLICK && event.button === 0) this.#choose(event);
-      down = null;
-    });
-    canvas.addEventListener("dblclick", () => this.page.store.set({ view: { name: "fit" } }));
-  }
-
-  #pointAt(event) {
-    if (!this.shown?.body) return { point: -1 };
-    const box = this.view.canvas.getBoundingClientRect();
-    const x = event.clientX - box.left;
-    const y = event.clientY - box.top;
-    return { x, y, point: nearest(this.#projected(), x, y, event.pointerType === "touch" ? 28 : undefined) };
-  }
-
-  #hover(event) {
-    const { x, y, point } = this.#pointAt(event);
-    this.labels.setPoint(point < 0 ? null : { x, y, text: this.#nameOf(point) });
-  }
-
-  #nameOf(point) {
-    const { name } = this.shown.clip.points[point];
-    if (this.page.store.get("colors") !== "error" || this.pointErrors === null) return name;
-    const error = this.pointErrors.ofShown[point];
-    return Number.isFinite(error) ? `${name}: ${roundTo(error)} ${this.pointErrors.unit}` : name;
-  }
-
-  #choose(event) {
-    const { store } = this.page;
-    const { point } = this.#pointAt(event);
-    const chosen = store.get("selection");
-    const adds = event.shiftKey || event.ctrlKey || event.metaKey;
-    if (point < 0) {
-      if (!adds && chosen.length > 0) store.set({ selection: [] });
-      return;
-    }
-    const others = adds ? chosen.filter((one) => one !== point) : [];
-    const isOff = chosen.includes(point) && (adds || chosen.length === 1);
-    store.set({ selection: isOff ? others : [...others, point] });
   }
 }
 
@@ -433,12 +389,12 @@ const ENDS = /hand|wrist|foot|toe|ankle|head/i;
 function trailed(store, { clip }) {
   const chosen = store.get("selection");
   if (chosen.length > 0) return chosen.slice(0, MOST_TRAILS);
-  return clip.points.flatMap(({ name }, point) => (ENDS.test(name) ? [point] : [])).slice(0, MOST_TRAILS);
+  return clip.points
+    .flatMap(({ name }, point) => (ENDS.test(name) ? [point] : []))
+    .slice(0, MOST_TRAILS);
 }
 
 function whyNoFigure({ nFrames, name }) {
   if (nFrames === 0) return `${name} has no frames.`;
   return `${name} has no figure: its channels do not say where anything is. Its curves are below.`;
 }
-
-const roundTo = (value) => Number(value.toPrecision(3));

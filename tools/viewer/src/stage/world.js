@@ -58,7 +58,10 @@ export class World {
     this.sun = new DirectionalLight("#ffffff", 1);
     this.#makeShadow();
     this.grid = new Mesh(new PlaneGeometry(2 * REACH, 2 * REACH), gridMaterial());
-    this.shadow = new Mesh(new PlaneGeometry(2 * SHADOW, 2 * SHADOW), new ShadowMaterial({ opacity: 0.25 }));
+    this.shadow = new Mesh(
+      new PlaneGeometry(2 * SHADOW, 2 * SHADOW),
+      new ShadowMaterial({ opacity: 0.25 }),
+    );
     for (const plane of [this.grid, this.shadow]) plane.rotation.x = -Math.PI / 2;
     this.grid.renderOrder = -2;
     this.shadow.renderOrder = -1;
@@ -72,7 +75,14 @@ export class World {
     const { shadow } = this.sun;
     this.sun.castShadow = true;
     shadow.mapSize.set(1024, 1024);
-    Object.assign(shadow.camera, { left: -SHADOW, right: SHADOW, top: SHADOW, bottom: -SHADOW, near: 0.5, far: 12 });
+    Object.assign(shadow.camera, {
+      left: -SHADOW,
+      right: SHADOW,
+      top: SHADOW,
+      bottom: -SHADOW,
+      near: 0.5,
+      far: 12,
+    });
     shadow.radius = 5;
     shadow.bias = -0.0015;
   }
@@ -115,7 +125,17 @@ function gridMaterial() {
     transparent: true,
     depthWrite: false,
     uniforms: {
-      middle: { value: { x: 0, y: 0, isVector2: true, set(x, y) { this.x = x; this.y = y; } } },
+      middle: {
+        value: {
+          x: 0,
+          y: 0,
+          isVector2: true,
+          set(x, y) {
+            this.x = x;
+            this.y = y;
+          },
+        },
+      },
       minor: { value: 0.1 },
       major: { value: 1 },
       reach: { value: REACH },

@@ -63,7 +63,12 @@ export class Clock {
       return;
     }
     if (frame !== this.#set) this.#restart(); // somebody else has set it
-    const due = frameAt(this.#begun, now, { rate: rateOf(shown), speed, loop, nFrames: shown.nFrames });
+    const due = frameAt(this.#begun, now, {
+      rate: rateOf(shown),
+      speed,
+      loop,
+      nFrames: shown.nFrames,
+    });
     this.#set = due.frame;
     this.#store.set({ frame: due.frame });
     if (due.ended) this.#store.set({ playing: false });

@@ -33,14 +33,26 @@ export function listenToKeys({ store }) {
 function isTyping(target, key) {
   if (!(target instanceof Element)) return false;
   if (target.closest("dialog[open]")) return true;
-  if (target.closest("input:not([type=range]):not([type=checkbox]):not([type=radio]), textarea, select, [contenteditable]")) {
+  if (
+    target.closest(
+      "input:not([type=range]):not([type=checkbox]):not([type=radio]), textarea, select, [contenteditable]",
+    )
+  ) {
     return true;
   }
   const moves = /^(Arrow|Home|End|Page)/.test(key);
-  if (moves && target.closest("[role=listbox], [role=tree], [role=tablist], [role=grid], [role=slider], [role=radiogroup], input")) {
+  if (
+    moves &&
+    target.closest(
+      "[role=listbox], [role=tree], [role=tablist], [role=grid], [role=slider], [role=radiogroup], input",
+    )
+  ) {
     return true;
   }
-  return key === " " && target.closest("button, a, summary, label, input, [role=option], [role=button]") !== null;
+  return (
+    key === " " &&
+    target.closest("button, a, summary, label, input, [role=option], [role=button]") !== null
+  );
 }
 
 function act(store, { key, shiftKey }) {

@@ -44,7 +44,10 @@ export function mountTimeline(element, page) {
     const isThere = shown !== null && shown.nFrames > 0;
     for (const one of [play, back, on, scrub, speed, loop]) one.disabled = !isThere;
     scrub.max = String(Math.max(0, (shown?.nFrames ?? 1) - 1));
-    place.title = isThere && !shown.rate ? `The file does not say its rate: ${USUAL_RATE} frames a second are assumed` : "";
+    place.title =
+      isThere && !shown.rate
+        ? `The file does not say its rate: ${USUAL_RATE} frames a second are assumed`
+        : "";
   });
   store.watch(["frame", "shown"], () => showPlace(store, scrub, place));
   store.watch(["playing"], () => {
