@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
-import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, copyFileSync, writeFileSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
@@ -96,7 +96,10 @@ test("an archive of 177 clips: found, walked through by keys", { skip }, async (
   const paths = found.trim().split("\n").sort();
   for (let k = 0; k < 177; k++) {
     mkdirSync(join(many, `part ${k % 5}`), { recursive: true });
-    copyFileSync(paths[k % paths.length], join(many, `part ${k % 5}`, `${String(k).padStart(3, "0")}.bvh`));
+    // Those that come twice have another rate: of equal files an archive has one clip.
+    const text = readFileSync(paths[k % paths.length], "latin1");
+    const other = k < paths.length ? text : text.replace(/Frame Time:\s*\S+/, `Frame Time: 0.0${100 + k}`);
+    writeFileSync(join(many, `part ${k % 5}`, `${String(k).padStart(3, "0")}.bvh`), other, "latin1");
   }
   const out = join(folder, "archive.mcz");
   mcz("pack", many, out, "--effort", "fast");
