@@ -22,5 +22,10 @@ export function initial() {
     errors: null,
     message: null,
     server: null,
+    theme: null,
+    curves: [],
+    panels: {},
+    errorsShare: null,
+    diff: null,
   };
 }

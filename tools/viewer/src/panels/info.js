@@ -1,0 +1,141 @@
+// All that is known of the clip that is shown.
+
+import { fileOf } from "./actions.js";
+import { choice, facts, fill, make, put } from "../ui/dom.js";
+import { count, counted, duration, figure, frameNumber, secondsOf, size } from "../ui/text.js";
+
+const AXES = ["x", "y", "z"];
+const MOST_ROWS = 200;
+const MOST_DEPTH = 4;
+
+export function mountInfo(panel, { store }) {
+  const body = make("div");
+  const up = choice({
+    name: "up",
+    legend: "Up axis",
+    choices: [["file", "The file's"], ...AXES.map((axis, k) => [String(k), axis])],
+    value: "file",
+    onChange: (value) => store.set({ up: value === "file" ? null : Number(value) }),
+  });
+  put(panel, body, up.element);
+  store.watch(["up"], () => up.set(store.get("up") === null ? "file" : String(store.get("up"))));
+  store.watch(["shown", "files"], () => {
+    const clip = store.get("shown");
+    up.element.hidden = !clip;
+    if (clip) fill(body, sections(clip, fileOf(store, clip)));
+    else fill(body, make("p", { class: "quiet" }, "Open a file, or drop one on the page."));
+  });
+}
+
+function sections(clip, file) {
+  return [
+    part("Clip", clipFacts(clip)),
+    part("Skeleton", skeletonFacts(clip)),
+    part("Signals", signalFacts(clip)),
+    part("Source", rowsOf(clip.source)),
+    part("Quality", rowsOf(clip.quality)),
+    part("Metadata", rowsOf(clip.metadata)),
+    part("Damage", damageFacts(clip, file)),
+    part("File", [
+      ["Name", file?.name],
+      ["Size", file && size(file.size)],
+      ["Clips", file && count(file.nClips)],
+    ]),
+  ];
+}
+
+function part(title, rows) {
+  const list = facts(rows);
+  return list.childElementCount > 0 && make("section", {}, make("h2", {}, title), list);
+}
+
+function clipFacts(clip) {
+  const seconds = secondsOf(clip);
+  return [
+    ["Name", clip.name || "(no name)"],
+    ["Frames", count(clip.nFrames)],
+    ["Duration", seconds === null ? "not known: no frame rate" : duration(seconds)],
+    ["Frame rate", clip.rate ? `${figure(clip.rate, 6)} frames/s` : "none"],
+    ["First frame", clip.firstFrame ? count(clip.firstFrame) : null],
+    ["Codec", clip.codec],
+    ["Bytes", clip.bytes && size(clip.bytes)],
+    ["Segments", clip.segments?.length ? count(clip.segments.length) : null],
+    ["Events", clip.events?.length ? count(clip.events.length) : null],
+  ];
+}
+
+function skeletonFacts(clip) {
+  const { points, bones, isMarkers, channels, unitCm, upAxis, upGuess } = clip;
+  const n = points.length;
+  const guess = Number.isInteger(upGuess) ? `; taken as ${AXES[upGuess]}` : "";
+  return [
+    ["Name", clip.skeleton],
+    ["Joints", clip.joints && count(clip.joints.length)],
+    ["Points", `${counted(n, isMarkers ? "marker" : "point")}, ${counted(bones.length, isMarkers ? "line" : "bone")}`],
+    ["Channels", Array.isArray(channels) ? count(channels.length) : channels && count(channels)],
+    ["Length unit", unitCm ? `${figure(unitCm)} cm` : "the file does not say"],
+    ["Up", AXES[upAxis] ?? `the file does not say${guess}`],
+  ];
+}
+
+function signalFacts({ signals }) {
+  return (signals ?? []).slice(0, MOST_ROWS).map((signal) => {
+    const n = Array.isArray(signal.channels) ? signal.channels.length : signal.nChannels;
+    const rate = signal.samplesPerFrame > 1 ? `, ${signal.samplesPerFrame} a frame` : "";
+    return [signal.name, `${n === undefined ? "" : counted(n, "channel")}${rate}${signal.codec ? `, ${signal.codec}` : ""}`];
+  });
+}
+
+function damageFacts(clip, file) {
+  const lost = (clip.lost ?? []).map(([from, to]) => `${count(frameNumber(clip, from))} to ${count(frameNumber(clip, to - 1))}`);
+  const damage = file?.damage;
+  const lines = Array.isArray(damage) ? damage : damage ? [damage] : [];
+  return [
+    ["Lost frames", lost.length ? lost.slice(0, MOST_ROWS).join(", ") : null],
+    ...lines
+      .slice(0, MOST_ROWS)
+      .map((line) => ["File", typeof line === "object" ? facts(rowsOf(line)) : String(line)]),
+  ];
+}
+
+/** Rows of any value that is of names and values; of a list its members by number. */
+function rowsOf(value, depth = 0) {
+  if (value === null || value === undefined) return [];
+  if (typeof value !== "object") return [["", described(value)]];
+  const entries = value instanceof Map || isPairs(value) ? [...value] : Object.entries(value);
+  const rows = entries.slice(0, MOST_ROWS).map(([key, held]) => {
+    const name = Array.isArray(value) && !isPairs(value) ? `${Number(key) + 1}` : words(key);
+    if (/size$|bytes$/i.test(key) && Number.isSafeInteger(held)) return [name, size(held)];
+    if (held === null || typeof held !== "object") return [name, described(held)];
+    if (ArrayBuffer.isView(held)) return [name, `${counted(held.length, "number")}`];
+    if (Array.isArray(held) && held.every((x) => x === null || typeof x !== "object")) {
+      return [name, held.slice(0, MOST_ROWS).map(described).join(", ")];
+    }
+    return [name, depth < MOST_DEPTH ? facts(rowsOf(held, depth + 1)) : "…"];
+  });
+  if (entries.length > MOST_ROWS) rows.push(["", `and ${count(entries.length - MOST_ROWS)} more`]);
+  return rows;
+}
+
+const isPairs = (value) =>
+  Array.isArray(value) &&
+  value.length > 0 &&
+  value.every((pair) => Array.isArray(pair) && pair.length === 2 && typeof pair[0] === "string");
+
+const described = (value) =>
+  typeof value === "number"
+    ? figure(value, 6)
+    : typeof value === "boolean"
+      ? value
+        ? "yes"
+        : "no"
+      : value === null || value === undefined
+        ? "–"
+        : String(value);
+
+/** "meanErrorCm" and "mean_error_cm" as "mean error cm". */
+const words = (key) =>
+  String(key)
+    .slice(0, 400)
+    .replace(/([a-z])([A-Z])/g, (_, a, b) => `${a} ${b.toLowerCase()}`)
+    .replaceAll("_", " ");

@@ -1,0 +1,94 @@
+// The page as the real `mcz view` serves it, and as `mcz view -o` writes it. Needs Python with mcz.
+
+import assert from "node:assert/strict";
+import { spawn, spawnSync } from "node:child_process";
+import { readFileSync, statSync } from "node:fs";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { pathToFileURL } from "node:url";
+import { axe, inked, launch, open, shown } from "./helpers/browser.js";
+import { environment, fixture, python } from "./helpers/fixtures.js";
+
+let browser;
+before(async () => {
+  browser = await launch();
+});
+after(() => browser?.close());
+
+/** Runs `mcz view` on files as long as `run(url)` takes. */
+async function viewed(args, run) {
+  const mcz = spawn(python, ["-m", "mcz.cli.main", "view", "--no-browser", "--keep", ...args], { env: environment });
+  let said = "";
+  mcz.stderr.on("data", (data) => (said += data));
+  try {
+    const url = await new Promise((resolve, reject) => {
+      let text = "";
+      mcz.stdout.on("data", (data) => {
+        text += data;
+        if (text.includes("\n")) resolve(text.trim());
+      });
+      mcz.on("exit", () => reject(new Error(said)));
+    });
+    await run(url);
+  } finally {
+    mcz.kill("SIGINT");
+    await new Promise((resolve) => (mcz.exitCode === null ? mcz.on("exit", resolve) : resolve()));
+  }
+}
+
+test("a BVH: shown, coded anew as the slider moves, compared, exported", async () => {
+  await viewed([fixture("walk.bvh"), "--unit", "cm"], async (url) => {
+    const page = await open(browser, url);
+    await page.click("#tab-quality");
+    const slider = page.locator("#quality-slider");
+    for (const [value, n] of [["300", 1], ["700", 2]]) {
+      await slider.fill(value);
+      await page.waitForFunction((k) => new RegExp(`of ${k} tries`).test(document.querySelector(".plot").ariaLabel ?? ""), n);
+    }
+    const rows = await page.$$eval("#panel-quality tbody tr", (all) => all.map((one) => one.textContent));
+    const bytes = rows.map((row) => Number(row.match(/ ([\d,]+)(?=[\d.]* mm|[\d,]* )/)?.[1]?.replaceAll(",", "")));
+    assert.equal(bytes.length, 2);
+    assert.match(await page.textContent(".result"), /mm/);
+    await page.click("#tab-compare");
+    await page.waitForSelector("text=Figures of mcz diff");
+    await page.waitForFunction(() => /Mean position error[\d.]+ cm/.test(document.querySelector("#panel-compare").textContent));
+    assert.deepEqual(await axe(page), []);
+    await page.click("#tab-export");
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click("#export-source")]);
+    assert.ok(readFileSync(await download.path()).equals(readFileSync(fixture("walk.bvh"))));
+    assert.deepEqual(page.faults, []);
+    assert.deepEqual(page.strays, []);
+    await page.context().close();
+  });
+});
+
+test("two files: the figures of mcz diff; a C3D that is chosen in the page is converted", async () => {
+  await viewed([fixture("walk.mcz"), fixture("walk-small.mcz")], async (url) => {
+    const page = await open(browser, url);
+    await page.click("#tab-compare");
+    await page.selectOption("#compare-clip", { index: 1 });
+    await page.waitForFunction(() => /SQNR/.test(document.querySelector("#panel-compare").textContent));
+    const chosen = page.waitForEvent("filechooser");
+    await page.click("#open");
+    await (await chosen).setFiles(fixture("walk.c3d"));
+    await page.waitForFunction(() => /walk\.c3d/.test(document.title));
+    assert.ok((await inked(page, ".strip.curves canvas")).pixels > 300);
+    assert.deepEqual(page.strays, []);
+    await page.context().close();
+  });
+});
+
+test("one page that holds the clip, opened from a disk", async () => {
+  const out = join(fixture(""), `take-${process.pid}.html`);
+  const done = spawnSync(python, ["-m", "mcz.cli.main", "view", fixture("walk.bvh"), "-o", out, "--force"], { env: environment, encoding: "utf8" });
+  assert.equal(done.status, 0, done.stderr);
+  const page = await open(browser, pathToFileURL(out).href);
+  await shown(page);
+  assert.ok((await inked(page, ".strip.curves canvas")).pixels > 300);
+  assert.deepEqual(await axe(page), []);
+  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.strays, []);
+  const size = statSync(out).size;
+  assert.ok(size < 3e6, `${size}`);
+  await page.context().close();
+});

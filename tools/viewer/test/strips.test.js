@@ -1,0 +1,129 @@
+// Strips of curves: zoom, pan, values, keys, marks.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { axe, inked, launch, open, settled } from "./helpers/browser.js";
+import { fixture } from "./helpers/fixtures.js";
+import { serve } from "./helpers/server.js";
+
+let browser, server, page;
+before(async () => {
+  server = await serve({ files: [fixture("walk.mcz"), fixture("walk-small.mcz"), fixture("markers.mcz")] });
+  browser = await launch();
+  page = await open(browser, server.url);
+});
+after(async () => {
+  await browser?.close();
+  await server?.close();
+});
+
+const ruler = () => page.getAttribute(".strip.ruler canvas", "aria-label");
+const place = () => page.textContent("output.place");
+const speed = () => page.locator(".strip.curves canvas").first();
+
+test("a strip says its figures, and its curve is drawn", async () => {
+  await page.waitForFunction(() => /[\d.]+ to [\d.]+ m\/s/.test(document.querySelector(".strip.curves canvas").ariaLabel));
+  assert.equal(await speed().getAttribute("role"), "slider");
+  const { pixels, colors } = await inked(page, ".strip.curves canvas");
+  assert.ok(pixels > 1000 && colors > 3, `${pixels} ${colors}`);
+});
+
+test("the pointer shows the value of its frame", async () => {
+  const value = page.locator(".strip.curves .value").first();
+  const before = await value.textContent();
+  const box = await speed().boundingBox();
+  await page.mouse.move(box.x + box.width * 0.8, box.y + 10);
+  assert.match(await value.textContent(), /m\/s$/);
+  assert.notEqual(await value.textContent(), before);
+});
+
+test("a click goes to its frame", async () => {
+  const box = await speed().boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + 20);
+  assert.match(await place(), /^121 \//);
+  const line = await page.locator(".playhead").boundingBox();
+  assert.ok(Math.abs(line.x - box.x - box.width / 2) < 8);
+});
+
+test("the wheel zooms all strips about the pointer; Shift moves; 0 shows all", async () => {
+  const box = await speed().boundingBox();
+  const all = await ruler();
+  await page.mouse.move(box.x + box.width / 2, box.y + 20);
+  for (let k = 0; k < 5; k++) await page.mouse.wheel(0, -100);
+  await page.waitForFunction((old) => document.querySelector(".strip.ruler canvas").ariaLabel !== old, all);
+  await settled(page);
+  const [, from, to] = (await ruler()).match(/Frames (\d+) to (\d+)/).map(Number);
+  assert.ok(from > 60 && to < 180, `${from} ${to}`);
+  await speed().focus();
+  await page.keyboard.press("Shift+ArrowRight");
+  await settled(page);
+  assert.ok(Number((await ruler()).match(/Frames (\d+)/)[1]) > from);
+  await page.keyboard.press("0");
+  await settled(page);
+  assert.match(await ruler(), /Frames 1 to 240/);
+});
+
+test("keys on a strip go through frames, and what is shown follows", async () => {
+  await speed().focus();
+  await page.keyboard.press("Home");
+  await page.keyboard.press("ArrowRight");
+  assert.match(await place(), /^2 \//);
+  assert.match(await speed().getAttribute("aria-valuetext"), /^frame 2, /);
+  for (let k = 0; k < 4; k++) await page.keyboard.press("+");
+  await settled(page);
+  await page.keyboard.press("End");
+  await settled(page);
+  assert.match(await ruler(), /to 240 are/);
+  await page.keyboard.press("0");
+});
+
+test("more curves: positions, channels; each can be taken away", async () => {
+  await page.click("button[aria-label='Curves to show']");
+  await page.click("text=Position of selected points");
+  await page.click("text=Channels of selected joints");
+  assert.deepEqual(await axe(page), []);
+  await page.keyboard.press("Escape");
+  await page.locator(".strip", { hasText: "Position of root" }).waitFor();
+  await page.waitForFunction(() =>
+    [...document.querySelectorAll(".strip canvas")].some((one) => /Position.*x: .* cm/.test(one.ariaLabel)),
+  );
+  await page.click("button[aria-label^='Take away: Channels']");
+  await page.locator(".strip.curves", { hasText: "Channels" }).waitFor({ state: "detached" });
+});
+
+test("contacts of feet are marked", async () => {
+  await page.click("button[aria-label='Curves to show']");
+  await page.click("#curves-menu >> text=Foot contacts");
+  await page.keyboard.press("Escape");
+  await page.waitForFunction(() => /contacts?/.test(document.querySelector(".strip.marks canvas")?.ariaLabel ?? ""));
+  assert.ok((await inked(page, ".strip.marks canvas")).pixels > 300);
+});
+
+test("a peak of the error is clicked: its frame, its worst point", async () => {
+  await page.hover(".tree-row:nth-child(2)");
+  await page.click('button[aria-label^="Compare with walk-small"]');
+  const error = page.locator(".strip", { hasText: "Error" }).locator("canvas");
+  await error.waitFor();
+  await error.focus();
+  await page.keyboard.press("n");
+  const first = await place();
+  await page.keyboard.press("n");
+  assert.notEqual(await place(), first);
+  await page.keyboard.press("p");
+  assert.equal(await place(), first);
+  assert.match(await page.textContent("#message"), /^Frame \d+: .+ mm/);
+  await page.click("#tab-joints");
+  assert.match(await page.textContent("#panel-joints > p"), /^1 of 31/);
+});
+
+test("markers have strips, too", async () => {
+  await page.click(".tree-row:nth-child(3)");
+  await page.waitForFunction(() => /markers\.mcz/.test(document.title));
+  await page.locator(".strip", { hasText: "Speed of" }).waitFor();
+  assert.deepEqual(await axe(page), []);
+});
+
+test("nothing failed", () => {
+  assert.deepEqual(page.faults, []);
+  assert.deepEqual(page.strays, []);
+});
