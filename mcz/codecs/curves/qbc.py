@@ -249,7 +249,9 @@ def _read_segment(
     start, stop = max(span.first, request.start), min(span.stop, request.stop)
     frames = marks_of(span.first, span.stop, fields.coded_frames, fields.delta)
     own = len(frames) - (span.stop < fields.coded_frames)
-    is_last, needs_next = index + 1 == len(spans), stop > frames[own - 1] + 1
+    # In a damaged file the segment behind may be lost, and another one follow in the list.
+    is_last = index + 1 == len(spans) or spans[index + 1].first != span.stop
+    needs_next = stop > frames[own - 1] + 1
     if own < len(frames) and is_last and needs_next:  # QBC-12, QBC-13
         raise FormatError(f"qbc: frames before {span.stop} need the segment behind")
     # The next segment is not fetched where a part of this one can do without.
