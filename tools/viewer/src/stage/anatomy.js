@@ -2,6 +2,7 @@
 // hips go away; what changes its length is no bone.
 
 const MOST_CHANGE = 0.25; // of its mean length
+const MOST_CHANGE_OF_ROOT = 0.005; // of the only bone at the first point, which may be a reference
 const MOST_LENGTH = 0.75; // of the figure
 
 /**
@@ -15,7 +16,11 @@ export function anatomyOf({ points, bones, isMarkers }, samples) {
   const lengths = bones.map(([a, b]) =>
     samples.map((places) => distance(places, a, b)).filter(Number.isFinite),
   );
-  const steady = bones.map((_, i) => isSteady(lengths[i]));
+  const ofFirst = bones.filter((bone) => bone.includes(0));
+  const steady = bones.map((bone, i) => {
+    const isAlone = ofFirst.length === 1 && bone === ofFirst[0];
+    return isSteady(lengths[i], isAlone ? MOST_CHANGE_OF_ROOT : MOST_CHANGE);
+  });
   const size = sizeOf(
     bones.filter((_, i) => steady[i]),
     samples,
@@ -30,10 +35,10 @@ export function anatomyOf({ points, bones, isMarkers }, samples) {
   };
 }
 
-function isSteady(lengths) {
+function isSteady(lengths, mostChange) {
   if (lengths.length === 0) return true;
   const [least, most] = [Math.min(...lengths), Math.max(...lengths)];
-  return most - least <= (MOST_CHANGE * (most + least)) / 2;
+  return most - least <= (mostChange * (most + least)) / 2;
 }
 
 /** The longest side of the box around the ends of some bones; the median of samples. */
