@@ -27,6 +27,7 @@ export class Row {
     this.name = name;
     this.draw = inNextPicture(() => this.#draw());
     this.#listen();
+    this.say();
   }
 
   /** The frame of a place on the canvas. */
