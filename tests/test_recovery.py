@@ -159,6 +159,19 @@ def test_a_burst_wherever_it_lies(
     assert found == archive
 
 
+def test_bad_blocks_are_solved_by_columns(
+    archive: bytes, shapes: list[Shape], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same bytes, whatever fits in memory at once; one burst crosses the end of a RECV."""
+    monkeypatch.setattr(making, "AT_ONCE", 1 << 11)
+    shape = shapes[0]
+    for at in (100, shape.stop - shape.burst):
+        bad = archive[:at] + bytes(shape.burst) + archive[at + shape.burst :]
+        report, found = restored(bad, tmp_path)
+        assert report.restored
+        assert found == archive
+
+
 @settings(max_examples=30, deadline=None, suppress_health_check=SHARED)
 @given(st.data())
 def test_what_is_cut_off_or_put_in(
