@@ -278,6 +278,22 @@ def test_protecting_twice_does_nothing(archive: bytes, tmp_path: Path) -> None:
             mcz.protect(path, wrong)
 
 
+def test_all_of_a_file_is_protected_anew(archive: bytes, tmp_path: Path) -> None:
+    """A lost tail that takes all that was appended costs nothing then."""
+    path = tmp_path / "a.mcz"
+    path.write_bytes(archive)
+    mcz.set_metadata(path, {"walk": {"subject": "05"}})
+    (protection,) = mcz.protect(path, 0.1, anew=True)
+    whole = path.read_bytes()
+    assert (protection.start, protection.stop) == (0, len(whole))
+    report, found = restored(whole[: -protection.burst], tmp_path)
+    assert report.restored
+    assert found == whole
+    with mcz.open(path) as file:
+        assert file.clips["walk"].metadata["subject"] == "05"
+        assert len(file) == 4
+
+
 @pytest.mark.parametrize("size", [1, 300, 5000, 100_000, 10**6, 10**9, 10**12])
 def test_shapes_of_any_size(size: int) -> None:
     for redundancy in (0.001, 0.05, 0.5, 1.0):
