@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -256,3 +257,18 @@ def a_part_costs_little(address: str, motion: mcz.Motion) -> None:
         )
         assert source.n_requests <= 4
         assert source.n_bytes <= 300_000
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
+def test_sources_come_back_without_python(folder: Path, tmp_path: Path) -> None:
+    program = Path(__file__).parents[1] / "tools" / "js" / "unpack.js"
+    mcz.pack(folder, tmp_path / "a.mcz", keep_all=True)
+    words = ["node", str(program), "a.mcz", "restored"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    for path in (path for path in folder.rglob("*") if path.is_file()):
+        again = tmp_path / "restored" / path.relative_to(folder)
+        assert again.read_bytes() == path.read_bytes()
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
+    assert done.returncode == 1
+    assert b"exists" in done.stderr

@@ -281,3 +281,26 @@ def test_metadata_that_are_registered_or_private_are_kept(tmp_path: Path) -> Non
         assert file.only_clip().metadata == metadata
     with pytest.raises(mcz.MotionError, match="is not text to text"):
         mcz.write(smooth(3, metadata={"subject": 7}), tmp_path / "b.mcz")
+
+
+def test_clips_that_nobody_has_are_let_go() -> None:
+    """What a clip has read goes with it, so that work on all of an archive is bounded."""
+    from weakref import ref
+
+    from mcz.codecs import by_name
+    from mcz.container.writer import Writer
+    from mcz.reading.clips import KEPT
+    from mcz.writing.clip_writer import write_clip
+
+    out, motion = io.BytesIO(), smooth(3)
+    writer = Writer(out)
+    for number in range(KEPT + 9):
+        write_clip(writer, replace(motion, name=f"{number}"), by_name("raw"), {})
+    writer.finish()
+    with mcz.open(out.getvalue()) as file:
+        first = file.clips["0"]
+        seen = ref(file.clips["1"])
+        assert all(clip.n_frames == 3 for clip in file)
+        assert first is file.clips["0"]
+        assert seen() is None
+        np.testing.assert_array_equal(file["1"].read(), motion.values)

@@ -98,6 +98,21 @@ def test_the_last_one_wins(archive: Path) -> None:
     assert "subject" not in found["walk.bvh"]
 
 
+def test_a_key_that_is_said_behind_costs_one_read(archive: Path) -> None:
+    """However many clips there are: no CLIP is read where a META has the last word."""
+    with mcz.open(archive) as file:
+        names = list(file.clips)
+    said(archive, *(Record(name, {"subject": "05", "x-mood": "good"}) for name in names))
+    said(archive, Record("walk", {}, ("subject",)))
+    with mcz.open(archive) as file:
+        source = file.container.source
+        before = source.n_requests
+        found = file.find("subject == '05' and x-mood == 'good'")
+        assert [clip.name for clip in found] == [name for name in names if name != "walk"]
+        assert source.n_requests - before == len(names) + 1  # the METAs
+        assert all("_fields" not in vars(clip) for clip in file)
+
+
 def test_what_readers_interpret_is_not_said_behind(archive: Path) -> None:
     before = archive.read_bytes()
     with pytest.raises(AssertionError):

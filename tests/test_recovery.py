@@ -159,6 +159,19 @@ def test_a_burst_wherever_it_lies(
     assert found == archive
 
 
+def test_bad_blocks_are_solved_by_columns(
+    archive: bytes, shapes: list[Shape], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same bytes, whatever fits in memory at once; one burst crosses the end of a RECV."""
+    monkeypatch.setattr(making, "AT_ONCE", 1 << 11)
+    shape = shapes[0]
+    for at in (100, shape.stop - shape.burst):
+        bad = archive[:at] + bytes(shape.burst) + archive[at + shape.burst :]
+        report, found = restored(bad, tmp_path)
+        assert report.restored
+        assert found == archive
+
+
 @settings(max_examples=30, deadline=None, suppress_health_check=SHARED)
 @given(st.data())
 def test_what_is_cut_off_or_put_in(
@@ -263,6 +276,22 @@ def test_protecting_twice_does_nothing(archive: bytes, tmp_path: Path) -> None:
     for wrong in (0, -1, 2, float("nan")):
         with pytest.raises(mcz.OptionError, match="redundancy"):
             mcz.protect(path, wrong)
+
+
+def test_all_of_a_file_is_protected_anew(archive: bytes, tmp_path: Path) -> None:
+    """A lost tail that takes all that was appended costs nothing then."""
+    path = tmp_path / "a.mcz"
+    path.write_bytes(archive)
+    mcz.set_metadata(path, {"walk": {"subject": "05"}})
+    (protection,) = mcz.protect(path, 0.1, anew=True)
+    whole = path.read_bytes()
+    assert (protection.start, protection.stop) == (0, len(whole))
+    report, found = restored(whole[: -protection.burst], tmp_path)
+    assert report.restored
+    assert found == whole
+    with mcz.open(path) as file:
+        assert file.clips["walk"].metadata["subject"] == "05"
+        assert len(file) == 4
 
 
 @pytest.mark.parametrize("size", [1, 300, 5000, 100_000, 10**6, 10**9, 10**12])

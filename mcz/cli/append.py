@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -78,7 +79,8 @@ def command(
     import mcz
 
     for path in (*sources, target):
-        existing(path)
+        if path == target or not Path(path).is_dir():
+            existing(path)
     if salvage and force:
         raise Failure("--salvage keeps what --force drops; choose one", Exit.USAGE)
     if "-" in sources:

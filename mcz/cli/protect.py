@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mcz.cli.common import Exit, about, echo, existing, plural, print_json, say
+from mcz.cli.common import Exit, Failure, about, echo, existing, plural, print_json, say
 from mcz.cli.options import json_option
 from mcz.cli.progress import Progress
 
@@ -36,16 +36,24 @@ def _to_share(ctx: click.Context, param: click.Parameter, value: str) -> float:
     callback=_to_share,
     help="Of its bytes, how many to add; a small file gets more, so that it can take something.",
 )
+@click.option(
+    "--anew",
+    is_flag=True,
+    help="Rewrite the file, and make recovery data for all of it together.",
+)
 @click.option("--check", is_flag=True, help="Say how the file is, and change nothing.")
 @json_option
-def command(file: str, redundancy: float, check: bool, as_json: bool) -> Exit:
+def command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool) -> Exit:
     """Append recovery data to FILE.mcz: mcz repair then restores every byte of it.
 
     It does so as long as no more blocks are bad than there are recovery blocks, wherever they lie:
     single bytes, a burst, the beginning or the end of the file. What the file held stays readable
-    at every moment. Where clips were appended since, they get recovery data of their own.
+    at every moment. What was appended since has recovery data of its own, which a lost tail may take
+    along; --anew makes one set for all.
     """
     existing(file)
+    if anew and check:
+        raise Failure("--check changes nothing, --anew does; choose one", Exit.USAGE)
     if check:
         return _check(file, as_json)
     import mcz
@@ -54,6 +62,7 @@ def command(file: str, redundancy: float, check: bool, as_json: bool) -> Exit:
         found = mcz.protect(
             file,
             redundancy,
+            anew=anew,
             progress=lambda done, total: progress(done + 1, total, "recovery data"),
         )
     if as_json:
@@ -66,6 +75,8 @@ def command(file: str, redundancy: float, check: bool, as_json: bool) -> Exit:
             f"{one.block_size:,} bytes each, or {one.burst:,} bytes in a row; "
             f"that takes {one.cost:,} bytes"
         )
+    if len(found) > 1:
+        echo(f"{file}: these {len(found)} parts are protected apart; --anew does it for all together")
     return Exit.FINE
 
 

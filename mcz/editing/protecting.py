@@ -49,17 +49,26 @@ class Protection:
 
 
 def protect(
-    target: str | os.PathLike[str], redundancy: float = DEFAULT, *, progress: Step | None = None
+    target: str | os.PathLike[str],
+    redundancy: float = DEFAULT,
+    *,
+    anew: bool = False,
+    progress: Step | None = None,
 ) -> list[Protection]:
     """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
 
     ``mcz.repair`` restores every byte of it as long as no more blocks are bad than there are
     recovery blocks, wherever they lie: single bytes, a burst, the beginning, the end. Where the
     file has some already, what was appended since gets its own; where nothing was, nothing is
-    done. Returns what there is of it then, in the order of the file. Raises OptionError,
-    AccessError where another process is appending, and as ``mcz.append`` for a file cut short.
+    done. ``anew``: what it has is left out, and all of the file gets recovery data together, for
+    which it is rewritten. Returns what there is of it then, in the order of the file. Raises
+    OptionError, FormatError where rewriting would lose a chunk that nobody here knows, AccessError where another process is appending, and as ``mcz.append`` for a file cut short.
     """
     check_redundancy(redundancy)
+    if anew:
+        from mcz.editing.rewriting import without_recovery  # which protects what it has rewritten
+
+        without_recovery(target)
     with growing(Path(target), salvage=False, force=False) as growth:
         found = [protection_of(key.shape) for key in protections(growth.container)]
         start, end = found[-1].stop if found else 0, growth.container.directory.end

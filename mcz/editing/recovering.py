@@ -6,10 +6,9 @@ were found say that bytes were inserted or cut off before them.
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
@@ -21,10 +20,11 @@ from mcz.container.source import ByteSource
 from mcz.editing.protecting import chunk_bytes
 from mcz.errors import FormatError
 from mcz.reading.file import reached
-from mcz.recovery.code import LANE, encoded, recovered
+from mcz.recovery import making
+from mcz.recovery.code import LANE, encoded, recovered, runs_of
 from mcz.recovery.field import Ints
 from mcz.recovery.making import Step, made
-from mcz.recovery.packets import Key, Packet, find_packets, short_hash
+from mcz.recovery.packets import FIELDS, Key, Packet, find_packets, short_hash
 from mcz.recovery.shape import HASH, Shape
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
@@ -86,7 +86,7 @@ class _Set:
 
     key: Key
     sections: dict[int, bytes] = field(default_factory=dict)
-    blocks: dict[int, bytes] = field(default_factory=dict)
+    blocks: dict[int, int] = field(default_factory=dict)  # where their bodies lie
     shifts: dict[int, None] = field(default_factory=dict)  # in the order of being found
     at_place: int = 0  # packets that lie where they belong
 
@@ -116,7 +116,10 @@ def recovery_sets(source: ByteSource) -> list[_Set]:
 def _keep(one: _Set, packet: Packet, place: int | None) -> None:
     if place is None:
         return
-    (one.blocks if packet.kind else one.sections)[packet.index] = packet.body
+    if packet.kind:
+        one.blocks[packet.index] = packet.offset + FIELDS.size
+    else:
+        one.sections[packet.index] = packet.body
     shift = packet.offset - place
     one.at_place += shift == 0
     if len(one.shifts) < MOST_SHIFTS:
@@ -202,48 +205,62 @@ class Restorer:
     def restore(self, one: _Set, there: dict[int, tuple[int, ...]]) -> None:
         """Write what one RECV protects, and itself; raises FormatError where it is not that."""
         shape = one.shape
-        blocks = self._blocks(one, there)
-        digest = hashlib.sha256()
-        for block in range(shape.n_blocks):
-            data = blocks.get(block) or _read(self.source, shape.pieces(block), there[block])
+        for block, shifts in there.items():
+            data = _read(self.source, shape.pieces(block), shifts)
             assert data is not None
-            at = 0
-            digest.update(memoryview(data)[: shape.size - block * shape.block_size])
-            for offset, size in shape.pieces(block):
-                self.out.seek(offset)
-                self.out.write(data[at : at + size])
-                at += size
-        if digest.digest()[:16] != one.key.set_id:
-            raise NotThatError("what recovery data give is not what they were made of")
-        self._recv(shape)
+            self._write(shape, block, data)
+        self._solve(one, there)
+        self._recv(one)
 
-    def _blocks(self, one: _Set, there: dict[int, tuple[int, ...]]) -> dict[int, bytes]:
-        """The bad blocks."""
+    def _write(self, shape: Shape, block: int, data: bytes, first: int = 0) -> None:
+        """Write what a block has from its byte ``first`` on; the padding is no part of the file."""
+        at, stop = 0, first + len(data)
+        for offset, size in shape.pieces(block):
+            begin, end = max(first, at), min(stop, at + size)
+            if begin < end:
+                self.out.seek(offset + begin - at)
+                self.out.write(data[begin - first : end - first])
+            at += size
+
+    def _solve(self, one: _Set, there: dict[int, tuple[int, ...]]) -> None:
+        """Write the bad blocks, of large ones some columns at a time."""
         shape = one.shape
         lost = [block for block in range(shape.n_blocks) if block not in there]
-        if not lost:
-            return {}
         rows = sorted(one.blocks)[: len(lost)]
         lanes = shape.block_size // LANE
+        width = max(1, making.AT_ONCE // (runs_of(shape.n_recovery) * LANE))
+        for start in range(0, lanes if lost else 0, width):
+            stop = min(start + width, lanes)
+            read = self._columns(shape, there, start, stop)
+            rest = encoded(read, shape.n_blocks, shape.n_recovery, stop - start)[rows]
+            for at, row in enumerate(rows):
+                place = one.blocks[row] + LANE * start
+                rest[at] ^= np.frombuffer(self.source.read(place, LANE * (stop - start)), "<i8")
+            found = recovered(rest, lost, rows, shape.n_recovery).astype("<i8")
+            for at, block in enumerate(lost):
+                self._write(shape, block, found[at].tobytes(), LANE * start)
 
-        def read(start: int, stop: int) -> Ints:
-            found = np.zeros((stop - start, lanes), np.int64)
-            for block in range(start, stop):
+    def _columns(
+        self, shape: Shape, there: dict[int, tuple[int, ...]], start: int, stop: int
+    ) -> Callable[[int, int], Ints]:
+        """What reads some lanes of the blocks that are there; those that are not are zeros."""
+
+        def read(first: int, last: int) -> Ints:
+            found = np.zeros((last - first, stop - start), np.int64)
+            for block in range(first, last):
                 if block in there:
                     data = _read(self.source, shape.pieces(block), there[block]) or b""
-                    found[block - start] = np.frombuffer(data.ljust(shape.block_size, b"\0"), "<i8")
+                    padded = memoryview(data.ljust(shape.block_size, b"\0"))
+                    found[block - first] = np.frombuffer(padded[LANE * start : LANE * stop], "<i8")
                 if self.step is not None:
                     self.step(block, shape.n_blocks)
             return found
 
-        rest = encoded(read, shape.n_blocks, shape.n_recovery, lanes)[rows]
-        for at, row in enumerate(rows):
-            rest[at] ^= np.frombuffer(one.blocks[row], "<i8")
-        found = recovered(rest, lost, rows, shape.n_recovery).astype("<i8")
-        return {block: found[at].tobytes() for at, block in enumerate(lost)}
+        return read
 
-    def _recv(self, shape: Shape) -> None:
-        """The RECV chunk, made anew of what was written around it."""
+    def _recv(self, one: _Set) -> None:
+        """The RECV chunk, made anew of what was written around it; raises NotThatError."""
+        shape = one.shape
 
         def read(block: int) -> bytes:
             parts = []
@@ -252,7 +269,9 @@ class Restorer:
                 parts.append(self.out.read(size))
             return b"".join(parts).ljust(shape.block_size, b"\0")
 
-        _, packets = made(shape, read, self.step)
+        key, packets = made(shape, read, self.step)
+        if key != one.key:
+            raise NotThatError("what recovery data give is not what they were made of")
         at = shape.chunk_offset
         for data in chunk_bytes(shape, packets):
             self.out.seek(at)

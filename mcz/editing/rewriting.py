@@ -24,7 +24,7 @@ from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
 from mcz.editing.carrying import SAME, UNPROTECTED, Carrier, Change, said_of
 from mcz.editing.protecting import DEFAULT, protect, redundancy_of
-from mcz.errors import AccessError, OptionError
+from mcz.errors import AccessError, FormatError, OptionError
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
 from mcz.schema import parse
@@ -173,17 +173,37 @@ def rewrite(target: Any, output: Any, force: bool, file: File, plan: Plan, step:
     inputs = () if output is None else (target,)
     path = Path(target) if output is None else output
     with replacing(path, force=force or output is None, inputs=inputs) as stream:
-        writer = writer_like(stream, [file])
-        left_out = carry(file, writer, plan, step)
-        writer.finish()
-        if getattr(stream, "readable", bool)():
-            check_written(stream, writer.offset)
+        size, left_out = _written(stream, file, plan, step)
     if output is None and UNPROTECTED in left_out:
         redundancy = redundancy_of(file.container)
         left_out = [text for text in left_out if text != UNPROTECTED]
         size = protect(path, redundancy or DEFAULT)[-1].stop
         return Written(size, left_out)
-    return Written(writer.offset, left_out)
+    return Written(size, left_out)
+
+
+def _written(stream: Any, file: File, plan: Plan, step: Step) -> tuple[int, list[str]]:
+    """Write what ``plan`` says of ``file``, and walk it; the size, and what was left out."""
+    writer = writer_like(stream, [file])
+    left_out = carry(file, writer, plan, step)
+    writer.finish()
+    if getattr(stream, "readable", bool)():
+        check_written(stream, writer.offset)
+    return writer.offset, left_out
+
+
+def without_recovery(target: Any) -> None:
+    """Rewrite a file without its recovery data, all else as it is; nothing where it has none.
+
+    Raises FormatError where more would be lost, and as ``source_of`` does.
+    """
+    with source_of(target, None) as file:
+        if redundancy_of(file.container) is None:
+            return
+        with replacing(Path(target), force=True) as stream:
+            _, left_out = _written(stream, file, whole(file), lambda name: None)
+            if lost := [text for text in left_out if text != UNPROTECTED]:
+                raise FormatError(f"{file.name}: rewriting it would lose {lost[0]}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ import os
 import pickle
 import signal
 import sys
+from contextlib import suppress
 from typing import Any, BinaryIO
 
 LENGTH = 8
@@ -45,8 +46,9 @@ def main() -> None:
     n_threads, packed = pickle.loads(first)
     with limited(n_threads):
         state = State(packed)
-        while (message := receive(sys.stdin.buffer)) is not None:
-            send(replies, _answer(state, message))
+        with suppress(BrokenPipeError):  # it was killed, and needs no answer any more
+            while (message := receive(sys.stdin.buffer)) is not None:
+                send(replies, _answer(state, message))
 
 
 class State:

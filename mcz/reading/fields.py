@@ -13,6 +13,7 @@ from mcz.brief import among
 from mcz.codecs import by_id
 from mcz.container.chunks import FRAMING
 from mcz.container.directory import ClipRow
+from mcz.container.metadata import Record
 from mcz.container.metadata_keys import SAID
 from mcz.errors import OptionError, UnsupportedError
 from mcz.formats import format_by_id
@@ -72,7 +73,8 @@ def _known(name: str, clips: Collection[Clip]) -> Getter | None:
     if name in FIELDS:
         return FIELDS[name]
     key = name.removeprefix(METADATA)
-    is_key = key in SAID or any(key in clip.metadata for clip in clips)
+    is_key = key in SAID or any(_last_said(key, clip) for clip in clips)
+    is_key = is_key or any(key in clip.metadata for clip in clips)
     return partial(_metadata, key) if is_key else None
 
 
@@ -83,7 +85,15 @@ def _names(name: str, clips: Collection[Clip]) -> list[str]:
 
 
 def _metadata(key: str, clip: Clip) -> Value:
-    return clip.metadata.get(key)
+    """Its value; CLIP is not read where a META has the last word."""
+    last = _last_said(key, clip)
+    return clip.metadata.get(key) if last is None else last.entries.get(key)
+
+
+def _last_said(key: str, clip: Clip) -> Record | None:
+    """The record that says last what the key is, or that it is not there any more."""
+    records = reversed(clip.container.said_of(clip.name))
+    return next((r for r in records if key in r.entries or key in r.removed), None)
 
 
 def _frame_rate(clip: Clip) -> Value:

@@ -29,6 +29,7 @@ from mcz.errors import (
 from mcz.formats import FORMATS
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
+from mcz.reading.clips import Clips
 from mcz.reading.fields import Where, taken
 from mcz.reading.lost_skeletons import restore_skeletons
 from mcz.reading.names import clip_called, clips_meant, listed
@@ -79,9 +80,7 @@ class File:
         self.container = container
         self.grows = False  # another process was appending: this is the file up to its last end
         rows = container.directory
-        self.clips: Mapping[str, Clip] = {
-            name: Clip(container, row) for name, row in rows.clips.items()
-        }
+        self.clips: Mapping[str, Clip] = Clips(container)
         self.attachments: Mapping[str, Attachment] = {
             name: Attachment(container, row) for name, row in rows.attachments.items()
         }

@@ -428,6 +428,13 @@ def test_append(walk: Path, call: Call) -> None:
     fails(call("decode", walk, "-o", "-"), 2, "2 clips")
 
 
+def test_append_of_a_folder(walk: Path, folder: Path, call: Call) -> None:
+    shown = call("append", folder, walk, "--json", "--rate", 120).document
+    assert {row["result"] for row in shown["files"]} >= {"parsed", "present"}
+    assert call("verify", walk).code == 0
+    fails(call("append", walk.with_name("nowhere"), walk), 1, "no such file")
+
+
 def test_markers_as_plain_c3d(folder: Path, call: Call) -> None:
     assert call("encode", folder / "walk.c3d").code == 0
     plain = folder / "plain.c3d"
