@@ -62,7 +62,8 @@ def protect(
     file has some already, what was appended since gets its own; where nothing was, nothing is
     done. ``anew``: what it has is left out, and all of the file gets recovery data together, for
     which it is rewritten. Returns what there is of it then, in the order of the file. Raises
-    OptionError, FormatError where rewriting would lose a chunk that nobody here knows, AccessError where another process is appending, and as ``mcz.append`` for a file cut short.
+    OptionError, FormatError where rewriting would lose a chunk that nobody here knows, AccessError
+    where another process is appending, and as ``mcz.append`` for a file cut short.
     """
     check_redundancy(redundancy)
     if anew:
