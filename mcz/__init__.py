@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from mcz.editing.extraction import ExtractedClip, Extraction, extract
     from mcz.editing.merging import merge
     from mcz.editing.outcomes import Outcome, Report
-    from mcz.editing.protecting import Protection, protect
+    from mcz.editing.protected import protect
+    from mcz.editing.protecting import Protection
     from mcz.editing.recovering import Recovery
     from mcz.editing.repair import Repair, repair
     from mcz.editing.replacing import Replacement, replace
@@ -102,7 +103,8 @@ _HOMES = {
     "mcz.live.concealment": ("LiveFrame",),
     "mcz.conversion": ("Fit", "convert", "from_positions"),
     "mcz.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
-    "mcz.editing.protecting": ("Protection", "protect"),
+    "mcz.editing.protected": ("protect",),
+    "mcz.editing.protecting": ("Protection",),
     "mcz.editing.recovering": ("Recovery",),
     "mcz.editing.repair": ("Repair", "repair"),
     "mcz.editing.replacing": ("Replacement", "replace"),

@@ -253,6 +253,19 @@ def test_columns_make_up_a_name(archive: Path) -> None:
     assert (said, unknown) == ({"walk.bvh": {}}, ["run.bvh"])
 
 
+def test_columns_are_keys_by_what_is_said(archive: Path) -> None:
+    table = archive.parent / "t.csv"
+    table.write_text("Trial #,What they do,date\n,a walk,2014\n")
+    take = ["description=What they do", "date"]
+    with mcz.open(archive) as file:
+        said, _ = from_table(table, file, match="walk{Trial #}", take=take)
+        assert said == {"walk": {"description": "a walk", "date": "2014"}}
+        with pytest.raises(mcz.OptionError, match="no column 'What'; there are Trial #"):
+            from_table(table, file, match="walk{Trial #}", take=["description=What"])
+        with pytest.raises(mcz.OptionError, match="such as description=What they do"):
+            from_table(table, file, match="walk{Trial #}")
+
+
 def test_a_registered_key_that_nobody_has_is_missing_and_no_error(archive: Path) -> None:
     with mcz.open(archive) as file:
         assert file.find("subject == '05'") == []

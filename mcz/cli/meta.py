@@ -65,7 +65,11 @@ def _to_pairs(
     help="How columns of the table name clips: {subject:0>2}_{trial:0>2}. Default: a column clip, "
     "name, path or file.",
 )
-@click.option("--take", metavar="a,b", help="The columns of the table to take. Default: all.")
+@click.option(
+    "--take", metavar="a,b",
+    help="The columns of the table to take, as KEY=COLUMN where they are called otherwise. "
+    "Default: all.",
+)  # fmt: skip
 @click.option("--skip-unknown", is_flag=True, help="Rows of the table without a clip are let be.")
 @click.option(
     "--rate", metavar="R", callback=to_rate,
@@ -106,8 +110,10 @@ def command(
         file, clips, where, of_file, dict.fromkeys(removed) | pairs, table, match, take,
         skip_unknown,
     )  # fmt: skip
-    for name in unknown:
-        say(f"{table}: no clip {name}")
+    if unknown:
+        from mcz.reading.names import listed
+
+        say(f"{table}: no clip for {plural(len(unknown), 'row')}: {listed(unknown)}")
     return _set(file, changes, rate, clips, where, force, as_json)
 
 

@@ -48,8 +48,8 @@ def command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool
 
     It does so as long as no more blocks are bad than there are recovery blocks, wherever they lie:
     single bytes, a burst, the beginning or the end of the file. What the file held stays readable
-    at every moment. What was appended since has recovery data of its own, which a lost tail may take
-    along; --anew makes one set for all.
+    at every moment. What was appended since has recovery data of its own, which a lost tail may
+    take along; --anew makes one set for all.
     """
     existing(file)
     if anew and check:
@@ -76,7 +76,9 @@ def command(file: str, redundancy: float, anew: bool, check: bool, as_json: bool
             f"that takes {one.cost:,} bytes"
         )
     if len(found) > 1:
-        echo(f"{file}: these {len(found)} parts are protected apart; --anew does it for all together")
+        echo(
+            f"{file}: these {len(found)} parts are protected apart; --anew does it for all together"
+        )
     return Exit.FINE
 
 

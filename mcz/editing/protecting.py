@@ -1,4 +1,4 @@
-"""``protect``: recovery data for an MCZ file, appended to it.
+"""Recovery data for an MCZ file, appended to it.
 
 SPEC.md, "RECV", is normative; ``mcz/recovery`` has the code.
 """
@@ -23,7 +23,7 @@ from mcz.errors import FormatError, OptionError
 from mcz.reading.recovery_check import recovery_chunks
 from mcz.recovery.making import Step, made
 from mcz.recovery.packets import Key, read_packet
-from mcz.recovery.shape import Shape, check_redundancy, shape_for
+from mcz.recovery.shape import Shape, shape_for
 
 DEFAULT = 0.05  # redundancy
 TRIES = 16  # to find the size of an index that names the chunk whose size depends on it
@@ -48,27 +48,10 @@ class Protection:
     __repr__ = brief
 
 
-def protect(
-    target: str | os.PathLike[str],
-    redundancy: float = DEFAULT,
-    *,
-    anew: bool = False,
-    progress: Step | None = None,
+def add_recovery(
+    target: str | os.PathLike[str], redundancy: float, progress: Step | None = None
 ) -> list[Protection]:
-    """Append recovery data to an MCZ file, of ``redundancy`` times its bytes.
-
-    ``mcz.repair`` restores every byte of it as long as no more blocks are bad than there are
-    recovery blocks, wherever they lie: single bytes, a burst, the beginning, the end. Where the
-    file has some already, what was appended since gets its own; where nothing was, nothing is
-    done. ``anew``: what it has is left out, and all of the file gets recovery data together, for
-    which it is rewritten. Returns what there is of it then, in the order of the file. Raises
-    OptionError, FormatError where rewriting would lose a chunk that nobody here knows, AccessError where another process is appending, and as ``mcz.append`` for a file cut short.
-    """
-    check_redundancy(redundancy)
-    if anew:
-        from mcz.editing.rewriting import without_recovery  # which protects what it has rewritten
-
-        without_recovery(target)
+    """Append recovery data for what has none; returns what there is then, in file order."""
     with growing(Path(target), salvage=False, force=False) as growth:
         found = [protection_of(key.shape) for key in protections(growth.container)]
         start, end = found[-1].stop if found else 0, growth.container.directory.end
@@ -81,7 +64,7 @@ def protect(
 def still_protect(target: str | os.PathLike[str], redundancy: float | None) -> bool:
     """Protect what was appended to a file that was protected so before; return whether it was."""
     if redundancy is not None:
-        protect(target, redundancy)
+        add_recovery(target, redundancy)
     return redundancy is not None
 
 

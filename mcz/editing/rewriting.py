@@ -23,7 +23,7 @@ from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
 from mcz.editing.carrying import SAME, UNPROTECTED, Carrier, Change, said_of
-from mcz.editing.protecting import DEFAULT, protect, redundancy_of
+from mcz.editing.protecting import DEFAULT, add_recovery, redundancy_of
 from mcz.errors import AccessError, FormatError, OptionError
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
@@ -177,7 +177,7 @@ def rewrite(target: Any, output: Any, force: bool, file: File, plan: Plan, step:
     if output is None and UNPROTECTED in left_out:
         redundancy = redundancy_of(file.container)
         left_out = [text for text in left_out if text != UNPROTECTED]
-        size = protect(path, redundancy or DEFAULT)[-1].stop
+        size = add_recovery(path, redundancy or DEFAULT)[-1].stop
         return Written(size, left_out)
     return Written(size, left_out)
 

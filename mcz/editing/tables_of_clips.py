@@ -6,7 +6,7 @@ import csv
 import io
 import os
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from mcz.brief import among
@@ -33,9 +33,10 @@ def from_table(
     A row names its clip in a column ``clip``, ``name``, ``path`` or ``file``, or by ``match``, a
     text with columns in braces: "{subject:0>2}_{trial:0>2}". That is a name as ``File.only_clip``
     takes it. ``take``: the columns to take, by default all but the one with the name; each must be
-    a key of the registry or begin with ``x-``. Empty cells say nothing. Also returns the names of
-    rows without a clip, where ``skip_unknown``; otherwise those are an OptionError, as are a clip
-    that two rows name and a column that is no key.
+    a key of the registry or begin with ``x-``, or stand behind one: "description=What they do".
+    Empty cells say nothing. Also returns the names of rows without a clip, where ``skip_unknown``;
+    otherwise those are an OptionError, as are a clip that two rows name and a column that is no
+    key.
     """
     rows = _rows(Path(path))
     head = list(rows[0]) if rows else []
@@ -55,7 +56,8 @@ def from_table(
         clip = next(iter(found))
         if clip in said:
             raise OptionError(f"{path}: two rows are about clip {clip!r}")
-        said[clip] = {key: row[key].strip() for key in columns if (row[key] or "").strip()}
+        cells = {key: row[column].strip() for key, column in columns.items()}
+        said[clip] = {key: text for key, text in cells.items() if text}
     if unknown and not skip_unknown:
         raise OptionError(
             f"{path}: no clip for {len(unknown)} of {len(rows)} rows: {listed(unknown)}"
@@ -122,21 +124,32 @@ def _namer(
 
 def _columns(
     path: object, head: Sequence[str], match: str | None, take: Sequence[str] | None
-) -> Collection[str]:
-    """The columns that are taken."""
+) -> dict[str, str]:
+    """The columns that are taken, by the key that each is."""
     if take is not None:
-        if missed := [name for name in take if name not in head]:
-            raise OptionError(f"{path}: no column {missed[0]!r}; there are {', '.join(head)}")
-        return take
+        return dict(_taken(path, head, text) for text in take)
     own = next((name for name in NAMES if name in head), None) if match is None else None
     used = _fields(match or "")
     columns = [name for name in head if name != own]
     odd = [name for name in columns if not _is_key(name) and name not in used]
     if odd:
         raise OptionError(
-            f"{path}: {among(odd, None)}: no key of the metadata; name the columns to take"
+            f"{path}: {among(odd, None)}: no key of the metadata; name the columns to take, such "
+            f"as description={odd[0]}"
         )
-    return [name for name in columns if _is_key(name)]
+    return {name: name for name in columns if _is_key(name)}
+
+
+def _taken(path: object, head: Sequence[str], text: str) -> tuple[str, str]:
+    """Key and column of ``key=column``, or of a column that is called as the key."""
+    key, equals, column = text.partition("=")
+    if text in head:
+        key, column = text, text
+    elif not equals:
+        column = text
+    if column not in head:
+        raise OptionError(f"{path}: no column {column!r}; there are {', '.join(head)}")
+    return key, column
 
 
 def _is_key(name: str) -> bool:
