@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +63,7 @@ def main(folder: Path, is_all: bool) -> None:
     mcz.encode(folder / "walk.c3d", folder / "markers.mcz")
     mcz.encode(folder / "walk.bvh", folder / "bvh.mcz")
     mcz.encode(folder / "walk.bvh", folder / "bvh-small.mcz", codec="mrdwt", params={"T_g": 2.0})
+    mcz.write(replace(motion, frame_rate=Fraction(60)), folder / "steps.mcz")
     parts = ["walks/slow", "walks/fast", "runs/a", "runs/b", "stand"]
     archive(folder / "folders.mcz", [replace(cut(motion, 30), name=name) for name in parts])
 
