@@ -55,6 +55,23 @@ test("search, by a key, and from there to a clip", async () => {
   await page.context().close();
 });
 
+for (const name of ["aliases.mcz", "aliases-damaged.mcz"]) {
+  test(`${name}: other names of a clip are found and told`, async () => {
+    const own = await serve({ files: [fixture(name)], api: { salvage: name.includes("damaged") } });
+    const page = await open(browser, own.url, { isEmpty: true });
+    await page.keyboard.press("/");
+    await page.keyboard.type("again bvh");
+    await page.waitForSelector("text=/1 found of \\d/");
+    assert.match(await page.textContent("#clips .tree-row"), /a\/walk.*also named b\/again\.bvh/);
+    await page.keyboard.press("Enter");
+    await page.keyboard.press("Enter");
+    await shown(page, "a/walk");
+    assert.match(await page.textContent("#panel-info"), /Also namedb\/again\.bvh/);
+    await page.context().close();
+    await own.close();
+  });
+}
+
 test("a clip is compared by Shift C", async () => {
   const page = await open(browser, server.url);
   await page.locator("#clips [tabindex='0'].tree-row").focus();

@@ -137,6 +137,7 @@ function factsOf(reader, drawn, ids) {
     ...ids,
     ...figure,
     name: reader.name,
+    aliases: reader.aliases ?? [],
     nFrames: reader.nFrames,
     rate: reader.rate,
     unitCm: skeleton.unitCm,
