@@ -155,14 +155,15 @@ async function converted(files) {
   return answer;
 }
 
-async function openEmbedded(page, { files, annex = {}, diff = null }) {
+async function openEmbedded(page, { files, annex = {}, diffs = [] }) {
   page.engine.setAnnex(await embeddedAnnex(annex));
   const opened = [];
   for (const { name, base64 } of files) {
     opened.push(await addFile(page, { bytes: fromBase64(base64) }, { name }));
   }
+  page.store.set({ diffs });
   await showFirst(page, opened);
-  if (diff !== null) await compareSecond(page, opened);
+  if (diffs.length > 0) await compareSecond(page, opened);
 }
 
 async function openServed(page) {

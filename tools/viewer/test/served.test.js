@@ -78,6 +78,60 @@ test("two files: the figures of mcz diff; a C3D that is chosen in the page is co
   });
 });
 
+/** The numbers of `mcz diff --json` of two files. */
+function diffOf(a, b) {
+  const args = ["-m", "mcz.cli.main", "diff", fixture(a), fixture(b), "--json"];
+  const done = spawnSync(python, args, { env: environment, encoding: "utf8" });
+  return JSON.parse(done.stdout).clips[0];
+}
+
+test("a page with three files has the figures of the pair that is compared", async () => {
+  const out = join(fixture(""), `three-${process.pid}.html`);
+  const names = ["walk.mcz", "walk-small.mcz", "walk-rough.mcz"];
+  const args = ["-m", "mcz.cli.main", "view", ...names.map((name) => fixture(name)), "-o", out, "--force"];
+  const done = spawnSync(python, args, { env: environment, encoding: "utf8" });
+  assert.equal(done.status, 0, done.stderr);
+  const page = await open(browser, pathToFileURL(out).href);
+  await page.click("#tab-compare");
+  const figures = page.locator("#panel-compare section", { hasText: "Figures of mcz diff" });
+  const sqnr = async (name) => {
+    const { sqnr_db: value } = diffOf(names[0], name);
+    const words = `SQNR${value.toFixed(1)}`.slice(0, 7);
+    await page.waitForFunction(
+      (text) => document.querySelector("#panel-compare").textContent.includes(text),
+      words,
+    );
+  };
+  await sqnr(names[1]);
+  await page.selectOption("#compare-file", { label: names[2] });
+  await sqnr(names[2]);
+  await page.click("text=Swap");
+  await figures.waitFor({ state: "hidden" });
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+test("GLB comes from the server; where it refuses, why is said", async () => {
+  await viewed([fixture("walk.mcz"), fixture("no-rate.mcz"), "--rate", "120"], async (url) => {
+    const page = await open(browser, url);
+    await page.click("#tab-export");
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click("#export-glb")]);
+    assert.match(download.suggestedFilename(), /\.glb$/);
+    const bytes = readFileSync(await download.path());
+    assert.equal(bytes.subarray(0, 4).toString(), "glTF");
+    assert.ok(bytes.length > 10_000 && bytes.readUInt32LE(8) === bytes.length);
+    await page.context().close();
+  });
+  await viewed([fixture("no-rate.mcz")], async (url) => {
+    const page = await open(browser, url);
+    await page.click("#tab-export");
+    await page.click("#export-glb");
+    await page.waitForSelector("#message.fault");
+    assert.match(await page.textContent("#message"), /rate/);
+    await page.context().close();
+  });
+});
+
 test("one page that holds the clip, opened from a disk", async () => {
   const out = join(fixture(""), `take-${process.pid}.html`);
   const done = spawnSync(python, ["-m", "mcz.cli.main", "view", fixture("walk.bvh"), "-o", out, "--force"], { env: environment, encoding: "utf8" });
