@@ -23,7 +23,9 @@ const place = () => page.textContent("output.place");
 const speed = () => page.locator(".strip.curves canvas").first();
 
 test("a strip says its figures, and its curve is drawn", async () => {
-  await page.waitForFunction(() => /[\d.]+ to [\d.]+ m\/s/.test(document.querySelector(".strip.curves canvas").ariaLabel));
+  await page.waitForFunction(() =>
+    /[\d.]+ to [\d.]+ m\/s/.test(document.querySelector(".strip.curves canvas").ariaLabel),
+  );
   assert.equal(await speed().getAttribute("role"), "slider");
   const { pixels, colors } = await inked(page, ".strip.curves canvas");
   assert.ok(pixels > 1000 && colors > 3, `${pixels} ${colors}`);

@@ -95,7 +95,9 @@ class Feet {
     const size = 3 * this.nPoints;
     for (let at = 0, frame = start; at < places.length; at += size, frame++) {
       const row = places.subarray(at, at + size);
-      this.points.forEach((point, k) => this.tracks[k].set(row.subarray(3 * point, 3 * point + 3), 3 * frame));
+      this.points.forEach((point, k) =>
+        this.tracks[k].set(row.subarray(3 * point, 3 * point + 3), 3 * frame),
+      );
       if (this.guesses) this.#measure(row);
     }
   }

@@ -155,7 +155,8 @@ function fillNumbers(section, store) {
 
 function sizes(shown, compared) {
   if (!shown?.bytes || !compared.bytes) return null;
-  return `${size(compared.bytes)} against ${size(shown.bytes)}: ${figure((100 * compared.bytes) / shown.bytes, 3)} %`;
+  const share = figure((100 * compared.bytes) / shown.bytes, 3);
+  return `${size(compared.bytes)} against ${size(shown.bytes)}: ${share} %`;
 }
 
 function worstTable(errors, { unitCm, jump, number }) {
