@@ -44,6 +44,7 @@ def _sources(root: Path) -> Iterator[Path]:
     yield from (folder / name for name in ("build.mjs", "package.json", "package-lock.json"))
     yield from (path for path in (folder / "src").rglob("*") if path.is_file())
     yield from (root / "tools" / "js").rglob("*.js")
+    yield from (root / "mcz" / "annex").glob("*")
 
 
 def _is_older(made: Path, sources: Iterator[Path]) -> bool:

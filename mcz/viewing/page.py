@@ -13,18 +13,25 @@ from mcz.viewing.shelf import Say
 PACKAGED = Path(__file__).with_name("viewer.html")  # in a wheel that was built with it
 OTHER = "MCZ_VIEWER_PAGE"  # an environment variable: a page to be taken in place of ours
 PLACE = "<!-- mcz:embedded -->"
+END = "<!-- mcz:end -->"
 POLICY = re.compile(r'<meta http-equiv="Content-Security-Policy" content="([^"<>]*)"')
 
 
 class Page:
-    """The text of the page, and ``policy``, what browsers let it do."""
+    """The text of the page, and ``policy``, what browsers let it do.
+
+    What it holds at ``PLACE`` when it is opened by itself, the tables of all codecs, is no part of
+    ``text``: a server has them, and pages that are written have what their files need.
+    """
 
     def __init__(self, text: str, name: str = "the page") -> None:
-        before, found, after = text.partition(PLACE)
+        before, found, rest = text.partition(PLACE)
+        _, end, after = rest.partition(END)
         policy = POLICY.search(before)
-        if not found or PLACE in after or policy is None:
+        if not found or not end or PLACE in after or policy is None:
             raise FormatError(f"{name}: it is no page of the viewer of this version")
-        self.text, self.before, self.after, self.policy = text, before, after, policy[1]
+        self.text = before + PLACE + END + after
+        self.before, self.after, self.policy = before, after, policy[1]
 
 
 def page(say: Say | None = None) -> Page:

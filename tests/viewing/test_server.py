@@ -567,9 +567,9 @@ def test_any_bytes_are_a_form_or_refused(
 
     whole = form(("a/x.bvh", body), ("b.bvh", body[::-1]))
     folder = tmp_path_factory.mktemp("form")
-    for data in (body, whole[:cut] + body, whole):
+    for number, data in enumerate((body, whole[:cut] + body, whole)):
         try:
-            paths = save_files(io.BytesIO(data), len(data), b"X", folder / str(len(data)))
+            paths = save_files(io.BytesIO(data), len(data), b"X", folder / str(number))
         except Refused as refused:
             assert refused.status in (400, 413)
             continue
@@ -609,6 +609,7 @@ def test_uploads_are_few(samples: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_a_page_of_another_version_is_refused() -> None:
     text = page().text
-    for wrong in ("", text.replace("mcz:embedded", "x"), text + "<!-- mcz:embedded -->"):
+    places = [text.replace(name, "x") for name in ("mcz:embedded", "mcz:end")]
+    for wrong in ("", *places, text + "<!-- mcz:embedded -->"):
         with pytest.raises(FormatError, match="no page of the viewer"):
             Page(wrong)

@@ -2,8 +2,9 @@
 // lets nothing else run. `node build.mjs`; three.js and esbuild come from `npm ci`.
 
 import { createHash } from "node:crypto";
-import { mkdirSync, readFileSync, renameSync, writeFileSync } from "node:fs";
+import { mkdirSync, readFileSync, readdirSync, renameSync, writeFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
+import { deflateRawSync } from "node:zlib";
 import { build } from "esbuild";
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
@@ -56,6 +57,18 @@ function policy(script, style) {
   ].join("; ");
 }
 
+const TABLES = /(?:_start\.json|^fast_counts\.json|\.bin)$/; // of the annex, those that decoders read
+
+/** What the page has when it is opened by itself: no file, and the tables of all codecs. */
+function embedded() {
+  const folder = here("../../mcz/annex/");
+  const names = readdirSync(folder).filter((name) => TABLES.test(name)).sort();
+  const packed = (name) => deflateRawSync(readFileSync(folder + name), { level: 9 }).toString("base64");
+  const annex = Object.fromEntries(names.map((name) => [name, packed(name)]));
+  const document = JSON.stringify({ files: [], annex });
+  return `<script type="application/json" id="embedded">${document}</script>`;
+}
+
 function licences() {
   const three = readFileSync(here("node_modules/three/LICENSE"), "utf8").trim();
   return `three.js\n\n${three}`;
@@ -66,6 +79,7 @@ const style = await bundled("src/page.css", { loader: { ".css": "css" } });
 const fill = {
   policy: policy(script, style),
   style: `<style>${style}</style>`,
+  embedded: embedded(),
   script: `<script type="module">${script}</script>`,
   licences: `<!--\nThis page holds:\n\n${licences()}\n-->`,
 };

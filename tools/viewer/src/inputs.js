@@ -11,9 +11,11 @@ const isMcz = (name) => /\.mcz$/i.test(name);
 export async function openFirst(page) {
   takeDrops(page);
   page.engine.onDamage = (clip, error) => salvage(page, clip.fileId, error);
-  const embedded = document.getElementById("embedded");
+  const text = document.getElementById("embedded")?.textContent;
   try {
-    if (embedded !== null) await openEmbedded(page, JSON.parse(embedded.textContent));
+    const { files = [], annex = {}, diffs = [] } = text ? JSON.parse(text) : {};
+    page.engine.setAnnex(await embeddedAnnex(annex));
+    if (files.length > 0) await openEmbedded(page, { files, diffs });
     else if (location.protocol.startsWith("http")) await openServed(page);
   } catch (error) {
     tell(page, faultText(error), true);
@@ -155,20 +157,20 @@ async function converted(files) {
   return answer;
 }
 
-async function openEmbedded(page, { files, annex = {}, diff = null }) {
-  page.engine.setAnnex(await embeddedAnnex(annex));
+async function openEmbedded(page, { files, diffs }) {
   const opened = [];
   for (const { name, base64 } of files) {
     opened.push(await addFile(page, { bytes: fromBase64(base64) }, { name }));
   }
+  page.store.set({ diffs });
   await showFirst(page, opened);
-  if (diff !== null) await compareSecond(page, opened);
+  if (diffs.length > 0) await compareSecond(page, opened);
 }
 
 async function openServed(page) {
-  page.engine.setAnnex(absolute("annex/"));
   const api = await serverFacts();
   if (api === null) return;
+  page.engine.setAnnex(absolute("annex/"));
   page.store.set({ server: api });
   stayAlive(page);
   const opened = [];
@@ -229,6 +231,9 @@ function takeDrops(page) {
   document.addEventListener("drop", async (event) => {
     event.preventDefault();
     document.body.classList.remove("is-dropping");
-    openAll(page, await droppedFiles(event.dataTransfer));
+    const { files, nLeft } = await droppedFiles(event.dataTransfer);
+    await openAll(page, files);
+    const left = `${nLeft} of what was dropped are left out: they cannot be read, or are too many`;
+    if (nLeft > 0) tell(page, left, true);
   });
 }

@@ -26,6 +26,6 @@ export function initial() {
     curves: [],
     panels: {},
     errorsShare: null,
-    diff: null,
+    diffs: [],
   };
 }

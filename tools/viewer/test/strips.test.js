@@ -8,7 +8,8 @@ import { serve } from "./helpers/server.js";
 
 let browser, server, page;
 before(async () => {
-  server = await serve({ files: [fixture("walk.mcz"), fixture("walk-small.mcz"), fixture("markers.mcz")] });
+  const names = ["walk.mcz", "walk-small.mcz", "markers.mcz", "steps.mcz", "bvh.mcz"];
+  server = await serve({ files: names.map((name) => fixture(name)) });
   browser = await launch();
   page = await open(browser, server.url);
 });
@@ -22,7 +23,9 @@ const place = () => page.textContent("output.place");
 const speed = () => page.locator(".strip.curves canvas").first();
 
 test("a strip says its figures, and its curve is drawn", async () => {
-  await page.waitForFunction(() => /[\d.]+ to [\d.]+ m\/s/.test(document.querySelector(".strip.curves canvas").ariaLabel));
+  await page.waitForFunction(() =>
+    /[\d.]+ to [\d.]+ m\/s/.test(document.querySelector(".strip.curves canvas").ariaLabel),
+  );
   assert.equal(await speed().getAttribute("role"), "slider");
   const { pixels, colors } = await inked(page, ".strip.curves canvas");
   assert.ok(pixels > 1000 && colors > 3, `${pixels} ${colors}`);
@@ -91,12 +94,51 @@ test("more curves: positions, channels; each can be taken away", async () => {
   await page.locator(".strip.curves", { hasText: "Channels" }).waitFor({ state: "detached" });
 });
 
-test("contacts of feet are marked", async () => {
+// As `mcz.contacts` has them.
+const STEPS = {
+  lfoot: [[14, 79], [147, 210]],
+  ltoes: [[16, 80], [148, 212]],
+  rfoot: [[81, 144]],
+  rtoes: [[82, 146]],
+};
+
+test("contacts of feet are those of mcz.contacts; strip and rings have the same", async () => {
+  const page = await open(browser, server.url);
+  await page.locator("#clips .tree-row", { hasText: "steps.mcz" }).click();
+  await page.waitForFunction(() => /steps\.mcz/.test(document.title));
   await page.click("button[aria-label='Curves to show']");
   await page.click("#curves-menu >> text=Foot contacts");
   await page.keyboard.press("Escape");
-  await page.waitForFunction(() => /contacts?/.test(document.querySelector(".strip.marks canvas")?.ariaLabel ?? ""));
+  const words = /lfoot 2 contacts; ltoes 2 contacts; rfoot 1 contact; rtoes 1 contact/;
+  await marked(page, words);
   assert.ok((await inked(page, ".strip.marks canvas")).pixels > 300);
+  const found = await page.evaluate(async () => {
+    const { engine, store } = mczViewer;
+    return engine.contacts(store.get("shown"), { from: 0, to: 1, up: null });
+  });
+  assert.deepEqual(Object.fromEntries(found.feet.map(({ name, runs }) => [name, runs])), STEPS);
+  for (const [frame, n] of [[0, 0], [40, 1], [100, 1], [145, 1], [220, 0]]) {
+    await page.evaluate((at) => mczViewer.store.set({ frame: at }), frame);
+    await page.waitForFunction((k) => mczViewer.stage.contacts.mesh.count === k, n);
+  }
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
+});
+
+const marked = (page, words) =>
+  page.waitForFunction(
+    (source) => new RegExp(source).test(document.querySelector(".strip.marks canvas")?.ariaLabel ?? ""),
+    words.source,
+  );
+
+test("without a length unit it is said why there are no contacts", async () => {
+  const page = await open(browser, server.url);
+  await page.locator("#clips .tree-row", { hasText: "bvh.mcz" }).click();
+  await page.waitForFunction(() => /bvh\.mcz/.test(document.title));
+  await page.click("button[aria-label='Curves to show']");
+  await page.click("#curves-menu >> text=Foot contacts");
+  await marked(page, /no contacts of feet: the length unit is not known/);
+  await page.context().close();
 });
 
 test("a peak of the error is clicked: its frame, its worst point", async () => {

@@ -1,6 +1,7 @@
 // A clip in the worker: its values in blocks, the places of its points, and what the page is told.
 
 import { hasKinematics } from "../../../js/kinematics.js";
+import { leadOf } from "./anatomy.js";
 import { figureOf } from "./figure.js";
 import { Lru } from "./lru.js";
 import { Places } from "./places.js";
@@ -8,6 +9,9 @@ import { guessedUp } from "./up.js";
 
 const LEAST_BLOCK = 64; // frames
 const MOST_BLOCK = 512; // frames, where a segment has more and its codec can decode a part
+const SMALL = 3000; // frames of a clip that is looked at as a whole before it is shown
+const SAMPLES = 8; // of it
+const APART = 4; // frames between samples of the first ones
 const CACHE = 160 * 2 ** 20; // bytes of decoded values, of all clips
 
 const cache = new Lru(CACHE);
@@ -42,6 +46,25 @@ export class OpenClip {
     const [block] = this.#cuts[0];
     const first = await this.positions(0, Math.min(nFrames, block[1], LEAST_BLOCK));
     this.facts.upGuess = upAxis ?? guessedUp(points, first, this.facts.isMarkers);
+    this.facts.lead = leadOf(this.facts, await this.#samples(first));
+  }
+
+  /** Places in some of the first frames, and, of a clip that is not long, in some of the others. */
+  async #samples(first) {
+    const { points, nFrames } = this.facts;
+    const samples = [];
+    for (let at = 0; at < first.length; at += 3 * points.length * APART) {
+      samples.push(first.subarray(at, at + 3 * points.length));
+    }
+    for (let i = 1; i <= SAMPLES && nFrames <= SMALL; i++) {
+      const frame = Math.floor((i * (nFrames - 1)) / SAMPLES);
+      try {
+        samples.push(await this.positions(frame, frame + 1));
+      } catch {
+        break; // what is wrong is told when the frame is to be shown
+      }
+    }
+    return samples;
   }
 
   /**
@@ -137,11 +160,13 @@ function factsOf(reader, drawn, ids) {
     ...ids,
     ...figure,
     name: reader.name,
+    aliases: reader.aliases ?? [],
     nFrames: reader.nFrames,
     rate: reader.rate,
     unitCm: skeleton.unitCm,
     upAxis: skeleton.upAxis === 0 ? null : skeleton.upAxis - 1,
     upGuess: null,
+    lead: 0,
     skeleton: skeleton.name,
     joints: skeleton.joints.map(({ name, parent }) => ({ name, parent })),
     channels: (motion?.channels ?? []).map(({ name, unit, joint }) => ({ name, unit, joint })),

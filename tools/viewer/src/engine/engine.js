@@ -43,6 +43,10 @@ export class Engine {
     return this.#ofClip(clip, this.#call("curves", [clip.key, wanted]));
   }
 
+  contacts(clip, wanted) {
+    return this.#ofClip(clip, this.#call("contacts", [clip.key, wanted]));
+  }
+
   errors(shown, compared, onProgress) {
     return this.#call("errors", [shown.key, compared.key], onProgress);
   }

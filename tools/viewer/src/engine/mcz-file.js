@@ -33,6 +33,7 @@ async function clipOf(file, clip) {
     signal.channels.map((channel, i) => ({ ...channel, ...unitOf(signal, recording, i) }));
   return {
     name,
+    aliases: file.clips[clip.index].aliases,
     nFrames,
     skeleton,
     rate,

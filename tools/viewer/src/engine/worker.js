@@ -9,6 +9,7 @@ import {
   annexFrom,
   setAnnex,
 } from "../../../js/mcz.js";
+import { contactsOf } from "./contacts.js";
 import { curvesOf } from "./curves.js";
 import { errorsBetween } from "./distances.js";
 import { OpenClip } from "./clip.js";
@@ -60,6 +61,8 @@ const METHODS = {
   positions: (key, from, to) => found(clips, key, "clip").positions(from, to),
 
   curves: (key, wanted) => curvesOf(found(clips, key, "clip"), wanted),
+
+  contacts: (key, wanted) => contactsOf(found(clips, key, "clip"), wanted),
 
   errors: (a, b, progress) =>
     errorsBetween(found(clips, a, "clip"), found(clips, b, "clip"), progress),

@@ -1,30 +1,67 @@
 // Files that were dropped, with those in folders, and which of them belong together.
 
 const MOST_FILES = 20_000;
+const MOST_DEPTH = 64; // folders within each other
 
-/** @returns {Promise<File[]>} those of folders as well, each with `path` */
+/**
+ * @returns {Promise<{files: File[], nLeft: number}>} those of folders as well, folder by folder and
+ *   in the order of their names; how many files and folders are left out
+ */
 export async function droppedFiles({ items, files }) {
-  const entries = [...(items ?? [])].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
-  if (entries.length === 0) return [...files];
-  const found = [];
-  for (const entry of entries) await walk(entry, found);
+  // What was dropped is there during the event alone, so all of it is taken before anything is awaited.
+  const dropped = [...(items ?? [])].filter(({ kind }) => kind === "file").map(taken);
+  if (dropped.length === 0) return { files: [...(files ?? [])], nLeft: 0 };
+  const found = { files: [], nLeft: 0 };
+  for (const one of await Promise.all(dropped)) await walk(one, found, 0);
   return found;
 }
 
-async function walk(entry, found) {
-  if (found.length >= MOST_FILES) return;
-  if (entry.isFile) {
-    const file = await new Promise((resolve, reject) => entry.file(resolve, reject));
-    file.path = entry.fullPath;
-    found.push(file);
-    return;
+/** A file, or a folder: a handle where browsers have them, for entries are not read in pages of a disk. */
+function taken(item) {
+  const entry = item.webkitGetAsEntry?.() ?? null;
+  if (entry === null || entry.isFile) return item.getAsFile();
+  return item.getAsFileSystemHandle?.().catch(() => entry) ?? entry;
+}
+
+async function walk(one, found, depth) {
+  if (one === null) return;
+  if (found.files.length >= MOST_FILES || depth > MOST_DEPTH) found.nLeft++;
+  else if (isFolder(one)) {
+    for (const each of await membersOf(one, found)) await walk(each, found, depth + 1);
+  } else await take(one, found);
+}
+
+const isFolder = ({ isDirectory = false, kind = "" }) => isDirectory || kind === "directory";
+
+/** A file, of a folder by its handle or entry. */
+async function take(one, found) {
+  try {
+    if (one.getFile) found.files.push(await one.getFile());
+    else if (one.isFile) found.files.push(await new Promise((resolve, reject) => one.file(resolve, reject)));
+    else found.files.push(one);
+  } catch {
+    found.nLeft++;
   }
-  const reader = entry.createReader();
+}
+
+/** What is in a folder, by name; of one that cannot be read what came before. */
+async function membersOf(folder, found) {
+  const members = [];
+  try {
+    for await (const one of folder.values?.() ?? entriesOf(folder)) members.push(one);
+  } catch {
+    found.nLeft++;
+  }
+  return members.sort((a, b) => (a.name < b.name ? -1 : 1));
+}
+
+/** Browsers give some entries at a time, and none when there are no more. */
+async function* entriesOf(folder) {
+  const reader = folder.createReader();
   for (;;) {
-    // Browsers give some entries at a time, and none when there are no more.
     const some = await new Promise((resolve, reject) => reader.readEntries(resolve, reject));
     if (some.length === 0) return;
-    for (const one of some) await walk(one, found);
+    yield* some;
   }
 }
 

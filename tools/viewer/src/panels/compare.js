@@ -155,22 +155,36 @@ function fillNumbers(section, store) {
 
 function sizes(shown, compared) {
   if (!shown?.bytes || !compared.bytes) return null;
-  return `${size(compared.bytes)} against ${size(shown.bytes)}: ${figure((100 * compared.bytes) / shown.bytes, 3)} %`;
+  const share = figure((100 * compared.bytes) / shown.bytes, 3);
+  return `${size(compared.bytes)} against ${size(shown.bytes)}: ${share} %`;
 }
 
 function worstTable(errors, { unitCm, jump, number }) {
   const worst = errors.byPoint.filter(({ max }) => max > 0).sort((a, b) => b.max - a.max);
+  const place = ({ point, name, frame }) =>
+    button({
+      label: `Go to ${name} in frame ${number(frame)}`,
+      shown: name || "(no name)",
+      class: "link",
+      onClick: () => jump(frame, point),
+    });
   const rows = worst.slice(0, MOST_POINTS).map(({ point, name, mean, max, frame }) =>
     make(
       "tr",
       {},
-      make("th", { scope: "row" }, button({ label: `Go to ${name} in frame ${number(frame)}`, shown: name || "(no name)", class: "link", onClick: () => jump(frame, point) })),
+      make("th", { scope: "row" }, place({ point, name, frame })),
       make("td", {}, distance(mean, unitCm)),
       make("td", {}, distance(max, unitCm)),
     ),
   );
   const head = ["Point", "Mean", "Greatest"].map((text) => make("th", { scope: "col" }, text));
-  return make("table", {}, make("caption", {}, "Farthest points"), make("thead", {}, make("tr", {}, head)), make("tbody", {}, rows));
+  return make(
+    "table",
+    {},
+    make("caption", {}, "Farthest points"),
+    make("thead", {}, make("tr", {}, head)),
+    make("tbody", {}, rows),
+  );
 }
 
 /** The figures of `mcz diff`, asked of the server, or carried by a page that was sent. */
@@ -179,7 +193,7 @@ function mountDiff(section, store) {
   const load = later(async () => {
     abort?.abort();
     const [a, b] = [served(store, store.get("shown")), served(store, store.get("compared"))];
-    const carried = store.get("diff");
+    const carried = carriedDiff(store);
     section.hidden = !store.get("compared") || !(carried || (a && b && store.get("server")?.canEncode));
     if (section.hidden) return;
     if (carried) return void showDiff(section, carried, store.get("shown"));
@@ -193,6 +207,18 @@ function mountDiff(section, store) {
   }, 300);
   section.hidden = true;
   store.watch(["shown", "compared"], load);
+}
+
+/** What a page that was sent has of the clips that are compared: its files against the first. */
+function carriedDiff(store) {
+  const place = (clip) => store.get("files").findIndex(({ id }) => id === clip?.fileId);
+  const { shown, compared } = { shown: store.get("shown"), compared: store.get("compared") };
+  if (place(shown) !== 0 || place(compared) < 1) return null;
+  const { clips = [], notes = [] } = store.get("diffs")[place(compared) - 1] ?? {};
+  const found = clips.find((one) => one.name_a === shown.name && one.name_b === compared.name);
+  if (found) return { clips: [found] };
+  const why = notes.filter((note) => note.startsWith(`${shown.name}: `));
+  return why.length > 0 ? { clips: [{ notes: why }] } : null;
 }
 
 const title = () => make("h2", {}, "Figures of mcz diff");

@@ -53,6 +53,7 @@ function clipFacts(clip) {
   const seconds = secondsOf(clip);
   return [
     ["Name", clip.name || "(no name)"],
+    ...aliasFacts(clip.aliases ?? []),
     ["Frames", count(clip.nFrames)],
     ["Duration", seconds === null ? "not known: no frame rate" : duration(seconds)],
     ["Frame rate", clip.rate ? `${figure(clip.rate, 6)} frames/s` : "none"],
@@ -64,14 +65,21 @@ function clipFacts(clip) {
   ];
 }
 
+/** Paths of files that are copies of the clip's source. */
+function aliasFacts(aliases) {
+  const rows = aliases.slice(0, MOST_ROWS).map((name, k) => [k === 0 ? "Also named" : "", name]);
+  return aliases.length > MOST_ROWS ? [...rows, ["", `and ${count(aliases.length - MOST_ROWS)} more`]] : rows;
+}
+
 function skeletonFacts(clip) {
   const { points, bones, isMarkers, channels, unitCm, upAxis, upGuess } = clip;
   const n = points.length;
+  const lines = counted(bones.length, isMarkers ? "line" : "bone");
   const guess = Number.isInteger(upGuess) ? `; taken as ${AXES[upGuess]}` : "";
   return [
     ["Name", clip.skeleton],
     ["Joints", clip.joints && count(clip.joints.length)],
-    ["Points", `${counted(n, isMarkers ? "marker" : "point")}, ${counted(bones.length, isMarkers ? "line" : "bone")}`],
+    ["Points", isMarkers ? `${counted(n, "marker")}, ${lines}` : `${counted(n, "point")}, ${lines}`],
     ["Channels", Array.isArray(channels) ? count(channels.length) : channels && count(channels)],
     ["Length unit", unitCm ? `${figure(unitCm)} cm` : "the file does not say"],
     ["Up", AXES[upAxis] ?? `the file does not say${guess}`],
@@ -82,12 +90,14 @@ function signalFacts({ signals }) {
   return (signals ?? []).slice(0, MOST_ROWS).map((signal) => {
     const n = Array.isArray(signal.channels) ? signal.channels.length : signal.nChannels;
     const rate = signal.samplesPerFrame > 1 ? `, ${signal.samplesPerFrame} a frame` : "";
-    return [signal.name, `${n === undefined ? "" : counted(n, "channel")}${rate}${signal.codec ? `, ${signal.codec}` : ""}`];
+    const codec = signal.codec ? `, ${signal.codec}` : "";
+    return [signal.name, `${n === undefined ? "" : counted(n, "channel")}${rate}${codec}`];
   });
 }
 
 function damageFacts(clip, file) {
-  const lost = (clip.lost ?? []).map(([from, to]) => `${count(frameNumber(clip, from))} to ${count(frameNumber(clip, to - 1))}`);
+  const number = (frame) => count(frameNumber(clip, frame));
+  const lost = (clip.lost ?? []).map(([from, to]) => `${number(from)} to ${number(to - 1)}`);
   const damage = file?.damage;
   const lines = Array.isArray(damage) ? damage : damage ? [damage] : [];
   return [

@@ -1,8 +1,9 @@
 // A clip on the stage: where its points are at any time, and what is drawn of it.
 
+import { anatomyOf } from "../engine/anatomy.js";
 import { Poses } from "../engine/poses.js";
+import { Standing } from "../engine/standing.js";
 import { rateOf } from "../timeline/clock.js";
-import { anatomyOf } from "./anatomy.js";
 import { Axes, between } from "./axes.js";
 import { Body } from "./body.js";
 import { boundsOf, facing, measured, quantile, scaleOf } from "./framing.js";
@@ -19,6 +20,7 @@ export class Actor {
     this.engine = engine;
     this.clip = clip;
     this.poses = new Poses(engine, clip, onArrival);
+    this.standing = new Standing(engine, clip, onArrival);
     this.samples = [];
     this.body = null;
     this.axes = null;

@@ -13,10 +13,7 @@ import { rodShape, setBone, solids } from "./instances.js";
 
 const SECONDS = 1.5; // of a trail, before the frame and after it
 const MOST = 1200; // pieces of all trails
-const FOOT = /foot|toe|heel|ankle|ball|(?:^|[:_ ])[lr](?:hee|toe|ank|mt5|mt1)$/i;
-const HIGH = 0.075; // of the figure above the floor
-const FAST = 0.28; // of the figure, a second
-const MOST_FEET = 24;
+const MOST_RINGS = 24;
 const APART = 0.13; // of rings: of points that are nearer one has a ring
 
 export class Trails {
@@ -74,27 +71,21 @@ export class Contacts {
     const material = new MeshBasicMaterial({ transparent: true, opacity: 0.85, depthWrite: false });
     const shape = new RingGeometry(0.055, 0.075, 32);
     shape.rotateX(-Math.PI / 2);
-    this.mesh = new InstancedMesh(shape, material, MOST_FEET);
-    this.mesh.instanceColor = new InstancedBufferAttribute(
-      new Float32Array(3 * MOST_FEET).fill(1),
-      3,
-    );
+    this.mesh = new InstancedMesh(shape, material, MOST_RINGS);
+    const colors = new Float32Array(3 * MOST_RINGS).fill(1);
+    this.mesh.instanceColor = new InstancedBufferAttribute(colors, 3);
     this.mesh.frustumCulled = false;
     this.mesh.count = 0;
   }
 
-  draw(actor, frame, { floor, theme, isOn }) {
+  /** @param {{point: number, side: string}[]} feet that stand */
+  draw({ places }, feet, { floor, theme }) {
     this.mesh.count = 0;
-    if (!isOn || actor.size === 0) return;
-    const { clip, places, axes } = actor;
-    const speeds = actor.speeds(frame, new Float32Array(clip.points.length));
-    const perUnit = axes.scale / ((clip.unitCm ?? 100) / 100); // units of the picture for a meter
     const color = new Color();
     const taken = [];
-    clip.points.forEach(({ name, side }, point) => {
+    feet.forEach(({ point, side }) => {
       const k = 3 * point;
-      if (!FOOT.test(name) || this.mesh.count >= MOST_FEET || Number.isNaN(places[k])) return;
-      if (places[k + 1] - floor > HIGH * 1.7 || speeds[point] * perUnit > FAST * 1.7) return;
+      if (this.mesh.count >= MOST_RINGS || Number.isNaN(places[k])) return;
       if (taken.some(([x, z]) => Math.hypot(x - places[k], z - places[k + 2]) < APART)) return;
       taken.push([places[k], places[k + 2]]);
       const index = this.mesh.count++;

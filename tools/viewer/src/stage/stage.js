@@ -296,11 +296,8 @@ class Stage {
     shown.body.move(places, { chosen, gone: this.painter.colors.gone, offset: aside });
     compared?.body?.move(compared.places, { gone: this.painter.colors.gone, offset: other });
     this.trails.draw(shown, store.get("trails") ? trailed(store, shown) : [], frame, this.theme);
-    this.contacts.draw(shown, frame, {
-      floor: shown.floor,
-      theme: this.theme,
-      isOn: store.get("contacts"),
-    });
+    const feet = store.get("contacts") ? shown.standing.at(frame, store.get("up")) : [];
+    this.contacts.draw(shown, feet, { floor: shown.floor, theme: this.theme });
     for (const { mesh } of [this.trails, this.contacts]) mesh.position.set(...aside);
   }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -57,13 +58,18 @@ def main(folder: Path, is_all: bool) -> None:
     motion = acclaim_walk()
     mcz.write(motion, folder / "walk.mcz")
     mcz.write(motion, folder / "walk-small.mcz", "mrdwt", T_g=2.0)
+    mcz.write(motion, folder / "walk-rough.mcz", "mrdwt", T_g=8.0)
     for name, data in sample_files().items():
         (folder / name).write_bytes(data)
     mcz.encode(folder / "walk.c3d", folder / "markers.mcz")
     mcz.encode(folder / "walk.bvh", folder / "bvh.mcz")
     mcz.encode(folder / "walk.bvh", folder / "bvh-small.mcz", codec="mrdwt", params={"T_g": 2.0})
+    mcz.write(replace(motion, frame_rate=Fraction(60)), folder / "steps.mcz")
     parts = ["walks/slow", "walks/fast", "runs/a", "runs/b", "stand"]
     archive(folder / "folders.mcz", [replace(cut(motion, 30), name=name) for name in parts])
+
+    aliases(folder)
+    mcz.write(replace(motion, frame_rate=None, source=None), folder / "no-rate.mcz")
 
     whole = (folder / "walk.mcz").read_bytes()
     raw = folder / "parts.mcz"
@@ -85,6 +91,19 @@ def main(folder: Path, is_all: bool) -> None:
     many = [replace(short, name=f"take {k // 100:03}/clip {k:05}") for k in range(20_000)]
     archive(folder / "many.mcz", many)
     mcz.write(long(motion, 100_000), folder / "long.mcz", "raw")
+
+
+def aliases(folder: Path) -> None:
+    """An archive in which a clip has a second name, and the same with a damaged segment."""
+    walk = (folder / "walk.bvh").read_bytes()
+    for name, data in {"a/walk": walk, "b/again": walk, "c/other": walk + b"\n"}.items():
+        path = folder / "takes" / f"{name}.bvh"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+    mcz.pack(folder / "takes", folder / "aliases.mcz")
+    damaged = bytearray((folder / "aliases.mcz").read_bytes())
+    damaged[len(damaged) * 7 // 10] ^= 0xFF
+    (folder / "aliases-damaged.mcz").write_bytes(damaged)
 
 
 def cut(motion: Motion, n_frames: int) -> Motion:

@@ -2,7 +2,7 @@
 
 import { compareClip, showClip } from "../actions.js";
 import { button, fill, icon, later, make, put } from "../../ui/dom.js";
-import { count, counted, summary } from "../../ui/text.js";
+import { count, counted, printable, summary } from "../../ui/text.js";
 import { Tree } from "../../ui/tree.js";
 import { search } from "./search.js";
 import { Section } from "./section.js";
@@ -119,7 +119,7 @@ class Clips {
       return {
         ...item,
         key: `${section.file.id}/${item.row.index}`,
-        stamp: `${isShown}${isCompared}${item.row.nFrames}${item.label}`,
+        stamp: `${isShown}${isCompared}${item.row.nFrames}${item.label}${item.alias}`,
         section,
         label: named(section, item),
         isOpen: null,
@@ -152,7 +152,12 @@ class Clips {
     return {
       length: found.length,
       item: (i) =>
-        clipItem(found[i].section, { level: 1, row: found[i].row, label: found[i].row.name }),
+        clipItem(found[i].section, {
+          level: 1,
+          row: found[i].row,
+          label: found[i].row.name,
+          alias: found[i].alias,
+        }),
     };
   }
 
@@ -203,7 +208,8 @@ class Clips {
       );
       return;
     }
-    const facts = item.row.nFrames === undefined ? "…" : summary(item.row);
+    const own = item.row.nFrames === undefined ? "…" : summary(item.row);
+    const facts = item.alias ? `also named ${printable(item.alias, 200)}` : own;
     fill(
       row,
       make(

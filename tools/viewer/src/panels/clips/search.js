@@ -14,6 +14,7 @@ export function matcher(text) {
 
 /**
  * Searches files one after the other; `onFound(found, nSeen)` is called after each page.
+ * What is found has the other name of a clip as `alias`, where that has the words and its own not.
  *
  * @returns {() => void} ends it
  */
@@ -29,7 +30,8 @@ export function search(sections, text, onFound) {
         if (isOver) return;
         for (const row of rows) {
           const name = section.file.nClips === 1 ? `${section.file.name} ${row.name}` : row.name;
-          if (isWanted(name) && found.length < MOST_FOUND) found.push({ section, row });
+          const alias = isWanted(name) ? null : (row.aliases ?? []).find(isWanted);
+          if (alias !== undefined && found.length < MOST_FOUND) found.push({ section, row, alias });
         }
         nSeen += rows.length;
         onFound(found, nSeen);

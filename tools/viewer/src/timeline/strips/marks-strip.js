@@ -2,21 +2,18 @@
 
 import { later } from "../../ui/dom.js";
 import { count, counted, frameNumber, printable } from "../../ui/text.js";
-import { Contacts, runsOf } from "./contacts.js";
 import { label, paintGround } from "./paint.js";
 import { whole } from "./window.js";
 
 const FOOT = 5; // pixels of a foot's bar
 
 export class MarksStrip {
-  #feet = [];
-  #first = 0;
+  #seen = { from: 0, to: 0, why: "", feet: [] }; // contacts, as the engine gives them
   #asked = 0;
 
   constructor(shared) {
     const clip = shared.page.store.get("shown");
     Object.assign(this, { shared, clip });
-    this.contacts = new Contacts(shared.page.engine, clip);
     this.events = [...(clip.events ?? [])].sort((a, b) => a.frame - b.frame);
     this.load = later(() => this.#load(), 60);
     this.load();
@@ -32,31 +29,41 @@ export class MarksStrip {
   }
 
   async #load() {
-    const { store } = this.shared.page;
+    const { store, engine } = this.shared.page;
     const mine = ++this.#asked;
-    const isOver = () => mine !== this.#asked;
+    if (!store.get("contacts")) return;
     const { from, to } = whole(this.shared.window(), this.clip.nFrames);
-    const up = store.get("up") ?? this.clip.upAxis ?? this.clip.upGuess ?? 1;
-    const wanted = store.get("contacts");
-    const found = wanted ? await this.contacts.between(from, to, { up, isOver }).catch(() => []) : [];
-    if (isOver()) return;
-    this.#first = from;
-    this.#feet = found.map((foot) => ({ ...foot, runs: runsOf(foot.isStanding, from) }));
+    const { why, from: first, to: last } = this.#seen;
+    if (!why && from >= first && to <= last) return;
+    const wanted = { from, to, up: store.get("up") };
+    const none = ({ message }) => ({ from, to, why: message, feet: [] });
+    const found = await engine.contacts(this.clip, wanted).catch(none);
+    if (mine !== this.#asked) return;
+    this.#seen = found;
     this.row?.draw();
   }
 
   paint(view) {
     paintGround(view, this.clip);
     this.#paintFeet(view);
+    this.#paintWhy(view);
     this.#paintEvents(view);
   }
 
   #paintFeet({ context, height, x, colors }) {
-    this.#feet.forEach(({ side, runs }, k) => {
+    this.#seen.feet.forEach(({ side, runs }, k) => {
       context.fillStyle = colors[side] ?? colors.quiet;
       const y = height - 3 - (k + 1) * (FOOT + 1);
       for (const [from, to] of runs) context.fillRect(x(from), y, Math.max(1, x(to) - x(from)), FOOT);
     });
+  }
+
+  /** Why there are no contacts, where somebody has asked for them. */
+  #paintWhy({ context, height, colors }) {
+    if (!this.#seen.why) return;
+    context.font = "11px system-ui, sans-serif";
+    context.textBaseline = "bottom";
+    label(context, `No contacts: ${this.#seen.why}`, 6, height - 3, colors, colors.quiet);
   }
 
   #paintEvents({ context, width, height, x, from, to, colors }) {
@@ -91,9 +98,11 @@ export class MarksStrip {
     const frame = Math.floor(this.shared.page.store.get("frame"));
     if (!this.events.length) return false;
     if (key === "n" || key === "Enter") {
-      this.shared.goTo((this.events.find((e) => Math.floor(e.frame) > frame) ?? this.events[0]).frame);
+      const next = this.events.find((e) => Math.floor(e.frame) > frame);
+      this.shared.goTo((next ?? this.events[0]).frame);
     } else if (key === "p") {
-      this.shared.goTo((this.events.findLast((e) => Math.floor(e.frame) < frame) ?? this.events.at(-1)).frame);
+      const before = this.events.findLast((e) => Math.floor(e.frame) < frame);
+      this.shared.goTo((before ?? this.events.at(-1)).frame);
     } else return false;
     return true;
   }
@@ -101,7 +110,7 @@ export class MarksStrip {
   valueAt(frame) {
     const isLost = (this.clip.lost ?? []).some(([from, to]) => frame >= from && frame < to);
     const event = this.events.find((e) => Math.abs(e.frame - frame) < 1);
-    const feet = this.#feet.filter(({ isStanding }) => isStanding[frame - this.#first] === 1);
+    const feet = this.#seen.feet.filter(({ runs }) => runs.some(([a, b]) => frame >= a && frame < b));
     const parts = [
       isLost && "lost",
       event && [event.context, event.label].filter(Boolean).join(" "),
@@ -112,12 +121,17 @@ export class MarksStrip {
 
   describe() {
     const { lost = [] } = this.clip;
+    const number = (frame) => count(frameNumber(this.clip, frame));
     const events = this.events
       .slice(0, 20)
-      .map((e) => `${[e.context, e.label].filter(Boolean).join(" ")} at ${count(frameNumber(this.clip, e.frame))}`);
-    const standing = this.#feet.map(({ name, runs }) => `${name} ${counted(runs.length, "contact")}`);
-    const lostText = lost.slice(0, 20).map(([from, to]) => `frames ${count(frameNumber(this.clip, from))} to ${count(frameNumber(this.clip, to - 1))} are lost`);
-    const text = [...events, ...standing, ...lostText].join("; ");
+      .map((e) => `${[e.context, e.label].filter(Boolean).join(" ")} at ${number(e.frame)}`);
+    const { feet, why } = this.#seen;
+    const standing = feet.map(({ name, runs }) => `${name} ${counted(runs.length, "contact")}`);
+    const unknown = why ? [`no contacts of feet: ${why}`] : [];
+    const gone = lost
+      .slice(0, 20)
+      .map(([from, to]) => `frames ${number(from)} to ${number(to - 1)} are lost`);
+    const text = [...events, ...standing, ...unknown, ...gone].join("; ");
     return printable(`${text || "Nothing is marked."} n and p go to events.`, 2000);
   }
 }

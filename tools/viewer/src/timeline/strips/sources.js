@@ -11,9 +11,10 @@ const MOST_CURVES = 6;
 const MOST_SOURCES = 100;
 const AXES = ["x", "y", "z"];
 
-/** The sources of a clip for selected points; speed of the first point where none is selected. */
+/** The sources of a clip for selected points; speed of one that moves where none is selected. */
 export function sourcesOf(engine, clip, selection) {
-  const points = clip.points.length ? (selection.length ? selection : [0]).slice(0, MOST_POINTS) : [];
+  const wanted = selection.length ? selection : [clip.lead ?? 0];
+  const points = clip.points.length ? wanted.slice(0, MOST_POINTS) : [];
   const sources = [];
   if (points.length) {
     const tracks = new Tracks(engine, clip, points);

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { anatomyOf } from "./anatomy.js";
+import { anatomyOf, leadOf } from "./anatomy.js";
 
 const clip = {
   points: ["root", "hips", "neck", "knee"].map((name, joint) => ({ name, joint })),
@@ -26,4 +26,15 @@ test("a first bone that keeps its length is one", () => {
   const { bones, loose } = anatomyOf(clip, [pose(20), pose(20)]);
   assert.equal(bones.length, 3);
   assert.equal(loose.size, 0);
+});
+
+test("curves begin with the first point of the figure that moves", () => {
+  const still = [0, 0, 0];
+  const at = (x, y = 0) => [...still, x, 90 + y, 0, x, 150, 0, x, 50, 0];
+  assert.equal(leadOf(clip, [at(0), at(20), at(40)]), 1); // the root is a reference on the floor
+  assert.equal(leadOf(clip, [at(0), at(0)]), 0); // nothing moves
+  const markers = { ...clip, bones: [], isMarkers: true };
+  assert.equal(leadOf(markers, [at(0), at(0, 1)]), 1);
+  assert.equal(leadOf(markers, [[NaN, NaN, NaN, ...at(0).slice(3)], at(1)]), 1);
+  assert.equal(leadOf({ points: [], bones: [], isMarkers: false }, []), 0);
 });

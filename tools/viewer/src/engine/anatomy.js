@@ -35,6 +35,26 @@ export function anatomyOf({ points, bones, isMarkers }, samples) {
   };
 }
 
+/**
+ * The first point of the figure that moves: what its curves begin with.
+ *
+ * @param {{points: object[], bones: number[][], isMarkers: boolean}} clip
+ * @param {ArrayLike<number>[]} samples x, y, z of each point in some frames
+ * @returns {number} its index; that of the first point of the figure where nothing moves
+ */
+export function leadOf(clip, samples) {
+  const { loose } = anatomyOf(clip, samples);
+  const ofFigure = clip.points.map((_, point) => point).filter((point) => !loose.has(point));
+  return ofFigure.find((point) => moves(point, samples)) ?? ofFigure[0] ?? 0;
+}
+
+function moves(point, samples) {
+  return [0, 1, 2].some((k) => {
+    const numbers = samples.map((places) => places[3 * point + k]).filter(Number.isFinite);
+    return numbers.some((x) => x !== numbers[0]);
+  });
+}
+
 function isSteady(lengths, mostChange) {
   if (lengths.length === 0) return true;
   const [least, most] = [Math.min(...lengths), Math.max(...lengths)];
