@@ -1,0 +1,94 @@
+"""Templates of tables at fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from mcz.formats.layout import DETAIL
+from mcz.formats.table_layout import CLOCK, TABLE_TEMPLATE
+from mcz.motion import Motion
+from mcz.numbers import GRID, Grid, GridKind
+from mcz.schema import build, varint
+from tools.vectors.build.edits import Edit, plus, put
+from tools.vectors.build.files import Unrestorable, file_of
+from tools.vectors.build.source_files import with_template
+from tools.vectors.build.table_files import MARKERS, QUATERNIONS, SPEC, TIMES
+from tools.vectors.valid.sources.tables import take_table
+
+PHRASE = b"\5"  # the mark of the longest one
+
+
+def add(shelf: Unrestorable) -> None:
+    plain = take_table(MARKERS, "plain.trc")
+    times = take_table(TIMES, "times.trc")
+    _fields(shelf, plain, times)
+    _clocks(shelf, plain)
+    _headers(shelf, plain)
+    sto = take_table(QUATERNIONS, "plain.sto")
+    rows = replace(sto, signals=(replace(sto.signals[0], samples_per_frame=3),))
+    shelf.add("table-rows", SPEC, "A table of three rows a frame.", file_of(rows))
+
+
+def _field(path: str, new: bytes) -> Edit:
+    return put(TABLE_TEMPLATE, path, new)
+
+
+def _fields(shelf: Unrestorable, plain: Motion, times: Motion) -> None:
+    cases: tuple[tuple[str, str, Motion, Edit], ...] = (
+        ("tail", "a byte behind it, which is closed", plain, plus(b"\0")),
+        ("cut", "it ends early", plain, lambda data: data[:-1]),
+        ("marks", "marks is 2", plain, _field("marks", b"\2")),
+        ("two-clocks", "two clocks", plain, _two_clocks),
+        ("column", "a column behind that of the clock", plain, _field("patterns.0.runs.1.column", b"\x08")),
+        ("no-clock", "the column of a clock that there is not", times, _field("patterns.0.runs.1.column", b"\5")),
+        ("gap", "a gap beyond the last", plain, _field("patterns.0.tail", b"\x63")),
+        ("width", "a width of -1", plain, _field("patterns.0.runs.1.width", b"\1")),
+    )  # fmt: skip
+    for name, purpose, motion, edit in cases:
+        data = file_of(motion, SRCE=with_template(edit))
+        shelf.add(f"table-{name}", SPEC, f"A template of a table: {purpose}.", data)
+    assert plain.source is not None
+    detail = put(DETAIL, "ends", b"\2")(plain.source.detail)
+    data = file_of(replace(plain, source=replace(plain.source, detail=detail)))
+    shelf.add("table-ends", SPEC, "A detail of a table: ends is 2.", data)
+
+
+def _two_clocks(template: bytes) -> bytes:
+    clock = {"grid": Grid(GridKind.FIXED, 3), "numerator": 1, "denominator": 1, "offset": 0}
+    return _field("clock", b"\2" + build(CLOCK, clock, "clock") * 2)(template)
+
+
+def _clocks(shelf: Unrestorable, plain: Motion) -> None:
+    general = build_grid(Grid(GridKind.GENERAL, 6))
+    cases = {
+        "grid": ("a clock on a GENERAL grid", "clock.0.grid", general),
+        "grid-without-text": ("a clock on an INTEGER grid", "clock.0.grid", b"\6\0\0"),
+        "denominator": ("a clock with the denominator 0", "clock.0.denominator", b"\0"),
+        "time": ("a time beyond its grid", "clock.0.offset", varint(2**53 - 2)),
+        "time-below": ("a time below its grid", "clock.0.offset", varint(2**53 - 1)),
+    }
+    for name, (purpose, path, new) in cases.items():
+        edit = _field(path, new)
+        if "time" in name:
+            edit = _both(edit, _field("clock.0.denominator", b"\1"))
+        data = file_of(plain, SRCE=with_template(edit))
+        shelf.add(f"table-clock-{name}", SPEC, f"A template of a table: {purpose}.", data)
+
+
+def _both(first: Edit, then: Edit) -> Edit:
+    return lambda data: then(first(data))
+
+
+def build_grid(grid: Grid) -> bytes:
+    return bytes(GRID.build(grid))
+
+
+def _headers(shelf: Unrestorable, plain: Motion) -> None:
+    cases = {
+        "names": ("three names of two joints", b"\0\0\0"),
+        "bomb": ("a header that fills to 300 MB", PHRASE * 3_000_000),
+    }
+    for name, (purpose, header) in cases.items():
+        edit = _field("header", varint(len(header)) + header)
+        data = file_of(plain, SRCE=with_template(edit, deflated=True))
+        shelf.add(f"table-{name}", SPEC, f"A template of a table: {purpose}.", data)
