@@ -106,7 +106,8 @@ def _short_fixed(x: float, decimals: int) -> str:
     digits = mantissa.replace(".", "")
     whole = digits.rjust(known + 1, "0") if known > 0 else digits + "0" * -known
     point = len(whole) - max(known, 0)
-    return f"{whole[:point]}.{whole[point:].ljust(decimals, '0')}"
+    fraction = whole[point:].ljust(decimals, "0")
+    return f"{whole[:point]}.{fraction}" if fraction else whole
 
 
 def texts(digits: int, style: int, flags: int, magnitudes: Ints, negative: Bools) -> Texts:
