@@ -153,7 +153,7 @@ def fill(header: bytes, names: Sequence[str], count: bytes) -> bytes:
             joint += 1
             if joint > len(names):  # TABLE-05
                 raise FormatError(f"source template: a name of joint {joint} of {len(names)}")
-            text = names[joint - 1].encode()
+            text = "".join(names[joint - 1 : joint]).encode()
         elif mark == COUNT:
             text = count
         elif mark in (NEXT, SAME):

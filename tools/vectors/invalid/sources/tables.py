@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mcz.formats.layout import DETAIL
-from mcz.formats.table_layout import CLOCK, TABLE_TEMPLATE
+from mcz.formats.table_layout import CLOCK, PHRASES, TABLE_TEMPLATE
 from mcz.motion import Motion
 from mcz.numbers import GRID, Grid, GridKind
-from mcz.schema import build, varint
+from mcz.schema import build, parse, varint
 from tools.vectors.build.edits import Edit, plus, put
 from tools.vectors.build.files import Unrestorable, file_of
-from tools.vectors.build.source_files import with_template
+from tools.vectors.build.source_files import restored, unhashed, with_source, with_template
 from tools.vectors.build.table_files import MARKERS, QUATERNIONS, SPEC, TIMES
 from tools.vectors.valid.sources.tables import take_table
 
@@ -59,19 +59,43 @@ def _two_clocks(template: bytes) -> bytes:
 
 
 def _clocks(shelf: Unrestorable, plain: Motion) -> None:
-    general = build_grid(Grid(GridKind.GENERAL, 6))
-    cases = {
-        "grid": ("a clock on a GENERAL grid", "clock.0.grid", general),
-        "grid-without-text": ("a clock on an INTEGER grid", "clock.0.grid", b"\6\0\0"),
-        "denominator": ("a clock with the denominator 0", "clock.0.denominator", b"\0"),
-        "time": ("a time beyond its grid", "clock.0.offset", varint(2**53 - 2)),
-        "time-below": ("a time below its grid", "clock.0.offset", varint(2**53 - 1)),
-    }
-    for name, (purpose, path, new) in cases.items():
-        edit = _field(path, new)
-        if "time" in name:
-            edit = _both(edit, _field("clock.0.denominator", b"\1"))
-        data = file_of(plain, SRCE=with_template(edit))
+    """What a reader that overlooks the fault restores has the size and hash that are stated."""
+    three = build_grid(Grid(GridKind.PRINTED, 3, style=3))  # prints as FIXED 3 does
+    empty = replace(plain, signals=(plain.signals[0].cut(0, 0),), frame_numbers=None)
+    none = restored(unhashed(empty))
+    late = MARKERS
+    for time in (b"3.067", b"3.083", b"3.100", b"3.117", b"3.133"):
+        late = late.replace(time, b"2251799813685.247")
+    cases: tuple[tuple[str, str, Motion, bytes, Edit], ...] = (
+        ("grid", "a clock on a PRINTED grid", plain, MARKERS, _field("clock.0.grid", three)),
+        (
+            "denominator",
+            "a clock with the denominator 0, and no time",
+            empty,
+            none,
+            _field("clock.0.denominator", b"\0"),
+        ),
+        (
+            "time",
+            "times beyond their grid",
+            plain,
+            late,
+            _both(
+                _field("clock.0.offset", varint(2**53 - 2)), _field("clock.0.denominator", b"\1")
+            ),
+        ),
+        (
+            "time-below",
+            "times below their grid",
+            plain,
+            MARKERS,
+            _both(
+                _field("clock.0.offset", varint(2**53 - 1)), _field("clock.0.denominator", b"\1")
+            ),
+        ),
+    )
+    for name, purpose, motion, text, edit in cases:
+        data = file_of(with_source(motion, text), SRCE=with_template(edit))
         shelf.add(f"table-clock-{name}", SPEC, f"A template of a table: {purpose}.", data)
 
 
@@ -84,11 +108,16 @@ def build_grid(grid: Grid) -> bytes:
 
 
 def _headers(shelf: Unrestorable, plain: Motion) -> None:
+    assert plain.source is not None
+    header = parse(TABLE_TEMPLATE, plain.source.template, "template").header
+    n = 2**26 // len(PHRASES[PHRASE[0]]) + 1
+    rows = MARKERS[MARKERS.index(b"185\t") :]
     cases = {
-        "names": ("three names of two joints", b"\0\0\0"),
-        "bomb": ("a header that fills to 300 MB", PHRASE * 3_000_000),
+        "names": ("three names of two joints", header + b"\0", MARKERS[: -len(rows)] + rows),
+        "bomb": ("a header that fills to 2^26 bytes", PHRASE * n, PHRASES[PHRASE[0]] * n + rows),
     }
-    for name, (purpose, header) in cases.items():
-        edit = _field("header", varint(len(header)) + header)
-        data = file_of(plain, SRCE=with_template(edit, deflated=True))
+    for name, (purpose, new, text) in cases.items():
+        edit = _field("header", varint(len(new)) + new)
+        motion = with_source(plain, text)
+        data = file_of(motion, SRCE=with_template(edit, deflated=True))
         shelf.add(f"table-{name}", SPEC, f"A template of a table: {purpose}.", data)

@@ -289,7 +289,9 @@ def _tables() -> Iterable[tuple[str, list[Grid], Sequence[Sequence[int]]]]:
 def _printed_grids(every: Sequence[GridFlag]) -> tuple[list[Grid], list[Sequence[int]]]:
     """PRINTED grids of all sorts, and magnitudes of each."""
     styles = [0, 3, 40, 64, 80, 104, 129, 144, 145, 192, 208, 232]
-    grids = [Grid(GridKind.PRINTED, digits, style=s) for digits in (0, 4, 22, 32, 64) for s in styles]
+    grids = [
+        Grid(GridKind.PRINTED, digits, style=s) for digits in (0, 4, 22, 32, 64) for s in styles
+    ]
     grids += [Grid(GridKind.PRINTED, 64, flags, style=145) for flags in every]
     exponents = _flags((NONE, F.PLUS), EXPONENTS, (NONE, F.UPPER))
     grids += [Grid(GridKind.PRINTED, 131, flags, style=194) for flags in exponents]

@@ -71,7 +71,9 @@ def _clocks(shelf: Whole) -> None:
         ("large", 2**50, 2**30 + 1, 2**31),
     ):
 
-        def edit(fields: Any, given: tuple[int, int, int] = (offset, numerator, denominator)) -> None:
+        def edit(
+            fields: Any, given: tuple[int, int, int] = (offset, numerator, denominator)
+        ) -> None:
             names = ("offset", "numerator", "denominator")
             fields.clock[0].update(zip(names, given, strict=True))
 
@@ -123,7 +125,8 @@ def _patterns(shelf: Whole) -> None:
         runs = [(n, 1, 8), (0, 1, -4), (2, n - 2, 0)]
         names = ("gap", "column", "n_columns", "width")
         fields.patterns[0].runs[:] = [
-            dict(zip(names, (1, column, count, width), strict=True)) for column, count, width in runs
+            dict(zip(names, (1, column, count, width), strict=True))
+            for column, count, width in runs
         ]
 
     motion = with_fields(times, edit)
