@@ -279,9 +279,7 @@ def test_worked_examples_of_grids(row: list[str]) -> None:
     spec, _, style = spec.partition(", style ")
     kind, *rest = spec.split()
     digits = int(rest.pop(0)) if rest and rest[0].isdigit() else 0
-    grid = Grid(
-        GridKind[kind], digits, sum(GridFlag[name] for name in rest), style=int(style or 0)
-    )
+    grid = Grid(GridKind[kind], digits, sum(GridFlag[name] for name in rest), style=int(style or 0))
     place = np.array([int(ordinal, 0)])
     text = re.fullmatch(r"(bytes )?`([^`]+)`", token)
     assert text is not None

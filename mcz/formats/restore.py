@@ -60,7 +60,7 @@ def rows_text(
     limit = max(TEXT_LIMIT, TEXT_PER_CELL * signal.n_rows * (signal.n_channels + 1))
     if source.size:
         limit = min(limit, max(TEXT_LIMIT, TEXT_PER_SIZE * source.size))
-    numbers = numbers_of(motion)
+    numbers = numbers_of(motion, signal.n_rows)
     cells = Cells(signal, numbers if numbered else None)
     if numbered and isinstance(source.notes, RowNotes):
         odd = (entry for entry in source.notes.texts if entry[0] < signal.n_rows)
@@ -76,11 +76,11 @@ def rows_text(
     return body[: len(body) - (len(runs[-1][0].tail) if runs else 0)] + layout.ending
 
 
-def numbers_of(motion: Motion) -> Ints:
-    """The number of every frame."""
+def numbers_of(motion: Motion, n_rows: int) -> Ints:
+    """The number of every row."""
     if motion.frame_numbers is not None:
         return motion.frame_numbers
-    return np.arange(1, motion.n_frames + 1)
+    return np.arange(1, n_rows + 1)
 
 
 def _pattern_runs(

@@ -55,6 +55,7 @@ PHRASES = {  # and others: what stands in many headers
     30: b",Total Frames in Take,",
     31: b",Total Exported Frames,",
 }
+MOST = 2**62  # of ordinals, so that they fit an int64
 MAX_HEADER = 2**26  # bytes of a header with its marks filled
 DECIMALS = (GridKind.FIXED, GridKind.TRIMMED)  # of times that follow from frame numbers
 _MARKS = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f]")
@@ -90,10 +91,9 @@ class Clock:
     offset: int
 
     def ordinals(self, numbers: Sequence[int]) -> list[int]:
-        """The ordinal of every time; FormatError for one beyond the grid."""
+        """The ordinal of every time; FormatError for one far beyond every grid."""
         found = [(n * self.numerator + self.offset) // self.denominator for n in numbers]
-        limit = self.grid.limit
-        if any(not -1 - limit <= ordinal <= limit for ordinal in found):  # TABLE-07
+        if any(abs(ordinal) > MOST for ordinal in found):
             raise FormatError("source template: a time is no number of its grid")
         return found
 
@@ -162,7 +162,7 @@ def fill(header: bytes, names: Sequence[str], count: bytes) -> bytes:
         else:
             text = PHRASES[mark[0]]
         size += len(text) - 1
-        if size > MAX_HEADER:  # TABLE-06
+        if size > MAX_HEADER:
             raise LimitError(f"source template: a header of {size} bytes, limit {MAX_HEADER}")
         out += [header[at : match.start()], text]
         at = match.end()

@@ -29,7 +29,7 @@ def plain_trc(motion: Motion) -> Motion:
     if unit is None:
         raise MotionError("TRC states a length unit: mm, cm or m; say which it is")
     rate = f"{float(_rate(motion)):.6f}"
-    first = int(numbers_of(motion)[0]) if motion.n_frames else 1
+    first = int(numbers_of(motion, motion.n_frames)[0]) if motion.n_frames else 1
     names = _names([joint.name for joint in skeleton.joints], motion.n_frames)
     values = (rate, rate, "\3", str(len(names)), unit, rate, str(first), str(motion.n_frames))
     axes = "".join("\tX\1\tY\2\tZ\2" for _ in names)
@@ -71,7 +71,7 @@ def _with_source(
 ) -> Motion:
     """``motion`` as its first signal alone, with the source; times begin with 0."""
     step = 10**DECIMALS / _rate(motion)
-    first = int(numbers_of(motion)[0]) if motion.n_frames else 1
+    first = int(numbers_of(motion, motion.n_frames)[0]) if motion.n_frames else 1
     clock = Clock(
         TIMES,
         step.numerator,

@@ -20,12 +20,12 @@ def restore_table(motion: Motion) -> bytes:
     """
     source = motion.source
     assert source is not None
-    if any(signal.samples_per_frame != 1 for signal in motion.signals):  # TABLE-08
+    if any(signal.samples_per_frame != 1 for signal in motion.signals):  # TABLE-06
         raise FormatError("source template: a table has one row a frame in every signal")
     signal = beside(motion.signals)
     layout = parse_table(source.template, source.detail, signal.n_channels)
     if layout.clock is not None:
-        signal = _with_clock(signal, layout.clock, numbers_of(motion).tolist())
+        signal = _with_clock(signal, layout.clock, numbers_of(motion, motion.n_frames).tolist())
     rows = rows_text(motion, source, signal, layout.rows, layout.missing)
     header = layout.header
     if layout.marked:
