@@ -11,13 +11,13 @@ from mcz.cli.common import Exit, Failure
 if TYPE_CHECKING:
     from mcz.reading.clip import Clip
 
-CONVERSIONS = ("bvh", "amc", "c3d")
+CONVERSIONS = ("bvh", "amc", "c3d", "trc", "sto", "mot")
 TARGETS = ("csv", "npz", *CONVERSIONS)
 # Formats that decode does not write; a file of that name would hold something else.
 OTHERS = {
     "mcz": "mcz extract takes clips out of an .mcz",
     "asf": "--with-skeleton writes the ASF beside it",
-    **dict.fromkeys(("trc", "tsv", "mot", "sto", "fbx", "gltf", "glb", "usd", "npy", "json"), ""),
+    **dict.fromkeys(("tsv", "fbx", "gltf", "glb", "usd", "npy", "json"), ""),
 }
 
 

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from construct import (
     Bytes,
-    Construct,
     ExprValidator,
     GreedyBytes,
     IfThenElse,
     Int8ul,
     OneOf,
     Pass,
-    PrefixedArray,
     Struct,
     this,
 )

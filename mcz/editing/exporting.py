@@ -42,7 +42,8 @@ def export(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """Write every clip of an MCZ file below ``directory`` as "npz", "csv", "bvh", "amc" or "c3d".
+    """Write every clip of an MCZ file below ``directory`` as "npz", "csv" or a format of
+    ``mcz.convert``.
 
     A clip "day1/walk" becomes "day1/walk.npz"; with an AMC comes its ASF. ``clips`` and ``where``:
     of these alone, as in ``unpack``. ``rate`` and ``unit`` are those of clips that do not say them.

@@ -149,6 +149,10 @@ def sniffed(data: bytes) -> str | None:
         return "bvh"
     if data[1:2] == b"\x50" and not data[:1].isspace() and not start[:1].isalpha():
         return "c3d"
+    if start.startswith(b"PATHFILETYPE"):
+        return "trc"
+    if re.search(rb"(?im)^[ \t]*endheader[ \t]*\r?$", data):
+        return "sto"
     if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", data):
         return "asf"
     return "amc" if _of("amc", "is_amc")(data) else None

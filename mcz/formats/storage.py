@@ -1,7 +1,7 @@
 """STO and MOT (tables of OpenSim and SIMM): bytes -> Motion, and back.
 
-SPEC.md, "The text of tables", is normative for the way back. Every column is a joint without a parent, the time
-among them, whose channels are plain scalars: what they move, only the model knows.
+SPEC.md, "The text of tables", is normative for the way back. Every column is a joint without a
+parent, the time among them, whose channels are plain scalars: what they move, only the model knows.
 """
 
 from __future__ import annotations

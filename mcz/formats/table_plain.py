@@ -10,7 +10,7 @@ from mcz.errors import MotionError
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.restore import numbers_of
 from mcz.formats.table_layout import Clock, TableLayout
-from mcz.motion import POSITION_KINDS, Motion, Source
+from mcz.motion import POSITION_KINDS, Motion, Skeleton, Source
 from mcz.numbers import Grid, GridKind
 
 UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m"}
@@ -54,12 +54,20 @@ def plain_storage(motion: Motion, format_name: str = "sto") -> Motion:
         for channel in joint.channels
     ]
     labels = _names(labels, motion.n_frames)
-    n = len(labels)
+    n, timed = len(labels), has_times(skeleton)
     degrees = "yes" if skeleton.angle_unit == "deg" else "no"
-    header = f"{_printable(motion.name)}\n\7" + f"1\n\x08\3\n\x0b{n + 1}\n\x0c{degrees}\n\x0e\ntime"
-    header += "".join(f"\t{label}" for label in labels) + "\n"
-    items = [(b"", n, 0), *((b"\t", column, 0) for column in range(n))]
-    return _with_source(motion, format_name, header, b"nan", items)
+    header = f"{_printable(motion.name)}\nversion=1\nnRows=\3\nnColumns={n + (not timed)}\n"
+    header += f"inDegrees={degrees}\nendheader\n"
+    header += "\t".join(labels if timed else ("time", *labels)) + "\n"
+    columns = [*range(n)] if timed else [n, *range(n)]
+    items = [(b"\t" if k else b"", column, 0) for k, column in enumerate(columns)]
+    return _with_source(motion, format_name, header, b"nan", items, timed=timed)
+
+
+def has_times(skeleton: Skeleton) -> bool:
+    """Whether the first column is the time, as of a STO or MOT that was read."""
+    channels = skeleton.joints[0].channels if skeleton.joints else ()
+    return len(channels) == 1 and skeleton.joints[0].name == "time" and not channels[0].kind
 
 
 def _with_source(
@@ -68,20 +76,29 @@ def _with_source(
     header: str,
     missing: bytes,
     items: Sequence[tuple[bytes, int, int]],
+    *,
+    timed: bool = False,
 ) -> Motion:
-    """``motion`` as its first signal alone, with the source; times begin with 0."""
-    step = 10**DECIMALS / _rate(motion)
-    first = int(numbers_of(motion, motion.n_frames)[0]) if motion.n_frames else 1
-    clock = Clock(
-        TIMES,
-        step.numerator,
-        step.denominator,
-        step.denominator // 2 - first * step.numerator,
-    )
+    """``motion`` as its first signal alone, with the source; ``timed``: the times are in it.
+
+    Else they begin with 0.
+    """
+    clock = None if timed else _clock(motion)
     rows = Layout((), (Pattern(runs_of(items), b"\n"),))
     template, detail = TableLayout(header.encode(), True, missing, clock, rows).build()
     source = Source(format_name, template, detail)
     return replace(motion, signals=motion.signals[:1], source=source)
+
+
+def _clock(motion: Motion) -> Clock:
+    step = 10**DECIMALS / _rate(motion)
+    first = int(numbers_of(motion, motion.n_frames)[0]) if motion.n_frames else 1
+    offset = step.denominator // 2 - first * step.numerator
+    if max(abs(offset), step.numerator, step.denominator) >= 2**52:
+        raise MotionError(
+            f"motion {motion.name!r}: its frame rate or numbers are too large for TRC"
+        )
+    return Clock(TIMES, step.numerator, step.denominator, offset)
 
 
 def _rate(motion: Motion) -> Fraction:

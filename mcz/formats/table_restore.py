@@ -1,4 +1,7 @@
-"""Signals, template, detail and notes -> the text of a table. SPEC.md, "The text of tables", is normative."""
+"""Signals, template, detail and notes -> the text of a table.
+
+SPEC.md, "The text of tables", is normative.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """TRC (marker trajectories): bytes -> Motion, and back.
 
-SPEC.md, "The text of tables", is normative for the way back. Every marker is a joint without a parent. The
-numbers of frames are those of the file; times follow from them, or are a signal of their own.
+SPEC.md, "The text of tables", is normative for the way back. Every marker is a joint without a
+parent. The numbers of frames are those of the file; times follow from them, or are a signal.
 """
 
 from __future__ import annotations

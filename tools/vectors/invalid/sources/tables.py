@@ -37,8 +37,8 @@ def _fields(shelf: Unrestorable, plain: Motion, times: Motion) -> None:
         ("cut", "it ends early", plain, lambda data: data[:-1]),
         ("marks", "marks is 2", plain, _field("marks", b"\2")),
         ("two-clocks", "two clocks", plain, _two_clocks),
-        ("column", "a column behind that of the clock", plain, _field("patterns.0.runs.1.column", b"\x08")),
-        ("no-clock", "the column of a clock that there is not", times, _field("patterns.0.runs.1.column", b"\5")),
+        ("column", "a column behind that of the clock", plain, _column(b"\x08")),
+        ("no-clock", "the column of a clock that there is not", times, _column(b"\5")),
         ("gap", "a gap beyond the last", plain, _field("patterns.0.tail", b"\x63")),
         ("width", "a width of -1", plain, _field("patterns.0.runs.1.width", b"\1")),
     )  # fmt: skip
@@ -49,6 +49,10 @@ def _fields(shelf: Unrestorable, plain: Motion, times: Motion) -> None:
     detail = put(DETAIL, "ends", b"\2")(plain.source.detail)
     data = file_of(replace(plain, source=replace(plain.source, detail=detail)))
     shelf.add("table-ends", SPEC, "A detail of a table: ends is 2.", data)
+
+
+def _column(number: bytes) -> Edit:
+    return _field("patterns.0.runs.1.column", number)
 
 
 def _two_clocks(template: bytes) -> bytes:
