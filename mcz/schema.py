@@ -131,9 +131,15 @@ UVARINT = Varint()
 SVARINT = _Zigzag(UVARINT)
 SIZED = Sized()
 TEXT = _Utf8(SIZED)
+AT_MOST_ONE = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)  # CONV-07
 # CONV-10
 EXTENSION = GreedyBytes  # the end of an open structure: ignored by readers, kept on rewriting
 FINITE = ExprValidator(Float64l, lambda obj, ctx: obj - obj == 0)  # SKEL-08
+
+
+def optional(item: Construct) -> Construct:
+    """A count of 0 or 1, then that many items."""
+    return PrefixedArray(AT_MOST_ONE, item)
 
 
 def counted(item: Construct, most: int = MAX_COUNT, kind: str = "") -> Construct:

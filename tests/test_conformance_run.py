@@ -401,7 +401,9 @@ def test_invalid_sources_need_every_format_unless_stated() -> None:
     vector = {"file": "invalid/s/x.mcz", "modes": ["sources"], "exit": [1], "expected": {}}
     (request,) = manifest.all_requests(vector)
     some = Capabilities(sources=frozenset(("bvh", "asf")))
-    assert some.lacks(request) == ["source amc", "source c3d", "source c3d-outputs"]
+    assert some.lacks(request) == [
+        f"source {name}" for name in ("amc", "c3d", "c3d-outputs", "trc", "mot", "sto")
+    ]
     vector["formats"] = ["bvh"]
     assert some.lacks(request) == []
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 import zlib
-from itertools import takewhile
+from itertools import product, takewhile
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +19,11 @@ from mcz.codecs.posewave import header as posewave
 from mcz.coding import logistic, mixing, residuals, space_kernels
 from mcz.coding.ordinals import kernels as lossless_kernels
 from mcz.container import chunks
-from mcz.formats import FORMATS, amc, c3d_restore
+from mcz.formats import FORMATS, amc, c3d_restore, trc
 from mcz.formats.c3d_layout import Kind
 from mcz.formats.layout import TEMPLATE
-from mcz.numbers import Grid, GridFlag, GridKind, rules, values_of_texts
+from mcz.formats.table_layout import PHRASES, TABLE_TEMPLATE
+from mcz.numbers import Grid, GridFlag, GridKind, printed_base, rules, values_of_texts
 from mcz.schema import parse
 from mcz.transforms.wavelets import MAX_LEVELS
 from tests.test_spec import ROOT, SPEC, rows_under
@@ -224,9 +225,10 @@ def test_grids() -> None:
             allowed[GridKind[kind], number] = flags_in(flags, number), most, ordinals
     for kind in GridKind:
         for digits in range(256):
-            legal = rules.fault(kind, digits, 0, 1.0) is None
+            style = digits + 63 if kind == GridKind.PRINTED and 128 < digits < 144 else 0
+            legal = rules.fault(kind, digits, 0, 1.0, style) is None
             assert legal == ((kind, digits) in allowed), (kind, digits)
-            if legal:
+            if legal and kind != GridKind.PRINTED:
                 check_grid(Grid(kind, digits), *allowed[kind, digits])
 
 
@@ -239,6 +241,33 @@ def check_grid(grid: Grid, flags: int, most: str, ordinals: str) -> None:
     assert ordinals == ("-1 - M to M" if grid.signed_magnitude else "-M to M")
 
 
+def test_styles_of_printed_grids() -> None:
+    """Each pair of digits and a style is legal where both tables have it, with those flags."""
+    styles = {
+        style: flags_in(flags, 1)
+        for listed, _, flags in table_after(section("PRINTED"), "| style | text |")
+        for style in numbers_in(listed)
+    }
+    wanted = {}
+    rows = table_after(section("PRINTED"), "| digits | numbers |")
+    for listed, _, kind, which, most in rows:
+        for digits in numbers_in(listed):
+            for style, flags in styles.items():
+                of = {"any": True, "below 128": style < 128, "128 and more": style >= 128}
+                if of.get(which, style == digits + 63):
+                    limit = eval(most.replace("^", "**").replace("digits", str(digits)))
+                    wanted[digits, style] = GridKind[kind], limit, flags
+    for digits, style in product(range(256), range(256)):
+        legal = rules.fault(GridKind.PRINTED, digits, 0, 1.0, style) is None
+        assert legal == ((digits, style) in wanted), (digits, style)
+    for (digits, style), (kind, limit, flags) in wanted.items():
+        grid = Grid(GridKind.PRINTED, digits, style=style)
+        assert (grid.limit, printed_base(grid).kind) == (limit, kind)
+        for flag in GridFlag:
+            legal = rules.fault(GridKind.PRINTED, digits, int(flag), 1.0, style) is None
+            assert legal == bool(flags & flag), (grid, flag)
+
+
 def test_flags_of_grids() -> None:
     rows = table_after(section("The grid structure"), "| flag | bit | text |")
     assert {row[0]: int(row[1]) for row in rows} == {flag.name: int(flag) for flag in GridFlag}
@@ -247,9 +276,10 @@ def test_flags_of_grids() -> None:
 @pytest.mark.parametrize("row", rows_under("Worked examples"), ids=lambda row: row[0])
 def test_worked_examples_of_grids(row: list[str]) -> None:
     token, spec, ordinal, value = row
+    spec, _, style = spec.partition(", style ")
     kind, *rest = spec.split()
     digits = int(rest.pop(0)) if rest and rest[0].isdigit() else 0
-    grid = Grid(GridKind[kind], digits, sum(GridFlag[name] for name in rest))
+    grid = Grid(GridKind[kind], digits, sum(GridFlag[name] for name in rest), style=int(style or 0))
     place = np.array([int(ordinal, 0)])
     text = re.fullmatch(r"(bytes )?`([^`]+)`", token)
     assert text is not None
@@ -295,6 +325,42 @@ def test_worked_example_of_a_template() -> None:
     )
     assert {grid.kind for grid in motion.signals[0].grids} == {GridKind.FIXED}
     assert amc.write(motion) == file
+
+
+def test_phrases_of_tables() -> None:
+    rows = table_after(section("The text of tables"), "| byte | phrase")
+    said = {int(row[0]): row[1].split("`")[1].replace("\\t", "\t").encode() for row in rows}
+    assert said == PHRASES
+
+
+def test_worked_example_of_a_table() -> None:
+    text = section("The text of tables")
+    block = re.search(r"Worked example, the file\n\n```\n(.*?)\n```", text, re.S)
+    assert block is not None
+    file = block[1].replace("\n", "").replace("\\n", "\n").replace("\\t", "\t").encode()
+    motion = trc.read_trc(file)
+    source = motion.source
+    assert source is not None
+    assert source.detail == bytes(6)
+    assert source.notes is None
+    fields = parse(TABLE_TEMPLATE, source.template, "template")
+    said = {row[0]: row[1] for row in table_after(text, "| part | value |")}
+    header = "".join(
+        part.replace("\\t", "\t").replace("\\n", "\n") if k % 2 else bytes.fromhex(part).decode()
+        for k, part in enumerate(said["header"].split("`"))
+    )
+    assert (fields.header, fields.marks, fields.missing) == (header.encode(), 1, b"")
+    clock = fields.clock[0]
+    told = f"FIXED {clock.grid.digits}, numerator {clock.numerator}, "
+    assert said["clock"] == f"{told}denominator {clock.denominator}, offset {clock.offset}"
+    assert fields.gaps == [b"", b"\t", b"\n"]
+    (pattern,) = fields.patterns
+    assert (pattern.tail, [(r.gap, r.column, r.n_columns, r.width) for r in pattern.runs]) == (
+        2,
+        [(0, 0, 1, 0), (1, 7, 1, 0), (1, 1, 6, 0)],
+    )
+    assert set(motion.signals[0].grids) == {Grid(GridKind.FIXED, 1)}
+    assert trc.write_trc(motion) == file
 
 
 def test_fields_of_c3d() -> None:

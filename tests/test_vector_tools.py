@@ -153,7 +153,7 @@ def test_facts_are_those_of_the_files() -> None:
         ("valid/raw/packets-frames", ["raw"], "0.3"),
         ("valid/raw/packets-numbered", ["raw"], "0.4"),
         ("valid/online/cosines", ["online"], "0.4"),
-        ("invalid/numbers/kind-11", [], "0.2"),
+        ("invalid/numbers/kind-12", [], "0.2"),
         ("invalid/lossless/kind-3", ["lossless"], "0.2"),
     ):
         assert (codecs_of(vector(name)), since(vector(name))) == (codecs, version), name

@@ -41,6 +41,7 @@ MODULES = (
     "mcz.codecs.posewave.header",
     "mcz.codecs.posewave.contact_plan",
     "mcz.formats.layout",
+    "mcz.formats.table_layout",
     "mcz.formats.notes",
     "mcz.formats.c3d_layout",
     "mcz.recovery.packets",
@@ -113,7 +114,7 @@ def type_name(subcon: Any) -> str:
 def _counted(subcon: Any) -> str:
     """construct's PrefixedArray: a Rebuild of the count, then an Array."""
     count, items = (renamed.subcon for renamed in subcon.subcons)
-    word = "optional" if count.subcon is payloads.AT_MOST_ONE else "counted"
+    word = "optional" if count.subcon is schema.AT_MOST_ONE else "counted"
     return f"{word} {type_name(items.subcon)}"
 
 

@@ -101,7 +101,7 @@ def command(
     as_json: bool,
     **options: Any,
 ) -> Exit:
-    """Compare B with A, the original: any two of .amc, .bvh, .c3d and .mcz.
+    """Compare B with A, the original: any two of .amc, .bvh, .c3d, .trc and .mcz.
 
     Errors of channels, and of positions in length units and cm, SPEC.md's "Metrics"; how far feet
     slide that stand in A; compression ratios of an .mcz. The exit code is 0 whenever the two could

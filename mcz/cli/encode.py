@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from mcz.writing.written import Written
 
 
-@click.command(short_help="A .bvh, .amc, .c3d or .asf file to .mcz.")
+@click.command(short_help="A .bvh, .amc, .c3d, .asf, .trc, .mot or .sto file to .mcz.")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
 @click.option(
     "-o",
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "format_name",
-    type=click.Choice(("bvh", "amc", "c3d", "asf")),
+    type=click.Choice(("bvh", "amc", "c3d", "asf", "trc", "mot", "sto")),
     help="What standard input is. Default: what it looks like; live BVH, or AMC with --skeleton.",
 )
 @copies_option("no")
@@ -70,7 +70,9 @@ def command(
     format_name: str | None,
     **options: Any,
 ) -> Exit:
-    """Encode SRC (.bvh, .amc, .c3d or .asf) into OUT.mcz; an ASF alone makes one of a skeleton.
+    """Encode SRC (.bvh, .amc, .c3d, .asf, .trc, .mot or .sto) into OUT.mcz.
+
+    An ASF alone makes one of a skeleton.
 
     With SRC - standard input is read. A codec that works frame by frame (lsdt-frame, or posewave
     with levels=0) then writes each frame of a BVH or AMC before it reads the next, to standard

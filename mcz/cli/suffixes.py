@@ -11,7 +11,7 @@ from mcz.cli.common import Exit, Failure
 if TYPE_CHECKING:
     from mcz.reading.clip import Clip
 
-CONVERSIONS = ("bvh", "amc", "c3d")
+CONVERSIONS = ("bvh", "amc", "c3d", "trc", "sto", "mot")
 SCENES = ("glb", "usda")  # animated nodes; mcz.conversion.scenes writes them
 TARGETS = ("csv", "npz", *CONVERSIONS, *SCENES)
 # Formats that decode does not write; a file of that name would hold something else.
@@ -20,7 +20,7 @@ OTHERS = {
     "asf": "--with-skeleton writes the ASF beside it",
     **dict.fromkeys(("usd", "usdc", "usdz"), "--to usda writes USD as text"),
     "gltf": "--to glb writes the same as one file",
-    **dict.fromkeys(("trc", "tsv", "mot", "sto", "fbx", "npy", "json"), ""),
+    **dict.fromkeys(("tsv", "fbx", "npy", "json"), ""),
 }
 
 

@@ -9,31 +9,23 @@ from __future__ import annotations
 
 from construct import (
     Bytes,
-    Construct,
     ExprValidator,
     GreedyBytes,
     IfThenElse,
     Int8ul,
     OneOf,
     Pass,
-    PrefixedArray,
     Struct,
     this,
 )
 
 from mcz.numbers import GRID
-from mcz.schema import EXTENSION, FINITE, SIZED, TEXT, UVARINT, counted
+from mcz.schema import EXTENSION, FINITE, SIZED, TEXT, UVARINT, counted, optional
 
 FORMAT_MAJOR, FORMAT_MINOR = 0, 9
 LEAST_NEEDED = 0, 2  # 0.1 had another CLIP and INDX
 
 POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)
-AT_MOST_ONE = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)  # CONV-07
-
-
-def optional(item: Construct) -> Construct:
-    """A count of 0 or 1, then that many items."""
-    return PrefixedArray(AT_MOST_ONE, item)
 
 
 def flags(*names: str) -> ExprValidator:

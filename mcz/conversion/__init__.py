@@ -9,6 +9,7 @@ from mcz.conversion.acclaim import to_amc
 from mcz.conversion.hierarchy import to_bvh
 from mcz.conversion.markers import to_c3d
 from mcz.conversion.solved import Fit, from_positions
+from mcz.conversion.tables import needs_rate, to_storage, to_trc
 from mcz.errors import OptionError
 from mcz.formats import FORMATS
 from mcz.kinematics import point_set
@@ -17,11 +18,18 @@ from mcz.reading.source_files import with_facts
 
 __all__ = ["TARGETS", "Fit", "convert", "converted_files", "from_positions"]
 
-TARGETS = {"bvh": to_bvh, "amc": to_amc, "c3d": to_c3d}
+TARGETS = {
+    "bvh": to_bvh,
+    "amc": to_amc,
+    "c3d": to_c3d,
+    "trc": to_trc,
+    "sto": to_storage,
+    "mot": to_storage,
+}
 
 
 def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Motion:
-    """``motion`` on a skeleton that files of the format ``to`` can hold: "bvh", "amc" or "c3d".
+    """``motion`` on a skeleton that files of the format ``to`` can hold: a key of ``TARGETS``.
 
     Its points are at the same positions, in the same order wherever both formats have the same
     points, to 1e-9 of the skeleton's size; numbers that are computed have a grid of 6 decimals,
@@ -36,6 +44,7 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
         raise OptionError(f"no conversion to {to!r}, but to {', '.join(TARGETS)}{scene}")
     motion = with_facts(motion, rate, None)
     same = to == "c3d" and point_set(motion.skeleton) == "markers"
+    same = same or (FORMATS[to].is_table and not needs_rate(motion, to))
     if to != "amc" and not same and motion.frame_rate is None:
         raise OptionError(
             f"motion {motion.name!r}: its frame rate is unknown, and {to.upper()} states one; "

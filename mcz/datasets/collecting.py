@@ -23,6 +23,7 @@ from mcz.poses.resampling import resampled_frames
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
+from mcz.reading.source_report import is_source
 from mcz.skeleton import Joints
 
 Target = str | os.PathLike[str] | File
@@ -130,7 +131,7 @@ def _files(target: Target | Iterable[Target], given: dict[str, File]) -> Iterato
             if not paths:
                 raise OptionError(f"{path}: a folder without .mcz files (mcz pack makes one)")
         for name in paths:
-            if Path(name).suffix.lower() in (".bvh", ".amc", ".asf", ".c3d"):
+            if is_source(name):
                 raise OptionError(f"{name}: a data set is made of .mcz files; mcz pack makes one")
             yield open(name, threads=1), name
 

@@ -46,7 +46,7 @@ def export(
 ) -> Report:
     """Write every clip of an MCZ file below ``directory`` as another format.
 
-    ``to`` is "npz", "csv", "bvh", "amc", "c3d", "glb" or "usda".
+    ``to`` is "npz", "csv", "glb", "usda" or a format of ``mcz.convert``.
     A clip "day1/walk" becomes "day1/walk.npz"; with an AMC comes its ASF. ``clips`` and ``where``:
     of these alone, as in ``unpack``. ``rate`` and ``unit`` are those of clips that do not say them;
     ``key_error_mm`` is that of ``to_glb``.

@@ -17,7 +17,7 @@ from mcz.formats.line_by_line import Arriving
 from mcz.formats.notes import join_notes
 from mcz.motion import FrameNotes, Source
 
-__all__ = ["FORMATS", "Format", "format_by_id", "format_of", "recording_of", "sniffed"]
+__all__ = ["FORMATS", "Format", "format_by_id", "format_of", "is_table", "recording_of", "sniffed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,8 @@ class Format:
     ``bones(data, whole=False)``: of a format that wants a skeleton, how many values each bone of
     the first frame, or of all, has. ``has_more_joints(data, most)`` says after a quick look whether
     a file surely has more, None where nobody can. ``states_rate``: the template holds the frame
-    rate, so that it does not suit another. ``recording(name, template, detail)`` is what the source
+    rate, so that it does not suit another. ``is_table``: its header names every column, which is
+    much of what is written. ``recording(name, template, detail)`` is what the source
     says beside all numbers, None where it says nothing; see ``mcz.Recording``.
     """
 
@@ -44,6 +45,7 @@ class Format:
     is_skeleton: bool = False
     wants_skeleton: bool = False
     states_rate: bool = False
+    is_table: bool = False
     arrive: Callable[..., Arriving] | None = None
     recording: Callable[[str, bytes, bytes], Any] | None = None
     has_more_joints: Callable[..., bool] | None = None
@@ -103,6 +105,23 @@ FORMATS: dict[str, Format] = {
             states_rate=True,
             recording=_of("c3d_recording", "recording"),
         ),
+        *(
+            Format(
+                name,
+                format_id,
+                (f".{name}",),
+                _of(module, f"read_{name}"),
+                _of(module, f"write_{name}"),
+                join_notes,
+                states_rate=True,
+                is_table=True,
+            )
+            for format_id, name, module in (
+                (6, "trc", "trc"),
+                (7, "mot", "storage"),
+                (8, "sto", "storage"),
+            )
+        ),
     )
 }
 
@@ -117,6 +136,12 @@ def format_of(path: str | Path) -> Format:
     raise SourceError(f"{Path(path).name}: no source format has the suffix {suffix!r}, but {known}")
 
 
+def is_table(path: str | Path) -> bool:
+    """Whether a file is a table by its suffix."""
+    suffix = Path(path).suffix.lower()
+    return any(f.is_table for f in FORMATS.values() if suffix in f.suffixes)
+
+
 def sniffed(data: bytes) -> str | None:
     """The name of the format that ``data`` seems to be of, None where it seems to be of none."""
     start = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:16].upper()
@@ -124,6 +149,10 @@ def sniffed(data: bytes) -> str | None:
         return "bvh"
     if data[1:2] == b"\x50" and not data[:1].isspace() and not start[:1].isalpha():
         return "c3d"
+    if start.startswith(b"PATHFILETYPE"):
+        return "trc"
+    if re.search(rb"(?im)^[ \t]*endheader[ \t]*\r?$", data):
+        return "sto"
     if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", data):
         return "asf"
     return "amc" if _of("amc", "is_amc")(data) else None

@@ -18,7 +18,11 @@ Columns = Ints | slice
 BLOCK = 2**17  # cells that are printed at a time
 INTEGERS = Grid(GridKind.FIXED)
 SHORTEST = Grid(GridKind.TEXT64)
-SLOW = (GridKind.TEXT32, GridKind.TEXT64)  # printed by Python, not by a compiled loop
+SLOW = (
+    GridKind.TEXT32,
+    GridKind.TEXT64,
+    GridKind.PRINTED,
+)  # printed by Python, not by a compiled loop
 
 
 class Cells:
@@ -54,6 +58,12 @@ class Cells:
             self.start[rows, columns] = self._total + stops - sizes
             self.size[rows, columns] = sizes
             self._append(np.frombuffer(b"".join(texts), np.uint8))
+
+    def set_same(self, chosen: NDArray[np.bool_], text: bytes) -> None:
+        """Give the ``chosen`` cells (n_rows, n_channels) one text, which may be empty."""
+        self.start[:, :-1][chosen] = self._total
+        self.size[:, :-1][chosen] = len(text)
+        self._append(np.frombuffer(text + b"\0", np.uint8))  # what is empty begins with no sign
 
     def _append(self, buffer: Bytes) -> None:
         self._pieces.append(buffer)

@@ -29,7 +29,7 @@ Ints = NDArray[np.int64]
 
 # SRC-12
 _WIDTH = ExprValidator(SVARINT, lambda obj, ctx: -MAX_WIDTH <= obj <= MAX_WIDTH and obj != -1)
-_BIT = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)  # SRC-13
+BIT = ExprValidator(UVARINT, lambda obj, ctx: obj <= 1)  # SRC-13
 
 RUN = Struct(
     "gap" / UVARINT * "number of the gap that precedes every token of the run",
@@ -56,7 +56,7 @@ DETAIL = Struct(
     "patterns"
     / counted(PATTERN, MAX_PATTERNS)
     * "further patterns, numbered on from the template's",
-    "ends" / _BIT * "1: ending stands in place of the last row's tail; 0: the tail does",
+    "ends" / BIT * "1: ending stands in place of the last row's tail; 0: the tail does",
     "ending" / SIZED * "what follows the last token; empty where ends is 0",
 )
 
@@ -134,29 +134,36 @@ class Layout:
 
     def build(self) -> tuple[bytes, bytes]:
         """The bytes of the template and of the detail; LimitError for too many runs."""
-        if sum(len(pattern.runs) for pattern in self.patterns) > MAX_RUNS:
-            raise LimitError(f"the frames are laid out in more than {MAX_RUNS} runs of columns")
-        gaps: dict[bytes, int] = {}
-        fields = []
-        n_shared = 0
-        for pattern in self.patterns:
-            fields.append(_pattern_fields(pattern, gaps))
-            n_shared = n_shared or len(gaps)
-        numbered = list(gaps)
-        template = {
-            "header": self.header,
-            "gaps": numbered[:n_shared],
-            "patterns": fields[:1],
-        }
-        detail = {
+        shared, own = numbered_patterns(self.patterns)
+        template = {"header": self.header, **shared}
+        return build(TEMPLATE, template, "source template"), build(
+            DETAIL, self.detail_fields(own), "source detail"
+        )
+
+    def detail_fields(self, own: dict[str, Any]) -> dict[str, Any]:
+        """The fields of DETAIL; ``own``: its gaps and patterns."""
+        return {
             "count": self.count,
             "rows": self.rows,
-            "gaps": numbered[n_shared:],
-            "patterns": fields[1:],
+            **own,
             "ends": int(self.ending is not None),
             "ending": self.ending or b"",
         }
-        return build(TEMPLATE, template, "source template"), build(DETAIL, detail, "source detail")
+
+
+def numbered_patterns(patterns: Sequence[Pattern]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Gaps and patterns of a template and of a detail, as fields; LimitError for too many runs."""
+    if sum(len(pattern.runs) for pattern in patterns) > MAX_RUNS:
+        raise LimitError(f"the frames are laid out in more than {MAX_RUNS} runs of columns")
+    gaps: dict[bytes, int] = {}
+    fields = []
+    n_shared = 0
+    for pattern in patterns:
+        fields.append(_pattern_fields(pattern, gaps))
+        n_shared = n_shared or len(gaps)
+    numbered = list(gaps)
+    shared = {"gaps": numbered[:n_shared], "patterns": fields[:1]}
+    return shared, {"gaps": numbered[n_shared:], "patterns": fields[1:]}
 
 
 def _pattern_fields(pattern: Pattern, gaps: dict[bytes, int]) -> dict[str, Any]:
@@ -177,11 +184,15 @@ def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
     """The layout of a clip of ``n_channels`` channels; raises FormatError on bad bytes."""
     shared = parse(TEMPLATE, template, "source template", {"runs": MAX_RUNS})
     own = parse(DETAIL, detail, "source detail", {"runs": MAX_RUNS})
-    if len(shared.header) not in (1, 2) or len(shared.patterns) > 1:  # SRC-03, SRC-04
-        raise FormatError(
-            f"source template: {len(shared.header)} parts of a header (1 or 2), "
-            f"{len(shared.patterns)} patterns (0 or 1)"
-        )
+    if len(shared.header) not in (1, 2):  # SRC-03
+        raise FormatError(f"source template: {len(shared.header)} parts of a header (1 or 2)")
+    return parsed_patterns(tuple(shared.header), shared, own, n_channels)
+
+
+def parsed_patterns(header: tuple[bytes, ...], shared: Any, own: Any, n_channels: int) -> Layout:
+    """The layout of the fields of a template and of a detail; raises FormatError."""
+    if len(shared.patterns) > 1:  # SRC-04
+        raise FormatError(f"source template: {len(shared.patterns)} patterns (0 or 1)")
     if len(own.patterns) >= MAX_PATTERNS:  # SRC-06
         raise LimitError(f"source detail: {len(own.patterns)} patterns, limit {MAX_PATTERNS - 1}")
     if own.patterns and not shared.patterns:  # SRC-05
@@ -194,7 +205,7 @@ def parse_layout(template: bytes, detail: bytes, n_channels: int) -> Layout:
         for number, fields in enumerate([*shared.patterns, *own.patterns])
     ]
     ending = own.ending if own.ends else None
-    return Layout(tuple(shared.header), tuple(patterns), own.count, own.rows, ending)
+    return Layout(header, tuple(patterns), own.count, own.rows, ending)
 
 
 def _pattern(fields: Any, gaps: Sequence[bytes], n_channels: int, where: str) -> Pattern:

@@ -7,7 +7,7 @@ from decimal import Decimal
 from fractions import Fraction
 
 MAX_TERM = 2**53 - 1  # of a frame rate's numerator and denominator
-_DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+DECIMAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
 def frame_rate(frame_time: str) -> tuple[Fraction | None, bool]:
@@ -18,7 +18,7 @@ def frame_rate(frame_time: str) -> tuple[Fraction | None, bool]:
     would tell such rates apart, one of at most 3 decimals; in this order. Otherwise it is the
     reciprocal itself. None where the frame time is zero, negative, absurd or not a number.
     """
-    if len(frame_time) > 64 or not _DECIMAL.fullmatch(frame_time):
+    if len(frame_time) > 64 or not DECIMAL.fullmatch(frame_time):
         return None, True
     if not 1e-9 <= float(frame_time) <= 1e9:
         return None, True

@@ -1,4 +1,4 @@
-"""Values, number grids, template, detail and notes -> the text of an AMC or BVH file.
+"""Values, number grids, template, detail and notes -> the text of AMC, BVH or a table.
 
 SPEC.md, "Source reconstruction", is normative.
 """
@@ -14,7 +14,7 @@ from mcz.errors import FormatError, LimitError
 from mcz.formats.cells import Cells
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, parse_layout
 from mcz.formats.notes import RowNotes
-from mcz.motion import FrameNotes, Motion, Source
+from mcz.motion import FrameNotes, Motion, Signal, Source
 
 Ints = NDArray[np.int64]
 
@@ -34,30 +34,53 @@ def restore(motion: Motion, source: Source) -> bytes:
     """
     signal = motion.signals[0]
     layout = parse_layout(source.template, source.detail, signal.n_channels)
+    rows = rows_text(motion, source, signal, layout)
+    if len(layout.header) > 1:
+        return printed_count(layout, signal.n_rows).join(layout.header) + rows
+    return layout.header[0] + rows
+
+
+def printed_count(layout: Layout, n_rows: int) -> bytes:
+    """The number of rows as a header prints it."""
+    return layout.count if layout.count and layout.rows == n_rows else b"%d" % n_rows  # AMC-06
+
+
+def rows_text(
+    motion: Motion, source: Source, signal: Signal, layout: Layout, missing: bytes | None = None
+) -> bytes:
+    """All rows and what follows them; ``signal`` has the columns of the patterns.
+
+    ``missing``: what stands where the signal is invalid, None where that does not matter. Raises as
+    ``restore`` does.
+    """
     runs = _pattern_runs(layout, source.notes, signal.n_rows)
     numbered = any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
     if numbered and signal.samples_per_frame != 1:  # AMC-08
         raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
-    numbers = motion.frame_numbers
-    if numbers is None:
-        numbers = np.arange(1, signal.n_rows + 1)
     limit = max(TEXT_LIMIT, TEXT_PER_CELL * signal.n_rows * (signal.n_channels + 1))
     if source.size:
         limit = min(limit, max(TEXT_LIMIT, TEXT_PER_SIZE * source.size))
+    numbers = numbers_of(motion, signal.n_rows)
     cells = Cells(signal, numbers if numbered else None)
     if numbered and isinstance(source.notes, RowNotes):
         odd = (entry for entry in source.notes.texts if entry[0] < signal.n_rows)
         texts = [(row, text) for row, text in odd if int(text) == numbers[row]]  # AMC-06
         rows = np.array([row for row, _ in texts], dtype=np.int64)
         cells.set(rows, np.full_like(rows, -1), [text for _, text in texts])
+    if missing is not None and signal.mask is not None:
+        cells.set_same(~signal.mask, missing)  # TABLE-04
     body = _body(cells, runs, limit)
-    # AMC-06
-    count = layout.count if layout.count and layout.rows == signal.n_rows else b"%d" % signal.n_rows
-    header = count.join(layout.header) if len(layout.header) > 1 else layout.header[0]
     if layout.ending is None:
-        return header + body
+        return body
     # AMC-06
-    return header + body[: len(body) - (len(runs[-1][0].tail) if runs else 0)] + layout.ending
+    return body[: len(body) - (len(runs[-1][0].tail) if runs else 0)] + layout.ending
+
+
+def numbers_of(motion: Motion, n_rows: int) -> Ints:
+    """The number of every row."""
+    if motion.frame_numbers is not None:
+        return motion.frame_numbers
+    return np.arange(1, n_rows + 1)
 
 
 def _pattern_runs(

@@ -24,6 +24,7 @@ Ints = NDArray[np.int64]
 Token = tuple[int, int, int]  # start, stop, column
 # The tokens of the frame that begins at an offset, and where it ends; None after the last frame.
 Frames = Callable[[int], tuple[list[Token], int] | None]
+Match = Callable[..., tuple[int, int]]  # as ``text_kernels.match_rows``, which it is by default
 
 MAX_NUMBER = 10**15  # of a frame, either sign
 LOOK_FOR_PADDING = (8, 64)  # numbers of patterns at which to look for padded columns
@@ -62,19 +63,26 @@ class Rows:
         return len(self.start)
 
 
-def read_rows(data: bytes, at: int, n_columns: int, frames: Frames) -> Rows:
-    """Read all frames of ``data`` from offset ``at`` on.
+def read_rows(
+    data: bytes,
+    at: int,
+    n_columns: int,
+    frames: Frames,
+    match: Match | None = None,
+    widths: dict[int, int] | None = None,
+) -> Rows:
+    """Read all frames of ``data`` from offset ``at`` on; ``widths``: of columns known to be padded.
 
     Raises SourceError where ``frames`` does, where the layout is too irregular to be worth
     a template, and where rows name so few columns that the table would dwarf the file.
     """
-    widths: dict[int, int] = {}
+    widths = widths or {}
     for look_at in LOOK_FOR_PADDING:
         try:
-            return _Reader(data, n_columns, frames, widths, look_at).read(at)
+            return _Reader(data, n_columns, frames, match, widths, look_at).read(at)
         except _Padded as padded:
             widths = padded.widths
-    return _Reader(data, n_columns, frames, widths).read(at)
+    return _Reader(data, n_columns, frames, match, widths).read(at)
 
 
 class _Padded(Exception):
@@ -89,6 +97,7 @@ class _Reader:
     data: bytes
     n_columns: int
     frames: Frames
+    match: Match | None
     widths: dict[int, int]  # of padded columns
     look_at: int = MAX_PATTERNS
     start: Ints = field(init=False)
@@ -105,6 +114,7 @@ class _Reader:
     def read(self, at: int) -> Rows:
         from mcz.formats import text_kernels
 
+        match = self.match or text_kernels.match_rows
         text = np.frombuffer(self.data, np.uint8)
         begin, last_end = at, at
         self._allocate(64)
@@ -116,7 +126,7 @@ class _Reader:
             number = self.used[-1][1]
             first, at = self.row, end
             while True:
-                self.row, at = text_kernels.match_rows(
+                self.row, at = match(
                     text, at, self.arrays[number], self.row, self.start, self.stop, self.numbers
                 )
                 if self.row < len(self.numbers):

@@ -10,8 +10,8 @@ magnitude index m >= 0 and that of a number with a minus sign is -1 - m, so that
 ordinal -1 and nothing is an exception only because of its sign.
 """
 
-from mcz.numbers.choose import choose_grid, fit
-from mcz.numbers.grid import GRID, GRID_FIELDS, Grid
+from mcz.numbers.choose import bits_of, choose_grid, fit
+from mcz.numbers.grid import GRID, GRID_FIELDS, Grid, printed_base
 from mcz.numbers.rules import GridFlag, GridKind
 from mcz.numbers.tokens import Texts, Tokens, scan, values_of_texts
 from mcz.numbers.values import ordinals_of, values_of
@@ -24,9 +24,11 @@ __all__ = [
     "GridKind",
     "Texts",
     "Tokens",
+    "bits_of",
     "choose_grid",
     "fit",
     "ordinals_of",
+    "printed_base",
     "scan",
     "values_of",
     "values_of_texts",

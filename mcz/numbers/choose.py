@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mcz.numbers import textgrids
+from mcz.numbers import printed, textgrids
 from mcz.numbers.grid import Grid
+from mcz.numbers.printed_choice import printed_bits, printed_candidates
 from mcz.numbers.rules import CHECKED_KINDS, FIXED_TEXT, GridFlag, GridKind
 from mcz.numbers.tokens import Bools, Ints, Tokens, kernels
 
@@ -16,7 +17,8 @@ _EXCEPTION_BITS = 200  # row, channel and text, a guess
 _DIGIT_BITS = 3.33
 _SIGN_AND_RANGE_BITS = 8.0
 
-Candidate = tuple[float, tuple[GridKind, int, int]]  # bits of an ordinal; kind, digits, flags
+Rule = tuple[GridKind, int, int, float, int]  # kind, digits, flags, scale, style
+Candidate = tuple[float, Rule]  # bits of an ordinal, and what makes its grid
 
 
 def cost(n_tokens: int, bits: float, n_exceptions: int) -> float:
@@ -25,10 +27,16 @@ def cost(n_tokens: int, bits: float, n_exceptions: int) -> float:
 
 def candidates(tokens: Tokens) -> Iterator[Candidate]:
     """Grids worth a try."""
+    if len(tokens) > _SAMPLE:  # a prime step, so that every column of a table is seen
+        tokens = tokens[np.arange(_SAMPLE) * 2_654_435_761 % len(tokens)]
+    for bits, rule in _plain_candidates(tokens.fields):
+        yield bits, (*rule, 1.0, 0)
+    yield from printed_candidates(tokens)
+
+
+def _plain_candidates(fields: Ints) -> Iterator[tuple[float, tuple[GridKind, int, int]]]:
+    """All grids but PRINTED."""
     loops = kernels()
-    fields = tokens.fields
-    if len(fields) > _SAMPLE:  # a prime step, so that every column of a table is seen
-        fields = fields[np.arange(_SAMPLE) * 2_654_435_761 % len(fields)]
     mantissa, power, shape = fields.T
     known = shape & (loops.BAD | loops.SPECIAL) == 0
     if not known.any():
@@ -119,19 +127,38 @@ def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]
         if wanted[-1][2].all():
             return wanted[-1]
     least = float("inf")
-    for bits, (kind, digits, flags) in sorted(candidates(tokens)):
+    for bits, rule in sorted(candidates(tokens)):
         if cost(len(tokens), bits, 0) >= least:
             continue
-        # Shape alone gives a lower bound, which spares TEXT grids where they cannot win.
-        bound = textgrids.match(tokens, kind, digits, flags)[2]
-        if kind in CHECKED_KINDS and bound:
-            bound -= int(np.count_nonzero(textgrids.long(tokens)))
-        if cost(len(tokens), bits, bound) >= least:
+        if cost(len(tokens), bits, _fewest_misses(tokens, rule)) >= least:
             continue
-        grid = Grid(kind, digits, flags)
-        ordinals, printed = grid.ordinals_of_tokens(tokens)
-        misses = len(tokens) - int(np.count_nonzero(printed))
+        grid = Grid(*rule)
+        ordinals, known = grid.ordinals_of_tokens(tokens)
+        misses = len(tokens) - int(np.count_nonzero(known))
         price = cost(len(tokens), bits, misses)
         if price < least:
-            least, fewest, best = price, misses, (grid, ordinals, printed)
+            least, fewest, best = price, misses, (grid, ordinals, known)
     return next((fitted for fitted in wanted if np.count_nonzero(~fitted[2]) <= fewest), best)
+
+
+def bits_of(grid: Grid) -> float:
+    """About how many bits an ordinal has that nothing is known of, as ``candidates`` guesses."""
+    match grid.kind:
+        case GridKind.TEXT32:
+            return 40.0
+        case GridKind.TEXT64:
+            return 64.0
+        case GridKind.PRINTED:
+            return printed_bits(grid.digits, grid.style)
+    return _bits(grid.digits)
+
+
+def _fewest_misses(tokens: Tokens, rule: Rule) -> int:
+    """Tokens that the shape alone rules out, which spares grids that are costly to try."""
+    kind, digits, flags, _, style = rule
+    if kind == GridKind.PRINTED:
+        return int(np.count_nonzero(~printed.plausible(tokens, style)))
+    bound = textgrids.match(tokens, kind, digits, flags)[2]
+    if kind in CHECKED_KINDS and bound:
+        bound -= int(np.count_nonzero(textgrids.long(tokens)))
+    return bound

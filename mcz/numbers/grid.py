@@ -10,7 +10,7 @@ from construct import Adapter, Container, If, Int8ul, Struct
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError, OptionError
-from mcz.numbers import rules, textgrids
+from mcz.numbers import printed, rules, textgrids
 from mcz.numbers.magnitudes import (
     binary32_magnitudes,
     binary32_values,
@@ -26,30 +26,32 @@ from mcz.numbers.rules import CHECKED_KINDS, TEXT_KINDS, GridKind
 from mcz.numbers.tokens import NAN, TENS, Bools, Floats, Ints, Texts, Tokens, nearest
 from mcz.schema import FINITE
 
+MAX = np.finfo(np.float64).max
 _IEEE = (GridKind.BINARY32, GridKind.BINARY64)
 
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A number grid. ``digits`` and ``flags`` mean what SPEC.md, "Number grids", says per kind.
+    """A number grid. ``digits``, ``flags`` and ``style`` mean what SPEC.md, "Number grids", says.
 
     Arrays of ordinals and values may have any shape. Every int64 is an ordinal of a number or is
-    refused with FormatError. Raises OptionError for digits, flags or a scale out of range.
+    refused with FormatError. Raises OptionError for digits, flags, a scale or a style out of range.
     """
 
     kind: GridKind
     digits: int = 0
     flags: int = 0
     scale: float = 1.0
+    style: int = 0
     _hash: int = field(init=False, repr=False, compare=False)  # many grids are looked up at once
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kind", GridKind(self.kind))
         object.__setattr__(self, "flags", int(self.flags))
-        fault = rules.fault(self.kind, self.digits, self.flags, self.scale)
+        fault = rules.fault(self.kind, self.digits, self.flags, self.scale, self.style)
         if fault:
             raise OptionError(f"a {self.kind.name} grid cannot have {fault}")
-        known = hash((int(self.kind), self.digits, self.flags, self.scale))
+        known = hash((int(self.kind), self.digits, self.flags, self.scale, self.style))
         object.__setattr__(self, "_hash", known)
 
     def __hash__(self) -> int:
@@ -67,7 +69,7 @@ class Grid:
     @property
     def limit(self) -> int:
         """The largest magnitude index; ordinals run from -1 - limit (or -limit) to limit."""
-        return rules.limit(self.kind, self.digits)
+        return rules.limit(self.kind, self.digits, self.style)
 
     def magnitudes(self, ordinals: Ints) -> Ints:
         """Magnitude indices; FormatError for an ordinal that is no number's."""
@@ -97,6 +99,8 @@ class Grid:
                 values = binary32_values(magnitudes)
             case GridKind.VAX_F:
                 values = vax_values(magnitudes)
+            case GridKind.PRINTED:
+                values = printed.values_of(self.digits, self.style, magnitudes)
             case _:
                 values = np.multiply(magnitudes, self.scale, dtype=np.float64)
         negative = ordinals < 0
@@ -115,7 +119,7 @@ class Grid:
         negative = np.signbit(values)
         magnitudes = np.where(np.isnan(values), 0.0, np.abs(values))
         if self.kind not in (GridKind.BINARY32, GridKind.BINARY64):
-            magnitudes = np.minimum(magnitudes, np.finfo(np.float64).max)
+            magnitudes = np.minimum(magnitudes, MAX)
         indices = np.minimum(self._indices(magnitudes), self.limit)
         ordinals = indices ^ -negative.astype(np.int64)
         if not self.signed_magnitude:
@@ -141,6 +145,8 @@ class Grid:
                 return binary32_magnitudes(values)
             case GridKind.VAX_F:
                 return vax_magnitudes(values)
+            case GridKind.PRINTED:
+                return printed.magnitudes_of(self.digits, values)
             case _:
                 return scaled_magnitudes(values, self.scale, True, self.limit)
 
@@ -176,19 +182,33 @@ class Grid:
         Where it does not (an exception), the ordinal is 0.
         """
         self._check_text()
-        ordinals, printed, _ = textgrids.match(tokens, self.kind, self.digits, self.flags)
+        if self.kind == GridKind.PRINTED:
+            return self._printed_ordinals(tokens)
+        ordinals, known, _ = textgrids.match(tokens, self.kind, self.digits, self.flags)
         if self.kind not in CHECKED_KINDS:
-            return ordinals, printed
-        unsure = textgrids.uncertain(tokens, self.kind, self.digits, printed)
-        printed |= unsure
-        chosen = tokens[printed]
+            return ordinals, known
+        unsure = textgrids.uncertain(tokens, self.kind, self.digits, known)
+        known |= unsure
+        chosen = tokens[known]
         if self.kind == GridKind.TEXT32:
-            ordinals[printed] = textgrids.token_ordinals32(chosen)
+            ordinals[known] = textgrids.token_ordinals32(chosen)
         else:
-            ordinals[printed] = self.ordinals(chosen.values())[0]
-        printed[unsure] = self.texts(ordinals[unsure]).equal(tokens[unsure].texts())
-        ordinals[~printed] = 0
-        return ordinals, printed
+            ordinals[known] = self.ordinals(chosen.values())[0]
+        known[unsure] = self.texts(ordinals[unsure]).equal(tokens[unsure].texts())
+        ordinals[~known] = 0
+        return ordinals, known
+
+    def _printed_ordinals(self, tokens: Tokens) -> tuple[Ints, Bools]:
+        """The same of a PRINTED grid: what has the right shape is printed, and compared."""
+        known = printed.plausible(tokens, self.style)
+        ordinals = np.zeros(len(tokens), np.int64)
+        chosen = tokens[known]
+        values = chosen.values()
+        indices = np.minimum(self._indices(np.minimum(np.abs(values), MAX)), self.limit)
+        ordinals[known] = indices ^ -np.signbit(values).astype(np.int64)
+        known[known] = self.texts(ordinals[known]).equal(chosen.texts())
+        ordinals[~known] = 0
+        return ordinals, known
 
     def exceptions(self, tokens: Tokens) -> int:
         """How many of the tokens this grid does not print."""
@@ -198,6 +218,9 @@ class Grid:
         """The text of each ordinal; FormatError for one out of range."""
         self._check_text()
         ordinals = np.ascontiguousarray(ordinals, np.int64).ravel()
+        if self.kind == GridKind.PRINTED:
+            magnitudes = self.magnitudes(ordinals)
+            return printed.texts(self.digits, self.style, self.flags, magnitudes, ordinals < 0)
         return textgrids.texts(
             self.kind, self.digits, self.flags, self.magnitudes(ordinals), ordinals < 0
         )
@@ -207,16 +230,28 @@ class Grid:
             raise OptionError(f"a {self.kind.name} grid has no text")
 
 
+def printed_base(grid: Grid) -> Grid:
+    """The grid that has the ordinals of a PRINTED one."""
+    digits = grid.digits
+    if digits in (rules.BASE_32, rules.BASE_64):
+        return Grid(GridKind.TEXT32 if digits == rules.BASE_32 else GridKind.TEXT64)
+    if digits > rules.BASE_GENERAL:
+        return Grid(GridKind.GENERAL, digits - rules.BASE_GENERAL)
+    return Grid(GridKind.FIXED, digits)
+
+
 class _GridAdapter(Adapter):
     def _decode(self, obj: Container, context: Any, path: str) -> Grid:
         try:
             # GRID-01
-            return Grid(obj.kind, obj.digits, obj.flags, 1.0 if obj.scale is None else obj.scale)
+            scale = 1.0 if obj.scale is None else obj.scale
+            return Grid(obj.kind, obj.digits, obj.flags, scale, obj.style or 0)
         except (ValueError, OptionError) as error:
             raise FormatError(f"{path}: {error}") from None
 
     def _encode(self, obj: Grid, context: Any, path: str) -> dict[str, Any]:
-        return {"kind": obj.kind, "digits": obj.digits, "flags": obj.flags, "scale": obj.scale}
+        names = ("kind", "digits", "flags", "scale", "style")
+        return {name: getattr(obj, name) for name in names}
 
 
 GRID_FIELDS = Struct(
@@ -224,5 +259,8 @@ GRID_FIELDS = Struct(
     "digits" / Int8ul * "digits, by kind",
     "flags" / Int8ul * "print style, by kind",
     "scale" / If(lambda fields: fields.kind == GridKind.SCALED, FINITE) * "SCALED only: the unit",
+    "style"
+    / If(lambda fields: fields.kind == GridKind.PRINTED, Int8ul)
+    * "PRINTED only: print rule",
 )
 GRID = _GridAdapter(GRID_FIELDS)

@@ -12,6 +12,11 @@ INTEGER_LIMIT = 2**53
 MIN_POWER, MAX_POWER = -307, 307  # of %g numbers: normal binary64, which 15 digits tell apart
 FIXED_TEXT = 64  # digits of a TEXT64 grid from here on: %.nf with n = digits - 64
 FIXED_TEXT_LIMIT = int(np.float64(1e21).view(np.int64)) - 1  # where JavaScript's toFixed ends
+BASE_32, BASE_64 = 32, 64  # digits of a PRINTED grid: an IEEE number; smaller: so many decimals;
+BASE_GENERAL = 128  # larger: BASE_GENERAL + n significant digits, 1 to 15
+SHORT_FIXED, SIGNIFICANT, EXPONENT = 64, 128, 192  # styles of a PRINTED grid, n added
+MOST_DECIMALS = 40  # of a style
+FIXED_TEXT_LIMIT32 = 0x6258D726  # the last binary32 below 10^21
 MIN_SCALE, MAX_SCALE = 2.0**-200, 2.0**200  # products with ordinals are normal binary64
 
 
@@ -26,6 +31,7 @@ class GridKind(IntEnum):
     BINARY32 = 8  # IEEE bits
     BINARY64 = 9
     VAX_F = 10  # 32-bit VAX F floating
+    PRINTED = 11  # decimals or binary floats, printed by a style of their own
 
 
 class GridFlag(IntFlag):
@@ -40,7 +46,10 @@ class GridFlag(IntFlag):
     UPPER = 64  # "E" instead of "e"
 
 
-TEXT_KINDS = (GridKind.FIXED, GridKind.TRIMMED, GridKind.GENERAL, GridKind.TEXT64, GridKind.TEXT32)
+TEXT_KINDS = (
+    *(GridKind.FIXED, GridKind.TRIMMED, GridKind.GENERAL, GridKind.TEXT64, GridKind.TEXT32),
+    GridKind.PRINTED,
+)
 CHECKED_KINDS = (GridKind.TEXT64, GridKind.TEXT32)  # printed or not is more than shape
 _STYLE = int(sum(GridFlag))
 _TEXT64_DIGITS = (0, 1, 16, 17, *range(FIXED_TEXT + 10, FIXED_TEXT + 41))
@@ -51,6 +60,7 @@ _ALLOWED: dict[GridKind, tuple[Collection[int], int]] = {
     GridKind.GENERAL: (range(1, 16), _STYLE),
     GridKind.TEXT64: (_TEXT64_DIGITS, _STYLE),
     GridKind.TEXT32: ((0,), _STYLE),
+    GridKind.PRINTED: ((*range(23), BASE_32, BASE_64, *range(129, 144)), _STYLE),
 }
 _CLASHES = (GridFlag.POINT_ZERO | GridFlag.POINT, GridFlag.EXPONENT3 | GridFlag.EXPONENT1)
 _LIMITS = {
@@ -66,12 +76,12 @@ _LIMITS = {
 }
 
 
-def fault(kind: GridKind, digits: int, flags: int, scale: float) -> str | None:
+def fault(kind: GridKind, digits: int, flags: int, scale: float, style: int = 0) -> str | None:
     """What is wrong with a grid, or None."""
-    allowed, style = _ALLOWED.get(kind, ((0,), 0))
+    allowed, known = _ALLOWED.get(kind, ((0,), 0))
     if digits not in allowed:  # GRID-02
         return f"{digits} digits"
-    if flags & ~style or any(flags & both == both for both in _CLASHES):  # GRID-03, GRID-06
+    if flags & ~known or any(flags & both == both for both in _CLASHES):  # GRID-03, GRID-06
         return f"flags {flags}"
     if kind == GridKind.TEXT64 and digits >= FIXED_TEXT and flags:  # GRID-03
         return f"flags {flags} with {digits} digits"
@@ -81,11 +91,36 @@ def fault(kind: GridKind, digits: int, flags: int, scale: float) -> str | None:
     # GRID-04
     if not (MIN_SCALE <= scale <= MAX_SCALE if kind == GridKind.SCALED else scale == 1.0):
         return f"scale {scale}"
+    if kind == GridKind.PRINTED:
+        return _style_fault(digits, flags, style)
+    return f"style {style}" if style else None
+
+
+def _style_fault(digits: int, flags: int, style: int) -> str | None:
+    """What is wrong with the style of a PRINTED grid, or None."""
+    significant = SIGNIFICANT < style <= SIGNIFICANT + 17
+    exponent = EXPONENT <= style <= EXPONENT + MOST_DECIMALS
+    if not (significant or exponent or (style < SIGNIFICANT and style % 64 <= MOST_DECIMALS)):
+        return f"style {style}"  # GRID-12
+    if digits > BASE_GENERAL and style != EXPONENT + digits - BASE_GENERAL - 1:  # GRID-12
+        return f"style {style} with {digits} digits"
+    exponents = GridFlag.PLUS | GridFlag.EXPONENT3 | GridFlag.EXPONENT1 | GridFlag.UPPER
+    if flags & ~(_STYLE if significant else exponents if exponent else 0):  # GRID-03
+        return f"flags {flags} with style {style}"
     return None
 
 
-def limit(kind: GridKind, digits: int) -> int:
+def limit(kind: GridKind, digits: int, style: int = 0) -> int:
     """The largest magnitude index of a grid."""
+    if kind == GridKind.PRINTED:
+        fixed = style < SIGNIFICANT
+        if digits == BASE_32:
+            return FIXED_TEXT_LIMIT32 if fixed else _LIMITS[GridKind.TEXT32]
+        if digits == BASE_64:
+            return FIXED_TEXT_LIMIT if fixed else _LIMITS[GridKind.TEXT64]
+        if digits < BASE_32:
+            return DECIMAL_LIMIT
+        kind, digits = GridKind.GENERAL, digits - BASE_GENERAL
     if kind == GridKind.GENERAL:
         return (MAX_POWER - MIN_POWER + 1) * 9 * int(10 ** (digits - 1))
     if kind == GridKind.TEXT64 and digits >= FIXED_TEXT:

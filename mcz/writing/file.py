@@ -17,6 +17,7 @@ from mcz.codecs import by_name, chosen
 from mcz.container.limits import ARCHIVE, BASE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import OptionError, SkeletonWarning
+from mcz.formats import is_table
 from mcz.motion import Motion
 from mcz.threads import limited
 from mcz.writing.atomic import replacing
@@ -105,7 +106,7 @@ def encode(
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
-        short = path.stat().st_size <= SHORT
+        short = path.stat().st_size <= SHORT or is_table(path)
         draft = Draft(stream, profile_of(archive), hold=verbatim, copies=copies, short=short)
         entry.write(draft, progress)
         refuse_inputs(target, entry.inputs)

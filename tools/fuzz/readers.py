@@ -44,6 +44,18 @@ WORDS = {
         "GEN_SCALE FORMAT UNSIGNED SIGNED TRIAL ACTUAL_START_FIELD ACTUAL_END_FIELD EVENT "
         "\\x02\\x50 \\x54 \\x55 \\x56 \\xff\\xff \\x00\\x80 \\x00\\x00\\x80\\x3f"
     ),
+    "trc": (
+        "PathFileType DataRate CameraRate NumFrames NumMarkers Units Frame# Time X1 Y1 Z1 mm m "
+        "\\x09 \\x0d\\x0a \\x0a\\x0a NaN nan -2.73E-01 1e300 599.793890 0.008 1547.538452148438 1,5"
+    ),
+    "mot": (
+        "version=1 nRows= nColumns= datarows inDegrees=yes endheader time \\x09 \\x0d\\x0a nan NaN "
+        "0.50170000000000003000 \\x09|||||| 9.669363727051634438e-03 1e300 -0 1,2,3 ;"
+    ),
+    "sto": (
+        "DataType=Vec3 DataType=Quaternion DataRate=100 version=3 endheader time \\x09 , 0,0,0 "
+        "0.8304999999999999 nan \\x0a\\x0a -1 1e-320 1e300 \\x00 \\x01 \\x03"
+    ),
 }
 
 
@@ -60,7 +72,7 @@ def seeds(name: str) -> dict[str, bytes]:
 def _sample(name: str) -> bytes:
     if name == "asf":
         return asf.write(acclaim_walk().skeleton)
-    walk = {"amc": acclaim_walk, "bvh": bvh_walk, "c3d": marker_walk}[name]()
+    walk = {"amc": acclaim_walk, "c3d": marker_walk, "trc": marker_walk}.get(name, bvh_walk)()
     signal = walk.signals[0]
     mask = None if signal.mask is None else signal.mask[:FRAMES]
     cut = replace(signal, values=signal.values[:FRAMES], mask=mask)
@@ -73,6 +85,18 @@ def check_bvh(data: bytes) -> bool:
 
 def check_c3d(data: bytes) -> bool:
     return _check("c3d", data)
+
+
+def check_trc(data: bytes) -> bool:
+    return _check("trc", data)
+
+
+def check_mot(data: bytes) -> bool:
+    return _check("mot", data)
+
+
+def check_sto(data: bytes) -> bool:
+    return _check("sto", data)
 
 
 def check_amc(data: bytes) -> bool:

@@ -77,6 +77,9 @@ TARGETS: dict[str, Target] = {
         _reader("asf", readers.check_asf),
         _reader("amc", readers.check_amc),
         _reader("c3d", readers.check_c3d),
+        _reader("trc", readers.check_trc),
+        _reader("mot", readers.check_mot),
+        _reader("sto", readers.check_sto),
         Target(
             "mcz",
             "whole files: strict, in parts, salvaged, live, verified",

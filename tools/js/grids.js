@@ -4,6 +4,7 @@
 import { shortest32 } from "./decimals.js";
 import { Refused } from "./errors.js";
 import { halvesOf, highHalf, lowHalf, setHalves } from "./int64.js";
+import { EXPONENT, OF_32, OF_64, OF_GENERAL, SIGNIFICANT, hasStyle, said } from "./printed.js";
 
 export const FIXED = 1;
 export const TRIMMED = 2;
@@ -15,11 +16,12 @@ export const SCALED = 7;
 export const BINARY32 = 8;
 export const BINARY64 = 9;
 export const VAX_F = 10;
+export const PRINTED = 11;
 
 // prettier-ignore
 const NAMES = [
   "FIXED", "TRIMMED", "GENERAL", "TEXT64", "TEXT32", "INTEGER", "SCALED", "BINARY32", "BINARY64",
-  "VAX_F",
+  "VAX_F", "PRINTED",
 ];
 
 export const POINT_ZERO = 1;
@@ -46,12 +48,14 @@ const word32 = new Uint32Array(float32.buffer);
 
 /** A number grid. */
 export class Grid {
-  constructor(kind, digits, flags, scale) {
+  constructor(kind, digits, flags, scale, style = 0) {
     this.kind = kind;
     this.digits = digits;
     this.flags = flags;
     this.scale = scale;
-    const greatest = greatestMagnitude(kind, digits);
+    this.style = style;
+    const { kind: base, digits: own } = baseOf(kind, digits);
+    const greatest = greatestMagnitude(base, own, kind === PRINTED && style < SIGNIFICANT);
     /** Least and greatest ordinal. */
     this.least = kind === INTEGER || kind === SCALED ? -greatest : -1n - greatest;
     this.greatest = greatest;
@@ -67,9 +71,23 @@ export class Grid {
   }
 }
 
+/**
+ * The kind and digits of the grid that has the ordinals of this one: another one for PRINTED.
+ *
+ * @returns {{kind: number, digits: number}}
+ */
+export function baseOf(kind, digits) {
+  if (kind !== PRINTED) return { kind, digits };
+  if (digits === OF_32) return { kind: TEXT32, digits: 0 };
+  if (digits === OF_64) return { kind: TEXT64, digits: 0 };
+  return digits > OF_GENERAL
+    ? { kind: GENERAL, digits: digits - OF_GENERAL }
+    : { kind: FIXED, digits };
+}
+
 /** Whether the numbers of a grid can be printed. */
 export function hasText(grid) {
-  return grid.kind <= TEXT32;
+  return grid.kind <= TEXT32 || grid.kind === PRINTED;
 }
 
 /**
@@ -83,9 +101,12 @@ export function parseGrid(reader) {
   const kind = reader.u8();
   const digits = reader.u8();
   const flags = reader.u8();
-  if (!hasDigits(kind, digits)) reader.refuse(`a grid of kind ${kind} with ${digits} digits`);
+  const style = kind === PRINTED ? reader.u8() : 0;
+  if (!hasDigits(kind, digits, style)) {
+    reader.refuse(`a grid of kind ${kind} with ${digits} digits, style ${style}`);
+  }
   const both = (a, b) => (flags & a) !== 0 && (flags & b) !== 0;
-  if (flags & ~knownFlags(kind, digits) || both(POINT_ZERO, POINT) || both(EXPONENT3, EXPONENT1)) {
+  if (flags & ~knownFlags(kind, digits, style) || both(POINT_ZERO, POINT) || both(EXPONENT3, EXPONENT1)) {
     reader.refuse(`${NAMES[kind - 1]} ${digits} with flags ${flags}`);
   }
   let scale = 1;
@@ -93,10 +114,10 @@ export function parseGrid(reader) {
     scale = reader.f64();
     if (!(scale >= 2 ** -200 && scale <= 2 ** 200)) reader.refuse(`a grid of scale ${scale}`);
   }
-  return new Grid(kind, digits, flags, scale);
+  return new Grid(kind, digits, flags, scale, style);
 }
 
-function hasDigits(kind, digits) {
+function hasDigits(kind, digits, style) {
   switch (kind) {
     case FIXED:
       return digits <= 22;
@@ -106,12 +127,14 @@ function hasDigits(kind, digits) {
       return digits >= 1 && digits <= 15;
     case TEXT64:
       return [0, 1, 16, 17].includes(digits) || (digits >= 74 && digits <= 104);
+    case PRINTED:
+      return hasStyle(digits, style);
     default:
       return kind >= TEXT32 && kind <= VAX_F && digits === 0;
   }
 }
 
-function knownFlags(kind, digits) {
+function knownFlags(kind, digits, style) {
   switch (kind) {
     case FIXED:
       return digits > 0 ? NO_ZERO | PLUS : POINT | PLUS;
@@ -122,20 +145,23 @@ function knownFlags(kind, digits) {
       return ALL_FLAGS;
     case TEXT64:
       return digits >= 74 ? 0 : ALL_FLAGS;
+    case PRINTED:
+      if (style < SIGNIFICANT) return 0;
+      return style < EXPONENT ? ALL_FLAGS : PLUS | EXPONENT3 | EXPONENT1 | UPPER;
     default:
       return 0;
   }
 }
 
-/** M of the table. */
-function greatestMagnitude(kind, digits) {
+/** M of the table; `below21`: of numbers below 10^21 alone. */
+function greatestMagnitude(kind, digits, below21) {
   switch (kind) {
     case GENERAL:
       return 5535n * 10n ** BigInt(digits - 1);
     case TEXT64:
-      return digits >= 74 ? 0x444b1ae4d6e2ef4fn : 0x7fefffffffffffffn;
+      return digits >= 74 || below21 ? 0x444b1ae4d6e2ef4fn : 0x7fefffffffffffffn;
     case TEXT32:
-      return 0x7f7fffffn;
+      return below21 ? 0x6258d726n : 0x7f7fffffn;
     case INTEGER:
       return 2n ** 53n;
     case BINARY32:
@@ -267,6 +293,21 @@ VALUE_OF[VAX_F] = (grid, low, high) => {
   const x = (2 ** 23 + (m & 0x7fffff)) * 2 ** (e - 152);
   return minus ? -x : x;
 };
+
+VALUE_OF[PRINTED] = (grid, low, high) => {
+  const minus = high < 0;
+  const x = said(printedNumber(grid, minus ? ~low >>> 0 : low, minus ? ~high : high), grid.style);
+  return minus ? -x : x;
+};
+
+/** base(grid, m): the binary64 that a PRINTED grid prints, from the halves of a magnitude. */
+export function printedNumber({ digits }, low, high) {
+  if (digits === OF_32) return float32Of(low);
+  if (digits === OF_64) return float64Of(low, high);
+  if (digits <= 22) return (high * TWO_32 + low) / EXACT_POWERS[digits];
+  const { d, k } = general(low, high, digits - OF_GENERAL);
+  return nearest(d, k);
+}
 
 /**
  * general(m, digits): the decimal d * 10^k of a magnitude, from the halves of m.

@@ -1,6 +1,15 @@
 // SPEC.md, "Codec 1: lossless": the heads of channels, which codec 14 has, too.
 
-import { BINARY32, BINARY64, GENERAL, TEXT32, TEXT64, VAX_F, binary32Ordinal } from "./grids.js";
+import {
+  BINARY32,
+  BINARY64,
+  GENERAL,
+  TEXT32,
+  TEXT64,
+  VAX_F,
+  baseOf,
+  binary32Ordinal,
+} from "./grids.js";
 
 export const CODED = 0;
 export const CONSTANT = 1;
@@ -128,9 +137,10 @@ export function withRests(heads) {
 
 /** The form of a channel whose head does not tell. */
 function formOf(grid) {
-  switch (grid.kind) {
+  const { kind, digits } = baseOf(grid.kind, grid.digits);
+  switch (kind) {
     case GENERAL:
-      return grid.digits;
+      return digits;
     case TEXT64:
     case BINARY64:
       return CLASSES_53;

@@ -15,6 +15,7 @@ import {
   TRIMMED,
   VAX_F,
   binary32Ordinal,
+  baseOf,
   bitsOf,
 } from "./grids.js";
 
@@ -48,7 +49,9 @@ export function ordinalOf(grid, x) {
 }
 
 /** The magnitude of a number that is not negative; it may be beyond the greatest of the grid. */
-function magnitudeOf({ kind, digits, scale }, size) {
+function magnitudeOf(grid, size) {
+  const { scale } = grid;
+  const { kind, digits } = baseOf(grid.kind, grid.digits);
   if (kind === BINARY32) return BigInt(binary32Ordinal(size));
   if (kind === BINARY64) return bitsOf(size);
   const v = Math.min(size, Number.MAX_VALUE);

@@ -9,6 +9,9 @@ const SOURCE_FORMATS = new Map([
   [3, { name: "bvh", of: "clip" }],
   [4, { name: "c3d", of: "clip" }],
   [5, { name: "c3d-outputs", of: "clip" }],
+  [6, { name: "trc", of: "clip" }],
+  [7, { name: "mot", of: "clip" }],
+  [8, { name: "sto", of: "clip" }],
 ]);
 
 /** Names of the source formats that this decoder restores. */

@@ -30,28 +30,53 @@ const FRAME_NUMBER_TEXT = /^[+-]?[0-9]{1,32}$/;
  * @throws {Refused}
  */
 export function restoreText(source, motion, numbers, maxBytes) {
-  const nChannels = motion.signal.channels.length;
   const template = readTextTemplate(source.template.data);
   const detail = readDetail(source.detail);
-  const gaps = [...template.gaps, ...detail.gaps];
-  const patterns = [...template.patterns, ...detail.patterns];
-  checkPatterns(template, detail, patterns, gaps, nChannels);
-
-  const n = motion.nRows;
-  const { samplesPerFrame } = motion.signal;
   const out = new ByteWriter(maxBytes, "a restored text");
+  const n = motion.nRows;
   out.write(template.header[0]);
   if (template.header.length === 2) {
-    if (detail.count.length > 0 && detail.rows === n) out.write(detail.count);
-    else out.ascii(String(n));
+    out.write(countText(detail, n));
     out.write(template.header[1]);
   }
-  out.limit = Math.min(maxBytes, out.size + rowsLimit(source.size, n, nChannels));
   const tokens = new Tokens(motion);
-  const frameNumber = numberOf(numbers);
+  const nColumns = motion.signal.channels.length;
+  const numberOfFrame = numberOf(numbers);
+  const tokenOf = (row, channel) => tokens.of(row, channel);
+  writeRows(out, { source, template, detail, motion, nColumns, numberOfFrame, tokenOf });
+  return out.content();
+}
+
+/** The number of rows as a header prints it. */
+export function countText(detail, n) {
+  if (detail.count.length > 0 && detail.rows === n) return detail.count;
+  return Uint8Array.from(String(n), (character) => character.charCodeAt(0));
+}
+
+/**
+ * Writes all rows of a text and what follows them.
+ *
+ * @param {ByteWriter} out its limit becomes that of the rows
+ * @param {object} text
+ * @param {object} text.source of CLIP
+ * @param {{gaps: Uint8Array[], patterns: object[]}} text.template
+ * @param {object} text.detail as readDetail has read it
+ * @param {object} text.motion the first signal, whose parts have the notes
+ * @param {number} text.nColumns beside that of frame numbers
+ * @param {(frame: number) => bigint} text.numberOfFrame asked in order
+ * @param {(row: number, column: number) => string} text.tokenOf asked row by row
+ * @throws {Refused}
+ */
+export function writeRows(out, text) {
+  const { source, template, detail, motion, nColumns, numberOfFrame, tokenOf } = text;
+  const gaps = [...template.gaps, ...detail.gaps];
+  const patterns = [...template.patterns, ...detail.patterns];
+  checkPatterns(template, detail, patterns, gaps, nColumns);
+  const n = motion.nRows;
+  const { samplesPerFrame } = motion.signal;
+  out.limit = Math.min(out.limit, out.size + rowsLimit(source.size, n, nColumns));
   for (const part of motion.parts) {
     const notes = readNotes(part.frameNotes, part.segmentRows);
-    tokens.enter(part);
     for (let i = 0; i < part.nRows; i++) {
       const row = part.firstRow + i;
       const pattern = patterns[notes.patternOf(part.skippedRows + i)];
@@ -64,8 +89,8 @@ export function restoreText(source, motion, numbers, maxBytes) {
           out.write(gaps[run.gap]);
           const token =
             c === 0
-              ? numberToken(frameNumber(row), notes.texts.get(part.skippedRows + i))
-              : tokens.of(row, c - 1);
+              ? numberToken(numberOfFrame(row), notes.texts.get(part.skippedRows + i))
+              : tokenOf(row, c - 1);
           writePadded(out, token, run.width);
         }
       }
@@ -73,7 +98,6 @@ export function restoreText(source, motion, numbers, maxBytes) {
     }
   }
   if (detail.ends) out.write(detail.ending);
-  return out.content();
 }
 
 /** Bytes that the rows of a text may take: a limit, not a fault. */
@@ -97,16 +121,21 @@ function writePadded(out, token, width) {
 const BEYOND_GRID = new Grid(TEXT64, 0, POINT_ZERO, 1);
 const WITHOUT_TEXT = new Grid(TEXT64, 0, 0, 1);
 
-/** The tokens of a signal, part by part. */
-class Tokens {
+/** The tokens of a signal, row after row. */
+export class Tokens {
   constructor(motion) {
     this.nChannels = motion.signal.channels.length;
     this.values = motion.values;
     this.halves = motion.ordinals ? halvesOf(motion.ordinals) : null;
+    this.parts = motion.parts;
+    this.at = -1;
+    this.end = 0;
   }
 
-  /** The part that the next rows are of: its grids and exceptions hold. */
-  enter(part) {
+  /** The next part of the rows: its grids and exceptions hold. */
+  enter() {
+    const part = this.parts[++this.at];
+    this.end = part.firstRow + part.nRows;
     this.grids = part.grids;
     this.exceptions = new Map();
     for (const exception of part.exceptions) {
@@ -115,6 +144,7 @@ class Tokens {
   }
 
   of(row, channel) {
+    while (row >= this.end) this.enter();
     const i = row * this.nChannels + channel;
     const exception = this.exceptions.size > 0 ? this.exceptions.get(i) : undefined;
     if (exception && Object.is(exception.value, this.values[i])) return latin1(exception.text);
@@ -144,7 +174,7 @@ function printed(grid, x) {
 }
 
 /** The number of a frame, from the runs of them; frames are asked for in order. */
-function numberOf(numbers) {
+export function numberOf(numbers) {
   let at = 0;
   return (frame) => {
     while (at + 1 < numbers.length && numbers[at + 1].frame <= frame) at++;
@@ -166,13 +196,12 @@ function readTextTemplate(bytes) {
     reader.refuse(`a header of ${header.length} parts`);
   }
   const gaps = readGaps(reader);
-  const patterns = readPatterns(reader);
-  if (patterns.length > 1) reader.refuse(`${patterns.length} patterns`);
+  const patterns = readPatterns(reader, 1);
   reader.end();
   return { header, gaps, patterns };
 }
 
-function readDetail(bytes) {
+export function readDetail(bytes) {
   const reader = new ByteReader(bytes, "the detail of a source");
   const count = reader.sized();
   const rows = reader.varint();
@@ -187,20 +216,22 @@ function readDetail(bytes) {
   return { count, rows, gaps, patterns, ends: ends === 1, ending };
 }
 
-function readGaps(reader) {
+export function readGaps(reader) {
   const gaps = reader.counted(() => reader.sized());
   if (gaps.length > MAX_GAPS) reader.refuse(`${gaps.length} gaps`);
   return gaps;
 }
 
-function readPatterns(reader) {
+export function readPatterns(reader, most = Infinity) {
   let nRuns = 0;
-  return reader.counted(() => {
+  const patterns = reader.counted(() => {
     const runs = reader.counted(readRun);
     nRuns += runs.length;
     if (nRuns > MAX_RUNS) reader.refuse(`more than ${MAX_RUNS} runs`);
     return { runs, tail: reader.varint() };
   });
+  if (patterns.length > most) reader.refuse(`${patterns.length} patterns`);
+  return patterns;
 }
 
 function readRun(reader) {

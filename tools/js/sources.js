@@ -7,7 +7,11 @@ import { sourceFormatName } from "./registry.js";
 import { sha256 } from "./sha256.js";
 import { checkAsf } from "./source-asf.js";
 import { restoreC3d } from "./source-c3d.js";
+import { restoreTable } from "./source-table.js";
 import { restoreText } from "./source-text.js";
+
+const C3D_FORMATS = ["c3d", "c3d-outputs"];
+const TABLES = ["trc", "mot", "sto"];
 
 /**
  * The source file of a clip. Of a clip whose codecs are lossless it is told by size and hash.
@@ -26,14 +30,23 @@ import { restoreText } from "./source-text.js";
 export function restoreClip({ clip, signals, numbers, sourceSha256, maxBytes }) {
   const { source } = clip;
   const format = sourceFormatName(source.format);
-  const bytes =
-    format === "c3d" || format === "c3d-outputs"
-      ? restoreC3d(source, signals, clip.nFrames, numbers[0].number, maxBytes)
-      : restoreText(source, signals[0], numbers, maxBytes);
+  const bytes = restored(format, { clip, signals, numbers, maxBytes });
   if (signals.every(({ ordinals }) => ordinals !== null)) {
     checkFile(bytes, source.size, sourceSha256, `the source of clip ${clip.name}`);
   }
   return bytes;
+}
+
+function restored(format, { clip, signals, numbers, maxBytes }) {
+  const { source } = clip;
+  if (C3D_FORMATS.includes(format)) {
+    return restoreC3d(source, signals, clip.nFrames, numbers[0].number, maxBytes);
+  }
+  if (TABLES.includes(format)) {
+    const names = clip.skeleton.joints.map(({ name }) => name);
+    return restoreTable(source, signals, numbers, names, maxBytes);
+  }
+  return restoreText(source, signals[0], numbers, maxBytes);
 }
 
 /**

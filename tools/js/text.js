@@ -10,6 +10,7 @@ import {
   NO_ZERO,
   PLUS,
   POINT,
+  PRINTED,
   POINT_ZERO,
   TEXT32,
   TRIMMED,
@@ -17,7 +18,9 @@ import {
   float32Of,
   float64Of,
   general,
+  printedNumber,
 } from "./grids.js";
+import { EXPONENT, SIGNIFICANT, exponential, fixedText } from "./printed.js";
 
 const TWO_32 = 2 ** 32;
 
@@ -45,20 +48,37 @@ export function textOfOrdinal(grid, oLow, oHigh) {
     const decimal = d === 0 ? { digits: "", k: 0 } : trimmed(String(d), k);
     return printed(grid, minus, decimal.digits, decimal.k, -4, digits);
   }
+  if (kind === PRINTED) return textOfPrinted(grid, minus, printedNumber(grid, low, high));
   return textOfBinary(grid, minus, kind === TEXT32 ? float32Of(low) : float64Of(low, high));
+}
+
+/** PRINTED, of a finite x >= 0. */
+function textOfPrinted({ flags, style }, minus, x) {
+  if (style < SIGNIFICANT) return (minus ? "-" : "") + fixedText(x, style);
+  if (style < EXPONENT) {
+    return significant({ flags }, minus, x, style - SIGNIFICANT);
+  }
+  const { mantissa, X } = exponential(x, style);
+  return (minus ? "-" : flags & PLUS ? "+" : "") + mantissa + exponentOf(flags, X);
 }
 
 /** TEXT64 and TEXT32, of a finite x >= 0. */
 function textOfBinary(grid, minus, x) {
   const { kind, digits } = grid;
   if (digits >= 64) return (minus ? "-" : "") + decimals(x, digits - 64);
+  if (digits >= 16) return significant(grid, minus, x, digits);
   let decimal;
   if (x === 0) decimal = { digits: "", k: 0 };
-  else if (digits >= 16) decimal = rounded(x, digits);
   else decimal = kind === TEXT32 ? decimalOf(shortest32(x)) : shortest(x);
-  const { digits: all, k } = trimmed(decimal.digits, decimal.k);
-  const [low, high] = digits >= 16 ? [-4, digits] : digits === 0 ? [-4, 16] : [-6, 21];
-  return printed(grid, minus, all, k, low, high);
+  const [low, high] = digits === 0 ? [-4, 16] : [-6, 21];
+  return printed(grid, minus, decimal.digits, decimal.k, low, high);
+}
+
+/** So many significant digits, as %g has them. */
+function significant(grid, minus, x, n) {
+  const decimal = x === 0 ? { digits: "", k: 0 } : rounded(x, n);
+  const { digits, k } = trimmed(decimal.digits, decimal.k);
+  return printed(grid, minus, digits, k, -4, n);
 }
 
 /** The text of the decimal d * 10^k, with an exponent where that of its first digit asks for it. */
@@ -68,9 +88,7 @@ function printed({ flags }, minus, d, k, low, high) {
   const sign = minus ? "-" : flags & PLUS ? "+" : "";
   if (n > 0 && (X < low || X >= high)) {
     const mantissa = n > 1 ? `${d[0]}.${d.slice(1)}` : d;
-    const width = flags & EXPONENT3 ? 3 : flags & EXPONENT1 ? 1 : 2;
-    const exponent = String(Math.abs(X)).padStart(width, "0");
-    return sign + mantissa + (flags & UPPER ? "E" : "e") + (X < 0 ? "-" : "+") + exponent;
+    return sign + mantissa + exponentOf(flags, X);
   }
   if (k >= 0) {
     const point = flags & POINT_ZERO ? ".0" : flags & POINT ? "." : "";
@@ -79,6 +97,13 @@ function printed({ flags }, minus, d, k, low, high) {
   const all = d.padStart(-k, "0");
   const whole = all.slice(0, all.length + k) || (flags & NO_ZERO ? "" : "0");
   return `${sign}${whole}.${all.slice(k)}`;
+}
+
+/** The exponent X as the flags have it. */
+function exponentOf(flags, X) {
+  const width = flags & EXPONENT3 ? 3 : flags & EXPONENT1 ? 1 : 2;
+  const exponent = String(Math.abs(X)).padStart(width, "0");
+  return (flags & UPPER ? "E" : "e") + (X < 0 ? "-" : "+") + exponent;
 }
 
 // Tokens

@@ -30,6 +30,7 @@ from mcz.codecs.contract import (
 from mcz.codecs.lossless.copying import decode_streams, encode_streams, recode_streams, regroup
 from mcz.codecs.lossless.segments import MAX_ROWS, segment_frames
 from mcz.codecs.segments import Sizing
+from mcz.coding.ordinals.choices import has_binary32
 from mcz.coding.ordinals.count_search import find_counts
 from mcz.coding.ordinals.degrees import is_tiny
 from mcz.coding.ordinals.streams import build_stream, parse_stream
@@ -68,7 +69,7 @@ def _has_noise(source: SignalSource) -> bool:
 def _has_counts(source: SignalSource) -> bool:
     """Whether form 34 helps one of some channels in one of some runs of rows."""
     layout = source.layout
-    known = [c for c, grid in enumerate(layout.grids) if grid.kind == GridKind.BINARY32]
+    known = [c for c, grid in enumerate(layout.grids) if has_binary32(grid)]
     tried = known[:: -(-len(known) // TRIED_CHANNELS)] if known else []
     length = min(layout.n_frames, -(-TRIED_ROWS // layout.samples_per_frame))
     if not tried or not length:

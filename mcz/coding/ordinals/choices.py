@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.numbers import Grid, GridKind
+from mcz.numbers import Grid, GridKind, printed_base
 
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -42,6 +42,8 @@ def max_top(shape: Lattice) -> int:
 
 def base_and_digits(grid: Grid) -> tuple[int, int]:
     """Base and mantissa digits that a grid has by its kind; (0, 0) for a plain one."""
+    if grid.kind == GridKind.PRINTED:
+        return base_and_digits(printed_base(grid))
     if grid.kind == GridKind.GENERAL:
         return 10, grid.digits
     if grid.kind in (GridKind.TEXT64, GridKind.BINARY64):
@@ -49,6 +51,13 @@ def base_and_digits(grid: Grid) -> tuple[int, int]:
     if grid.kind in (GridKind.TEXT32, GridKind.BINARY32, GridKind.VAX_F):
         return 2, 24
     return 0, 0
+
+
+def has_binary32(grid: Grid) -> bool:
+    """Whether ordinals of the grid are those of BINARY32, which forms 32 and 34 give."""
+    return grid.kind == GridKind.BINARY32 or (
+        grid.kind == GridKind.PRINTED and printed_base(grid).kind == GridKind.TEXT32
+    )
 
 
 def lattice(grid: Grid, ordinals: Ints) -> Lattice:

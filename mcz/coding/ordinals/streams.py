@@ -17,6 +17,7 @@ from mcz.coding.ordinals.choices import (
     Lattice,
     choose_predictor,
     fixed_point,
+    has_binary32,
     lattice,
     max_top,
 )
@@ -126,7 +127,7 @@ def _coded_head(
 
 def in_units(column: Ints, grid: Grid, version: int) -> tuple[int | None, bytes, Ints, Ints | None]:
     """A form with a unit, its fields, integers and rests; none and the column where none fits."""
-    if grid.kind == GridKind.BINARY32:
+    if has_binary32(grid):
         found = find_unit(column)
         law = find_counts(column, found) if version >= 1 else None
         if law is not None:

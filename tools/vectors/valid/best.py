@@ -39,7 +39,7 @@ from tools.vectors.valid.common import every_codec
 from tools.vectors.valid.lossless.counts import values_of
 
 NO_MINUS = (GridKind.INTEGER, GridKind.SCALED, GridKind.VAX_F)  # grids without -0
-LONG = {"fixed", "fixed-integers", "fixed-22-digits", "integer", "scaled"}  # ordinals of 2^44
+LONG = {"fixed", "fixed-integers", "fixed-22-digits", "integer", "printed", "scaled"}  # from 2^44
 
 
 def vectors() -> Iterable[Vector]:

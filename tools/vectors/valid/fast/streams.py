@@ -10,6 +10,7 @@ from mcz.coding.ordinals.counts import Law
 from mcz.coding.ordinals.degrees import of_products
 from mcz.coding.ordinals.heads import MAX_SCALE
 from mcz.numbers import Grid, GridKind
+from mcz.numbers.rules import BASE_64
 from tools.vectors.build.fast_clips import HEADING, Coded, Head, Streams
 from tools.vectors.build.files import partial
 from tools.vectors.build.lossless_clips import (
@@ -31,7 +32,7 @@ from tools.vectors.valid.lossless.counts import values_of
 
 NO_MINUS = (GridKind.INTEGER, GridKind.SCALED, GridKind.VAX_F)  # grids without -0
 # Cases of ``grid_cases`` whose ordinals exceed 2^44 on a plain grid, and those of too many classes.
-LONG = {"fixed", "fixed-integers", "fixed-22-digits", "integer", "scaled"}
+LONG = {"fixed", "fixed-integers", "fixed-22-digits", "integer", "printed", "scaled"}
 FIFTEEN = Grid(GridKind.GENERAL, 15)
 
 
@@ -53,7 +54,7 @@ def _grids(shelf: Streams) -> None:
         turned = [v if np.isnan(v) or (v == 0 and grid.kind in NO_MINUS) else -v for v in values]
         motion = column([*values, *turned, *values], grid)
         head = Coded(form=PLAIN, drop=10) if name in LONG else Coded()
-        if grid.kind in (GridKind.TEXT64, GridKind.BINARY64):
+        if grid.kind in (GridKind.TEXT64, GridKind.BINARY64) or grid.digits == BASE_64:
             head = Coded(form=PLAIN, drop=19)
         purpose = f"Ordinals of a {grid.kind.name} grid, jumping about: {name}."
         shelf.code(f"grid-{name}", purpose, motion, [head], f"{HEADING}; Number grids")

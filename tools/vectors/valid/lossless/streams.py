@@ -36,7 +36,7 @@ from tools.vectors.build.motions import HUNDREDTHS, column, grid_cases, panel, w
 
 NO_MINUS = (GridKind.INTEGER, GridKind.SCALED, GridKind.VAX_F)  # grids without -0
 # Cases of ``grid_cases`` whose ordinals exceed 2^44 on a plain grid.
-LONG = {"fixed", "fixed-integers", "fixed-22-digits", "integer", "scaled"}
+LONG = {"fixed", "fixed-integers", "fixed-22-digits", "integer", "printed", "scaled"}
 
 
 def add(shelf: Streams) -> None:

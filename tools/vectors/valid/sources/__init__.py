@@ -13,6 +13,7 @@ from tools.vectors.valid.sources import (
     lossy,
     lossy_steps,
     numbers,
+    tables,
     text,
 )
 
@@ -27,4 +28,5 @@ def vectors() -> Iterable[Vector]:
     c3d.add(shelf)
     c3d_parts.add(shelf)
     c3d_outputs.add(shelf)
+    tables.add(shelf)
     return shelf.vectors

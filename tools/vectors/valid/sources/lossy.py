@@ -45,6 +45,7 @@ F = GridFlag
 def add(shelf: Whole) -> None:
     _ties(shelf)
     _products(shelf)
+    _printed(shelf)
     _general(shelf)
     _words(shelf)
     _zeros(shelf)
@@ -93,6 +94,21 @@ def _ties(shelf: Whole) -> None:
     )
     purpose = "Values halfway between two numbers of their grids, to the even one, in a lossy clip."
     _hold_lossy(shelf, "lossy-ties", purpose, 3, [(grid, halves) for grid in grids])
+
+
+def _printed(shelf: Whole) -> None:
+    """The same numbers on grids whose text is another rule's."""
+    halves = _both_signs([500, 1500, 2500, 125, 375, 100, 333, 1])
+    grids = (
+        Grid(GridKind.PRINTED, 0, style=210),
+        Grid(GridKind.PRINTED, 1, style=145),
+        Grid(GridKind.PRINTED, 2, style=84),
+        Grid(GridKind.PRINTED, 32, style=144),
+        Grid(GridKind.PRINTED, 64, style=210),
+        Grid(GridKind.PRINTED, 129, style=192),
+    )
+    purpose = "Values of a lossy clip on PRINTED grids."
+    _hold_lossy(shelf, "lossy-printed", purpose, 3, [(grid, halves) for grid in grids])
 
 
 def _products(shelf: Whole) -> None:

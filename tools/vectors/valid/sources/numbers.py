@@ -131,6 +131,56 @@ STYLES: dict[str, tuple[Grid, str]] = {
         Grid(GridKind.TRIMMED, 3, F.NO_ZERO),
         ".5 -.25 12 0 -0 1.05 -7.25 .001 -.999 100 .1 -1",
     ),
+    "18e": (
+        Grid(GridKind.PRINTED, 64, style=210),
+        (
+            "9.669363727051634438e-03 0.000000000000000000e+00 -5.000000000000000104e-04 "
+            "1.000000000000000021e-03 -0.000000000000000000e+00 1.797693134862315708e+308 "
+            "4.940656458412465442e-324 2.500000000000000000e+00 -1.000000000000000000e+22 "
+            "3.333333333333333148e-01 1.234567890123456717e+09 -7.000000000000000000e+00"
+        ),
+    ),
+    "18e-decimals": (
+        Grid(GridKind.PRINTED, 4, style=210),
+        (
+            "5.000000000000000104e-04 0.000000000000000000e+00 -1.000000000000000048e-04 "
+            "1.000000000000000021e-03 -0.000000000000000000e+00 1.234567890999999945e+05 "
+            "1.234566999999999979e+02 -2.500000000000000000e+00 9.999899999999999636e+03 "
+            "3.330000000000000182e-01 1.000000000000000000e+00 -7.000000000000000000e+00"
+        ),
+    ),
+    "2e-upper": (
+        Grid(GridKind.PRINTED, 131, F.UPPER, style=194),
+        (
+            "-2.73E-01 7.46E-02 -1.57E+00 0.00E+00 -0.00E+00 9.99E+307 1.00E-307 5.50E+10 "
+            "-1.00E+100 3.00E+00 1.23E-05 4.56E+06"
+        ),
+    ),
+    "20f-of-17-digits": (
+        Grid(GridKind.PRINTED, 64, style=84),
+        (
+            "0.50170000000000003000 0.00000000000000000000 12.81530059000000000000 "
+            "0.24999969999999250000 0.00000410605182992599 10.72562839040902800000 "
+            "-0.00000000000000000000 123456789012345680.00000000000000000000 "
+            "100000000000000000000.00000000000000000000 0.00000000000000000001 "
+            "-0.99999999999999989000 1.00000000000000000000"
+        ),
+    ),
+    "16g-of-binary32": (
+        Grid(GridKind.PRINTED, 32, style=144),
+        (
+            "3538.87939453125 665.2630615234375 1547.538452148438 0 -0 -2.275110006332397 "
+            "0.1000000014901161 3.402823466385289e+38 1.401298464324817e-45 16777216 "
+            "9.999999747378752e-06 0.25"
+        ),
+    ),
+    "8f-of-binary32": (
+        Grid(GridKind.PRINTED, 32, style=8),
+        (
+            "2.27511001 -0.88972002 -14.20642757 918.59997559 611.09497070 0.00000000 -0.00000000 "
+            "0.00000001 16777216.00000000 -1.18654180 850.02319336 0.10000000"
+        ),
+    ),
     "every-flag": (
         Grid(GridKind.GENERAL, 6, F.PLUS | F.NO_ZERO | F.UPPER | F.EXPONENT1 | F.POINT_ZERO),
         "+.5 -.25 +12.0 +0.0 -0.0 +1.5E+7 -1E-7 +.0001 -.125 +100.0 +1E+6 -3.0",
@@ -229,10 +279,34 @@ def _tables() -> Iterable[tuple[str, list[Grid], Sequence[Sequence[int]]]]:
     places = [Grid(GridKind.TEXT64, 64 + places) for places in range(10, 41)]
     short = [0x444B1AE4D6E2EF4F, *(b for b in TEXT64_BITS if b < 0x444B1AE4D6E2EF4F)]
     yield "text64-places", places, [short[:12]] * len(places)
+    yield "printed", *_printed_grids(every)
     words = [0, 1, 0x7F7FFFFF, 0x3F800000, 0x3DCCCCCD, 0x42F60000, 0x4B800000, 0x5A0E1BCA]
     words += [0x38D1B717, 0x3727C5AC, 0x0F800000, 0x007FFFFF]
     text32 = [Grid(GridKind.TEXT32, 0, flags) for flags in every]
     yield "text32", text32, [words] * len(text32)
+
+
+def _printed_grids(every: Sequence[GridFlag]) -> tuple[list[Grid], list[Sequence[int]]]:
+    """PRINTED grids of all sorts, and magnitudes of each."""
+    styles = [0, 3, 40, 64, 80, 104, 129, 144, 145, 192, 208, 232]
+    grids = [
+        Grid(GridKind.PRINTED, digits, style=s) for digits in (0, 4, 22, 32, 64) for s in styles
+    ]
+    grids += [Grid(GridKind.PRINTED, 64, flags, style=145) for flags in every]
+    exponents = _flags((NONE, F.PLUS), EXPONENTS, (NONE, F.UPPER))
+    grids += [Grid(GridKind.PRINTED, 131, flags, style=194) for flags in exponents]
+    grids += [Grid(GridKind.PRINTED, 128 + n, style=191 + n) for n in (1, 15)]
+    found: list[Sequence[int]] = []
+    for grid in grids:
+        if grid.digits > 128:
+            found.append(_general(grid.digits - 128))
+        elif grid.digits < 32:
+            found.append(_decimals(grid.digits))
+        else:
+            words = (0x3F800000, 0x3DCCCCCD, 0x42F60000, 0x5A0E1BCA, 0x38D1B717, 0x3A83126F)
+            bits = [b for b in TEXT64_BITS if b <= grid.limit] if grid.digits == 64 else [*words]
+            found.append([0, 1, grid.limit, *bits, *[0] * 9][:12])
+    return grids, found
 
 
 def _decimals(digits: int) -> list[int]:

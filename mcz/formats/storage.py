@@ -1,0 +1,177 @@
+"""STO and MOT (tables of OpenSim and SIMM): bytes -> Motion, and back.
+
+SPEC.md, "The text of tables", is normative for the way back. Every column is a joint without a
+parent, the time among them, whose channels are plain scalars: what they move, only the model knows.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from itertools import accumulate
+
+from mcz.errors import SourceError
+from mcz.formats.rows import line_of
+from mcz.formats.table_plain import plain_storage
+from mcz.formats.table_restore import beside, restore_table
+from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
+from mcz.formats.table_signals import read_columns
+from mcz.formats.table_source import named_count, names_in, table_source
+from mcz.formats.text_source import check_text, text_encoding
+from mcz.formats.times import half_digit_of, stated_rate, uniform_rate
+from mcz.motion import Channel, Joint, Motion, Skeleton
+from mcz.numbers import scan
+
+PARTS = {1: ("value",), 3: ("x", "y", "z")}  # names of the numbers of a cell; else 1, 2, ...
+QUATERNION = ("w", "x", "y", "z")
+MAX_PARTS = 64  # numbers of a cell
+
+_END = re.compile(rb"(?im)^[ \t]*endheader[ \t]*\r?$\n?")
+_KEY = re.compile(rb"(?m)^[ \t]*([A-Za-z]+)[ \t]*[= \t][ \t]*([^\t\r\n]*?)[ \t]*\r?$")
+_COUNTS = ("nrows", "datarows")
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    values: dict[str, str]  # by key in lower case
+    count: tuple[int, int]  # where the number of rows is printed; (0, 0): nowhere
+    labels: tuple[int, int]
+    rows: int
+
+
+def read_mot(data: bytes, name: str = "motion") -> Motion:
+    """The motion in a MOT file; see ``read_sto``."""
+    return _read(data, name, "mot")
+
+
+def read_sto(data: bytes, name: str = "motion") -> Motion:
+    """The motion in a STO file; ``name`` becomes its name.
+
+    A frame rate is stated where the times are uniform. Raises SourceError, with the number of the
+    line.
+    """
+    return _read(data, name, "sto")
+
+
+def _read(data: bytes, name: str, format_name: str) -> Motion:
+    check_text(data)
+    encoding = text_encoding(data)
+    header = _header(data)
+    separator = b"\t" if b"\t" in data[header.rows :].partition(b"\n")[0] else None
+    names, sizes = _columns(data, header, separator, encoding)
+    starts = [0, *accumulate(sizes)]
+    columns = [list(range(a, a + n)) for a, n in zip(starts, sizes, strict=False)]
+    table = read_table(data, header.rows, starts[-1], columns, separator)
+    groups = (columns[0], [column for cell in columns[1:] for column in cell])
+    rows = without_zeros(data, table.rows, groups)
+    signal = beside([read_columns(data, rows, columns) for columns in groups])
+    kind = header.values.get("datatype", "").lower()
+    skeleton = Skeleton(
+        tuple(
+            Joint(label, channels=_channels(size, kind, "s" if k == 0 else ""))
+            for k, (label, size) in enumerate(zip(names, sizes, strict=True))
+        ),
+        angle_unit={"yes": "deg", "no": "rad"}.get(header.values.get("indegrees", "").lower(), ""),
+    )
+    times = signal.values[:, 0]
+    tokens = scan(data, rows.start[:, 0], rows.stop[:, 0])
+    stated = stated_rate(header.values.get("datarate", ""))
+    rate, exact = uniform_rate(times, half_digit_of(tokens), [stated] if stated else [])
+    start, stop = header.labels
+    marked = b"".join(
+        (
+            named_count(data, 0, start, header.count, rows.n_rows),
+            names_in(data[start:stop], names),
+            data[stop : header.rows],
+        )
+    )
+    return Motion(
+        skeleton,
+        (signal,),
+        rate,
+        exact,
+        name,
+        _metadata(encoding, header.values, rows.n_rows),
+        table_source(
+            format_name, data, (marked, data[: header.rows]), (table.missing, None), rows, names
+        ),
+    )
+
+
+def _header(data: bytes) -> _Header:
+    end = _END.search(data)
+    if end is None:
+        raise SourceError("line 1: no line 'endheader'; not a STO or MOT file, or cut off")
+    values: dict[str, str] = {}
+    count = (0, 0)
+    for match in _KEY.finditer(data, 0, end.start()):
+        key = match[1].decode("latin-1").lower()
+        values.setdefault(key, match[2].decode("latin-1"))
+        if key in _COUNTS:
+            count = match.span(2)
+    labels = None
+    for at, line in lines_from(data, end.end())[:16]:
+        if labels is None and line.strip():
+            labels = at, at + len(line)
+        elif begins_with_number(line):
+            if labels is None:
+                break
+            return _Header(values, count, labels, at)
+    raise SourceError(
+        f"line {line_of(data, end.end())}: no names and row of numbers after endheader"
+    )
+
+
+def _columns(
+    data: bytes, header: _Header, separator: bytes | None, encoding: str
+) -> tuple[list[str], list[int]]:
+    """The name of every column, and how many numbers a cell of it holds."""
+    labels = data[slice(*header.labels)]
+    names = [cell.strip().decode(encoding) for cell in labels.split(separator)]
+    row = data[header.rows :].partition(b"\n")[0].rstrip()
+    cells = [cell.strip() for cell in row.split(separator)]
+    while names and not names[-1] and len(names) > len(cells):
+        names.pop()
+    names += [f"column {k + 1}" for k in range(len(names), len(cells))]
+    sizes = [cell.count(b",") + 1 for cell in cells]
+    if max(sizes) > MAX_PARTS or sizes[0] != 1:
+        raise SourceError(
+            f"line {line_of(data, header.rows)}: {max(sizes)} numbers in a cell, limit "
+            f"{MAX_PARTS}, and one in the first"
+        )
+    usual = max(set(sizes[1:]), key=sizes[1:].count, default=1)
+    sizes += [usual] * (len(names) - len(sizes))
+    return names, sizes
+
+
+def _channels(size: int, kind: str, unit: str) -> tuple[Channel, ...]:
+    names = QUATERNION if kind == "quaternion" and size == 4 else PARTS.get(size, ())
+    names = names or tuple(str(k + 1) for k in range(size))
+    return tuple(Channel("", name, unit) for name in names)
+
+
+def _metadata(encoding: str, values: dict[str, str], n_rows: int) -> dict[str, str]:
+    metadata = {"name-encoding": encoding} if encoding != "utf-8" else {}
+    declared = next((values[key] for key in _COUNTS if key in values), None)
+    if declared is not None and declared != str(n_rows):
+        metadata["source-note"] = f"{declared[:40]} frames are declared, {n_rows} are there"
+    return metadata
+
+
+def write_sto(motion: Motion) -> bytes:
+    """The STO file of ``motion``: its own source with its values, or a plain one.
+
+    Raises MotionError for what STO cannot say; see ``plain_storage``.
+    """
+    return _write(motion, "sto")
+
+
+def write_mot(motion: Motion) -> bytes:
+    """The MOT file of ``motion``, as ``write_sto``."""
+    return _write(motion, "mot")
+
+
+def _write(motion: Motion, format_name: str) -> bytes:
+    if motion.source is None or motion.source.format != format_name:
+        motion = plain_storage(motion, format_name)
+    return restore_table(motion)

@@ -1,0 +1,293 @@
+"""The rows of a table in text: cells between separators, of one number or of several.
+
+``read_table`` finds the token of every column of every row, what stands for a missing value, and
+the patterns that lay them out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import SourceError
+from mcz.formats.layout import FRAME_NUMBER, MAX_WIDTH, Pattern, runs_of
+from mcz.formats.rows import Rows, Token, line_of, read_rows
+from mcz.numbers import Tokens, scan
+
+Bools = NDArray[np.bool_]
+
+LOOKED_AT = 64  # rows, for columns that are padded
+_BLANKS = b" \t\r\n"
+_WORDS = re.compile(rb"[^ \t\r\n]+")
+_PART = b","  # between the numbers of a cell
+_FIRST = re.compile(rb"[ \t]*([-+]?(?:[0-9]|\.[0-9])[^ \t\r\n,;]*)")
+
+
+def lines_from(data: bytes, at: int) -> list[tuple[int, bytes]]:
+    """(offset, line with its end) of the lines from ``at`` on, at most 4096 of them."""
+    found: list[tuple[int, bytes]] = []
+    while at < len(data) and len(found) < 4096:
+        end = data.find(b"\n", at) + 1 or len(data)
+        found.append((at, data[at:end]))
+        at = end
+    return found
+
+
+def begins_with_number(line: bytes) -> bool:
+    return _FIRST.match(line) is not None
+
+
+class RowCells:
+    """The tokens of the row that begins at an offset; see ``rows.Frames``.
+
+    ``columns``: of each cell its columns, several where it holds several numbers. ``separator``
+    None: blanks. ``blanks``: cells may be empty.
+    """
+
+    def __init__(
+        self,
+        data: bytes,
+        columns: Sequence[Sequence[int]],
+        separator: bytes | None,
+        blanks: bool = True,
+    ) -> None:
+        self.data, self.columns, self.separator = data, columns, separator
+        self.blanks = blanks
+
+    def __call__(self, at: int) -> tuple[list[Token], int] | None:
+        while True:
+            end = self.data.find(b"\n", at) + 1 or len(self.data)
+            line = self.data[at:end]
+            if line.strip(_BLANKS):
+                break
+            if end == len(self.data):
+                return None
+            at = end
+        if not begins_with_number(line):
+            raise SourceError(f"line {line_of(self.data, at)}: not a row of numbers: {line[:40]!r}")
+        tokens: list[Token] = []
+        for number, (start, stop) in enumerate(self._cells(at, line)):
+            if number >= len(self.columns):
+                if start < stop:
+                    raise SourceError(
+                        f"line {line_of(self.data, at)}: more than {len(self.columns)} cells"
+                    )
+                continue
+            tokens += self._cell(start, stop, self.columns[number])
+        return tokens, end
+
+    def _cells(self, at: int, line: bytes) -> list[tuple[int, int]]:
+        """Start and stop of every cell without its blanks; a blank cell at its end."""
+        if self.separator is None:
+            return [(at + m.start(), at + m.end()) for m in _WORDS.finditer(line)]
+        found = []
+        for cell in line.rstrip(b"\r\n").split(self.separator):
+            bare = cell.strip(_BLANKS)
+            start = at + (cell.index(bare) if bare else len(cell))
+            found.append((start, start + len(bare)))
+            at += len(cell) + len(self.separator)
+        return found
+
+    def _cell(self, start: int, stop: int, columns: Sequence[int]) -> list[Token]:
+        if start == stop and (len(columns) > 1 or not self.blanks):
+            return []
+        if len(columns) == 1:
+            return [(start, stop, columns[0])]
+        parts = self.data[start:stop].split(_PART)
+        if len(parts) != len(columns):
+            raise SourceError(
+                f"line {line_of(self.data, start)}: {len(parts)} numbers in a cell, expected "
+                f"{len(columns)}"
+            )
+        tokens, at = [], start
+        for part, column in zip(parts, columns, strict=True):
+            bare = part.strip(_BLANKS)
+            first = at + part.index(bare)
+            tokens.append((first, first + len(bare), column))
+            at += len(part) + len(_PART)
+        return tokens
+
+
+@dataclass(frozen=True, slots=True)
+class TableRows:
+    """All rows, and what stands for a missing value; a missing one has start and stop 0."""
+
+    rows: Rows
+    missing: bytes
+
+
+def read_table(
+    data: bytes, at: int, n_columns: int, columns: Sequence[Sequence[int]], separator: bytes | None
+) -> TableRows:
+    """Read all rows of ``data`` from offset ``at`` on.
+
+    Raises SourceError for what is no table, and where ``read_rows`` does.
+    """
+    from mcz.formats import table_kernels
+
+    def attempt(blanks: bool) -> Rows:
+        cells = RowCells(data, columns, separator, blanks)
+        match = partial(_match, table_kernels.match_cells, int(blanks))
+        return read_rows(data, at, n_columns, cells, match, _padded(data, at, cells))
+
+    rows = attempt(True)
+    if not rows.n_rows:
+        raise SourceError(f"line {line_of(data, min(at, len(data)))}: no row of numbers")
+    blank = (rows.stop > 0) & (rows.start == rows.stop)
+    words = _words(data, rows, blank)
+    missing, n_missing = words.most_common(1)[0] if words else (b"", 0)
+    if n_missing <= np.count_nonzero(blank):
+        missing = b""
+    elif blank.any():  # both: what is blank is left out of the layout
+        rows = attempt(False)
+        blank[:] = False
+    gone = blank
+    if missing:
+        gone = blank | _are(data, rows, missing)
+    return TableRows(_without(rows, gone), missing)
+
+
+def _padded(data: bytes, at: int, cells: RowCells) -> dict[int, int]:
+    """The width of each column that its first rows show to be right justified."""
+    totals: dict[int, list[tuple[int, int]]] = {}
+    for _ in range(LOOKED_AT):
+        found = cells(at)
+        if found is None:
+            break
+        before = at
+        for start, stop, column in found[0]:
+            gap = data[before:start]
+            totals.setdefault(column, []).append((len(gap) - len(gap.rstrip(b" ")), stop - start))
+            before = stop
+        at = found[1]
+    widths = {}
+    for column, seen in totals.items():
+        width = max(n + size for n, size in seen)
+        if any(n for n, _ in seen) and all(n == max(0, width - size) for n, size in seen):
+            widths[column] = width
+    return {column: width for column, width in widths.items() if 1 < width <= MAX_WIDTH}
+
+
+def _match(match: object, blanks: int, *arguments: object) -> tuple[int, int]:
+    return match(*arguments, blanks)  # type: ignore[operator,no-any-return]
+
+
+def _words(data: bytes, rows: Rows, blank: Bools) -> Counter[bytes]:
+    """How often each spelling of a number that is none occurs."""
+    if re.search(rb"(?i)nan|#", data) is None:
+        return Counter()
+    chosen = (rows.stop > 0) & ~blank
+    tokens = scan(data, rows.start[chosen], rows.stop[chosen])
+    nan = _are_nan(tokens)
+    return Counter(tokens[nan].texts().tolist())
+
+
+def _are_nan(tokens: Tokens) -> Bools:
+    found = np.zeros(len(tokens), np.bool_)
+    bad = tokens.bad()
+    good = np.flatnonzero(~bad)
+    found[good] = np.isnan(tokens[good].values())
+    return found
+
+
+def _are(data: bytes, rows: Rows, word: bytes) -> Bools:
+    """Which tokens are ``word``."""
+    text = np.frombuffer(data, np.uint8)
+    same: Bools = rows.stop - rows.start == len(word)
+    for k, byte in enumerate(word):
+        same &= text[np.minimum(rows.start + k, len(text) - 1)] == byte
+    return same
+
+
+def _without(rows: Rows, gone: Bools) -> Rows:
+    if not gone.any():
+        return rows
+    keep = ~gone
+    return replace(rows, start=rows.start * keep, stop=rows.stop * keep)
+
+
+def without_zeros(data: bytes, rows: Rows, groups: Sequence[Sequence[int]]) -> Rows:
+    """``rows`` where the zeros that end every number of a group of columns belong to the gaps.
+
+    ``%.6f`` of what has 3 decimals prints three zeros that say nothing.
+    """
+    zeros: dict[int, bytes] = {}
+    for columns in groups:
+        shared = _shared_zeros(data, rows, columns)
+        if shared:
+            zeros |= dict.fromkeys(columns, shared)
+    for item in (item for pattern in rows.patterns for item in _split(pattern)):
+        if item.width < 0 or (item.width > 1 and item.width - len(zeros.get(item.column, b"")) < 2):
+            zeros.pop(item.column, None)  # blanks come between, or the width would mean another
+    if not zeros:
+        return rows
+    less = np.zeros(rows.stop.shape[1], np.int64)
+    less[list(zeros)] = [len(zero) for zero in zeros.values()]
+    ending = rows.ending
+    moved = [_moved(pattern, zeros) for pattern in rows.patterns]
+    if ending is not None:
+        last = rows.patterns[_last_pattern(rows)].runs
+        column = last[-1].column + last[-1].n_columns - 1 if last else FRAME_NUMBER
+        ending = zeros.get(column, b"") + ending
+    return replace(rows, stop=rows.stop - less, patterns=tuple(moved), ending=ending)
+
+
+def _last_pattern(rows: Rows) -> int:
+    if rows.notes is None or not len(rows.notes.patterns):
+        return 0
+    return int(rows.notes.patterns[-1])
+
+
+def _split(pattern: Pattern) -> list[_Item]:
+    return [
+        _Item(run.gap, run.column + k, run.width)
+        for run in pattern.runs
+        for k in range(run.n_columns)
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    gap: bytes
+    column: int
+    width: int
+
+
+def _moved(pattern: Pattern, zeros: dict[int, bytes]) -> Pattern:
+    """``pattern`` with the zeros behind each token at the front of the gap that follows."""
+    items, before = [], b""
+    for item in _split(pattern):
+        zero = zeros.get(item.column, b"")
+        width = item.width - len(zero) if item.width > 1 else item.width
+        items.append((before + item.gap, item.column, width))
+        before = zero
+    return Pattern(runs_of(items), before + pattern.tail)
+
+
+def _shared_zeros(data: bytes, rows: Rows, columns: Sequence[int]) -> bytes:
+    """The zeros that end all tokens of the columns, with the point where nothing is before them."""
+    from mcz.numbers import kernels
+
+    chosen = list(columns)
+    start, stop = rows.start[:, chosen].ravel(), rows.stop[:, chosen].ravel()
+    if not len(start) or not stop.all():
+        return b""
+    tokens = scan(data, start, stop)
+    mantissa, _, shape = tokens.fields.T
+    odd = kernels.EXPONENT | kernels.LONG | kernels.SPECIAL | kernels.BAD
+    places = shape >> kernels.FRACTION_DIGITS
+    if (shape & odd).any() or (places != places[0]).any() or places[0] > 17:
+        return b""
+    decimals = int(places[0])
+    if not mantissa.any():
+        return b""  # a constant costs nothing
+    n = 0
+    while n < decimals and not (mantissa % 10 ** (n + 1)).any():
+        n += 1
+    return b"" if not n else b"." * (n == decimals) + b"0" * n

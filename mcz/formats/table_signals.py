@@ -1,0 +1,80 @@
+"""The columns of a table -> a Signal. Each column may have a grid of its own.
+
+The columns of a table are different things: a time, an angle, a force. So are their digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mcz.formats.rows import Rows
+from mcz.formats.signals import read_signal
+from mcz.motion import Exceptions, Signal
+from mcz.numbers import Grid, bits_of, fit, scan
+
+RUN_BITS = 48  # of one more run of grids in CLIP, and of what its heads need
+EXCEPTION_BITS = 200
+
+
+def of_columns(rows: Rows, columns: Sequence[int]) -> Rows:
+    """``rows`` with these columns alone; their layout is not theirs any more."""
+    chosen = list(columns)
+    start, stop = rows.start[:, chosen], rows.stop[:, chosen]
+    return replace(rows, start=np.ascontiguousarray(start), stop=np.ascontiguousarray(stop))
+
+
+def read_columns(data: bytes, rows: Rows, columns: Sequence[int]) -> Signal:
+    """The signal of these columns; raises SourceError for a token that is no number."""
+    rows = of_columns(rows, columns)
+    signal = read_signal(data, rows)
+    found = {c: better for c in range(len(columns)) if (better := _better(data, rows, signal, c))}
+    if not found:
+        return signal
+    grids = list(signal.grids)
+    exceptions = signal.exceptions
+    kept = ~np.isin(exceptions.channels, list(found))
+    entries = [
+        *zip(
+            exceptions.rows[kept].tolist(),
+            exceptions.channels[kept].tolist(),
+            [text for text, keep in zip(exceptions.texts, kept.tolist(), strict=True) if keep],
+            strict=True,
+        )
+    ]
+    for column, (grid, odd) in found.items():
+        grids[column] = grid
+        entries += [(row, column, text) for row, text in odd]
+    entries.sort()
+    return replace(
+        signal,
+        grids=tuple(grids),
+        grid_changes=tuple(change for change in signal.grid_changes if change[1] not in found),
+        exceptions=Exceptions(
+            np.array([row for row, _, _ in entries], np.int64),
+            np.array([column for _, column, _ in entries], np.int64),
+            tuple(text for _, _, text in entries),
+        ),
+    )
+
+
+def _better(
+    data: bytes, rows: Rows, signal: Signal, column: int
+) -> tuple[Grid, list[tuple[int, bytes]]] | None:
+    """A grid that suits the column better than that of the signal, with what it does not print."""
+    present = np.flatnonzero(rows.stop[:, column])
+    tokens = scan(data, rows.start[present, column], rows.stop[present, column])
+    values = signal.values[present, column]
+    if not len(values) or (values == values[0]).all():
+        return None  # a constant costs nothing
+    grid, _, known = fit(tokens)
+    n_odd = int(np.count_nonzero(signal.exceptions.channels == column))
+    now = bits_of(signal.grids[column]) * len(tokens) + EXCEPTION_BITS * n_odd
+    odd = np.flatnonzero(~known)
+    then = bits_of(grid) * len(tokens) + EXCEPTION_BITS * len(odd)
+    if grid == signal.grids[column] or len(odd) > n_odd or then + RUN_BITS >= now:
+        return None
+    texts = tokens[odd].texts().tolist() if len(odd) else []
+    return grid, list(zip(present[odd].tolist(), texts, strict=True))

@@ -1,0 +1,68 @@
+"""The Source of a table that was read, its header with marks where these give the same bytes."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Sequence
+
+from mcz.errors import FormatError, LimitError
+from mcz.formats.layout import Layout
+from mcz.formats.rows import Rows
+from mcz.formats.table_layout import COUNT, NAME, Clock, TableLayout, any_mark, fill, with_phrases
+from mcz.motion import Source
+
+
+def names_in(line: bytes, names: Sequence[str]) -> bytes:
+    """A line of labels with a mark for each name, as far as the names come in order."""
+    out, at = [], 0
+    for name in names:
+        label = name.encode()
+        found = re.compile(rb"(?<![^\t ,;\"])" + re.escape(label) + rb"(?![^\t ,;\"\r\n])").search(
+            line, at
+        )
+        if found is None:
+            break
+        out += [line[at : found.start()], NAME]
+        at = found.end()
+    return b"".join((*out, line[at:]))
+
+
+def named_count(data: bytes, at: int, stop: int, count: tuple[int, int], n_rows: int) -> bytes:
+    """The text data[at:stop] with a mark in place of the number of rows at ``count``."""
+    if not at < count[0] < count[1] <= stop or data[slice(*count)] != b"%d" % n_rows:
+        return data[at:stop]
+    return data[at : count[0]] + COUNT + data[count[1] : stop]
+
+
+def table_source(
+    format_name: str,
+    data: bytes,
+    header: tuple[bytes, bytes],
+    beside: tuple[bytes, Clock | None],
+    rows: Rows,
+    names: Sequence[str],
+) -> Source:
+    """The source of a table.
+
+    ``header``: with marks, and as it is; the second is taken where the first does not give it.
+    ``beside``: what stands for a missing value, and the clock.
+    """
+    marked, whole = with_phrases(header[0]), header[1]
+    fits = not any_mark(whole) and _fills(marked, names, b"%d" % rows.n_rows, whole)
+    layout = TableLayout(
+        marked if fits else whole,
+        fits,
+        *beside,
+        Layout((), rows.patterns, ending=rows.ending),
+    )
+    template, detail = layout.build()
+    digest = hashlib.sha256(data).digest()
+    return Source(format_name, template, detail, rows.notes, size=len(data), sha256=digest)
+
+
+def _fills(header: bytes, names: Sequence[str], count: bytes, whole: bytes) -> bool:
+    try:
+        return fill(header, names, count) == whole
+    except (FormatError, LimitError):
+        return False

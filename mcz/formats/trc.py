@@ -1,0 +1,187 @@
+"""TRC (marker trajectories): bytes -> Motion, and back.
+
+SPEC.md, "The text of tables", is normative for the way back. Every marker is a joint without a
+parent. The numbers of frames are those of the file; times follow from them, or are a signal.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from mcz.errors import SourceError
+from mcz.formats.layout import FRAME_NUMBER
+from mcz.formats.rows import Rows
+from mcz.formats.table_layout import NEXT, SAME, Clock
+from mcz.formats.table_plain import plain_trc
+from mcz.formats.table_restore import restore_table
+from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
+from mcz.formats.table_signals import read_columns
+from mcz.formats.table_source import named_count, names_in, table_source
+from mcz.formats.text_source import check_text, text_encoding
+from mcz.formats.times import find_clock, half_digit_of, stated_rate, uniform_rate
+from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.numbers import scan
+
+UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54, "ft": 30.48}
+POSITION = tuple(Channel(kind) for kind in POSITION_KINDS)
+TIME = (Channel("", "time", "s"),)
+
+_LABELS = re.compile(rb"(?i)[ \t]*frame#?[ \t]")
+_AXES = re.compile(rb"([Xx])([0-9]+)|([YyZz])([0-9]+)")
+_KEYS = re.compile(rb"(?i)[ \t]*datarate\b")
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    """What a header says: ``values`` by key in lower case, and where the labels and rows begin."""
+
+    values: dict[str, str]
+    count: tuple[int, int]  # where NumFrames is printed; (0, 0): nowhere
+    labels: tuple[int, int]  # the line of labels
+    rows: int
+
+
+def read_trc(data: bytes, name: str = "motion") -> Motion:
+    """The motion in a TRC file; ``name`` becomes its name; the up axis is unknown.
+
+    Raises SourceError, with the number of the line.
+    """
+    check_text(data)
+    encoding = text_encoding(data)
+    header = _header(data)
+    labels = _labels(data[slice(*header.labels)], encoding)
+    n_markers = max(len(labels), _widest(data, header.rows))
+    names = (*labels, *(f"marker {k + 1}" for k in range(len(labels), n_markers)))
+    time = 3 * n_markers
+    columns = [[FRAME_NUMBER], [time], *([c] for c in range(time))]
+    separator = b"\t" if b"\t" in data[header.rows :].partition(b"\n")[0] else None
+    table = read_table(data, header.rows, time + 1, columns, separator)
+    rows = without_zeros(data, table.rows, ([time], range(time)))
+    motion = read_columns(data, rows, range(time))
+    joints = tuple(Joint(marker, channels=POSITION) for marker in names)
+    unit_cm = UNIT_CM.get(header.values.get("units", "").lower())
+    skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="")
+    clock, times, rate, exact, note = _times(data, rows, time, header.values)
+    text = _marked(data, header, rows.n_rows, names[: len(labels)])
+    return Motion(
+        skeleton,
+        (motion, *times),
+        rate,
+        exact,
+        name,
+        _metadata(encoding, [*note, *_notes(header.values, len(labels), rows.n_rows)]),
+        table_source("trc", data, text, (table.missing, clock), rows, names),
+        rows.numbers,
+    )
+
+
+def _header(data: bytes) -> _Header:
+    """The header, which begins with PathFileType and ends before the first row."""
+    lines = lines_from(data, 0)
+    keys = next((k for k, (_, line) in enumerate(lines[:16]) if _KEYS.match(line)), None)
+    labels = next((k for k, (_, line) in enumerate(lines[:64]) if _LABELS.match(line)), None)
+    if labels is None:
+        raise SourceError(
+            f"line {min(len(lines), 4)}: no line that begins with Frame#; no TRC file, or cut off"
+        )
+    values, count = {}, (0, 0)
+    if keys is not None and keys + 1 < labels:
+        names = lines[keys][1].decode("latin-1").split()
+        at, line = lines[keys + 1]
+        words = [(at + m.start(), m[0]) for m in re.finditer(rb"[^\t\r\n ]+", line)]
+        for key, (start, word) in zip(names, words, strict=False):
+            values[key.lower()] = word.decode("latin-1")
+            if key.lower() == "numframes":
+                count = start, start + len(word)
+    for at, line in lines[labels + 1 : labels + 16]:
+        if begins_with_number(line):
+            start = lines[labels][0]
+            return _Header(values, count, (start, start + len(lines[labels][1])), at)
+    raise SourceError(f"line {labels + 2}: no row of numbers after the names of the markers")
+
+
+def _labels(line: bytes, encoding: str) -> list[str]:
+    """The names of the markers: what stands behind Frame# and Time."""
+    separator = b"\t" if b"\t" in line else None
+    cells = [cell.strip() for cell in line.split(separator)]
+    return [cell.decode(encoding) for cell in cells[2:] if cell]
+
+
+def _widest(data: bytes, at: int) -> int:
+    """How many markers the cells of the longest row are of."""
+    cells = max((line.rstrip().count(b"\t") for line in data[at:].split(b"\n")), default=1)
+    return max(0, -(-(cells - 1) // 3))
+
+
+def _times(
+    data: bytes, rows: Rows, column: int, values: dict[str, str]
+) -> tuple[Clock | None, tuple[Signal, ...], Fraction | None, bool, list[str]]:
+    """The clock, or a signal of times; the frame rate, whether it is exact, and what is odd."""
+    present = np.flatnonzero(rows.stop[:, column])
+    tokens = scan(data, rows.start[present, column], rows.stop[present, column])
+    whole = len(tokens) == rows.n_rows and not tokens.bad().any()
+    numbers = rows.numbers if rows.numbers is not None else np.arange(1, rows.n_rows + 1)
+    stated = [
+        rate for key in ("datarate", "camerarate") if (rate := stated_rate(values.get(key, "")))
+    ]
+    clock = find_clock(tokens, numbers, stated) if whole else None
+    used = {run.column for pattern in rows.patterns for run in pattern.runs}
+    if clock is not None:
+        signals: tuple[Signal, ...] = ()
+    elif column in used:
+        signals = (replace(read_columns(data, rows, [column]), name="time", channels=TIME),)
+    else:
+        signals = ()
+    rate, exact = (
+        uniform_rate(tokens.values(), half_digit_of(tokens), stated) if whole else (None, True)
+    )
+    if rate is None and rows.n_rows < 2 and stated:
+        return clock, signals, stated[0], True, []
+    odd = []
+    if stated and rate is None:
+        odd = ["the times are not uniform"]
+    elif stated and rate is not None and rate not in stated:
+        odd = [f"DataRate is {values['datarate'][:40]}, the times are {float(rate):g} a second"]
+    return clock, signals, rate, exact, odd
+
+
+def _marked(data: bytes, header: _Header, n_rows: int, names: Sequence[str]) -> tuple[bytes, bytes]:
+    """The header with marks for names, their numbers and the number of rows; and as it is."""
+    start, stop = header.labels
+    parts = (
+        named_count(data, 0, start, header.count, n_rows),
+        names_in(data[start:stop], names),
+        _AXES.sub(lambda m: m[1] + NEXT if m[1] else m[3] + SAME, data[stop : header.rows]),
+    )
+    return b"".join(parts), data[: header.rows]
+
+
+def _notes(values: dict[str, str], n_labels: int, n_rows: int) -> list[str]:
+    notes = []
+    declared = values.get("numframes", "")
+    if declared != str(n_rows):
+        notes.append(f"{declared[:40] or 'no'} frames are declared, {n_rows} are there")
+    declared = values.get("nummarkers", "")
+    if declared != str(n_labels):
+        notes.append(f"{declared[:40] or 'no'} markers are declared, {n_labels} are named")
+    return notes
+
+
+def _metadata(encoding: str, notes: Sequence[str]) -> dict[str, str]:
+    metadata = {"name-encoding": encoding} if encoding != "utf-8" else {}
+    return metadata | ({"source-note": "; ".join(notes)} if notes else {})
+
+
+def write_trc(motion: Motion) -> bytes:
+    """The TRC file of ``motion``: its own source with its values, or a plain one.
+
+    Raises MotionError for what TRC cannot say; see ``plain_trc``.
+    """
+    if motion.source is None or motion.source.format != "trc":
+        motion = plain_trc(motion)
+    return restore_table(motion)

@@ -1,0 +1,136 @@
+"""TRC, MOT and STO: files, and what their templates can say beside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mcz.formats import FORMATS
+from mcz.formats.layout import DETAIL
+from mcz.formats.table_layout import PHRASES, TABLE_TEMPLATE
+from mcz.motion import Motion
+from mcz.schema import build, parse
+from tools.vectors.build.edits import put
+from tools.vectors.build.files import Whole, file_of
+from tools.vectors.build.source_files import BOTH, called, path_of, restored, unhashed
+from tools.vectors.build.table_files import FORCES, MARKERS, QUATERNIONS, SPEC, TIMES
+
+KINDS = {"trc": MARKERS, "mot": FORCES, "sto": QUATERNIONS}
+
+
+def add(shelf: Whole) -> None:
+    for suffix, text in KINDS.items():
+        purpose = f"A {suffix.upper()} file: its header names the joints, a segment is two frames."
+        _hold(shelf, suffix, purpose, take_table(text, f"plain.{suffix}"), segment_frames=2)
+    times = take_table(TIMES, "times.trc")
+    assert len(times.signals) == 2
+    _hold(shelf, "trc-times", "Times that follow from nothing are a signal.", times)
+    _hold(shelf, "trc-times-segments", "The same, in segments.", times, segment_frames=1)
+    _clocks(shelf)
+    _headers(shelf)
+    _missing(shelf)
+    _patterns(shelf)
+
+
+def take_table(text: bytes, path: str) -> Motion:
+    name, _, suffix = path.partition(".")
+    motion = called(FORMATS[suffix].read(text, name), path)
+    assert FORMATS[suffix].write(motion) == text, path
+    return motion
+
+
+def _hold(shelf: Whole, name: str, purpose: str, motion: Motion, **made: Any) -> None:
+    sources = ((path_of(motion), restored(motion)),)
+    data = file_of(motion, **made)
+    shelf.hold(f"table-{name}", SPEC, purpose, data, motion, sources=sources, modes=BOTH)
+
+
+def with_fields(motion: Motion, edit: Callable[[Any], Any]) -> Motion:
+    """``motion`` with its template edited, without the size and hash of its file."""
+    motion = unhashed(motion)
+    assert motion.source is not None
+    fields = parse(TABLE_TEMPLATE, motion.source.template, "template")
+    edit(fields)
+    template = build(TABLE_TEMPLATE, fields, "template")
+    return replace(motion, source=replace(motion.source, template=template))
+
+
+def _clocks(shelf: Whole) -> None:
+    """Times of frames that have other numbers, and of other clocks."""
+    plain = take_table(MARKERS, "clock.trc")
+    numbers = unhashed(replace(plain, frame_numbers=np.array([-3, 0, 1, 10**12, 7])))
+    purpose = "Frames that have got other numbers, one of them below 0: their times follow."
+    signals = tuple(replace(s, values=np.abs(s.values)) for s in numbers.signals)
+    _hold(shelf, "clock-numbers", purpose, replace(numbers, signals=signals))
+    for name, offset, numerator, denominator in (
+        ("down", -1, 1, 3),
+        ("still", 7, 0, 1),
+        ("large", 2**50, 2**30 + 1, 2**31),
+    ):
+
+        def edit(
+            fields: Any, given: tuple[int, int, int] = (offset, numerator, denominator)
+        ) -> None:
+            names = ("offset", "numerator", "denominator")
+            fields.clock[0].update(zip(names, given, strict=True))
+
+        purpose = f"A clock that is {name}: its quotients are rounded down."
+        _hold(shelf, f"clock-{name}", purpose, with_fields(plain, edit))
+
+
+def _headers(shelf: Whole) -> None:
+    plain = take_table(MARKERS, "marks.trc")
+    every = b"".join(bytes((mark,)) + b"|" for mark in (*range(4), *PHRASES, 2, 1, 3, 0))
+    marked = with_fields(plain, lambda fields: fields.update({"header": every, "marks": 1}))
+    _hold(shelf, "marks", "Every mark of a header.", marked)
+    text = with_fields(plain, lambda fields: fields.update({"header": every, "marks": 0}))
+    _hold(shelf, "no-marks", "The same bytes, which are text.", text)
+    empty = with_fields(plain, lambda fields: fields.update({"header": b"", "marks": 1}))
+    _hold(shelf, "no-header", "No header at all.", empty)
+    for rows, what in ((plain.n_frames, "these"), (plain.n_frames + 1, "other")):
+        assert marked.source is not None
+        fields = parse(DETAIL, marked.source.detail, "detail")
+        fields.update({"count": b"0x5", "rows": rows})
+        source = replace(marked.source, detail=build(DETAIL, fields, "detail"))
+        purpose = f"A count as printed for {what} rows."
+        _hold(shelf, f"count-{what}", purpose, replace(marked, source=source))
+
+
+def _missing(shelf: Whole) -> None:
+    """What stands where a value is invalid: also padded, and where that is nothing."""
+    forces = take_table(FORCES, "missing.mot")
+    assert forces.signals[0].mask is not None
+    for name, word in (("long", b"a word that is longer than its column"), ("empty", b"")):
+        motion = with_fields(forces, lambda fields, word=word: fields.update({"missing": word}))
+        _hold(shelf, f"missing-{name}", f"Padded columns, {name} where invalid.", motion)
+
+    def signs(fields: Any) -> None:
+        for run in fields.patterns[0].runs:
+            run.width = 1
+        fields.missing = b""
+
+    purpose = "A blank where the sign would be, also of nothing."
+    _hold(shelf, "missing-sign", purpose, with_fields(forces, signs))
+
+
+def _patterns(shelf: Whole) -> None:
+    """Columns of both signals, the frame number and no clock, in another order."""
+    times = take_table(TIMES, "order.trc")
+    n = sum(signal.n_channels for signal in times.signals)
+
+    def edit(fields: Any) -> None:
+        runs = [(n, 1, 8), (0, 1, -4), (2, n - 2, 0)]
+        names = ("gap", "column", "n_columns", "width")
+        fields.patterns[0].runs[:] = [
+            dict(zip(names, (1, column, count, width), strict=True))
+            for column, count, width in runs
+        ]
+
+    motion = with_fields(times, edit)
+    assert motion.source is not None
+    detail = put(DETAIL, "ends", b"\1")(motion.source.detail)
+    motion = replace(motion, source=replace(motion.source, detail=detail))
+    _hold(shelf, "order", "Channels of two signals in another order; one is left out.", motion)
