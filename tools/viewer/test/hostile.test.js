@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { axe, inked, launch, open, settled, shown } from "./helpers/browser.js";
+import { axe, curved, inked, launch, open, settled, shown } from "./helpers/browser.js";
 import { fixture } from "./helpers/fixtures.js";
 import { serve } from "./helpers/server.js";
 
@@ -84,5 +84,6 @@ test("a damaged segment: it is said, and the page goes on", () =>
     await page.waitForSelector("#message.fault", { timeout: 20_000 });
     await page.locator("#clips .tree-row", { hasText: "walk.mcz" }).click();
     await page.waitForFunction(() => /walk\.mcz/.test(document.title));
+    await curved(page);
     assert.ok((await inked(page, ".strip.curves canvas")).pixels > 300);
   }));

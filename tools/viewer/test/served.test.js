@@ -6,7 +6,7 @@ import { readFileSync, statSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { pathToFileURL } from "node:url";
-import { axe, inked, launch, open, shown } from "./helpers/browser.js";
+import { axe, curved, inked, launch, open, shown } from "./helpers/browser.js";
 import { environment, fixture, python } from "./helpers/fixtures.js";
 
 let browser;
@@ -85,6 +85,7 @@ test("two files: the figures of mcz diff; a C3D that is chosen in the page is co
     await page.click("#open");
     await (await chosen).setFiles(fixture("walk.c3d"));
     await page.waitForFunction(() => /walk\.c3d/.test(document.title));
+    await curved(page);
     assert.ok((await inked(page, ".strip.curves canvas")).pixels > 300);
     assert.deepEqual(page.strays, []);
     await page.context().close();
@@ -146,6 +147,7 @@ test("one page that holds the clip, opened from a disk", async () => {
   assert.equal(done.status, 0, done.stderr);
   const page = await open(browser, pathToFileURL(out).href);
   await shown(page);
+  await curved(page);
   assert.ok((await inked(page, ".strip.curves canvas")).pixels > 300);
   assert.deepEqual(await axe(page), []);
   assert.deepEqual(page.faults, []);

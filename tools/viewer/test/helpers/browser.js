@@ -67,6 +67,14 @@ export async function axe(page) {
     .map(({ id, nodes }) => `${id}: ${nodes.map(({ target, failureSummary }) => `${target} ${failureSummary}`).join(" | ")}`);
 }
 
+/** Waits until the first strip of curves says its figures, and is drawn. */
+export async function curved(page) {
+  await page.waitForFunction(() =>
+    /: .*[\d.]+ to [\d.]+/.test(document.querySelector(".strip.curves canvas")?.ariaLabel ?? ""),
+  );
+  await settled(page);
+}
+
 /** How many pixels of a canvas are not of its most frequent color, and how many colors there are. */
 export const inked = (page, selector) =>
   page.$eval(selector, (canvas) => {
