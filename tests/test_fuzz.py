@@ -111,7 +111,8 @@ def test_seeds_pass(name: str) -> None:
         try:
             decoded += target.check(seeds[key])
         except mcz.MczError:
-            assert any(word in key for word in ("invalid", "uncommon", "long"))  # long: decoded
+            harmless = "invalid", "uncommon", "long", "table-odd"  # long: decoded
+            assert any(word in key for word in harmless)
     assert decoded > 0
 
 

@@ -58,6 +58,44 @@ def check_printed(grid: Grid, texts: list[str]) -> np.ndarray:
     return ordinals
 
 
+@given(
+    st.lists(DOUBLES | st.floats(width=32, allow_nan=False, allow_infinity=False), max_size=8),
+    st.sampled_from([0, 3, 6, 15, 32, 64]),
+    st.integers(0, 40),
+    st.sampled_from(["f", "e", "g"]),
+)
+def test_printed_as_python_prints(
+    numbers: list[float], digits: int, places: int, letter: str
+) -> None:
+    """Numbers of a base print as Python's format does, and come back from their texts."""
+    places = max(1, places % 18) if letter == "g" else places
+    style = {"f": 0, "g": 128, "e": 192}[letter] + places
+    grid = Grid(GridKind.PRINTED, digits, style=style)
+    ordinals, _ = grid.ordinals(np.array(numbers, np.float64))
+    base = Grid(
+        {32: GridKind.BINARY32, 64: GridKind.BINARY64}.get(digits, GridKind.FIXED), digits % 32
+    )
+    texts = [f"{x:.{places}{letter}}" for x in base.values(ordinals).tolist()]
+    assert [text.decode() for text in grid.texts(ordinals).tolist()] == texts
+    assert bits(grid.values(ordinals)) == bits(np.array([float(text) for text in texts]))
+    if texts:
+        again, printed = grid.ordinals_of_tokens(tokens_of(*texts))
+        assert grid.texts(again[printed]).tolist() == [
+            text.encode() for text, ok in zip(texts, printed, strict=True) if ok
+        ]
+
+
+@given(st.lists(st.floats(0, 1e20), min_size=1, max_size=8), st.integers(0, 40))
+def test_printed_with_17_digits(numbers: list[float], places: int) -> None:
+    """As C libraries of Windows did: digits behind the 17th are 0."""
+    grid = Grid(GridKind.PRINTED, 64, style=64 + places)
+    for text, x in zip(grid.texts(grid.ordinals(np.array(numbers))[0]), numbers, strict=True):
+        exact = Decimal(f"{x:.16e}")
+        cut = exact if exact.adjusted() - 16 >= -places else Decimal(x)
+        assert text.decode() == f"{cut:.{places}f}" or x == 0
+        assert len(text.replace(b".", b"").lstrip(b"0").rstrip(b"0")) <= max(17, 1)
+
+
 def trimmed(text: str, end: str = "") -> str:
     """``text`` without the zeros at the end of its fraction; ``end`` if it had nothing else."""
     head, point, fraction = text.partition(".")

@@ -215,7 +215,7 @@ def test_to_wins(folder: Path, call: Call) -> None:
     assert (folder / "x.bvh").read_bytes().startswith(b"frame,")
 
 
-@pytest.mark.parametrize("suffix", ["asf", "mcz", "trc", "fbx", "gltf", "usd"])
+@pytest.mark.parametrize("suffix", ["asf", "mcz", "tsv", "fbx", "gltf", "usd"])
 def test_what_cannot_be_written_is_refused(folder: Path, call: Call, suffix: str) -> None:
     call("encode", folder / "walk.amc")
     out = folder / f"x.{suffix}"
@@ -385,14 +385,14 @@ def test_info_of_some_clips(packed: Path, call: Call) -> None:
 
 def test_pack_names_what_it_leaves_out(folder: Path, call: Call) -> None:
     (folder / "sub").mkdir()
-    for name in ("a.trc", "sub/b.trc", "notes.txt", "README"):
+    for name in ("a.tsv", "sub/b.tsv", "notes.txt", "README"):
         (folder / name).write_bytes(b"12345")
     (folder / "sloppy.bvh").write_text(SLOPPY % 2)
     words = ("pack", folder, folder / "all.mcz")
     code, out, errors = call(*words)
     assert code == 0
-    assert "left out 4 files: 2 .trc, 1 .txt, 1 without suffix" in errors
-    for name in ("a.trc", "sub/b.trc", "notes.txt", "README"):
+    assert "left out 4 files: 2 .tsv, 1 .txt, 1 without suffix" in errors
+    for name in ("a.tsv", "sub/b.tsv", "notes.txt", "README"):
         assert f"mcz: {name}: skipped: no motion file; --keep-all keeps it" in errors
     assert "mcz: sloppy.bvh: 2 frames are declared, 3 are there" in errors
     size = (folder / "all.mcz").stat().st_size
@@ -405,7 +405,7 @@ def test_pack_names_what_it_leaves_out(folder: Path, call: Call) -> None:
     assert document["bytes"] == size
     assert document["counts"] == {"parsed": 4, "skeleton": 1, "skipped": 4}
     rows = {row["path"]: row for row in document["files"]}
-    assert rows["a.trc"]["result"] == "skipped"
+    assert rows["a.tsv"]["result"] == "skipped"
     assert rows["sloppy.bvh"]["notes"] == ["2 frames are declared, 3 are there"]
     assert "left out" not in call(*words, "--force", "--keep-all")[2]
 

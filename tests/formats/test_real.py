@@ -25,6 +25,7 @@ REFUSED = {
     "no-hierarchy-section.bvh": "line 1: no HIERARCHY section",
     "empty.c3d": "offset 0: the file ends",
     "zero-filled.c3d": "offset 515: processor 0",
+    "truncated.trc": "line 2: no line that begins with Frame#",
 }
 
 

@@ -85,18 +85,18 @@ def _headers(shelf: Whole) -> None:
     plain = take_table(MARKERS, "marks.trc")
     every = b"".join(bytes((mark,)) + b"|" for mark in (*range(4), *PHRASES, 2, 1, 3, 0))
     marked = with_fields(plain, lambda fields: fields.update({"header": every, "marks": 1}))
-    _hold(shelf, "marks", "Every mark of a header.", marked)
+    _hold(shelf, "odd-marks", "Every mark of a header.", marked)
     text = with_fields(plain, lambda fields: fields.update({"header": every, "marks": 0}))
-    _hold(shelf, "no-marks", "The same bytes, which are text.", text)
+    _hold(shelf, "odd-no-marks", "The same bytes, which are text.", text)
     empty = with_fields(plain, lambda fields: fields.update({"header": b"", "marks": 1}))
-    _hold(shelf, "no-header", "No header at all.", empty)
+    _hold(shelf, "odd-no-header", "No header at all.", empty)
     for rows, what in ((plain.n_frames, "these"), (plain.n_frames + 1, "other")):
         assert marked.source is not None
         fields = parse(DETAIL, marked.source.detail, "detail")
         fields.update({"count": b"0x5", "rows": rows})
         source = replace(marked.source, detail=build(DETAIL, fields, "detail"))
         purpose = f"A count as printed for {what} rows."
-        _hold(shelf, f"count-{what}", purpose, replace(marked, source=source))
+        _hold(shelf, f"odd-count-{what}", purpose, replace(marked, source=source))
 
 
 def _missing(shelf: Whole) -> None:
@@ -133,4 +133,4 @@ def _patterns(shelf: Whole) -> None:
     assert motion.source is not None
     detail = put(DETAIL, "ends", b"\1")(motion.source.detail)
     motion = replace(motion, source=replace(motion.source, detail=detail))
-    _hold(shelf, "order", "Channels of two signals in another order; one is left out.", motion)
+    _hold(shelf, "odd-order", "Channels of two signals in another order; one is left out.", motion)

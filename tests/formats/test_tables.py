@@ -1,0 +1,433 @@
+"""TRC, MOT and STO of every style: bytes -> Motion -> the same bytes."""
+
+from __future__ import annotations
+
+import io
+import lzma
+import os
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.errors import FormatError, LimitError, MotionError, SourceError
+from mcz.formats import FORMATS, sniffed
+from mcz.formats.table_layout import PHRASES, fill, parse_table, with_phrases
+from mcz.formats.times import find_clock, stated_rate, uniform_rate
+from mcz.motion import Motion
+from mcz.numbers import GridKind, scan
+from mcz.sample import bvh_walk, marker_walk
+from tools.vectors.build.table_files import FORCES, MARKERS, QUATERNIONS, TIMES
+
+SMALL = {"trc": MARKERS, "mot": FORCES, "sto": QUATERNIONS}
+ENDS = st.sampled_from(["\n", "\r\n"])
+NUMBERS = {  # styles of one column: how a number is printed
+    "%.3f": lambda x: f"{x:.3f}",
+    "%.6f of 3": lambda x: f"{x:.3f}000",
+    "%14.8f": lambda x: f"{x:14.8f}",
+    "%g": lambda x: f"{x:g}",
+    "%.16g": lambda x: f"{x:.16g}",
+    "%.18e": lambda x: f"{x:.18e}",
+    "%.2E": lambda x: f"{x:.2E}",
+    "binary32": lambda x: f"{np.float32(x).item():.16g}",
+    "17 digits": lambda x: f"{round(x, 4):.16e}",
+    "%d": lambda x: f"{x:.0f}",
+}
+MISSING = st.sampled_from(["", "NaN", "nan", "NAN", " "])
+
+
+def back(name: str, data: bytes) -> Motion:
+    """The motion, which is written as the same bytes."""
+    motion: Motion = FORMATS[name].read(data, "table")
+    assert FORMATS[name].write(motion) == data
+    return motion
+
+
+def stored(name: str, data: bytes, tmp_path: Path, **options: str) -> mcz.Motion:
+    """The motion of the file after a way through an MCZ file, whose source is the same."""
+    source, target = tmp_path / f"table.{name}", io.BytesIO()
+    source.write_bytes(data)
+    mcz.encode(source, target, **options)
+    with mcz.open(target.getvalue()) as file:
+        assert file.only_clip().source_bytes() == data
+        return file.only_clip().motion()
+
+
+@st.composite
+def cells(draw: st.DrawFn, n_rows: int, n_columns: int) -> list[list[str]]:
+    """Rows of cells, some missing, each column in a style of its own or all in one."""
+    columns = []
+    styles = draw(st.lists(st.sampled_from(sorted(NUMBERS)), min_size=1, max_size=2))
+    for place in range(n_columns):
+        style = NUMBERS[styles[place % len(styles)]]
+        numbers = st.floats(-2000, 2000) | st.just(0.0) | st.floats(-1, 1, width=32)
+        values = draw(st.lists(numbers, min_size=n_rows, max_size=n_rows))
+        columns.append([style(value) for value in values])
+    holes = st.sets(st.tuples(st.integers(0, n_rows - 1), st.integers(0, n_columns - 1)))
+    for row, column in draw(holes | st.just(set())):
+        columns[column][row] = draw(MISSING)
+    return [list(row) for row in zip(*columns, strict=True)]
+
+
+@st.composite
+def trc_files(draw: st.DrawFn) -> bytes:
+    n_rows, n_markers = draw(st.integers(1, 12)), draw(st.integers(1, 4))
+    eol, rate = draw(ENDS), draw(st.sampled_from([60, 100, 119.88, 250, 2000]))
+    first = draw(st.integers(0, 200))
+    places = draw(st.integers(1, 7))
+    tail = draw(st.sampled_from(["", "\t", " ", "\t\t"]))
+    names = draw(st.lists(st.sampled_from(["R.ASIS", "C 7", "Ferse"]), max_size=n_markers))
+    lines = [
+        "PathFileType\t4\t(X/Y/Z)\ta b.trc",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate",
+        f"{rate:.2f}\t{rate:.2f}\t{draw(st.sampled_from([n_rows, 900]))}\t{n_markers}\tmm\t{rate}",
+        "Frame#\tTime\t" + "\t\t\t".join(names) + "\t\t",
+        "\t\t" + "\t".join(f"X{k + 1}\tY{k + 1}\tZ{k + 1}" for k in range(len(names))),
+        *draw(st.sampled_from([[], [""]])),
+    ]
+    for row, numbers in enumerate(draw(cells(n_rows, 3 * n_markers))):
+        time = f"{(row + draw(st.sampled_from([0, 0, 0, 0.5]))) / rate:.{places}f}"
+        kept = numbers[: draw(st.sampled_from([len(numbers)] * 4 + [3]))]
+        lines.append("\t".join([str(first + row), time, *kept]) + tail)
+    return (
+        eol.join(lines) + draw(st.sampled_from(["", eol, eol + eol, eol + "\t\t" + eol]))
+    ).encode()
+
+
+@st.composite
+def storage_files(draw: st.DrawFn) -> bytes:
+    n_rows, n_columns = draw(st.integers(1, 12)), draw(st.integers(1, 5))
+    eol, parts = draw(ENDS), draw(st.sampled_from([1, 1, 3, 4]))
+    lines = draw(
+        st.sampled_from(
+            [
+                ["Coordinates", "version=1", f"nRows={n_rows}", "inDegrees=yes"],
+                ["name x.mot", f"datarows {n_rows}", "range 0 1"],
+                ["", "DataRate=100.000000", "DataType=Quaternion", "version=3"],
+                ["first\t\t", "nRows=7\t\t", "\x01"],
+            ]
+        )
+    )
+    names = [f"/jointset/knee_{k}/value" for k in range(n_columns)]
+    lines = [*lines, "endheader", "\t".join(["time", *names])]
+    step = draw(st.sampled_from([0.01, 0.0005, 1 / 60, 1.0]))
+    style = NUMBERS[draw(st.sampled_from(["%g", "%.16g", "%14.8f"]))]
+    table = draw(cells(n_rows, n_columns * parts))
+    for row, numbers in enumerate(table):
+        whole = [numbers[k : k + parts] for k in range(0, len(numbers), parts)]
+        # What is missing from a cell of several numbers is a number that is none.
+        joined = [
+            ",".join(n.strip() or "nan" for n in cell) if parts > 1 else cell[0] for cell in whole
+        ]
+        lines.append("\t".join([style(row * step), *joined]))
+    return (eol.join(lines) + draw(st.sampled_from(["", eol]))).encode()
+
+
+@given(trc_files())
+def test_any_trc_comes_back(data: bytes) -> None:
+    motion = back("trc", data)
+    assert motion.skeleton.unit_cm == 0.1
+    kinds = {channel.kind for channel in motion.skeleton.channels}
+    assert kinds <= {"tx", "ty", "tz"}
+
+
+@given(storage_files(), st.sampled_from(["sto", "mot"]))
+def test_any_storage_file_comes_back(data: bytes, name: str) -> None:
+    motion = back(name, data)
+    assert motion.skeleton.joints[0].name == "time"
+    assert {channel.kind for channel in motion.skeleton.channels} == {""}
+
+
+@given(trc_files() | storage_files(), st.data())
+def test_what_is_cut_off_is_read_exactly_or_refused(data: bytes, choice: st.DataObject) -> None:
+    name = "trc" if data.startswith(b"Path") else "sto"
+    cut = data[: choice.draw(st.integers(0, len(data)))]
+    try:
+        motion = FORMATS[name].read(cut, "table")
+    except SourceError as error:
+        assert "\n" not in str(error)
+    else:
+        assert FORMATS[name].write(motion) == cut
+
+
+@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("effort", ["fast", "best"])
+def test_stored_and_restored(name: str, effort: str, tmp_path: Path) -> None:
+    motion = stored(name, SMALL[name], tmp_path, effort=effort)
+    again = back(name, SMALL[name])
+    assert np.array_equal(motion.values, again.values, equal_nan=True)
+    assert motion.skeleton.joints == again.skeleton.joints
+
+
+def test_a_trc_says_its_markers() -> None:
+    motion = back("trc", MARKERS)
+    assert [joint.name for joint in motion.skeleton.joints] == ["R.Heel", "L Heel"]
+    assert (motion.frame_rate, motion.frame_rate_exact, motion.metadata) == (60, True, {})
+    assert motion.frame_numbers is not None
+    assert motion.frame_numbers.tolist() == [185, 186, 187, 188, 189]
+    assert len(motion.signals) == 1  # the times follow from the numbers
+    assert motion.values[0, 0] == 596.88123
+    assert np.isnan(motion.values[1, 3:]).all() and np.isnan(motion.values[3, :3]).all()
+    assert not len(motion.signals[0].exceptions)
+
+
+def test_times_that_follow_from_nothing_are_a_signal() -> None:
+    motion = back("trc", TIMES)
+    assert motion.signals[1].values.ravel().tolist() == [0.0, 0.02, 0.05, 1e9]
+    assert motion.frame_rate is None
+    assert "not uniform" in motion.metadata["source-note"]
+    other = replace(motion.signals[1], values=motion.signals[1].values + 1)
+    assert b"\n1\t1.00\t-2.73" in FORMATS["trc"].write(
+        replace(motion, signals=(motion.signals[0], other))
+    )
+
+
+def test_a_storage_file_says_its_columns() -> None:
+    motion = back("mot", FORCES)
+    assert [joint.name for joint in motion.skeleton.joints] == [
+        "time",
+        "pelvis_tilt",
+        "pelvis_tx",
+        "force",
+    ]
+    assert (motion.skeleton.angle_unit, motion.frame_rate) == ("deg", 60)
+    assert motion.skeleton.channels[0].unit == "s"
+    quaternions = back("sto", QUATERNIONS)
+    assert [c.name for c in quaternions.skeleton.joints[1].channels] == ["w", "x", "y", "z"]
+    assert (quaternions.skeleton.angle_unit, quaternions.frame_rate) == ("", 100)
+    assert quaternions.values[1, 1:].tolist() == [
+        *(0.5066763245921503, 0.4914209832138792, -0.5354515570241827, 0.4637630315530473),
+        *(0.8, 0, 0.6, 0),
+    ]
+
+
+def test_other_values_and_frames_print_in_the_same_style() -> None:
+    motion = back("trc", MARKERS)
+    values = np.where(np.isnan(motion.values), 0.0, motion.values + 1)
+    text = FORMATS["trc"].write(motion.with_values(values))
+    at = MARKERS.index(b"185")
+    assert text[:at] == MARKERS[:at]
+    assert b"185\t3.067000\t597.881230\t1045.682860\t119.560020\t605.533390" in text
+    numbers = replace(motion, frame_numbers=np.arange(200, 205))
+    assert b"\n200\t3.317000\t596.88" in FORMATS["trc"].write(numbers)
+
+
+def test_part_of_a_clip_keeps_its_times(tmp_path: Path) -> None:
+    source = tmp_path / "walk.trc"
+    source.write_bytes(MARKERS)
+    mcz.encode(source, tmp_path / "walk.mcz")
+    with mcz.open(tmp_path / "walk.mcz") as file:
+        lines = file.only_clip().source_bytes((1, 3)).splitlines()
+    assert lines[2].split(b"\t")[2].strip() == b"2"  # NumFrames counts what is there
+    assert [line.split(b"\t")[:2] for line in lines[6:]] == [
+        [b"186", b"3.083000"],
+        [b"187", b"3.100000"],
+    ]
+
+
+def test_a_lossy_clip_keeps_its_layout(tmp_path: Path) -> None:
+    motion = marker_walk()
+    source = tmp_path / "walk.trc"
+    source.write_bytes(FORMATS["trc"].write(replace(motion, source=None)))
+    mcz.encode(source, tmp_path / "walk.mcz", codec="mrdwt", params={"mean_error_cm": 0.1})
+    with mcz.open(tmp_path / "walk.mcz") as file:
+        text = file.only_clip().source_bytes()
+    again = FORMATS["trc"].read(text, "walk")
+    assert again.skeleton.joint_names == motion.skeleton.joint_names
+    assert np.nanmax(np.abs(again.values - motion.values)) < 20
+
+
+REFUSED = {
+    "trc": {
+        b"": "no line that begins with Frame#",
+        b"PathFileType\t4\n": "no line that begins with Frame#",
+        b"Frame#\tTime\tA\n\t\tX1\n": "line 2: no row of numbers",
+        b"Frame#\tTime\tA\n1\t0\t1\t2\t3\nnothing\n": "line 3: not a row of numbers",
+        b"Frame#\tTime\tA\n1\t0\t1\t2\tx\n": "line 2: b'x' is not a number",
+        b"Frame#\tTime\tA\n1.5\t0\t1\t2\t3\n": "is no frame number",
+        b"\xff\xfeF\0": "UTF-16",
+    },
+    "sto": {
+        b"": "no line 'endheader'",
+        b"name\nendheader\n": "no names and row of numbers",
+        b"endheader\ntime\ta\n0\t1\n1\t2\t3\n": "line 4: more than 2 cells",
+        b"endheader\ntime\ta\n0\t1,2,3\n1\t1,2\n": "line 4: 2 numbers in a cell, expected 3",
+        b"endheader\ntime\ta\n0\t1\n# end\n": "line 4: not a row of numbers",
+        b"endheader\ntime\ta\n0," + b"1," * 99 + b"1\t2\n": "101 numbers in a cell, limit 64",
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "data"), [(name, data) for name, cases in REFUSED.items() for data in cases]
+)
+def test_what_is_no_table_is_refused_with_the_reason(name: str, data: bytes) -> None:
+    with pytest.raises(SourceError) as caught:
+        FORMATS[name].read(data, "table")
+    assert REFUSED[name][data] in str(caught.value)
+
+
+def test_sniffed() -> None:
+    assert sniffed(MARKERS) == "trc"
+    assert sniffed(FORCES) == sniffed(QUATERNIONS) == "sto"
+
+
+# Headers
+
+
+@given(st.binary(max_size=200), st.lists(st.text(max_size=5), max_size=4))
+def test_phrases_and_marks(header: bytes, names: list[str]) -> None:
+    plain = bytes(byte for byte in header if byte >= 32 or byte in b"\t\n\r")
+    text = plain + b"nRows=7\nversion=3 Frame#\tTimes"
+    assert fill(with_phrases(text), names, b"7") == text
+    marks = b"\0|" * len(names)
+    assert fill(marks, names, b"") == "".join(f"{name}|" for name in names).encode()
+    with pytest.raises(FormatError, match="a name of joint"):
+        fill(marks + b"\0", names, b"")
+
+
+def test_a_header_has_a_limit() -> None:
+    longest = max(PHRASES.values(), key=len)
+    mark = next(bytes((mark,)) for mark, phrase in PHRASES.items() if phrase == longest)
+    n = 2**26 // len(longest)
+    assert len(fill(mark * n, [], b"")) == n * len(longest)
+    with pytest.raises(LimitError, match="a header of"):
+        fill(mark * (n + 1), [], b"")
+
+
+@given(st.binary(max_size=60))
+def test_hostile_templates_are_refused(template: bytes) -> None:
+    motion = back("trc", MARKERS)
+    assert motion.source is not None
+    for damaged in (
+        template,
+        motion.source.template[: len(template)],
+        motion.source.template + template,
+    ):
+        try:
+            layout = parse_table(damaged, motion.source.detail, 6)
+        except (FormatError, LimitError):
+            continue
+        assert layout.rows.patterns is not None
+        source = replace(motion.source, template=damaged)
+        try:
+            FORMATS["trc"].write(replace(motion, source=source))
+        except (FormatError, LimitError):
+            continue
+
+
+# Times
+
+
+@given(
+    st.fractions(1, 10**5, max_denominator=1001),
+    st.integers(0, 8),
+    st.integers(-100, 10**6),
+    st.integers(2, 40),
+)
+def test_a_clock_is_found_where_times_are_rounded(
+    rate: Fraction, places: int, first: int, n: int
+) -> None:
+    numbers = np.arange(first, first + n)
+    times = [f"{float(k / rate):.{places}f}" for k in range(n)]
+    stop = np.cumsum([len(time) + 1 for time in times]) - 1
+    tokens = scan(" ".join(times).encode(), stop - [len(time) for time in times], stop)
+    clock = find_clock(tokens, numbers, [rate])
+    if clock is None:  # nothing moves, or a tie was rounded to even
+        exact = [k * 10**places / rate for k in range(n)]
+        assert times[0] == times[-1] or any((2 * x).denominator == 1 for x in exact)
+        return
+    printed = clock.grid.texts(np.array(clock.ordinals(numbers.tolist()))).tolist()
+    assert printed == [time.encode() for time in times]
+
+
+def test_rates() -> None:
+    times = np.arange(50) / 119.88
+    assert uniform_rate(np.round(times, 6), 5e-7) == (Fraction(120000, 1001), True)
+    assert uniform_rate(np.round(times, 6), 5e-7, [Fraction("119.88")])[0] == Fraction("119.88")
+    assert uniform_rate(np.arange(30) / 60, 0.0)[0] == 60
+    assert uniform_rate(np.array([0.0, 0.1, 0.3]), 5e-3) == (None, True)
+    assert uniform_rate(np.array([0.0, np.inf]), 5e-3) == (None, True)
+    assert uniform_rate(np.array([0.0]), 5e-3) == (None, True)
+    assert stated_rate("1e999999999") is None
+    assert stated_rate(" 119.88") == Fraction("119.88")
+
+
+# Plain files
+
+
+def test_a_plain_trc_holds_markers_alone() -> None:
+    markers = replace(marker_walk(), source=None)
+    again = back("trc", FORMATS["trc"].write(markers))
+    assert np.array_equal(again.values, markers.values, equal_nan=True)
+    assert again.skeleton.joint_names == markers.skeleton.joint_names
+    with pytest.raises(MotionError, match="markers alone"):
+        FORMATS["trc"].write(replace(bvh_walk(), source=None))
+    unknown = replace(markers, skeleton=replace(markers.skeleton, unit_cm=None))
+    with pytest.raises(MotionError, match="length unit"):
+        FORMATS["trc"].write(unknown)
+    with pytest.raises(MotionError, match="rate is unknown"):
+        FORMATS["trc"].write(replace(markers, frame_rate=None))
+
+
+@pytest.mark.parametrize("to", ["trc", "sto", "mot"])
+def test_converted(to: str) -> None:
+    walk = replace(bvh_walk(), skeleton=replace(bvh_walk().skeleton, unit_cm=1.0))
+    again = back(to, FORMATS[to].write(mcz.convert(walk, to)))
+    assert again.frame_rate == 120
+    if to == "trc":
+        assert (
+            np.abs(again.values - 10 * mcz.positions(walk).reshape(again.n_frames, -1)).max() < 1e-5
+        )
+    else:
+        assert np.array_equal(again.values[:, 1:], walk.values)
+        assert np.allclose(again.values[:, 0], np.arange(again.n_frames) / 120, atol=1e-6)
+        other = {"sto": "mot", "mot": "sto"}[to]
+        twice = back(other, FORMATS[other].write(mcz.convert(again, other)))
+        assert np.array_equal(twice.values, again.values)
+
+
+# Real files
+
+DATA = Path(os.environ.get("MCZ_DATA", "/nonexistent"))
+
+
+def real_files() -> list[Path]:
+    folders = DATA / "other/opensim-core", DATA / "other/trc"
+    return [p for folder in folders for p in sorted(folder.glob("*")) if p.suffix[1:] in SMALL]
+
+
+@pytest.mark.real
+def test_real_tables_are_small() -> None:
+    """Short ones: five take more than xz -9e and 200 bytes. tools/source_sizes.py has all."""
+    chosen = [path for path in real_files() if path.stat().st_size < 60_000]
+    total = against = beyond = 0
+    for path in chosen:
+        data = path.read_bytes()
+        target = io.BytesIO()
+        mcz.encode(path, target, effort="best")
+        with mcz.open(target.getvalue()) as file:
+            assert file.only_clip().source_bytes() == data, path
+        size = len(target.getvalue())
+        xz = len(lzma.compress(data, preset=9 | lzma.PRESET_EXTREME))
+        total, against, beyond = total + size, against + xz, beyond + (size > xz + 200)
+    assert len(chosen) > 15
+    assert total < 0.85 * against
+    assert beyond <= 5
+
+
+@pytest.mark.parametrize("style", ["%.18e", "%.2E", "binary32", "17 digits"])
+def test_a_grid_for_each_style(style: str) -> None:
+    """Numbers as other programs print them are on a grid, and no exceptions."""
+    texts = [NUMBERS[style](x) for x in np.linspace(0.5, 90, 40).tolist()]
+    rows = "".join(f"{k}\t{text}\n" for k, text in enumerate(texts))
+    signal = back("sto", f"endheader\ntime\ta\n{rows}".encode()).signals[0]
+    assert not len(signal.exceptions)
+    assert signal.grids[1].kind == GridKind.PRINTED
+    bases = {"%.18e": 64, "%.2E": 131, "binary32": 32, "17 digits": 4}
+    assert signal.grids[1].digits == bases[style]
