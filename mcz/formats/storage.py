@@ -27,7 +27,7 @@ QUATERNION = ("w", "x", "y", "z")
 MAX_PARTS = 64  # numbers of a cell
 
 _END = re.compile(rb"(?im)^[ \t]*endheader[ \t]*\r?$\n?")
-_KEY = re.compile(rb"(?m)^[ \t]*([A-Za-z]+)[ \t]*[= \t][ \t]*([^\t\r\n]*?)[ \t]*\r?$")
+_KEY = re.compile(rb"[A-Za-z]+")
 _COUNTS = ("nrows", "datarows")
 
 
@@ -104,11 +104,16 @@ def _header(data: bytes) -> _Header:
         raise SourceError("line 1: no line 'endheader'; not a STO or MOT file, or cut off")
     values: dict[str, str] = {}
     count = (0, 0)
-    for match in _KEY.finditer(data, 0, end.start()):
-        key = match[1].decode("latin-1").lower()
-        values.setdefault(key, match[2].decode("latin-1"))
-        if key in _COUNTS:
-            count = match.span(2)
+    for at, line in lines_from(data[: end.start()], 0):
+        word = _KEY.match(line)
+        if word is None:
+            continue
+        key, rest = word[0].decode("latin-1").lower(), line[word.end() :]
+        value = rest.strip(b" \t\r\n=")
+        values.setdefault(key, value.decode("latin-1"))
+        if key in _COUNTS and value:
+            start = at + word.end() + rest.index(value)
+            count = start, start + len(value)
     labels = None
     for at, line in lines_from(data, end.end())[:16]:
         if labels is None and line.strip():

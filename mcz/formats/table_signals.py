@@ -17,6 +17,7 @@ from mcz.numbers import Grid, bits_of, fit, scan
 
 RUN_BITS = 48  # of one more run of grids in CLIP, and of what its heads need
 EXCEPTION_BITS = 200
+MOST_TRIED = 2048  # columns; of more each may take long, and has little to gain
 
 
 def of_columns(rows: Rows, columns: Sequence[int]) -> Rows:
@@ -30,7 +31,8 @@ def read_columns(data: bytes, rows: Rows, columns: Sequence[int]) -> Signal:
     """The signal of these columns; raises SourceError for a token that is no number."""
     rows = of_columns(rows, columns)
     signal = read_signal(data, rows)
-    found = {c: better for c in range(len(columns)) if (better := _better(data, rows, signal, c))}
+    tried = range(min(len(columns), MOST_TRIED))
+    found = {c: better for c in tried if (better := _better(data, rows, signal, c))}
     if not found:
         return signal
     grids = list(signal.grids)

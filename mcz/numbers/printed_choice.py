@@ -43,6 +43,8 @@ def printed_candidates(tokens: Tokens) -> Iterator[Candidate]:
         return
     values = np.abs(tokens.values())
     values = values[np.isfinite(values)]
+    if not len(values):
+        return
     plain = decimals[~with_exponent]
     fixed = int(np.bincount(plain).argmax()) if len(plain) else 0
     if significant.max() >= 16:
@@ -95,6 +97,7 @@ def _exponents(tokens: Tokens, decimals: Ints) -> Iterator[Candidate]:
         yield _with_bits(BASE_GENERAL + n + 1, flags, EXPONENT + n)
         return
     values = np.abs(tokens.values())
+    values = values[np.isfinite(values)]
     for base in (*_decimals(values), BASE_64):
         yield _with_bits(base, flags, EXPONENT + n)
     if _are_binary32(values, np.zeros(len(values))):
@@ -107,7 +110,7 @@ def _decimals(values: Floats) -> Iterator[int]:
         with np.errstate(over="ignore"):
             scaled = np.rint(values * TENS[digits])
         same = (scaled / TENS[digits] == values) & (scaled <= DECIMAL_LIMIT)
-        if np.mean(same) >= NEARLY_ALL:
+        if len(values) and np.mean(same) >= NEARLY_ALL:
             yield digits
             return
 

@@ -376,6 +376,10 @@ const GRIDS = {
   binary32: new grids.Grid(grids.BINARY32, 0, 0, 1),
   binary64: new grids.Grid(grids.BINARY64, 0, 0, 1),
   vax: new grids.Grid(grids.VAX_F, 0, 0, 1),
+  printed4: new grids.Grid(grids.PRINTED, 4, 0, 1, 210),
+  printed32: new grids.Grid(grids.PRINTED, 32, 0, 1, 145),
+  printed64: new grids.Grid(grids.PRINTED, 64, 0, 1, 208),
+  printed6digits: new grids.Grid(grids.PRINTED, 134, 0, 1, 197),
 };
 
 test("value to ordinal undoes ordinal to value", () => {
@@ -431,6 +435,24 @@ test("ordinal to text", () => {
   assert.equal(text(general6, ordinalOf(general6, 1e-5)), "1e-05");
   assert.equal(text(general6, ordinalOf(general6, -123456)), "-123456");
   assert.equal(text(text64, grids.bitsOf(0.1)), "0.1");
+});
+
+test("ordinal to text of PRINTED grids", () => {
+  const cases = [
+    [4, 0, 210, 5n, "5.000000000000000104e-04"],
+    [4, 0, 84, 5017n, "0.50170000000000003000"],
+    [131, grids.UPPER, 194, -275575n, "-2.73E-01"],
+    [32, 0, 144, 0x3dcccccdn, "0.1000000014901161"],
+    [64, 0, 64, 0x43abc16d674ec800n, "1000000000000000000"],
+    [64, grids.PLUS | grids.EXPONENT3, 192, 0n, "+0e+000"],
+    [0, 0, 2, -8n, "-7.00"],
+  ];
+  for (const [digits, flags, style, ordinal, text] of cases) {
+    const grid = new grids.Grid(grids.PRINTED, digits, flags, 1, style);
+    const halves = [Number(ordinal & 0xffffffffn), Number(ordinal >> 32n)];
+    assert.equal(textOfOrdinal(grid, ...halves), text);
+    assert.equal(grids.valueOf(grid, ordinal), Number(text));
+  }
 });
 
 test("tokens", () => {
