@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import zlib
 from pathlib import Path
@@ -292,6 +293,27 @@ def test_all_of_a_file_is_protected_anew(archive: bytes, tmp_path: Path) -> None
     with mcz.open(path) as file:
         assert file.clips["walk"].metadata["subject"] == "05"
         assert len(file) == 4
+
+
+def test_a_full_disk_costs_no_recovery_data(
+    archive: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is rewritten has its new recovery data before it has the name."""
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    path = tmp_path / "a.mcz"
+    path.write_bytes(archive)
+    monkeypatch.setattr("mcz.editing.protecting.write_recovery", full)
+    for rewrite in (
+        lambda: mcz.protect(path, 0.1, anew=True),
+        lambda: mcz.delete_clips(path, "more"),
+    ):
+        with pytest.raises(mcz.AccessError, match="No space"):
+            rewrite()
+        assert path.read_bytes() == archive
+        assert [entry.name for entry in tmp_path.iterdir()] == ["a.mcz"]
 
 
 @pytest.mark.parametrize("size", [1, 300, 5000, 100_000, 10**6, 10**9, 10**12])

@@ -92,7 +92,8 @@ def command(
         raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)
     target = output or str(Path(file).with_suffix(".gif" if options["sheet"] is None else ".png"))
     refuse_inputs(target, (file, skeleton))
-    check_new(Path(target), force)
+    if "://" not in target:
+        check_new(Path(target), force)
     facts = {key: options[key] for key in ("rate", "up", "unit")}
     wanted = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts}
     with moving_of(file, **wanted) as moving, about(file, target), Progress() as progress:
@@ -106,11 +107,12 @@ def command(
         )
     for note in drawn.notes:
         say(f"{file}: {note}")
-    size = Path(target).stat().st_size
     if as_json:
-        print_json({**asdict(drawn), "bytes": size})
+        document = asdict(drawn)
+        document["bytes"] = document.pop("n_bytes")
+        print_json(document)
         return Exit.FINE
     what = plural(drawn.n_pictures, "picture" if drawn.fps else "pose")
     at = f" at {drawn.fps:g} a second" if drawn.fps else ""
-    echo(f"{target}: {what}{at}, {drawn.width} x {drawn.height} pixels, {size:,} bytes")
+    echo(f"{target}: {what}{at}, {drawn.width} x {drawn.height} pixels, {drawn.n_bytes:,} bytes")
     return Exit.FINE

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 
 from mcz.editing.protecting import DEFAULT, Protection, add_recovery
-from mcz.editing.rewriting import without_recovery
+from mcz.editing.rewriting import protected_anew
 from mcz.recovery.making import Step
 from mcz.recovery.shape import check_redundancy
 
@@ -31,6 +31,6 @@ def protect(
     where another process is appending, and as ``mcz.append`` for a file cut short.
     """
     check_redundancy(redundancy)
-    if anew:
-        without_recovery(target)
+    if anew and (found := protected_anew(target, redundancy, progress)) is not None:
+        return [found]
     return add_recovery(target, redundancy, progress)

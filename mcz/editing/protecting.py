@@ -6,11 +6,13 @@ SPEC.md, "RECV", is normative; ``mcz/recovery`` has the code.
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 from mcz.brief import brief
 from mcz.container.chunks import ANCILLARY, CRC, FOOT, RECOVERY, Chunk, build_foot, build_header
@@ -18,7 +20,7 @@ from mcz.container.directory import Directory
 from mcz.container.index import build_index
 from mcz.container.reader import Container
 from mcz.container.source import ByteSource
-from mcz.editing.appending import growing
+from mcz.editing.appending import IN_MEMORY, growing
 from mcz.errors import FormatError, OptionError
 from mcz.reading.recovery_check import recovery_chunks
 from mcz.recovery.making import Step, made
@@ -59,6 +61,18 @@ def add_recovery(
             shape = write_recovery(growth.container, growth.added, start, redundancy, progress)
             found.append(protection_of(shape))
     return found
+
+
+def protect_written(stream: BinaryIO, redundancy: float, progress: Step | None = None) -> Shape:
+    """Write recovery data behind the file that ``stream`` holds, before that gets its name."""
+    stream.flush()
+    container = Container(ByteSource(stream))
+    with tempfile.SpooledTemporaryFile(IN_MEMORY) as added:  # the stream is read meanwhile
+        shape = write_recovery(container, cast(BinaryIO, added), 0, redundancy, progress)
+        added.seek(0)
+        stream.seek(0, os.SEEK_END)
+        shutil.copyfileobj(added, stream)
+    return shape
 
 
 def still_protect(target: str | os.PathLike[str], redundancy: float | None) -> bool:

@@ -23,7 +23,13 @@ from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
 from mcz.editing.carrying import SAME, UNPROTECTED, Carrier, Change, said_of
-from mcz.editing.protecting import DEFAULT, add_recovery, redundancy_of
+from mcz.editing.protecting import (
+    DEFAULT,
+    Protection,
+    protect_written,
+    protection_of,
+    redundancy_of,
+)
 from mcz.errors import AccessError, FormatError, OptionError
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
@@ -174,11 +180,10 @@ def rewrite(target: Any, output: Any, force: bool, file: File, plan: Plan, step:
     path = Path(target) if output is None else output
     with replacing(path, force=force or output is None, inputs=inputs) as stream:
         size, left_out = _written(stream, file, plan, step)
-    if output is None and UNPROTECTED in left_out:
-        redundancy = redundancy_of(file.container)
-        left_out = [text for text in left_out if text != UNPROTECTED]
-        size = add_recovery(path, redundancy or DEFAULT)[-1].stop
-        return Written(size, left_out)
+        if output is None and UNPROTECTED in left_out:
+            left_out = [text for text in left_out if text != UNPROTECTED]
+            protect_written(stream, redundancy_of(file.container) or DEFAULT)
+            size = stream.tell()
     return Written(size, left_out)
 
 
@@ -192,18 +197,22 @@ def _written(stream: Any, file: File, plan: Plan, step: Step) -> tuple[int, list
     return writer.offset, left_out
 
 
-def without_recovery(target: Any) -> None:
-    """Rewrite a file without its recovery data, all else as it is; nothing where it has none.
+def protected_anew(
+    target: Any, redundancy: float, progress: Callable[[int, int], object] | None
+) -> Protection | None:
+    """Rewrite a file with recovery data for all of it in place of those that it has.
 
-    Raises FormatError where more would be lost, and as ``source_of`` does.
+    The file has its old ones until it has the new ones. Returns None, and does nothing, where it
+    has none. Raises FormatError where more would be lost, and as ``source_of`` does.
     """
     with source_of(target, None) as file:
         if redundancy_of(file.container) is None:
-            return
+            return None
         with replacing(Path(target), force=True) as stream:
             _, left_out = _written(stream, file, whole(file), lambda name: None)
             if lost := [text for text in left_out if text != UNPROTECTED]:
                 raise FormatError(f"{file.name}: rewriting it would lose {lost[0]}")
+            return protection_of(protect_written(stream, redundancy, progress))
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,12 +43,13 @@ Progress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True, slots=True)
 class Rendered:
-    """What was written: ``n_pictures`` of ``width`` x ``height``, ``fps`` None of a still.
+    """What was written: ``n_pictures`` of ``width`` x ``height``, in ``n_bytes``.
 
-    ``notes`` say what was assumed.
+    ``fps`` is None of a still. ``notes`` say what was assumed.
     """
 
     path: str
+    n_bytes: int
     n_pictures: int
     width: int
     height: int
@@ -194,16 +195,15 @@ class _Job:
             width, height = width // 2 * 2, height // 2 * 2  # as these codecs want it
         scene = self._scene(frames, width, height, float(fps))
         canvas = Canvas(width, height, self.look.theme)
-        with (
-            replacing(self.path, force=self.force) as stream,
-            film(stream, suffix[1:], width, height, fps) as taken,
-        ):
-            for number, (frame, nodes) in enumerate(scene.track):
-                self.progress(number, len(frames), f"frame {frame}")
-                words = words_around(scene, width, height, self.moving.name, self._when(frame))
-                canvas.draw(drawing_of(scene, number, nodes, words))
-                taken.add(canvas.pixels())
-        return self._rendered(len(frames), width, height, float(fps))
+        with replacing(self.path, force=self.force) as stream:
+            with film(stream, suffix[1:], width, height, fps) as taken:
+                for number, (frame, nodes) in enumerate(scene.track):
+                    self.progress(number, len(frames), f"frame {frame}")
+                    words = words_around(scene, width, height, self.moving.name, self._when(frame))
+                    canvas.draw(drawing_of(scene, number, nodes, words))
+                    taken.add(canvas.pixels())
+            size = stream.tell()
+        return self._rendered(size, len(frames), width, height, float(fps))
 
     def still(self, frames: Ints) -> Rendered:
         width, height = self.look.size or SIZE
@@ -212,8 +212,7 @@ class _Job:
         ((frame, nodes),) = scene.track
         words = words_around(scene, width, height, self.moving.name, self._when(frame))
         canvas.draw(drawing_of(scene, 0, nodes, words))
-        self._write(canvas)
-        return self._rendered(1, width, height, None)
+        return self._rendered(self._written(canvas), 1, width, height, None)
 
     def sheet(self, frames: Ints) -> Rendered:
         layout = sheet_size(len(frames), self.look.size)
@@ -223,8 +222,8 @@ class _Job:
         canvas = Canvas(layout.width, layout.height, self.look.theme)
         title = f"{self.moving.name}"
         canvas.draw(sheet_drawing(scene, layout, title, self._when))
-        self._write(canvas)
-        return self._rendered(len(frames), layout.width, layout.height, None)
+        size = self._written(canvas)
+        return self._rendered(size, len(frames), layout.width, layout.height, None)
 
     def _scene(
         self,
@@ -249,12 +248,16 @@ class _Job:
             return f"frame {frame}"
         return f"frame {frame}  {float(frame / self.rate):.2f} s"
 
-    def _write(self, canvas: Canvas) -> None:
+    def _written(self, canvas: Canvas) -> int:
+        """Write a still; its bytes."""
         with replacing(self.path, force=self.force) as stream:
             write_still(canvas, stream, Path(self.path).suffix.lower(), self.moving.name)
+            return stream.tell()
 
-    def _rendered(self, count: int, width: int, height: int, fps: float | None) -> Rendered:
-        return Rendered(str(self.path), count, width, height, fps, tuple(self.notes))
+    def _rendered(
+        self, size: int, count: int, width: int, height: int, fps: float | None
+    ) -> Rendered:
+        return Rendered(str(self.path), size, count, width, height, fps, tuple(self.notes))
 
 
 def write_still(canvas: Canvas, stream: BinaryIO, suffix: str, title: str) -> None:

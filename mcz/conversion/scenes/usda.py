@@ -203,14 +203,16 @@ def identifiers(names: Sequence[str]) -> list[str]:
     ['Left_Foot', 'Left_Foot_2', '_3']
     """
     found: dict[str, None] = {}
+    numbers: dict[str, int] = {}  # the last one of each stem, so that many alike cost no search
     for name in names:
         stem = IDENTIFIER.sub("_", name)
         stem = f"_{stem}" if not stem or stem[0].isdigit() else stem
-        made, number = stem, 1
+        made, number = stem, numbers.get(stem, 1)
         while made in found:
             number += 1
             made = f"{stem}_{number}"
         found[made] = None
+        numbers[stem] = number
     return list(found)
 
 
