@@ -367,6 +367,8 @@ def test_the_command(samples: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     assert document["bytes"] == out.stat().st_size
     assert "its up axis is unknown: y up assumed (--up)" in said
     assert "frame rate" not in said  # of a still
+    code, printed, _ = call(samples / "walk.bvh", "-o", "memory://a.png", "--size", "64")
+    assert (code, "64 x 64 pixels" in printed) == (0, True)  # a store has nothing on the disk
     assert call(*words)[0] == 2  # it exists
     assert call(*words, "--force", "--up", "y", "--frames", "7:8")[2] == ""
     film = (samples / "walk.amc", "-o", tmp_path / "a.gif", "--frames", ":9")
