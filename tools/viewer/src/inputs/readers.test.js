@@ -1,9 +1,11 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { readAmc } from "./acclaim.js";
-import { readBvh, roundRate } from "./bvh.js";
+import { readBvh } from "./bvh.js";
 import { readC3d } from "./c3d.js";
 import { gathered } from "./files.js";
+import { valueOf } from "./lines.js";
+import { frameRate } from "./rates.js";
 
 const bytes = (text) => new TextEncoder().encode(text);
 
@@ -198,8 +200,42 @@ test("what is no C3D is refused", () => {
 });
 
 test("rates that frame times state with few digits", () => {
-  assert.deepEqual([1 / 0.033333, 1 / 0.0083333, 1 / 0.04].map(roundRate), [30, 120, 25]);
-  assert.ok(Math.abs(roundRate(1 / 0.0333667) - 29.97) < 0.04);
+  const rates = {
+    ".0083333": 120,
+    0.033333: 30,
+    0.04: 25,
+    "4e-2": 25,
+    "8.33333e-3": 120,
+    0.0333667: 30000 / 1001,
+    0.016683: 60000 / 1001,
+    0.0417083: 24000 / 1001,
+    0.01: 100,
+    0.0081: 1 / 0.0081,
+    "0.016683350016683350": 59.94005994005994,
+    "0.02857959416976279": 34.99,
+  };
+  for (const [word, rate] of Object.entries(rates)) {
+    const found = frameRate(word);
+    assert.ok(Math.abs(found - rate) <= 1e-12 * rate, `${word}: ${found}`);
+  }
+  const none = ["0", "-0.01", "0x1", "", "nan", "1e-10", "1e10", `0.0${"1".repeat(70)}`];
+  assert.deepEqual(none.map(frameRate), none.map(() => null));
+});
+
+test("values that are words, as other systems write them, and words that are none", () => {
+  const good = ["1.", ".5", "+5", "-1e5", "1e999", "-Infinity", "1.#INF00"].map(valueOf);
+  assert.deepEqual(good, [1, 0.5, 5, -1e5, Infinity, -Infinity, Infinity]);
+  for (const word of ["nan", "-NaN", "nan(ind)", "-1.#IND", "1.#QNAN"]) assert.ok(Number.isNaN(valueOf(word)));
+  for (const word of ["0x1F", "0b1", "1_0", "nan0", "1.#", "", "infx", "null"]) assert.equal(valueOf(word), null);
+});
+
+test("a value of a BVH that is no decimal number is refused by its line", () => {
+  const bvh = (value) =>
+    new TextEncoder().encode(
+      `HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 1\nFrame Time: 0.016683\n${value}\n`,
+    );
+  assert.equal(readBvh(bvh("1"), "a.bvh").rate, 60000 / 1001);
+  for (const word of ["0x1F", "\u00a01", "1\u2003"]) assert.throws(() => readBvh(bvh(word), "a.bvh"), /line 10/);
 });
 
 test("each AMC gets its ASF", () => {
