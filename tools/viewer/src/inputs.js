@@ -1,9 +1,8 @@
 // Which files the page has: those of its server, those within it, those that people choose or drop.
 
 import { embeddedAnnex, fromBase64 } from "./engine/annex.js";
-import { droppedFiles, gathered } from "./inputs/files.js";
+import { accepted, droppedFiles, gathered } from "./inputs/files.js";
 
-const ACCEPT = ".mcz,.bvh,.amc,.asf,.c3d";
 const places = new Map(); // of opened files, to open them again
 const isMcz = (name) => /\.mcz$/i.test(name);
 
@@ -21,7 +20,7 @@ export async function openFirst(page) {
     tell(page, faultText(error), true);
   }
   if (page.store.get("files").length === 0 && page.store.get("message") === null) {
-    tell(page, "Open a motion file, or drop one here: .mcz, .bvh, .amc with its .asf, .c3d");
+    tell(page, `Open a motion file, or drop one here: ${formatsText(page)}`);
   }
 }
 
@@ -30,10 +29,22 @@ export function chooseFiles(page) {
   const input = document.createElement("input");
   input.type = "file";
   input.multiple = true;
-  input.accept = ACCEPT;
+  input.accept = accepted(suffixesOf(page)).join(",");
   input.addEventListener("change", () => openAll(page, [...input.files]));
   input.click();
 }
+
+/** What the server reads, as ".trc": nothing where it does not say. */
+function suffixesOf({ store }) {
+  const server = store.get("server");
+  return server?.canConvert ? (server.suffixes ?? []) : [];
+}
+
+/** The formats, to be told. */
+const formatsText = (page) => {
+  const others = accepted(suffixesOf(page)).filter((suffix) => suffix !== ".amc" && suffix !== ".asf");
+  return [others[0], others[1], ".amc with its .asf", ...others.slice(2)].join(", ");
+};
 
 /**
  * Opens a file, and adds it to the list.
@@ -115,16 +126,22 @@ export function tell({ store }, text, isFault = false) {
   store.set({ message: { text, isFault } });
 }
 
-/** Opens files that were chosen or dropped, and shows the first. */
-export async function openAll(page, files) {
-  const wanted = gathered(files);
+/**
+ * Opens files that were chosen or dropped, and shows the first.
+ *
+ * @param {Map<File, string>} [folders] of `droppedFiles`
+ */
+export async function openAll(page, files, folders) {
+  const wanted = gathered(files, { folders, suffixes: suffixesOf(page) });
   if (wanted.length === 0) {
-    tell(page, "Nothing there that is a motion file: .mcz, .bvh, .amc with its .asf, .c3d", true);
+    tell(page, `Nothing there that is a motion file: ${formatsText(page)}`, true);
     return;
   }
   let shown = false;
-  for (const { file, skeleton } of wanted) {
+  for (const { file, skeleton, nSkeletons } of wanted) {
     try {
+      if (nSkeletons > 1)
+        throw new Error(`${nSkeletons} ASF files may be its skeleton: drop it with one alone`);
       const opened = await openOne(page, file, { skeleton, isLater: shown });
       if (!shown && opened.nClips > 0) {
         await showClip(page, opened.id, 0);
@@ -231,8 +248,8 @@ function takeDrops(page) {
   document.addEventListener("drop", async (event) => {
     event.preventDefault();
     document.body.classList.remove("is-dropping");
-    const { files, nLeft } = await droppedFiles(event.dataTransfer);
-    await openAll(page, files);
+    const { files, folders, nLeft } = await droppedFiles(event.dataTransfer);
+    await openAll(page, files, folders);
     const left = `${nLeft} of what was dropped are left out: they cannot be read, or are too many`;
     if (nLeft > 0) tell(page, left, true);
   });

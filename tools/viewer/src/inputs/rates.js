@@ -32,9 +32,15 @@ export function frameRate(word) {
 
 /** The multiple of `unit` that is nearest; an integer is divided, which is exact where it can be. */
 function near(rate, unit) {
-  if (unit === UNITS[1]) return (Math.round(rate * 1.001) * 1000) / 1001;
+  if (unit === UNITS[1]) return (rounded(rate * 1.001) * 1000) / 1001;
   const parts = Math.round(1 / unit);
-  return Math.round(rate * parts) / parts;
+  return rounded(rate * parts) / parts;
+}
+
+/** To the nearest integer, and from halfway to the even one, as the reader does. */
+function rounded(x) {
+  const below = Math.floor(x);
+  return x - below === 0.5 ? below + (below % 2) : Math.round(x);
 }
 
 /** Half a unit of the last digit that is printed. */

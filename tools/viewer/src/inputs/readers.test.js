@@ -3,7 +3,7 @@ import { test } from "node:test";
 import { readAmc } from "./acclaim.js";
 import { readBvh } from "./bvh.js";
 import { readC3d } from "./c3d.js";
-import { gathered } from "./files.js";
+import { accepted, gathered } from "./files.js";
 import { valueOf } from "./lines.js";
 import { frameRate } from "./rates.js";
 
@@ -210,8 +210,10 @@ test("rates that frame times state with few digits", () => {
     0.016683: 60000 / 1001,
     0.0417083: 24000 / 1001,
     0.01: 100,
-    0.0081: 1 / 0.0081,
-    "0.016683350016683350": 59.94005994005994,
+    0.00809716: 1 / 0.00809716,
+    0.016: 62,
+    "0.016683350016683350": 59.94,
+    "0.016683333333333333": 60000 / 1001,
     "0.02857959416976279": 34.99,
   };
   for (const [word, rate] of Object.entries(rates)) {
@@ -252,4 +254,35 @@ test("each AMC gets its ASF", () => {
       ["99_1.amc", null],
     ],
   );
+});
+
+test("an AMC gets the ASF of its folder; of several in other folders none", () => {
+  const folders = new Map();
+  const file = (path) => {
+    const [folder, name] = path.split("/");
+    const one = { name };
+    folders.set(one, folder);
+    return one;
+  };
+  const files = ["a/skel.asf", "a/walk.amc", "b/skel.asf", "b/walk.amc", "c/walk.amc", "d/skel_1.amc"].map(file);
+  const found = gathered(files, { folders });
+  assert.deepEqual(
+    found.map(({ file: one, skeleton, nSkeletons }) => [folders.get(one), folders.get(skeleton) ?? null, nSkeletons]),
+    [
+      ["a", "a", 1],
+      ["b", "b", 1],
+      ["c", null, 0],
+      ["d", null, 2],
+    ],
+  );
+  const [alone] = gathered([file("a/skel.asf"), file("b/walk.amc")], { folders });
+  assert.equal(folders.get(alone.skeleton), "a");
+});
+
+test("files that the server reads are taken where there is one", () => {
+  const files = ["a.trc", "b.STO", "c.asf", "d.txt", "e.mcz"].map((name) => ({ name }));
+  const names = (more) => gathered(files, more).map(({ file }) => file.name);
+  assert.deepEqual(names(), ["e.mcz"]);
+  assert.deepEqual(names({ suffixes: [".asf", ".trc", ".sto"] }), ["a.trc", "b.STO", "e.mcz"]);
+  assert.deepEqual(accepted([".bvh", ".trc"]), [".mcz", ".bvh", ".amc", ".asf", ".c3d", ".trc"]);
 });
