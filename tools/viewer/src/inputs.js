@@ -1,9 +1,9 @@
 // Which files the page has: those of its server, those within it, those that people choose or drop.
 
+import { ask, compareClip, showClip, tell } from "./asked.js";
 import { embeddedAnnex, fromBase64 } from "./engine/annex.js";
-import { droppedFiles, gathered } from "./inputs/files.js";
+import { accepted, droppedFiles, gathered } from "./inputs/files.js";
 
-const ACCEPT = ".mcz,.bvh,.amc,.asf,.c3d";
 const places = new Map(); // of opened files, to open them again
 const isMcz = (name) => /\.mcz$/i.test(name);
 
@@ -18,10 +18,10 @@ export async function openFirst(page) {
     if (files.length > 0) await openEmbedded(page, { files, diffs });
     else if (location.protocol.startsWith("http")) await openServed(page);
   } catch (error) {
-    tell(page, faultText(error), true);
+    tell(page.store, faultText(error), true);
   }
   if (page.store.get("files").length === 0 && page.store.get("message") === null) {
-    tell(page, "Open a motion file, or drop one here: .mcz, .bvh, .amc with its .asf, .c3d");
+    tell(page.store, `Open a motion file, or drop one here: ${formatsText(page)}`);
   }
 }
 
@@ -30,10 +30,22 @@ export function chooseFiles(page) {
   const input = document.createElement("input");
   input.type = "file";
   input.multiple = true;
-  input.accept = ACCEPT;
+  input.accept = accepted(suffixesOf(page)).join(",");
   input.addEventListener("change", () => openAll(page, [...input.files]));
   input.click();
 }
+
+/** What the server reads, as ".trc": nothing where it does not say. */
+function suffixesOf({ store }) {
+  const server = store.get("server");
+  return server?.canConvert ? (server.suffixes ?? []) : [];
+}
+
+/** The formats, to be told. */
+const formatsText = (page) => {
+  const others = accepted(suffixesOf(page)).filter((suffix) => suffix !== ".amc" && suffix !== ".asf");
+  return [others[0], others[1], ".amc with its .asf", ...others.slice(2)].join(", ");
+};
 
 /**
  * Opens a file, and adds it to the list.
@@ -67,7 +79,7 @@ async function openedStrictlyOrNot(page, where, options) {
     } catch {
       throw error; // what is wrong, not what could not be saved
     }
-    tell(page, `${name} is damaged: ${error.message}. What is whole is shown.`, true);
+    tell(page.store, `${name} is damaged: ${error.message}. What is whole is shown.`, true);
     return opened;
   }
 }
@@ -82,56 +94,43 @@ async function salvage(page, id, fault) {
   try {
     const opened = await engine.open(where, { name: file.name, salvage: true });
     const files = store.get("files").map((one) => (one.id === id ? { ...one, ...opened } : one));
-    const anew = async (clip) => (clip?.fileId === id ? engine.clip(opened.id, clip.index) : clip);
-    const shown = await anew(store.get("shown"));
-    const compared = await anew(store.get("compared"));
-    store.set({ files, shown, compared, errors: null });
-    tell(page, `${file.name} is damaged: ${fault.message}. What is whole is shown.`, true);
+    store.set({ files });
+    for (const key of ["shown", "compared"]) {
+      const clip = store.get(key);
+      if (clip?.fileId !== id) continue;
+      const anew = await engine.clip(opened.id, clip.index);
+      if (store.get(key) === clip) store.set({ [key]: anew, errors: null });
+    }
+    tell(page.store, `${file.name} is damaged: ${fault.message}. What is whole is shown.`, true);
   } catch {
-    tell(page, `${file.name}: ${faultText(fault)}`, true);
+    tell(page.store, `${file.name}: ${faultText(fault)}`, true);
   }
 }
 
-/** Shows a clip of a file. What was asked for last counts. */
-export async function showClip(page, fileId, index) {
-  const clip = await page.engine.clip(fileId, index);
-  const { store } = page;
-  const before = store.get("message");
-  const stays = before?.isFault && store.get("shown") === null;
-  store.set({
-    shown: clip,
-    compared: null,
-    errors: null,
-    frame: 0,
-    playing: false,
-    selection: [],
-    message: stays ? before : null,
-  });
-  return clip;
-}
-
-/** Says something to the user. */
-export function tell({ store }, text, isFault = false) {
-  store.set({ message: { text, isFault } });
-}
-
-/** Opens files that were chosen or dropped, and shows the first. */
-export async function openAll(page, files) {
-  const wanted = gathered(files);
+/**
+ * Opens files that were chosen or dropped, and shows the first.
+ *
+ * @param {Map<File, string>} [folders] of `droppedFiles`
+ */
+export async function openAll(page, files, folders) {
+  const wanted = gathered(files, { folders, suffixes: suffixesOf(page) });
   if (wanted.length === 0) {
-    tell(page, "Nothing there that is a motion file: .mcz, .bvh, .amc with its .asf, .c3d", true);
+    tell(page.store, `Nothing there that is a motion file: ${formatsText(page)}`, true);
     return;
   }
+  const turn = ask();
   let shown = false;
-  for (const { file, skeleton } of wanted) {
+  for (const { file, skeleton, nSkeletons } of wanted) {
     try {
+      if (nSkeletons > 1)
+        throw new Error(`${nSkeletons} ASF files may be its skeleton: drop it with one alone`);
       const opened = await openOne(page, file, { skeleton, isLater: shown });
       if (!shown && opened.nClips > 0) {
-        await showClip(page, opened.id, 0);
+        await showClip(page, opened.id, 0, { turn, isNew: true });
         shown = true;
       }
     } catch (error) {
-      tell(page, `${file.name}: ${faultText(error)}`, true);
+      tell(page.store, `${file.name}: ${faultText(error)}`, true);
     }
   }
 }
@@ -158,12 +157,13 @@ async function converted(files) {
 }
 
 async function openEmbedded(page, { files, diffs }) {
+  const turn = ask();
   const opened = [];
   for (const { name, base64 } of files) {
     opened.push(await addFile(page, { bytes: fromBase64(base64) }, { name }));
   }
   page.store.set({ diffs });
-  await showFirst(page, opened);
+  await showFirst(page, opened, turn);
   if (diffs.length > 0) await compareSecond(page, opened);
 }
 
@@ -173,14 +173,15 @@ async function openServed(page) {
   page.engine.setAnnex(absolute("annex/"));
   page.store.set({ server: api });
   stayAlive(page);
+  const turn = ask();
   const opened = [];
   for (const { name, url } of api.files) {
     try {
       const { salvage } = api;
       opened.push(await addFile(page, { url: absolute(url) }, { name, url, salvage }));
-      if (opened.length === 1) await showFirst(page, opened);
+      if (opened.length === 1) await showFirst(page, opened, turn);
     } catch (error) {
-      tell(page, `${name}: ${faultText(error)}`, true);
+      tell(page.store, `${name}: ${faultText(error)}`, true);
     }
   }
   if (api.diff) await compareSecond(page, opened);
@@ -192,18 +193,18 @@ function stayAlive(page) {
   alive.addEventListener("end", () => {
     alive.close();
     page.store.set({ server: null });
-    tell(page, "The server has ended. What is here can still be looked at.", true);
+    tell(page.store, "The server has ended. What is here can still be looked at.", true);
   });
 }
 
-async function showFirst(page, [first]) {
-  if (first?.nClips > 0) await showClip(page, first.id, 0);
+async function showFirst(page, [first], turn) {
+  if (first?.nClips > 0) await showClip(page, first.id, 0, { turn, isNew: true });
 }
 
 /** The first clips of two files are compared. */
 async function compareSecond(page, [first, second]) {
   if (!(first?.nClips > 0 && second?.nClips > 0)) return;
-  page.store.set({ compared: await page.engine.clip(second.id, 0) });
+  if (page.store.get("shown")?.fileId === first.id) await compareClip(page, second.id, 0);
 }
 
 async function serverFacts() {
@@ -231,9 +232,9 @@ function takeDrops(page) {
   document.addEventListener("drop", async (event) => {
     event.preventDefault();
     document.body.classList.remove("is-dropping");
-    const { files, nLeft } = await droppedFiles(event.dataTransfer);
-    await openAll(page, files);
+    const { files, folders, nLeft } = await droppedFiles(event.dataTransfer);
+    await openAll(page, files, folders);
     const left = `${nLeft} of what was dropped are left out: they cannot be read, or are too many`;
-    if (nLeft > 0) tell(page, left, true);
+    if (nLeft > 0) tell(page.store, left, true);
   });
 }

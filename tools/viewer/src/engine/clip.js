@@ -15,7 +15,6 @@ const APART = 4; // frames between samples of the first ones
 const CACHE = 160 * 2 ** 20; // bytes of decoded values, of all clips
 
 const cache = new Lru(CACHE);
-let nClips = 0;
 
 /** What the page has of a clip, and reads of it. README.md lists what is in `facts`. */
 export class OpenClip {
@@ -24,15 +23,18 @@ export class OpenClip {
   #cuts;
   #pending = new Map(); // blocks that are being read
 
-  /** @param {object} reader a clip of mcz-file.js, or of a reader of another format */
-  constructor(reader, { fileId, index }) {
+  /**
+   * @param {object} reader a clip of mcz-file.js, or of a reader of another format
+   * @param {{key: string, fileId: number, index: number}} ids `key` is that of no other clip
+   */
+  constructor(reader, { key, fileId, index }) {
     this.#reader = reader;
-    this.key = `${fileId}/${index}/${nClips++}`;
+    this.key = key;
     const { skeleton, signals } = reader;
     const drawn = signals[0] && !signals[0].ownChannels && hasKinematics(skeleton);
     this.#places = drawn ? new Places(skeleton) : null;
     this.#cuts = signals.map(({ segments }) => blocksOf(segments, reader.nFrames));
-    this.facts = factsOf(reader, drawn, { key: this.key, fileId, index });
+    this.facts = factsOf(reader, drawn, { key, fileId, index });
   }
 
   get nFrames() {
@@ -120,7 +122,7 @@ export class OpenClip {
 
   async #read(signal, from, to, key) {
     const block = await this.#reader.read(signal, from, to);
-    const kept = { values: numbers(block.values), mask: block.mask };
+    const kept = { values: alone(numbers(block.values)), mask: block.mask && alone(block.mask) };
     cache.set(key, kept, kept.values.byteLength + (kept.mask?.byteLength ?? 0));
     return kept;
   }
@@ -132,6 +134,9 @@ export class OpenClip {
 
 const numbers = (values) =>
   values instanceof BigInt64Array ? Float64Array.from(values, Number) : values;
+
+/** A part as an array of its own: it would keep the whole. */
+const alone = (part) => (part.byteLength < part.buffer.byteLength ? part.slice() : part);
 
 /** Frames that are decoded together: whole segments, small ones several at a time. */
 function blocksOf(segments, nFrames) {

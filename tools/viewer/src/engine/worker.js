@@ -12,7 +12,7 @@ import {
 import { contactsOf } from "./contacts.js";
 import { curvesOf } from "./curves.js";
 import { errorsBetween } from "./distances.js";
-import { OpenClip } from "./clip.js";
+import { Clips } from "./clips.js";
 import { openFile } from "./open.js";
 
 /** Names of errors, which the build shortens. */
@@ -24,7 +24,7 @@ const NAMES = new Map([
 ]);
 
 const files = new Map();
-const clips = new Map();
+const clips = new Clips(files);
 let nFiles = 0;
 
 const METHODS = {
@@ -48,37 +48,33 @@ const METHODS = {
     return { id, name, size: file.size, nClips: file.nClips, damage: file.damage };
   },
 
-  rows: (id, from, to) => found(files, id, "file").rows(from, to),
+  rows: (id, from, to) => fileOf(id).rows(from, to),
 
   async clip(id, index) {
-    const reader = await found(files, id, "file").clip(index);
-    const clip = new OpenClip(reader, { fileId: id, index });
-    clips.set(clip.key, clip);
-    await clip.prepare();
-    return clip.facts;
+    fileOf(id);
+    return (await clips.open(id, index)).facts;
   },
 
-  positions: (key, from, to) => found(clips, key, "clip").positions(from, to),
+  positions: async (key, from, to) => (await clips.get(key)).positions(from, to),
 
-  curves: (key, wanted) => curvesOf(found(clips, key, "clip"), wanted),
+  curves: async (key, wanted) => curvesOf(await clips.get(key), wanted),
 
-  contacts: (key, wanted) => contactsOf(found(clips, key, "clip"), wanted),
+  contacts: async (key, wanted) => contactsOf(await clips.get(key), wanted),
 
-  errors: (a, b, progress) =>
-    errorsBetween(found(clips, a, "clip"), found(clips, b, "clip"), progress),
+  errors: async (a, b, progress) => errorsBetween(await clips.get(a), await clips.get(b), progress),
 
-  source: (key) => found(clips, key, "clip").sourceBytes(),
+  source: async (key) => (await clips.get(key)).sourceBytes(),
 
   close(id) {
     files.delete(id);
-    for (const [key, clip] of clips) if (clip.facts.fileId === id) clips.delete(key);
+    clips.close(id);
   },
 };
 
-function found(map, key, what) {
-  const item = map.get(key);
-  if (item === undefined) throw new Error(`this ${what} is closed`);
-  return item;
+function fileOf(id) {
+  const file = files.get(id);
+  if (file === undefined) throw new Error("this file is closed");
+  return file;
 }
 
 /** The buffers of typed arrays that nobody here needs any more. */

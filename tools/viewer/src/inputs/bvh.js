@@ -1,6 +1,7 @@
 // BVH, for pages that nobody serves: the skeleton and its motion, as the engine reads a clip.
 
-import { SourceError, clipOf, numberOf, shown, skeletonOf, textOf } from "./lines.js";
+import { SourceError, clipOf, numberOf, shown, skeletonOf, textOf, valueOf } from "./lines.js";
+import { frameRate } from "./rates.js";
 
 const KINDS = {
   xposition: 1,
@@ -157,11 +158,10 @@ class Reader {
     const match = head.exec(this.#text);
     if (match === null) this.#refuse("Frames: and Frame Time: are due behind MOTION");
     this.#word.lastIndex = head.lastIndex;
-    const time = numberOf(match[2]);
     const values = this.#numbers(head.lastIndex);
     const whole = nChannels === 0 ? 0 : Math.floor(values.length / nChannels);
     return {
-      rate: time > 0 ? roundRate(1 / time) : null,
+      rate: frameRate(match[2]),
       declared: numberOf(match[1]),
       values: values.subarray(0, whole * nChannels),
     };
@@ -178,8 +178,8 @@ class Reader {
       let end = at;
       while (end < text.length && text.charCodeAt(end) > 32) end++;
       const word = text.slice(at, end);
-      const value = Number(word);
-      if (!Number.isFinite(value) && !/^[+-]?nan/i.test(word)) {
+      const value = valueOf(word);
+      if (value === null) {
         this.#word.lastIndex = end;
         this.#refuse(`${shown(word)}, where a number was expected`);
       }
@@ -192,14 +192,6 @@ class Reader {
       at = end;
     }
   }
-}
-
-/** A rate that a frame time states with few decimals: 0.033333 is 30. */
-export function roundRate(rate) {
-  for (const near of [Math.round(rate), Math.round(rate * 1.001) / 1.001]) {
-    if (Math.abs(rate - near) < 2e-3 * near) return near;
-  }
-  return rate;
 }
 
 /**

@@ -80,3 +80,11 @@ test("files that are no entries; text is no file", async () => {
   assert.deepEqual((await droppedFiles({ items, files: [] })).files, [plain]);
   assert.deepEqual((await droppedFiles({ files: [plain] })).files, [plain]);
 });
+
+test("the folder of each file is kept, and of two dropped ones of one name both", async () => {
+  const found = await dropped(file("z.amc"), folder("s", [folder("in", [file("a.amc")])]), folder("s", [file("b.amc")]));
+  assert.deepEqual(
+    found.files.map((one) => found.folders.get(one)),
+    ["", "1:s/in", "2:s"],
+  );
+});

@@ -31,6 +31,17 @@ export function numberOf(word) {
   return word !== "" && Number.isFinite(number) && NUMBER.test(word) ? number : NaN;
 }
 
+const NAN = /^[+-]?(?:nan(?:\([^()\s]*\))?|1\.#(?:ind|qnan|snan)\d*)$/i; // as printf of several systems says it
+const INFINITE = /^[+-]?(?:inf(?:inity)?|1\.#inf\d*)$/i;
+
+/** The value that a word is, which may be none: NaN or infinite; null where it is no value. */
+export function valueOf(word) {
+  if (NUMBER.test(word)) return Number(word);
+  if (NAN.test(word)) return NaN;
+  if (INFINITE.test(word)) return word.startsWith("-") ? -Infinity : Infinity;
+  return null;
+}
+
 const DEGREES = 1;
 
 /** A clip whose values are all at hand, as the engine reads one: see engine/clip.js. */

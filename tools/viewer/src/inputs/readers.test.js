@@ -1,9 +1,11 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { readAmc } from "./acclaim.js";
-import { readBvh, roundRate } from "./bvh.js";
+import { readBvh } from "./bvh.js";
 import { readC3d } from "./c3d.js";
-import { gathered } from "./files.js";
+import { accepted, gathered } from "./files.js";
+import { valueOf } from "./lines.js";
+import { frameRate } from "./rates.js";
 
 const bytes = (text) => new TextEncoder().encode(text);
 
@@ -198,8 +200,44 @@ test("what is no C3D is refused", () => {
 });
 
 test("rates that frame times state with few digits", () => {
-  assert.deepEqual([1 / 0.033333, 1 / 0.0083333, 1 / 0.04].map(roundRate), [30, 120, 25]);
-  assert.ok(Math.abs(roundRate(1 / 0.0333667) - 29.97) < 0.04);
+  const rates = {
+    ".0083333": 120,
+    0.033333: 30,
+    0.04: 25,
+    "4e-2": 25,
+    "8.33333e-3": 120,
+    0.0333667: 30000 / 1001,
+    0.016683: 60000 / 1001,
+    0.0417083: 24000 / 1001,
+    0.01: 100,
+    0.00809716: 1 / 0.00809716,
+    0.016: 62,
+    "0.016683350016683350": 59.94,
+    "0.016683333333333333": 60000 / 1001,
+    "0.02857959416976279": 34.99,
+  };
+  for (const [word, rate] of Object.entries(rates)) {
+    const found = frameRate(word);
+    assert.ok(Math.abs(found - rate) <= 1e-12 * rate, `${word}: ${found}`);
+  }
+  const none = ["0", "-0.01", "0x1", "", "nan", "1e-10", "1e10", `0.0${"1".repeat(70)}`];
+  assert.deepEqual(none.map(frameRate), none.map(() => null));
+});
+
+test("values that are words, as other systems write them, and words that are none", () => {
+  const good = ["1.", ".5", "+5", "-1e5", "1e999", "-Infinity", "1.#INF00"].map(valueOf);
+  assert.deepEqual(good, [1, 0.5, 5, -1e5, Infinity, -Infinity, Infinity]);
+  for (const word of ["nan", "-NaN", "nan(ind)", "-1.#IND", "1.#QNAN"]) assert.ok(Number.isNaN(valueOf(word)));
+  for (const word of ["0x1F", "0b1", "1_0", "nan0", "1.#", "", "infx", "null"]) assert.equal(valueOf(word), null);
+});
+
+test("a value of a BVH that is no decimal number is refused by its line", () => {
+  const bvh = (value) =>
+    new TextEncoder().encode(
+      `HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: 1\nFrame Time: 0.016683\n${value}\n`,
+    );
+  assert.equal(readBvh(bvh("1"), "a.bvh").rate, 60000 / 1001);
+  for (const word of ["0x1F", "\u00a01", "1\u2003"]) assert.throws(() => readBvh(bvh(word), "a.bvh"), /line 10/);
 });
 
 test("each AMC gets its ASF", () => {
@@ -216,4 +254,35 @@ test("each AMC gets its ASF", () => {
       ["99_1.amc", null],
     ],
   );
+});
+
+test("an AMC gets the ASF of its folder; of several in other folders none", () => {
+  const folders = new Map();
+  const file = (path) => {
+    const [folder, name] = path.split("/");
+    const one = { name };
+    folders.set(one, folder);
+    return one;
+  };
+  const files = ["a/skel.asf", "a/walk.amc", "b/skel.asf", "b/walk.amc", "c/walk.amc", "d/skel_1.amc"].map(file);
+  const found = gathered(files, { folders });
+  assert.deepEqual(
+    found.map(({ file: one, skeleton, nSkeletons }) => [folders.get(one), folders.get(skeleton) ?? null, nSkeletons]),
+    [
+      ["a", "a", 1],
+      ["b", "b", 1],
+      ["c", null, 0],
+      ["d", null, 2],
+    ],
+  );
+  const [alone] = gathered([file("a/skel.asf"), file("b/walk.amc")], { folders });
+  assert.equal(folders.get(alone.skeleton), "a");
+});
+
+test("files that the server reads are taken where there is one", () => {
+  const files = ["a.trc", "b.STO", "c.asf", "d.txt", "e.mcz"].map((name) => ({ name }));
+  const names = (more) => gathered(files, more).map(({ file }) => file.name);
+  assert.deepEqual(names(), ["e.mcz"]);
+  assert.deepEqual(names({ suffixes: [".asf", ".trc", ".sto"] }), ["a.trc", "b.STO", "e.mcz"]);
+  assert.deepEqual(accepted([".bvh", ".trc"]), [".mcz", ".bvh", ".amc", ".asf", ".c3d", ".trc"]);
 });

@@ -1,55 +1,12 @@
 // What several panels do to the store.
 
-/** Tells the user something; `isFault` where it did not go well. */
-export const tell = (store, text, isFault = false) => store.set({ message: { text, isFault } });
+import { showClip as showAsked, tellError } from "../asked.js";
 
-/** What is told of an error. */
-export const tellError = (store, error) => tell(store, error?.message ?? String(error), true);
+export { compareClip, tell, tellError } from "../asked.js";
 
-let nAsked = 0;
-
-/** Shows a clip; the one compared goes, or is followed by the clip of the same name of its file. */
-export async function showClip(page, fileId, index) {
-  const { store, engine } = page;
-  const asked = ++nAsked;
-  try {
-    const clip = await engine.clip(fileId, index);
-    if (asked !== nAsked) return;
-    const partner = await partnerOf(page, clip).catch(() => null);
-    if (asked !== nAsked) return;
-    store.set({ shown: clip, compared: partner, errors: null, selection: [], frame: 0 });
-  } catch (error) {
-    if (asked === nAsked) tellError(store, error);
-  }
-}
-
-/** The clip of the compared file that has the name and place of `clip`, or null. */
-async function partnerOf({ store, engine }, clip) {
-  const compared = store.get("compared");
-  if (!compared || compared.fileId === clip.fileId) return null;
-  const file = store.get("files").find(({ id }) => id === compared.fileId);
-  if (!file || clip.index >= file.nClips) return null;
-  const [row] = await engine.rows(file.id, clip.index, clip.index + 1);
-  return row?.name === clip.name ? engine.clip(file.id, clip.index) : null;
-}
-
-/** Compares a clip with the one that is shown; with none where `fileId` is null. */
-export async function compareClip({ store, engine }, fileId, index) {
-  if (fileId === null) {
-    store.set({ compared: null, errors: null, ...colorsWithoutErrors(store) });
-    return;
-  }
-  const { key } = store.get("shown") ?? {};
-  try {
-    const clip = await engine.clip(fileId, index);
-    if (store.get("shown")?.key !== key) return;
-    store.set({ compared: clip, errors: null });
-  } catch (error) {
-    tellError(store, error);
-  }
-}
-
-const colorsWithoutErrors = (store) => (store.get("colors") === "error" ? { colors: "sides" } : {});
+/** Shows a clip; tells what is wrong. */
+export const showClip = (page, fileId, index) =>
+  showAsked(page, fileId, index).catch((error) => tellError(page.store, error));
 
 /** Keeps `errors` true to `shown` and `compared`. */
 export function watchErrors({ store, engine }) {
