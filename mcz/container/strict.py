@@ -21,7 +21,7 @@ from mcz.schema import inflate, parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
 # The source formats of the registry, by what they are sources of.
-OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset({2, 3, 4, 5})
+OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset(range(2, 9))
 
 
 def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:

@@ -171,10 +171,15 @@ def search(
     Raises OptionError where no setting meets it. A figure may jump, up and down: a greatest error
     does.
     """
-    meets, misses, ended = _bracket(dial, target, measure)
+    tried: list[Point] = []
+
+    def measured(target: Target, setting: float) -> float:
+        tried.append((setting, measure(target, setting)))
+        return tried[-1][1]
+
+    meets, misses, ended = _bracket(dial, target, measured)
     if ended:
         return *meets, True
-    best = meets
     for _ in range(MOST_TRIALS):
         if meets[1] >= GOAL * target.limit or _neighboring(dial, meets[0], misses[0]):
             break
@@ -182,12 +187,13 @@ def search(
         if dial.whole:  # strictly between the two
             low, high = sorted((meets[0], misses[0]))
             setting = min(max(round(setting), low + 1), high - 1)
-        found = setting, _figure(dial, measure, target, setting)
+        found = setting, _figure(dial, measured, target, setting)
         if found[1] <= target.limit:
             meets = found
-            best = max(found, best, key=itemgetter(1))
         else:
             misses = found
+    met = (point for point in reversed(tried) if point[1] <= target.limit)
+    best = max(met, key=itemgetter(1))
     if best[1] < PROMISED * target.limit:
         best = _beside(best, dial, target, measure)
     return *best, False
