@@ -139,6 +139,42 @@ def test_a_source_that_changed_is_converted_anew(samples: Path, tmp_path: Path) 
         assert after.headers["ETag"] != before.headers["ETag"]
 
 
+def test_what_is_below_a_folder_is_converted_anew(
+    samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shelf_module, "REST", 0)
+    folder = tmp_path / "takes"
+    (folder / "deep").mkdir(parents=True)
+    source = folder / "deep" / "walk.bvh"
+    source.write_bytes((samples / "walk.bvh").read_bytes())
+    shelf = Shelf()
+    put(shelf, str(folder))
+    first = shelf[0].target()
+    (folder / "notes.txt").write_text("no motion")
+    assert shelf[0].target() == first
+    source.write_bytes(source.read_bytes() + b"\n")
+    with mcz.open(shelf[0].target()) as file:
+        assert file.only_clip().source_bytes() == source.read_bytes()
+    shelf.close()
+
+
+@pytest.mark.parametrize("is_named", [False, True])
+def test_an_amc_is_converted_anew_with_its_asf(
+    samples: Path, tmp_path: Path, is_named: bool
+) -> None:
+    (tmp_path / "walk.amc").write_bytes((samples / "walk.amc").read_bytes())
+    asf = tmp_path / "elsewhere" / "other.asf" if is_named else tmp_path / "walk.asf"
+    asf.parent.mkdir(exist_ok=True)
+    asf.write_bytes((samples / "walk.asf").read_bytes())
+    shelf = Shelf({"skeleton": str(asf)} if is_named else None)
+    put(shelf, str(tmp_path / "walk.amc"))
+    first = shelf[0].target()
+    assert shelf[0].target() == first
+    asf.write_bytes(b"# edited\n" + asf.read_bytes())
+    assert shelf[0].target() != first
+    shelf.close()
+
+
 def test_a_folder_is_its_files_and_one_archive(samples: Path, folder: Path) -> None:
     shelf = Shelf()
     put(shelf, str(folder))
