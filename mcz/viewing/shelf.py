@@ -19,7 +19,9 @@ from mcz.container.source import ByteSource
 from mcz.errors import AccessError, LimitError, MczError, OptionError
 from mcz.formats import FORMATS
 from mcz.formats.find import skeletons_around
+from mcz.motion import Motion
 from mcz.reading.file import reached
+from mcz.reading.source_files import told
 from mcz.viewing.contents import Contents, FarAway, OnDisk
 
 Say = Callable[[str], None]
@@ -28,6 +30,7 @@ Make = Callable[[BinaryIO], None]  # writes an .mcz
 MOST_RESULTS = 16  # files made of a clip in view: the oldest goes when there is one more
 MOST_UPLOADS = 256  # files that the page gave
 MCZ = ".mcz"
+FACTS = ("rate", "unit", "up")  # which files may not say themselves
 REST = 10  # a folder is looked through again after so many times as long as that took
 
 
@@ -207,6 +210,10 @@ class Shelf:
         """The file of that number; raises KeyError."""
         with self._lock:
             return self._files[number]
+
+    def told(self, motion: Motion) -> Motion:
+        """``motion`` with what is said of files that do not say it; raises OptionError."""
+        return told(motion, *map(self.said.get, FACTS))
 
     def given(self) -> list[tuple[int, Shelved]]:
         """The files that were there from the beginning, with their numbers."""

@@ -196,8 +196,7 @@ class Work:
                 return motion
         with self._opened(asked) as (_, clip):
             motion = clip.motion()
-        unit = self._shelf.said.get("unit") if motion.skeleton.unit_cm is None else None
-        motion = with_facts(motion, None, unit)
+        motion = self._shelf.told(motion)
         if sum(signal.values.nbytes for signal in motion.signals) <= HELD_BYTES:
             self._held.append((key, motion))
         return motion

@@ -469,6 +469,24 @@ def test_a_unit_can_be_said_later(tmp_path: Path) -> None:
         assert post(server, "encode", {**asked, "unit": "cm"}).status == 200
 
 
+def test_what_an_mcz_does_not_say_is_told(tmp_path: Path) -> None:
+    motion = smooth(12)
+    skeleton = replace(motion.skeleton, unit_cm=None, up_axis="")
+    mcz.write(replace(motion, skeleton=skeleton, frame_rate=None), tmp_path / "a.mcz")
+    shelf = Shelf({"rate": 50, "unit": "mm", "up": "z", "skeleton": None})
+    put(shelf, str(tmp_path / "a.mcz"))
+    with Server(page(), shelf) as server:
+        made = post(server, "encode", {"url": "files/0", "codec": "mrdwt", "params": {"T_g": 4}})
+        with mcz.open(ask(server, made.json["url"]).body) as file:
+            clip = file.only_clip()
+            assert (clip.frame_rate, clip.skeleton.unit_cm) == (50, 0.1)
+            assert clip.skeleton.up_axis == "z"
+        assert post(server, "glb", {"url": "files/0"}).status == 200  # which needs a rate
+        pair = {"a": {"url": "files/0"}, "b": {"url": "files/0"}}
+        (found,) = post(server, "diff", pair).json["clips"]
+        assert found["mean_position_error_cm"] == 0  # which needs a unit
+
+
 @pytest.mark.parametrize(
     ("path", "document", "status"),
     [
