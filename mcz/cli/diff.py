@@ -149,14 +149,9 @@ class _Wanted:
 
     def told(self, motion: Motion) -> Motion:
         """``motion`` with what it does not say itself."""
-        from mcz.reading.source_files import with_facts
+        from mcz.reading.source_files import told
 
-        return with_facts(
-            motion,
-            self.rate if motion.frame_rate is None else None,
-            self.unit if motion.skeleton.unit_cm is None else None,
-            None if motion.skeleton.up_axis else self.up,
-        )
+        return told(motion, self.rate, self.unit, self.up)
 
 
 @dataclass(frozen=True, slots=True)

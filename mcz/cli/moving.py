@@ -66,6 +66,7 @@ def moving_of(
     What is told of a clip is not in it: whoever draws it is told the same.
     """
     import mcz
+    from mcz.reading.source_files import told
 
     if path == "-" or PurePath(path).suffix.lower() == ".mcz":
         with opened(path, max_decoded=max_decoded) as file, about(path):
@@ -76,18 +77,6 @@ def moving_of(
         is_amc = PurePath(path).suffix.lower() == ".amc"
         motion = mcz.read(path, skeleton=skeleton if is_amc else None)
         yield told(motion, rate, unit, up)
-
-
-def told(motion: Motion, rate: Fraction | None, unit: str | None, up: str | None) -> Motion:
-    """``motion`` with what it does not say itself."""
-    from mcz.reading.source_files import with_facts
-
-    return with_facts(
-        motion,
-        rate if motion.frame_rate is None else None,
-        unit if motion.skeleton.unit_cm is None else None,
-        None if motion.skeleton.up_axis else up,
-    )
 
 
 def cut_of(frames: tuple[int, int | None] | None, moving: Motion | Clip) -> tuple[int, int] | None:

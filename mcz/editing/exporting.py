@@ -20,7 +20,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.sharing import shared_out
-from mcz.reading.source_files import with_facts
+from mcz.reading.source_files import told
 from mcz.tables.files import EXPORTS, table_of
 from mcz.writing.atomic import replacing
 
@@ -96,7 +96,8 @@ def _converted(
 ) -> list[Made]:
     """The files that the clip ``name`` becomes."""
     file, (to, rate, unit, key_error) = shared
-    return list(_files(file.clips[name], to, _told(file.clips[name], rate, unit), key_error))
+    clip = file.clips[name]
+    return list(_files(clip, to, told(clip.motion(), rate, unit), key_error))
 
 
 def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Made]:
@@ -111,13 +112,6 @@ def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iter
     files = converted_files(motion, to, None, True)
     for suffix in sorted(files, reverse=True):
         yield _named(clip, suffix), files[suffix], ()
-
-
-def _told(clip: Clip, rate: Fraction | float | None, unit: str | None) -> Motion:
-    """The motion of a clip, with what it does not say itself."""
-    motion = clip.motion()
-    wanted = rate if motion.frame_rate is None else None
-    return with_facts(motion, wanted, unit if motion.skeleton.unit_cm is None else None)
 
 
 def _named(clip: Clip, suffix: str) -> str:

@@ -17,7 +17,7 @@ from mcz.pictures.error_charts import error_chart
 from mcz.pictures.rendering import Progress, checked_size
 from mcz.poses.moving import Frames, Moving, frame_range
 from mcz.reading.clip import Clip
-from mcz.reading.source_files import with_facts
+from mcz.reading.source_files import told
 
 KINDS = ("channels", "spectrum", "error", "bytes", "rate-distortion")
 CODECS = ("posewave", "mrdwt")  # of a chart of rate and distortion, unless others are asked for
@@ -111,10 +111,4 @@ def _motion(moving: Moving, cut: tuple[int, int] | None, facts: Any) -> Motion:
     else:
         clip: Any = moving
         motion = clip.motion(cut)
-    rate, unit, up = facts
-    return with_facts(
-        motion,
-        rate if motion.frame_rate is None else None,
-        unit if motion.skeleton.unit_cm is None else None,
-        None if motion.skeleton.up_axis else up,
-    )
+    return told(motion, *facts)

@@ -75,3 +75,18 @@ def with_facts(
     if up is not None:
         motion = replace(motion, skeleton=facing(motion.skeleton, up))
     return motion
+
+
+def told(
+    motion: Motion,
+    rate: Fraction | float | None = None,
+    unit: str | None = None,
+    up: str | None = None,
+) -> Motion:
+    """``motion`` with those of the facts that it does not say itself; raises OptionError."""
+    return with_facts(
+        motion,
+        rate if motion.frame_rate is None else None,
+        unit if motion.skeleton.unit_cm is None else None,
+        None if motion.skeleton.up_axis else up,
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -14,10 +14,11 @@ from mcz.brief import brief
 from mcz.codecs import by_name, chosen
 from mcz.errors import LimitError, MczError
 from mcz.metrics.document import difference
+from mcz.motion import Motion
 from mcz.reading.file import File
 from mcz.reading.file import open as mcz_open
 from mcz.viewing.page import Page
-from mcz.viewing.shelf import Shelf, Shelved
+from mcz.viewing.shelf import FACTS, Shelf, Shelved
 from mcz.viewing.tables import deflated, tables_for
 from mcz.writing.atomic import replacing
 
@@ -88,7 +89,7 @@ def write_page(
         for number, file in enumerate(given):
             data = _bytes_of(file, shelf, wanted, left)
             left -= len(data) * 4 // 3
-            held[number] = data, stack.enter_context(_file(data))
+            held[number] = data, stack.enter_context(_file(data, wanted.max_decoded))
         files = [file for _, file in held.values()]
         document: dict[str, Any] = {
             "files": [
@@ -98,14 +99,14 @@ def write_page(
             "annex": deflated(set().union(*map(tables_for, files))),
         }
         if len(files) > 1:
-            document["diffs"] = list(_differences(files, [file.name for file in given]))
-            document["diff"] = document["diffs"][0]
+            names = [file.name for file in given]
+            document["diffs"] = list(_differences(files, names, shelf.told))
         whole = (page.before + element(document) + page.after).encode()
         if len(whole) > most:
             raise _too_large(given[-1].name, most)
         stream.write(whole)
-        told = (Embedded(given[n].name, file.size, len(file)) for n, (_, file) in held.items())
-        return PageWritten(len(whole), len(page.text.encode()), tuple(told))
+        found = (Embedded(given[n].name, file.size, len(file)) for n, (_, file) in held.items())
+        return PageWritten(len(whole), len(page.text.encode()), tuple(found))
 
 
 def element(document: Mapping[str, Any]) -> str:
@@ -121,12 +122,12 @@ def _too_large(name: str, most: int) -> LimitError:
     )
 
 
-def _file(data: bytes) -> File:
+def _file(data: bytes, max_decoded: int | None) -> File:
     """The file in ``data``, in salvage where it is damaged."""
     try:
-        return mcz_open(data)
+        return mcz_open(data, max_decoded=max_decoded)
     except MczError:
-        return mcz_open(data, salvage=True)
+        return mcz_open(data, salvage=True, max_decoded=max_decoded)
 
 
 def _bytes_of(file: Shelved, shelf: Shelf, wanted: Wanted, most: int) -> bytes:
@@ -134,6 +135,9 @@ def _bytes_of(file: Shelved, shelf: Shelf, wanted: Wanted, most: int) -> bytes:
     target = file.target()
     if wanted.is_coded:
         return _coded(target, shelf, wanted)
+    options = ", ".join(f"--{fact}" for fact in FACTS if shelf.said.get(fact) is not None)
+    if options and file.kind == "mcz":
+        shelf.say(f"{file.name}: copied as it is, so that {options} is not in it; see --codec")
     if wanted.is_cut:
         return _cut(target, shelf, wanted)
     contents = file.open()
@@ -165,7 +169,6 @@ def _cut(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
 def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
     """The clips that are wanted, coded anew."""
     from mcz.container.writer import Writer
-    from mcz.reading.source_files import with_facts
     from mcz.writing.names import name_skeleton
     from mcz.writing.tuning import write_tuned
 
@@ -174,17 +177,20 @@ def _coded(target: str, shelf: Shelf, wanted: Wanted) -> bytes:
     with mcz_open(target, salvage=shelf.salvage, max_decoded=wanted.max_decoded) as file:
         writer = Writer(out, profile=file.container.profile)
         for clip in file.chosen(wanted.clips or None, wanted.where):
-            motion = clip.motion()
-            unit = shelf.said.get("unit") if motion.skeleton.unit_cm is None else None
-            motion = with_facts(motion, None, unit)
+            motion = shelf.told(clip.motion())
             name_skeleton(writer, motion.skeleton)
             write_tuned(writer, motion, codec, wanted.params or {})
         writer.finish()
     return out.getvalue()
 
 
-def _differences(files: Sequence[File], names: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """Of every other file against the first what ``mcz diff --by-joint --json`` says."""
+def _differences(
+    files: Sequence[File], names: Sequence[str], told: Callable[[Motion], Motion]
+) -> Iterator[dict[str, Any]]:
+    """Of every other file against the first what ``mcz diff --by-joint --json`` says.
+
+    ``told`` gives motions what they do not say themselves.
+    """
     first, *others = files
     for other, name in zip(others, names[1:], strict=True):
         pairs = [(one, one) for one in first.clips if one in other.clips]
@@ -193,8 +199,8 @@ def _differences(files: Sequence[File], names: Sequence[str]) -> Iterator[dict[s
         found, notes = [], []
         for a, b in pairs[:MOST_COMPARED]:
             try:
-                motions = first.clips[a].motion(), other.clips[b].motion()
-                found.append(difference(*motions, by_joint=True))
+                original, coded = told(first.clips[a].motion()), told(other.clips[b].motion())
+                found.append(difference(original, coded, by_joint=True))
             except MczError as error:
                 notes.append(f"{a}: {error}")
         yield {"a": names[0], "b": name, "clips": found, "notes": notes}

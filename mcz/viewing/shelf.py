@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import secrets
 import shutil
+import stat
 import tempfile
 import time
 from collections import deque
@@ -16,7 +18,10 @@ from typing import Any, BinaryIO, Protocol
 from mcz.container.source import ByteSource
 from mcz.errors import AccessError, LimitError, MczError, OptionError
 from mcz.formats import FORMATS
+from mcz.formats.find import skeletons_around
+from mcz.motion import Motion
 from mcz.reading.file import reached
+from mcz.reading.source_files import told
 from mcz.viewing.contents import Contents, FarAway, OnDisk
 
 Say = Callable[[str], None]
@@ -25,6 +30,8 @@ Make = Callable[[BinaryIO], None]  # writes an .mcz
 MOST_RESULTS = 16  # files made of a clip in view: the oldest goes when there is one more
 MOST_UPLOADS = 256  # files that the page gave
 MCZ = ".mcz"
+FACTS = ("rate", "unit", "up")  # which files may not say themselves
+REST = 10  # a folder is looked through again after so many times as long as that took
 
 
 class Shelved(Protocol):
@@ -104,6 +111,7 @@ class Made:
         self._stored: Stored | None = None
         self._error: MczError | None = None
         self._made_of: object = None
+        self._next_look = 0.0  # monotonic seconds
 
     @property
     def size(self) -> int | None:
@@ -111,14 +119,23 @@ class Made:
 
     def target(self) -> str:
         with self._lock:
-            now = _state(Path(self.source))
-            if self._made_of != now:
-                self._run()
-                self._made_of = now
+            if time.monotonic() >= self._next_look:
+                self._look()
         if self._error is not None:
             raise self._error
         assert self._stored is not None
         return self._stored.target()
+
+    def _look(self) -> None:
+        """Make it where what it is made of has changed; raises AccessError."""
+        began = time.monotonic()
+        now = _state(Path(self.source), self._shelf.said.get("skeleton"))
+        took = time.monotonic() - began
+        if self._made_of != now:
+            self._run()
+            self._made_of = now
+        if self.kind == "folder":  # pages ask for many ranges, and folders may be large
+            self._next_look = time.monotonic() + REST * took
 
     def _run(self) -> None:
         before, self._stored, self._error = self._stored, None, None
@@ -137,12 +154,32 @@ class Made:
         return OnDisk(self.target())
 
 
-def _state(path: Path) -> object:
-    """What changes when a file does; raises AccessError where there is none."""
+def _state(path: Path, skeleton: Any = None) -> object:
+    """What changes when a file does, a motion file below a folder, or the ASF of an AMC.
+
+    ``skeleton``: the ASF that was named, or None. Raises AccessError where there is no ``path``.
+    """
+    from mcz.editing.folders import files_below, motion_files
+
     try:
-        found = path.stat()
+        is_folder, own = stat.S_ISDIR(path.stat().st_mode), _stamp(path)
     except OSError as error:
         raise AccessError(f"{path}: {error.strerror}") from None
+    paths = motion_files(files_below(path, None)[0])[0] if is_folder else [path]
+    takes = {one.parent: one for one in paths if one.suffix.lower() == ".amc"}
+    around = [found.path for take in takes.values() for found in skeletons_around(take)]
+    if takes and isinstance(skeleton, (str, os.PathLike)) and not is_folder:
+        around = [Path(skeleton)]
+    stamps = {str(one): _stamp(one) for one in (*paths, *around)}
+    return stamps if is_folder else (own, stamps)
+
+
+def _stamp(path: Path) -> tuple[int, int, int] | None:
+    """When a file was written, its size and number; None where it is gone."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return None
     return found.st_mtime_ns, found.st_size, found.st_ino
 
 
@@ -173,6 +210,10 @@ class Shelf:
         """The file of that number; raises KeyError."""
         with self._lock:
             return self._files[number]
+
+    def told(self, motion: Motion) -> Motion:
+        """``motion`` with what is said of files that do not say it; raises OptionError."""
+        return told(motion, *map(self.said.get, FACTS))
 
     def given(self) -> list[tuple[int, Shelved]]:
         """The files that were there from the beginning, with their numbers."""

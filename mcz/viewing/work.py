@@ -18,6 +18,7 @@ from typing import Any, BinaryIO
 
 from mcz.codecs.parameters import Dial
 from mcz.errors import MczError, OptionError
+from mcz.formats import FORMATS
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.file import File
@@ -68,6 +69,7 @@ class Work:
             "canEncode": True,
             "canConvert": True,
             "canGlb": glb_writer() is not None,
+            "suffixes": sorted({suffix for f in FORMATS.values() for suffix in f.suffixes}),
         }
 
     def files(self) -> list[dict[str, Any]]:
@@ -196,8 +198,7 @@ class Work:
                 return motion
         with self._opened(asked) as (_, clip):
             motion = clip.motion()
-        unit = self._shelf.said.get("unit") if motion.skeleton.unit_cm is None else None
-        motion = with_facts(motion, None, unit)
+        motion = self._shelf.told(motion)
         if sum(signal.values.nbytes for signal in motion.signals) <= HELD_BYTES:
             self._held.append((key, motion))
         return motion

@@ -88,7 +88,7 @@ def test_a_source_is_held_without_loss(samples: Path, tmp_path: Path, call: Call
     assert file["walk"].source_bytes() == (samples / "walk.bvh").read_bytes()
     assert f"{out.stat().st_size:,} bytes, the player {len(page().text):,} of them" in printed
     assert f"walk.bvh: 1 clip, {file.size:,} bytes" in printed
-    assert "diff" not in document
+    assert "diffs" not in document
     assert document["annex"].keys() == {"words.bin", "fast_counts.json"}
     for name, text in document["annex"].items():
         assert zlib.decompress(base64.b64decode(text), -15) == annex_bytes(name)
@@ -103,7 +103,9 @@ def test_an_mcz_is_held_as_it_is(samples: Path, tmp_path: Path, call: Call) -> N
     document = embedded(tmp_path / "x.html")
     held = [base64.b64decode(file["base64"]) for file in document["files"]]
     assert held == [(tmp_path / "a.mcz").read_bytes(), bytes(damaged[:-100])]
-    assert document["diff"]["clips"] or document["diff"]["notes"]
+    (found,) = document["diffs"]
+    assert found["clips"] or found["notes"]
+    assert "diff" not in document
 
 
 def test_clips_are_copied(samples: Path, tmp_path: Path, call: Call) -> None:
@@ -137,11 +139,39 @@ def test_a_codec_makes_it_small_and_says_how_far_it_is(
     held = embedded(tmp_path / "x.html")["files"][0]["base64"]
     (tmp_path / "b.mcz").write_bytes(base64.b64decode(held))
     assert call(tmp_path / "a.mcz", tmp_path / "b.mcz", "-o", tmp_path / "y.html")[0] == 0
-    difference = embedded(tmp_path / "y.html")["diff"]
+    (difference,) = embedded(tmp_path / "y.html")["diffs"]
     assert (difference["a"], difference["b"]) == ("a.mcz", "b.mcz")
     (clip,) = difference["clips"]
     record = float(file["walk"].quality["mean_position_error_cm"])
     assert clip["mean_position_error_cm"] == pytest.approx(record)
+
+
+def test_a_page_tells_what_an_mcz_does_not_say(samples: Path, tmp_path: Path, call: Call) -> None:
+    mcz.encode(samples / "walk.bvh", tmp_path / "a.mcz")  # which says no unit
+    words = (tmp_path / "a.mcz", samples / "walk.bvh", "--unit", "mm", "--up", "z")
+    code, _, errors = call(*words, "-o", tmp_path / "x.html")
+    assert (code, errors.count("\n")) == (0, 1)
+    assert "a.mcz: copied as it is, so that --unit, --up is not in it" in errors
+    document = embedded(tmp_path / "x.html")
+    assert document["diffs"][0]["clips"][0]["mean_position_error_cm"] == 0
+    copied, made = files_of(document)
+    assert (copied["walk"].skeleton.unit_cm, made["walk"].skeleton.unit_cm) == (None, 0.1)
+    code, _, errors = call(*words, "-o", tmp_path / "y.html", "--effort", "fast")
+    assert (code, errors) == (0, "")
+    for file in files_of(embedded(tmp_path / "y.html")):
+        assert (file["walk"].skeleton.unit_cm, file["walk"].skeleton.up_axis) == (0.1, "z")
+
+
+def test_the_limit_of_decoded_bytes_holds_for_pages(
+    samples: Path, tmp_path: Path, call: Call
+) -> None:
+    mcz.encode(samples / "walk.bvh", tmp_path / "a.mcz")
+    words = (tmp_path / "a.mcz", tmp_path / "a.mcz", "-o", tmp_path / "x.html", "--force")
+    for limit, is_enough in (("10M", True), ("10k", False)):
+        assert call(*words, "--max-decoded", limit)[0] == 0
+        (found,) = embedded(tmp_path / "x.html")["diffs"]
+        assert bool(found["clips"]) == is_enough
+        assert ("--max-decoded" in " ".join(found["notes"])) != is_enough
 
 
 def test_a_page_that_is_too_large_is_not_written(samples: Path, tmp_path: Path, call: Call) -> None:

@@ -78,6 +78,7 @@ def test_api_says_what_is_there(server: Server) -> None:
     ]
     assert (api["canEncode"], api["canConvert"], api["salvage"]) == (True, True, False)
     assert api["diff"] is False  # there are three
+    assert api["suffixes"] == [".amc", ".asf", ".bvh", ".c3d", ".mot", ".sto", ".trc"]
     assert api["version"] == mcz.__version__
     codecs = {codec["name"]: codec for codec in api["codecs"]}
     assert "posewave" in codecs
@@ -137,6 +138,42 @@ def test_a_source_that_changed_is_converted_anew(samples: Path, tmp_path: Path) 
         after = ask(server, "files/0")
         assert after.status == 200
         assert after.headers["ETag"] != before.headers["ETag"]
+
+
+def test_what_is_below_a_folder_is_converted_anew(
+    samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shelf_module, "REST", 0)
+    folder = tmp_path / "takes"
+    (folder / "deep").mkdir(parents=True)
+    source = folder / "deep" / "walk.bvh"
+    source.write_bytes((samples / "walk.bvh").read_bytes())
+    shelf = Shelf()
+    put(shelf, str(folder))
+    first = shelf[0].target()
+    (folder / "notes.txt").write_text("no motion")
+    assert shelf[0].target() == first
+    source.write_bytes(source.read_bytes() + b"\n")
+    with mcz.open(shelf[0].target()) as file:
+        assert file.only_clip().source_bytes() == source.read_bytes()
+    shelf.close()
+
+
+@pytest.mark.parametrize("is_named", [False, True])
+def test_an_amc_is_converted_anew_with_its_asf(
+    samples: Path, tmp_path: Path, is_named: bool
+) -> None:
+    (tmp_path / "walk.amc").write_bytes((samples / "walk.amc").read_bytes())
+    asf = tmp_path / "elsewhere" / "other.asf" if is_named else tmp_path / "walk.asf"
+    asf.parent.mkdir(exist_ok=True)
+    asf.write_bytes((samples / "walk.asf").read_bytes())
+    shelf = Shelf({"skeleton": str(asf)} if is_named else None)
+    put(shelf, str(tmp_path / "walk.amc"))
+    first = shelf[0].target()
+    assert shelf[0].target() == first
+    asf.write_bytes(b"# edited\n" + asf.read_bytes())
+    assert shelf[0].target() != first
+    shelf.close()
 
 
 def test_a_folder_is_its_files_and_one_archive(samples: Path, folder: Path) -> None:
@@ -431,6 +468,24 @@ def test_a_unit_can_be_said_later(tmp_path: Path) -> None:
         assert (refused.status, refused.json["error"]["class"]) == (422, "OptionError")
         assert "unit" in refused.json["error"]["message"]
         assert post(server, "encode", {**asked, "unit": "cm"}).status == 200
+
+
+def test_what_an_mcz_does_not_say_is_told(tmp_path: Path) -> None:
+    motion = smooth(12)
+    skeleton = replace(motion.skeleton, unit_cm=None, up_axis="")
+    mcz.write(replace(motion, skeleton=skeleton, frame_rate=None), tmp_path / "a.mcz")
+    shelf = Shelf({"rate": 50, "unit": "mm", "up": "z", "skeleton": None})
+    put(shelf, str(tmp_path / "a.mcz"))
+    with Server(page(), shelf) as server:
+        made = post(server, "encode", {"url": "files/0", "codec": "mrdwt", "params": {"T_g": 4}})
+        with mcz.open(ask(server, made.json["url"]).body) as file:
+            clip = file.only_clip()
+            assert (clip.frame_rate, clip.skeleton.unit_cm) == (50, 0.1)
+            assert clip.skeleton.up_axis == "z"
+        assert post(server, "glb", {"url": "files/0"}).status == 200  # which needs a rate
+        pair = {"a": {"url": "files/0"}, "b": {"url": "files/0"}}
+        (found,) = post(server, "diff", pair).json["clips"]
+        assert found["mean_position_error_cm"] == 0  # which needs a unit
 
 
 @pytest.mark.parametrize(
