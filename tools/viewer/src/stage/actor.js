@@ -69,8 +69,9 @@ export class Actor {
     this.axes = new Axes(up, scale ?? scaleOf(size));
     this.floor = floor * this.axes.scale;
     this.facing = 0;
-    if (this.samples.length > 0) {
-      const first = this.axes.apply(this.samples[0], new Float32Array(this.places.length));
+    const seen = this.samples.find((places) => !places.every(Number.isNaN));
+    if (seen) {
+      const first = this.axes.apply(seen, new Float32Array(this.places.length));
       this.facing = facing(this.clip.points, first);
     }
   }

@@ -262,6 +262,7 @@ class Stage {
     const { clip } = this.shown ?? {};
     const noFigure = clip && !this.shown.hasFigure;
     this.#fault(noFigure ? whyNoFigure(clip) : "");
+    this.view.world.grid.visible = !noFigure; // there is nothing to stand on it
     if (noFigure || !clip) this.labels.setNote("");
     this.view.canvas.setAttribute(
       "aria-label",
@@ -339,7 +340,8 @@ class Stage {
     if (!shown?.body) return;
     const frame = this.page.store.get("frame");
     const now = shown.at(frame, 1);
-    const figure = now ? shown.bounds(now) : shown.extent();
+    const seen = now && shown.bounds(now);
+    const figure = seen?.least.every(Number.isFinite) ? seen : shown.extent(); // markers may be gone
     const isFit = name === "fit";
     const box = isFit || this.page.store.get("follow") ? figure : shown.extent();
     const aside = this.#aside().map(Math.abs);

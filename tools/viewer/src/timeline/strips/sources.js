@@ -61,7 +61,8 @@ function ofSignal(engine, clip, { signal, index, columns, isAll }) {
   const range = isAll ? "" : `: ${labels[0]}${labels.length > 1 ? " …" : ""}`;
   return {
     id: `signal ${index} ${columns.join(",")}`,
-    kind: index === 0 ? "channels" : "analog",
+    // Where nothing has a place, channels are all there is, and each strip is chosen by itself.
+    kind: index === 0 && clip.points.length > 0 ? "channels" : "analog",
     name: index === 0 ? `Channels${range}` : `${signal.name}${range}`,
     unit: same(columns.map((column) => signal.channels[column].unit)),
     series: columns.map((column, k) => ({ label: labels[k], signal: index, column })),
