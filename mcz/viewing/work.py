@@ -213,16 +213,17 @@ def url_of(number: int) -> str:
 def lossy_codecs() -> list[dict[str, Any]]:
     """What a slider needs to know: the lossy codecs, their parameters, and the range of the dial.
 
-    The keys are those of ``mcz codecs --json``, and ``dial``.
+    The keys are those of ``mcz codecs --json``, and ``dial``. The one that is called "lossy" is the
+    first.
     """
-    from mcz.codecs import CODECS
+    from mcz.codecs import CODECS, by_name
     from mcz.codecs.listing import document
 
-    return [
-        document(codec) | {"dial": dial_of(codec.dial)}
-        for codec in CODECS.values()
-        if not codec.lossless
-    ]
+    lossy = sorted(
+        (codec for codec in CODECS.values() if not codec.lossless),
+        key=lambda codec: codec is not by_name("lossy"),
+    )
+    return [document(codec) | {"dial": dial_of(codec.dial)} for codec in lossy]
 
 
 def dial_of(dial: Dial | None) -> dict[str, Any] | None:
