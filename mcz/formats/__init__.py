@@ -15,6 +15,7 @@ from typing import Any
 from mcz.errors import FormatError, SourceError, UnsupportedError
 from mcz.formats.line_by_line import Arriving
 from mcz.formats.notes import join_notes
+from mcz.formats.table_notes import join_table_notes
 from mcz.motion import FrameNotes, Source
 
 __all__ = ["FORMATS", "Format", "format_by_id", "format_of", "is_table", "recording_of", "sniffed"]
@@ -112,7 +113,7 @@ FORMATS: dict[str, Format] = {
                 (f".{name}",),
                 _of(module, f"read_{name}"),
                 _of(module, f"write_{name}"),
-                join_notes,
+                join_table_notes,
                 states_rate=True,
                 is_table=True,
             )

@@ -21,7 +21,7 @@ from mcz.formats.table_plain import plain_trc
 from mcz.formats.table_restore import restore_table
 from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.formats.table_signals import read_columns
-from mcz.formats.table_source import named_count, names_in, table_source
+from mcz.formats.table_source import named_count, names_in, section_of, table_source
 from mcz.formats.text_source import check_text, text_encoding
 from mcz.formats.times import find_clock, half_digit_of, stated_rate, uniform_rate
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
@@ -68,6 +68,8 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
     skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="")
     clock, times, rate, exact, note = _times(data, rows, time, header.values)
     text = _marked(data, header, rows.n_rows, names[: len(labels)])
+    signals = range(1 + len(times))
+    section = section_of(text, (table.missing, clock), rows, names, signals)
     return Motion(
         skeleton,
         (motion, *times),
@@ -75,7 +77,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
         exact,
         name,
         _metadata(encoding, [*note, *_notes(header.values, len(labels), rows.n_rows)]),
-        table_source("trc", data, text, (table.missing, clock), rows, names),
+        table_source("trc", data, [(section, rows, 1)]),
         rows.numbers,
     )
 
