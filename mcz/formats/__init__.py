@@ -34,7 +34,8 @@ class Format:
     a file surely has more, None where nobody can. ``states_rate``: the template holds the frame
     rate, so that it does not suit another. ``is_table``: its header names every column, which is
     much of what is written. ``recording(name, template, detail)`` is what the source
-    says beside all numbers, None where it says nothing; see ``mcz.Recording``.
+    says beside all numbers, None where it says nothing; see ``mcz.Recording``. ``is_motion(data)``
+    says of a suffix that others use, too, whether a file that begins so seems to be of this format.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Format:
     recording: Callable[[str, bytes, bytes], Any] | None = None
     has_more_joints: Callable[..., bool] | None = None
     bones: Callable[..., dict[str, int]] | None = None
+    is_motion: Callable[[bytes], bool] | None = None
 
 
 def _of(module: str, name: str) -> Callable[..., Any]:
@@ -122,6 +124,20 @@ FORMATS: dict[str, Format] = {
                 (7, "mot", "storage"),
                 (8, "sto", "storage"),
             )
+        ),
+        *(  # the table gives csv for .csv; which kind a file is, its reader finds
+            Format(
+                name,
+                format_id,
+                (".csv",),
+                _of("csv_files", "read"),
+                _of("csv_files", "write"),
+                join_table_notes,
+                states_rate=True,
+                is_table=True,
+                is_motion=_of("csv_files", "is_motion"),
+            )
+            for format_id, name in ((11, "csv"), (9, "motive"), (10, "vicon"))
         ),
     )
 }

@@ -56,8 +56,8 @@ def _match_row(
 ) -> tuple[int, int]:
     """The offset after a row of the pattern at ``at`` and its frame number; offset -1: no match.
 
-    Fills ``start`` and ``stop`` (n_columns,) of its tokens. The first cell is never empty, and
-    where ``blanks`` is 0 none is.
+    Fills ``start`` and ``stop`` (n_columns,) of its tokens. Where ``blanks`` is 0 no cell is empty,
+    where it is 1 the first is not.
     """
     gaps, gap_start, gap_stop, columns, widths = items
     number = 0
@@ -65,7 +65,7 @@ def _match_row(
         if not _is_at(text, at, gaps, gap_start[k], gap_stop[k]):
             return -1, 0
         first, last, at = _match_cell(text, at + gap_stop[k] - gap_start[k], widths[k])
-        if first < 0 or (first == last and (k == 0 or blanks == 0)):
+        if first < 0 or (first == last and blanks < (2 if k == 0 else 1)):
             return -1, 0
         if columns[k] >= 0:
             start[columns[k]] = first
@@ -91,7 +91,10 @@ def match_cells(
     numbers: Ints,
     blanks: int,
 ) -> tuple[int, int]:
-    """As ``text_kernels.match_rows``, of a table; ``blanks``: 1 where cells may be empty."""
+    """As ``text_kernels.match_rows``, of a table.
+
+    ``blanks``: 1 where cells may be empty, 2 where the first may, too.
+    """
     while row < len(numbers):
         end, number = _match_row(text, at, items, start[row], stop[row], blanks)
         if end <= at:

@@ -24,6 +24,8 @@ Bools = NDArray[np.bool_]
 
 LOOKED_AT = 64  # rows, for columns that are padded
 _BLANKS = b" \t\r\n"
+_AROUND = _BLANKS + b'"'  # of a cell
+_NONE = (b"NA", b"N/A", b"null", b"NULL", b"None")  # what is no number, and stands for one
 _WORDS = re.compile(rb"[^ \t\r\n]+")
 _PART = b","  # between the numbers of a cell
 _FIRST = re.compile(rb"[ \t]*([-+]?(?:[0-9]|\.[0-9])[^ \t\r\n,;]*)")
@@ -47,7 +49,7 @@ class RowCells:
     """The tokens of the row that begins at an offset; see ``rows.Frames``.
 
     ``columns``: of each cell its columns, several where it holds several numbers. ``separator``
-    None: blanks. ``blanks``: cells may be empty.
+    None: blanks. ``blanks``: cells may be empty. ``free``: the first one, too.
     """
 
     def __init__(
@@ -56,9 +58,10 @@ class RowCells:
         columns: Sequence[Sequence[int]],
         separator: bytes | None,
         blanks: bool = True,
+        free: bool = False,
     ) -> None:
         self.data, self.columns, self.separator = data, columns, separator
-        self.blanks = blanks
+        self.blanks, self.free = blanks, free
 
     def __call__(self, at: int) -> tuple[list[Token], int] | None:
         while True:
@@ -69,7 +72,7 @@ class RowCells:
             if end == len(self.data):
                 return None
             at = end
-        if not begins_with_number(line):
+        if not (self.free or begins_with_number(line)):
             raise SourceError(f"line {line_of(self.data, at)}: not a row of numbers: {line[:40]!r}")
         tokens: list[Token] = []
         for number, (start, stop) in enumerate(self._cells(at, line)):
@@ -88,7 +91,7 @@ class RowCells:
             return [(at + m.start(), at + m.end()) for m in _WORDS.finditer(line)]
         found = []
         for cell in line.rstrip(b"\r\n").split(self.separator):
-            bare = cell.strip(_BLANKS)
+            bare = cell.strip(_AROUND)
             start = at + (cell.index(bare) if bare else len(cell))
             found.append((start, start + len(bare)))
             at += len(cell) + len(self.separator)
@@ -123,17 +126,23 @@ class TableRows:
 
 
 def read_table(
-    data: bytes, at: int, n_columns: int, columns: Sequence[Sequence[int]], separator: bytes | None
+    data: bytes,
+    at: int,
+    n_columns: int,
+    columns: Sequence[Sequence[int]],
+    separator: bytes | None,
+    *,
+    free: bool = False,
 ) -> TableRows:
-    """Read all rows of ``data`` from offset ``at`` on.
+    """Read all rows of ``data`` from offset ``at`` on; ``free``: their first cell may be blank.
 
     Raises SourceError for what is no table, and where ``read_rows`` does.
     """
     from mcz.formats import table_kernels
 
     def attempt(blanks: bool) -> Rows:
-        cells = RowCells(data, columns, separator, blanks)
-        match = partial(_match, table_kernels.match_cells, int(blanks))
+        cells = RowCells(data, columns, separator, blanks, free)
+        match = partial(_match, table_kernels.match_cells, blanks + (blanks and free))
         return read_rows(data, at, n_columns, cells, match, _padded(data, at, cells))
 
     rows = attempt(True)
@@ -180,12 +189,16 @@ def _match(match: object, blanks: int, *arguments: object) -> tuple[int, int]:
 
 def _words(data: bytes, rows: Rows, blank: Bools) -> Counter[bytes]:
     """How often each spelling of a number that is none occurs."""
+    found: Counter[bytes] = Counter()
+    for word in _NONE:
+        if word in data and (n := int(np.count_nonzero(_are(data, rows, word)))):
+            found[word] = n
     if re.search(rb"(?i)nan|#", data) is None:
-        return Counter()
+        return found
     chosen = (rows.stop > 0) & ~blank
     tokens = scan(data, rows.start[chosen], rows.stop[chosen])
     nan = _are_nan(tokens)
-    return Counter(tokens[nan].texts().tolist())
+    return found + Counter(tokens[nan].texts().tolist())
 
 
 def _are_nan(tokens: Tokens) -> Bools:

@@ -1,0 +1,79 @@
+"""Lines of comma-separated values: their cells, quotes undone, and where rows of numbers begin."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from mcz.formats.text_source import BOM
+
+SEPARATORS: tuple[bytes | None, ...] = (b",", b";", b"\t", None)  # None: blanks
+NOT_THERE = (b"", b"NA", b"N/A", b"null", b"NULL", b"None")  # what programs write for no number
+LOOKED_AT = 64  # lines in which rows of numbers have to begin
+
+_NUMBER = re.compile(
+    rb"(?i)[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?|nan|inf(?:inity)?"
+    rb"|[0-9]\.#[a-z]+[0-9]*)"
+)
+_QUOTED = re.compile(rb'[ \t]*"((?:[^"]|"")*)"[ \t]*')
+_COMMA = re.compile(rb"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
+
+
+def cells_of(line: bytes, separator: bytes | None) -> list[bytes]:
+    """The cells of a line, without blanks and quotes around them."""
+    line = line.removeprefix(BOM).rstrip(b"\r\n")
+    if separator is None:
+        return line.split()
+    if b'"' not in line:
+        return [cell.strip() for cell in line.split(separator)]
+    cells, at = [], 0
+    while True:
+        quoted = _QUOTED.match(line, at)
+        if quoted and line[quoted.end() : quoted.end() + 1] in (b"", separator):
+            cells.append(quoted[1].replace(b'""', b'"').strip())
+            end = quoted.end()
+        else:
+            found = line.find(separator, at)
+            end = found if found >= 0 else len(line)
+            cells.append(line[at:end].strip())
+        if end >= len(line):
+            return cells
+        at = end + len(separator)
+
+
+def texts_of(line: bytes, separator: bytes | None, encoding: str) -> list[str]:
+    """The cells of a line as text."""
+    return [cell.decode(encoding, "replace") for cell in cells_of(line, separator)]
+
+
+def first_row(
+    lines: Sequence[tuple[int, bytes]],
+) -> tuple[int, bytes | None, int] | None:
+    """The number of the first line of numbers, its separator and how many cells it has."""
+    for number, (_, line) in enumerate(lines[:LOOKED_AT]):
+        found: list[tuple[int, bytes | None]] = []
+        for separator in SEPARATORS:
+            cells = cells_of(line, separator)
+            if is_row(cells):
+                found.append((len(cells), separator))
+        if found:
+            n_cells, separator = max(found, key=lambda entry: entry[0])
+            return number, separator, n_cells
+    return None
+
+
+def is_row(cells: Sequence[bytes]) -> bool:
+    """Whether cells are numbers, at least one, and what stands for none."""
+    numbers = [_NUMBER.fullmatch(cell) is not None for cell in cells]
+    return any(numbers) and all(
+        known or cell in NOT_THERE for known, cell in zip(numbers, cells, strict=True)
+    )
+
+
+def has_decimal_commas(lines: Sequence[tuple[int, bytes]]) -> bool:
+    """Whether cells between semicolons or tabs are numbers such as 1,5."""
+    return any(
+        len(cells := cells_of(line, separator)) > 1 and any(map(_COMMA.fullmatch, cells))
+        for _, line in lines[:LOOKED_AT]
+        for separator in (b";", b"\t")
+    )
