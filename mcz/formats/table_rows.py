@@ -245,13 +245,14 @@ def without_zeros(data: bytes, rows: Rows, groups: Sequence[Sequence[int]]) -> R
     ending = rows.ending
     moved = [_moved(pattern, zeros) for pattern in rows.patterns]
     if ending is not None:
-        last = rows.patterns[_last_pattern(rows)].runs
+        last = rows.patterns[last_pattern(rows)].runs
         column = last[-1].column + last[-1].n_columns - 1 if last else FRAME_NUMBER
         ending = zeros.get(column, b"") + ending
     return replace(rows, stop=rows.stop - less, patterns=tuple(moved), ending=ending)
 
 
-def _last_pattern(rows: Rows) -> int:
+def last_pattern(rows: Rows) -> int:
+    """The number of the pattern of the last row."""
     if rows.notes is None or not len(rows.notes.patterns):
         return 0
     return int(rows.notes.patterns[-1])

@@ -19,7 +19,13 @@ from mcz.formats.csv_text import cells_of, texts_of
 from mcz.formats.layout import FRAME_NUMBER
 from mcz.formats.rows import Rows, line_of
 from mcz.formats.table_layout import MAX_SECTIONS, Section
-from mcz.formats.table_rows import TableRows, begins_with_number, read_table, without_zeros
+from mcz.formats.table_rows import (
+    TableRows,
+    begins_with_number,
+    last_pattern,
+    read_table,
+    without_zeros,
+)
 from mcz.formats.table_signals import read_columns
 from mcz.formats.table_source import names_in, section_of, table_source
 from mcz.formats.text_source import check_text, text_encoding
@@ -78,6 +84,7 @@ def read_vicon(data: bytes, name: str = "motion") -> Motion:
     encoding = text_encoding(data)
     parts = _parts(data, encoding)
     found = [_read(data, part) for part in parts]
+    found[-1].rows = _followed_by(found[-1].rows, data[parts[-1].stop :])
     first = _motion_of(found)
     numbers = found[first if first is not None else 0].numbers
     if first is None:
@@ -142,7 +149,6 @@ def _parts(data: bytes, encoding: str) -> list[_Part]:
         at = parts[-1].stop
     if not parts:
         raise SourceError("line 1: no line that begins with Frame,Sub Frame; no file of Vicon")
-    parts[-1] = replace(parts[-1], stop=len(data))
     return parts
 
 
@@ -196,6 +202,12 @@ def _read(data: bytes, part: _Part) -> _Read:
     texts = [b"%d" % k for k in range(n_each)]
     in_order = tokens.texts().tolist() == texts * (rows.n_rows // n_each)
     return _Read(part, table, rows, numbers, n_each, not in_order)
+
+
+def _followed_by(rows: Rows, rest: bytes) -> Rows:
+    """``rows`` of the last section, with what follows it."""
+    ending = rows.patterns[last_pattern(rows)].tail if rows.ending is None else rows.ending
+    return replace(rows, ending=ending + rest) if rest else rows
 
 
 def _motion_of(found: Sequence[_Read]) -> int | None:
