@@ -35,10 +35,12 @@ def restore(motion: Motion, source: Source) -> bytes:
     """
     signal = motion.signals[0]
     layout = parse_layout(source.template, source.detail, signal.n_channels)
-    numbers = numbers_of(motion, signal.n_rows) if signal.samples_per_frame == 1 else None
     limit = text_limit(source, [(signal.n_rows, signal.n_channels)])
     notes = source.notes if isinstance(source.notes, RowNotes) else None
-    rows = rows_text(signal, layout, notes, numbers, limit)
+    runs = pattern_runs(layout, notes, signal.n_rows)
+    if any_numbers(runs) and signal.samples_per_frame != 1:  # AMC-08
+        raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
+    rows = rows_text(signal, layout, notes, numbers_of(motion, signal.n_rows), limit)
     if len(layout.header) > 1:
         return printed_count(layout, signal.n_rows).join(layout.header) + rows
     return layout.header[0] + rows
@@ -59,21 +61,19 @@ def rows_text(
     signal: Signal,
     layout: Layout,
     notes: RowNotes | None,
-    numbers: Ints | None,
+    numbers: Ints,
     limit: int,
     missing: bytes | None = None,
 ) -> bytes:
     """All rows and what follows them; ``signal`` has the columns of the patterns.
 
-    ``numbers`` are the frame numbers of the rows, None: they have none. ``missing``: what stands
-    where the signal is invalid, None where that does not matter. Raises as ``restore`` does.
+    ``numbers`` are the frame numbers of the rows. ``missing``: what stands where the signal is
+    invalid, None where that does not matter. Raises as ``restore`` does.
     """
-    runs = _pattern_runs(layout, notes, signal.n_rows)
-    numbered = any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
-    if numbered and numbers is None:  # AMC-08
-        raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
+    runs = pattern_runs(layout, notes, signal.n_rows)
+    numbered = any_numbers(runs)
     cells = Cells(signal, numbers if numbered else None)
-    if numbered and numbers is not None and notes is not None:
+    if numbered and notes is not None:
         odd = (entry for entry in notes.texts if entry[0] < signal.n_rows)
         texts = [(row, text) for row, text in odd if int(text) == numbers[row]]  # AMC-06
         rows = np.array([row for row, _ in texts], dtype=np.int64)
@@ -94,7 +94,12 @@ def numbers_of(motion: Motion, n_rows: int) -> Ints:
     return np.arange(1, n_rows + 1)
 
 
-def _pattern_runs(
+def any_numbers(runs: Sequence[tuple[Pattern, int, int]]) -> bool:
+    """Whether rows print their frame number."""
+    return any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
+
+
+def pattern_runs(
     layout: Layout, notes: RowNotes | None, n_rows: int
 ) -> list[tuple[Pattern, int, int]]:
     """(pattern, start, stop) of each run of rows."""

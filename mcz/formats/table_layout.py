@@ -154,7 +154,7 @@ def parse_table(template: bytes, detail: bytes, sizes: Sequence[int]) -> list[Se
     numbers = [number for fields in shared for number in fields.signals]
     if max(numbers, default=0) >= len(sizes) or len(set(numbers)) < len(numbers):  # TABLE-08
         raise FormatError(f"source template: signals {numbers[:8]} of {len(sizes)}")
-    return [_section(*fields, sizes) for fields in zip(shared, own, strict=True)]
+    return [_section(*fields, sizes) for fields in zip(shared, own, strict=False)]
 
 
 def _section(shared: Any, own: Any, sizes: Sequence[int]) -> Section:

@@ -123,8 +123,8 @@ def _sections(shelf: Unrestorable) -> None:
     assert plain.source is not None
     template, detail = plain.source.template, plain.source.detail
 
-    def add(name: str, purpose: str, motion: Motion) -> None:
-        data = file_of(with_source(motion, VICON))
+    def add(name: str, purpose: str, motion: Motion, text: bytes = VICON) -> None:
+        data = file_of(with_source(motion, text))
         shelf.add(f"table-{name}", SPEC, f"Sections of a table: {purpose}.", data)
 
     def changed(**said: Any) -> Motion:
@@ -139,20 +139,25 @@ def _sections(shelf: Unrestorable) -> None:
             detail=build(TABLE_DETAIL, {"details": own}, "detail"),
         )
 
-    add("sections-none", "there are none", built([], []))
+    parts = VICON.split(b"\n\n")
+    parts[1:] = [b"\n" + part for part in parts[1:]]
+    parts[0] += b"\n"
+    parts[1] += b"\n"
+    add("sections-none", "there are none", built([], []), b"")
     blank = {**sections[0], "header": b"", "patterns": [], "gaps": []}
-    more = [{**blank, "signals": [k]} for k in range(3, 66)]
-    add("sections-65", "there are 65 and more", _many(plain, more))
-    add("sections-details", "a detail is missing", built(sections, details[:-1]))
+    more = [{**blank, "signals": [k]} for k in range(3, 65)]
+    add("sections-65", "there are 65", _many(plain, more))
+    fewer = built(sections, details[:-1])
+    add("sections-details", "a detail is missing", fewer, parts[0] + parts[1])
     for name, purpose, numbers in (
         ("none", "one has no signals", []),
         ("beyond", "a signal that there is not", [1, 3]),
-        ("twice", "a signal that another has", [1, 2]),
     ):
         odd = [{**sections[0], "signals": numbers}, *sections[1:]]
         add(f"signals-{name}", purpose, built(odd, details))
-    mixed = [{**sections[0], "signals": [1, 0]}, sections[1]]
-    add("rows", "its signals differ in their rows a frame", built(mixed, details[:2]))
+    again = built([*sections, sections[-1]], [*details, details[-1]])
+    add("signals-twice", "a signal that another has", again, VICON + parts[-1])
+    add("rows", "signals that differ in their rows a frame", _mixed(plain), parts[0] + parts[2])
     for name, purpose, rows in (
         ("rows", "of other rows a frame", [1]),
         ("more", "of 4", [2, 1, 1, 1]),
@@ -185,3 +190,22 @@ def _many(plain: Motion, more: Any) -> Motion:
     detail = count + b"".join(DETAIL.build(d) for d in [*own.details, *[usual] * len(more)])
     source = replace(plain.source, template=template, detail=detail)
     return replace(plain, signals=(*plain.signals, *signals), source=source)
+
+
+def _mixed(plain: Motion) -> Motion:
+    """The first section has another's signal behind its own, and prints nothing of it."""
+    assert plain.source is not None
+    fields = parse(TABLE_TEMPLATE, plain.source.template, "template")
+    details = parse(TABLE_DETAIL, plain.source.detail, "detail").details
+    first, other, last = fields.sections
+    sizes = [plain.signals[section.signals[0]].n_channels for section in (first, other)]
+    for run in first.patterns[0].runs:
+        if run.column == sizes[0] + 1:
+            run.column += sizes[1]
+    first.signals = [*first.signals, *other.signals]
+    source = replace(
+        plain.source,
+        template=build(TABLE_TEMPLATE, {"sections": [first, last]}, "template"),
+        detail=build(TABLE_DETAIL, {"details": [details[0], details[2]]}, "detail"),
+    )
+    return replace(plain, source=source)
