@@ -172,7 +172,10 @@ def sniffed(data: bytes) -> str | None:
         return "sto"
     if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", data):
         return "asf"
-    return "amc" if _of("amc", "is_amc")(data) else None
+    kind: str | None = _of("csv_files", "kind_of")(data)
+    if kind in ("motive", "vicon"):
+        return kind
+    return "amc" if _of("amc", "is_amc")(data) else kind
 
 
 def recording_of(source: Source | None) -> Any:
