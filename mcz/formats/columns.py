@@ -18,7 +18,7 @@ from mcz.formats.table_rows import TableRows, lines_from, read_table, without_ze
 from mcz.formats.table_signals import read_columns
 from mcz.formats.table_source import names_in, section_of, table_source
 from mcz.formats.table_times import Times, read_times
-from mcz.formats.text_source import check_text, text_encoding
+from mcz.formats.text_source import check_text, text_encoding, text_start
 from mcz.motion import Channel, Joint, Motion, Skeleton
 
 MAX_COLUMNS = 2**18  # of a table; no skeleton is stored with more joints
@@ -148,7 +148,8 @@ def _head(data: bytes, encoding: str) -> _Head:
     names = names or [f"column {k + 1}" for k in range(n_cells)]
     names = [_printable(label) for label in names]
     units += [""] * (n_cells - len(units))
-    return _Head(lines[number][0], separator, names, [_printable(u) for u in units], labels)
+    rows = lines[number][0] or text_start(data)
+    return _Head(rows, separator, names, [_printable(u) for u in units], labels)
 
 
 def _are_units(cells: Sequence[str]) -> bool:
