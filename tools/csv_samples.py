@@ -1,8 +1,9 @@
-"""CSV files as Motive and Vicon Nexus write them, of real clips: ``python -m tools.csv_samples OUT FILES``.
+"""CSV files as Motive and Vicon Nexus write them, of real clips.
 
-Each C3D file of markers becomes a Motive file and one of Vicon, with its analog channels as devices;
-each BVH or AMC file one of a skeleton as Motive exports it. To measure sizes with, see
-``tools/source_sizes.py``: programs that write such files are not at hand.
+``python -m tools.csv_samples OUT FILES``: a C3D file of markers becomes a Motive file and one of
+Vicon, with its analog channels as devices; a BVH or AMC file one of a skeleton as Motive exports
+it. To measure sizes with, see ``tools/source_sizes.py``: programs that write such files are not at
+hand.
 """
 
 from __future__ import annotations

@@ -60,8 +60,8 @@ WORDS = {
     "csv": (
         "Format|Version,1.21 Rotation|Type,XYZ Length|Units,Meters Coordinate|Space,Local "
         "Frame,Time Frame,Sub|Frame Devices Trajectories Segments Model|Outputs Rotation Position "
-        "Marker|Quality ,X,Y,Z ,,,, ; \\x09 \\x0d\\x0a \\x0a\\x0a \\x22 \\x22\\x22 NA nan 1,5 -0 1e300 1e-320 "
-        "time_ms frame \\xef\\xbb\\xbf"
+        "Marker|Quality ,X,Y,Z ,,,, ; \\x09 \\x0d\\x0a \\x0a\\x0a \\x22 \\x22\\x22 "
+        "NA nan 1,5 -0 1e300 1e-320 time_ms frame \\xef\\xbb\\xbf"
     ),
 }
 
