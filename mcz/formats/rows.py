@@ -26,6 +26,8 @@ Token = tuple[int, int, int]  # start, stop, column
 Frames = Callable[[int], tuple[list[Token], int] | None]
 Match = Callable[..., tuple[int, int]]  # as ``text_kernels.match_rows``, which it is by default
 
+SPARSE, DENSE = 16, 2  # cells a byte: where a row names its columns, and where each has a cell
+FEW_CELLS = 2**18  # that any file may have
 MAX_NUMBER = 10**15  # of a frame, either sign
 LOOK_FOR_PADDING = (8, 64)  # numbers of patterns at which to look for padded columns
 _TAIL = re.compile(rb"[\x00-\x09\x0b-\x20]*\n?")
@@ -70,8 +72,11 @@ def read_rows(
     frames: Frames,
     match: Match | None = None,
     widths: dict[int, int] | None = None,
+    room: int = SPARSE,
 ) -> Rows:
     """Read all frames of ``data`` from offset ``at`` on; ``widths``: of columns known to be padded.
+
+    ``room``: how many cells there may be for each byte of ``data``, which bounds the memory.
 
     Raises SourceError where ``frames`` does, where the layout is too irregular to be worth
     a template, and where rows name so few columns that the table would dwarf the file.
@@ -79,10 +84,10 @@ def read_rows(
     widths = widths or {}
     for look_at in LOOK_FOR_PADDING:
         try:
-            return _Reader(data, n_columns, frames, match, widths, look_at).read(at)
+            return _Reader(data, n_columns, frames, match, widths, room, look_at).read(at)
         except _Padded as padded:
             widths = padded.widths
-    return _Reader(data, n_columns, frames, match, widths).read(at)
+    return _Reader(data, n_columns, frames, match, widths, room).read(at)
 
 
 class _Padded(Exception):
@@ -99,6 +104,7 @@ class _Reader:
     frames: Frames
     match: Match | None
     widths: dict[int, int]  # of padded columns
+    room: int
     look_at: int = MAX_PATTERNS
     start: Ints = field(init=False)
     stop: Ints = field(init=False)
@@ -117,7 +123,7 @@ class _Reader:
         match = self.match or text_kernels.match_rows
         text = np.frombuffer(self.data, np.uint8)
         begin, last_end = at, at
-        self._allocate(64)
+        self._allocate(min(64, self._most_rows()))
         while (found := self.frames(at)) is not None:
             tokens, end = found
             if self.row + 1 >= len(self.numbers):
@@ -141,15 +147,21 @@ class _Reader:
         self.stop = np.zeros((n_rows, self.n_columns), np.int64)
         self.numbers = np.zeros(n_rows, np.int64)
 
+    def _most_rows(self) -> int:
+        """How many rows there may be: more would take memory that no bytes stand for."""
+        return (self.room * len(self.data) + FEW_CELLS) // max(1, self.n_columns) + 2
+
     def _grow(self, done: int, size: int) -> None:
         """Make room for as many rows as the file seems to have, going by the ``done`` bytes."""
-        if self.row * self.n_columns > 16 * len(self.data) + 2**20:
+        most = self._most_rows()
+        if self.row + 2 > most:
             raise SourceError(
                 f"frame {self.row}: most of the {self.n_columns} channels are missing from most "
                 f"frames; a table of all of them would dwarf the file"
             )
         expected = int((self.row + 1) * size / max(1, done) * 1.01) + 64
         n_rows = max(min(expected, 4 * len(self.numbers)), len(self.numbers) * 3 // 2)
+        n_rows = max(min(n_rows, most), self.row + 2)
         old = self.start, self.stop, self.numbers
         self._allocate(n_rows)
         for new, array in zip((self.start, self.stop, self.numbers), old, strict=True):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mcz.errors import SourceError
 from mcz.formats.layout import FRAME_NUMBER, MAX_WIDTH, Pattern, runs_of
-from mcz.formats.rows import Rows, Token, line_of, read_rows
+from mcz.formats.rows import DENSE, Rows, Token, line_of, read_rows
 from mcz.numbers import Tokens, scan
 
 Bools = NDArray[np.bool_]
@@ -143,7 +143,7 @@ def read_table(
     def attempt(blanks: bool) -> Rows:
         cells = RowCells(data, columns, separator, blanks, free)
         match = partial(_match, table_kernels.match_cells, blanks + (blanks and free))
-        return read_rows(data, at, n_columns, cells, match, _padded(data, at, cells))
+        return read_rows(data, at, n_columns, cells, match, _padded(data, at, cells), DENSE)
 
     rows = attempt(True)
     if not rows.n_rows:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -299,3 +300,17 @@ def test_hostile_notes_and_templates_are_refused(noise: bytes) -> None:
         FORMATS["csv"].write(replace(motion, source=source))
     except MczError as error:
         assert "\n" not in str(error)
+
+
+def test_memory_is_bounded_by_the_bytes_of_a_ragged_table() -> None:
+    """Rows that leave out most of many columns do not take what these would need."""
+    text = b",".join(b"c%d" % k for k in range(60_000)) + b"\n" + b"1,2\n" * 2000
+    tracemalloc.start()
+    try:
+        with pytest.raises(SourceError, match="would dwarf the file"):
+            FORMATS["csv"].read(text, "table")
+        assert tracemalloc.get_traced_memory()[1] < 2**27
+    finally:
+        tracemalloc.stop()
+    wide = b",".join(b"c%d" % k for k in range(5000)) + b"\n" + (b"," * 4999 + b"1\n") * 200
+    assert back(wide).values.shape == (200, 5000)
