@@ -113,7 +113,7 @@ def _rows(data: bytes, head: _Head, time: int | None) -> tuple[TableRows, list[i
             continue
         try:
             columns = [[cell] for cell in cells]
-            return read_table(data, head.rows, at, columns, head.separator, free=at > 1), cells
+            return read_table(data, head.rows, at, columns, head.separator, free=True), cells
         except SourceError:
             if first != FRAME_NUMBER:
                 raise

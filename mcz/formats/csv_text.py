@@ -49,17 +49,25 @@ def texts_of(line: bytes, separator: bytes | None, encoding: str) -> list[str]:
 def first_row(
     lines: Sequence[tuple[int, bytes]],
 ) -> tuple[int, bytes | None, int] | None:
-    """The number of the first line of numbers, its separator and how many cells it has."""
+    """The number of the first line of numbers, its separator and how many cells it has.
+
+    A line of names may look so; it has no other one below.
+    """
+    first = None
     for number, (_, line) in enumerate(lines[:LOOKED_AT]):
-        found: list[tuple[int, bytes | None]] = []
-        for separator in SEPARATORS:
-            cells = cells_of(line, separator)
-            if is_row(cells):
-                found.append((len(cells), separator))
-        if found:
-            n_cells, separator = max(found, key=lambda entry: entry[0])
+        found = [
+            (len(cells), separator)
+            for separator in SEPARATORS
+            if is_row(cells := cells_of(line, separator))
+        ]
+        if not found:
+            continue
+        n_cells, separator = max(found, key=lambda entry: entry[0])
+        first = first or (number, separator, n_cells)
+        below = next((line for _, line in lines[number + 1 :] if line.strip()), None)
+        if below is None or is_row(cells_of(below, separator)):
             return number, separator, n_cells
-    return None
+    return first
 
 
 def is_row(cells: Sequence[bytes]) -> bool:

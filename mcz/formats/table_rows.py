@@ -134,7 +134,7 @@ def read_table(
     *,
     free: bool = False,
 ) -> TableRows:
-    """Read all rows of ``data`` from offset ``at`` on; ``free``: their first cell may be blank.
+    """Read all rows of ``data`` from offset ``at`` on; ``free``: they may begin with none.
 
     Raises SourceError for what is no table, and where ``read_rows`` does.
     """
@@ -142,7 +142,8 @@ def read_table(
 
     def attempt(blanks: bool) -> Rows:
         cells = RowCells(data, columns, separator, blanks, free)
-        match = partial(_match, table_kernels.match_cells, blanks + (blanks and free))
+        mode = blanks + (blanks and free and len(columns) > 1)  # an empty line is no row
+        match = partial(_match, table_kernels.match_cells, mode)
         return read_rows(data, at, n_columns, cells, match, _padded(data, at, cells), DENSE)
 
     rows = attempt(True)
