@@ -55,17 +55,14 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     check_text(data)
     encoding = text_encoding(data)
     head = _head(data, encoding)
-    time = next((k for k, n in enumerate(head.names[:8]) if _TIME.fullmatch(n.strip())), None)
-    if len(head.names) == 1:
-        time = None
+    called = (k for k, n in enumerate(head.names[:8]) if _TIME.fullmatch(n.strip()))
+    time = next(called, None) if len(head.names) > 1 else None
     table, cells = _rows(data, head, time)
     n_values = sum(cell >= 0 for cell in cells) - (time is not None)
     values = range(n_values)
-    times = Times(None, (), None, True)
-    groups: list[Sequence[int]] = [values]
-    if time is not None:
-        groups.append([n_values])
+    groups: list[Sequence[int]] = [values] if time is None else [values, [n_values]]
     rows = without_zeros(data, table.rows, groups)
+    times = Times(None, (), None, True)
     if time is not None:
         label = head.names[time].strip()
         times = read_times(data, rows, n_values, unit=_seconds(label, head.units[time]), name=label)
@@ -74,13 +71,11 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     joints = tuple(
         Joint(head.names[k], channels=(Channel("", "value", head.units[k]),)) for k in chosen
     )
-    start, stop = head.labels
     names = [joint.name for joint in joints]
+    start, stop = head.labels
     marked = data[:start] + names_in(data[start:stop], names) + data[stop : head.rows]
-    text = marked, data[: head.rows]
-    section = section_of(
-        text, (table.missing, times.clock), rows, names, range(1 + len(times.signals))
-    )
+    signals, said = range(1 + len(times.signals)), (table.missing, times.clock)
+    section = section_of((marked, data[: head.rows]), said, rows, names, signals)
     return Motion(
         Skeleton(joints, angle_unit=""),
         (signal, *times.signals),

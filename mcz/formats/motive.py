@@ -78,19 +78,9 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     ]
     times = read_times(data, rows, time, stated)
     names = [found.name for found in objects]
-    start, stop = head.labels
-    match = _COUNT.search(data, 0, start)
-    text = b"".join(
-        (
-            named_count(data, 0, start, match.span(1) if match else (0, 0), rows.n_rows),
-            names_in(data[start:stop], names),
-            data[stop : head.rows],
-        )
-    )
+    text = _marked(data, head, names, rows.n_rows), data[: head.rows]
     signals = range(1 + len(times.signals))
-    section = section_of(
-        (text, data[: head.rows]), (table.missing, times.clock), rows, names, signals
-    )
+    section = section_of(text, (table.missing, times.clock), rows, names, signals)
     return Motion(
         _skeleton(head, objects),
         (read_columns(data, rows, range(time)), *times.signals),
@@ -101,6 +91,15 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
         table_source("motive", data, [(section, rows, 1)]),
         rows.numbers,
     )
+
+
+def _marked(data: bytes, head: _Head, names: Sequence[str], n_rows: int) -> bytes:
+    """What stands above the rows, with marks for the first of each name and the number of rows."""
+    start, stop = head.labels
+    match = _COUNT.search(data, 0, start)
+    count = match.span(1) if match else (0, 0)
+    labels = names_in(data[start:stop], names)
+    return named_count(data, 0, start, count, n_rows) + labels + data[stop : head.rows]
 
 
 def _head(data: bytes, encoding: str) -> _Head:

@@ -78,13 +78,8 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
     stated = stated_rate(header.values.get("datarate", ""))
     rate, exact = uniform_rate(times, half_digit_of(tokens), [stated] if stated else [])
     start, stop = header.labels
-    marked = b"".join(
-        (
-            named_count(data, 0, start, header.count, rows.n_rows),
-            names_in(data[start:stop], names),
-            data[stop : header.rows],
-        )
-    )
+    counted = named_count(data, 0, start, header.count, rows.n_rows)
+    marked = counted + names_in(data[start:stop], names) + data[stop : header.rows]
     text = marked, data[: header.rows]
     section = section_of(text, (table.missing, None), rows, names, [0])
     return Motion(

@@ -86,9 +86,8 @@ def read_vicon(data: bytes, name: str = "motion") -> Motion:
     found = [_read(data, part) for part in parts]
     found[-1].rows = _followed_by(found[-1].rows, data[parts[-1].stop :])
     first = _motion_of(found)
-    numbers = found[first if first is not None else 0].numbers
-    if first is None:
-        numbers = numbers[:: found[0].n_each]
+    rated = found[first or 0]
+    numbers = rated.numbers[:: rated.n_each]
     for one in found:
         _check_frames(data, one, numbers)
     signals, of_section = _signals(data, found, first, len(numbers))
@@ -97,26 +96,16 @@ def read_vicon(data: bytes, name: str = "motion") -> Motion:
     for k, one in enumerate(found):
         names = [joint.name for joint in joints] if k == first else []
         sections.append((_section(data, one, names, of_section[k]), one.rows, one.n_each))
-    units = {
-        unit.lower()
-        for k in ([first] if first is not None else [])
-        for _, columns in parts[k].groups
-        for axis, unit in columns
-        if _kind(parts[k], axis)
-    }
     usual = np.array_equal(numbers, np.arange(1, len(numbers) + 1))
-    rated = found[first if first is not None else 0]
     rate = stated_rate(rated.part.rate)
-    if rate is not None and first is None:
-        rate /= rated.n_each
     return Motion(
         Skeleton(
             joints,
-            unit_cm=UNIT_CM.get(units.pop()) if len(units) == 1 else None,
+            unit_cm=None if first is None else _unit_cm(parts[first]),
             angle_unit="",
         ),
         signals,
-        rate,
+        rate and rate / rated.n_each,
         True,
         name,
         {"name-encoding": encoding} if encoding != "utf-8" else {},
@@ -276,6 +265,14 @@ def _joints(part: _Part) -> tuple[Joint, ...]:
         )
         for name, columns in part.groups
     )
+
+
+def _unit_cm(part: _Part) -> float | None:
+    """The unit of the positions in cm, None where there are none, or of several units."""
+    units = {
+        unit.lower() for _, columns in part.groups for axis, unit in columns if _kind(part, axis)
+    }
+    return UNIT_CM.get(units.pop()) if len(units) == 1 else None
 
 
 def _kind(part: _Part, axis: str) -> str:

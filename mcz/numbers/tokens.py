@@ -92,8 +92,10 @@ class Tokens:
     def __getitem__(self, index: Any) -> Tokens:
         if isinstance(index, int | np.integer):
             raise TypeError("a single token is a slice of one, or token(i)")
-        chosen = (np.ascontiguousarray(a[index]) for a in (self.start, self.stop, self.fields))
-        return Tokens(self.text, *chosen, [values[index] for values in self.known])
+        start, stop, fields = (
+            np.ascontiguousarray(a[index]) for a in (self.start, self.stop, self.fields)
+        )
+        return Tokens(self.text, start, stop, fields, [values[index] for values in self.known])
 
     def token(self, index: int) -> bytes:
         """The text of one token."""

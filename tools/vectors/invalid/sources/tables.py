@@ -121,23 +121,18 @@ def _sections(shelf: Unrestorable) -> None:
     """Sections, their signals and their notes at fault."""
     plain = take_table(VICON, "sections.csv")
     assert plain.source is not None
-    template, detail = plain.source.template, plain.source.detail
 
     def add(name: str, purpose: str, motion: Motion, text: bytes = VICON) -> None:
         data = file_of(with_source(motion, text))
         shelf.add(f"table-{name}", SPEC, f"Sections of a table: {purpose}.", data)
 
-    def changed(**said: Any) -> Motion:
-        return replace(plain, source=replace(plain.source, **said))
-
-    sections = parse(TABLE_TEMPLATE, template, "template").sections
-    details = parse(TABLE_DETAIL, detail, "detail").details
+    sections = parse(TABLE_TEMPLATE, plain.source.template, "template").sections
+    details = parse(TABLE_DETAIL, plain.source.detail, "detail").details
 
     def built(chosen: Any, own: Any) -> Motion:
-        return changed(
-            template=build(TABLE_TEMPLATE, {"sections": chosen}, "template"),
-            detail=build(TABLE_DETAIL, {"details": own}, "detail"),
-        )
+        template = build(TABLE_TEMPLATE, {"sections": chosen}, "template")
+        detail = build(TABLE_DETAIL, {"details": own}, "detail")
+        return replace(plain, source=replace(plain.source, template=template, detail=detail))
 
     parts = VICON.split(b"\n\n")
     parts[1:] = [b"\n" + part for part in parts[1:]]
@@ -158,6 +153,10 @@ def _sections(shelf: Unrestorable) -> None:
     again = built([*sections, sections[-1]], [*details, details[-1]])
     add("signals-twice", "a signal that another has", again, VICON + parts[-1])
     add("rows", "signals that differ in their rows a frame", _mixed(plain), parts[0] + parts[2])
+    _notes(shelf, plain)
+
+
+def _notes(shelf: Unrestorable, plain: Motion) -> None:
     for name, purpose, rows in (
         ("rows", "of other rows a frame", [1]),
         ("more", "of 4", [2, 1, 1, 1]),
@@ -165,7 +164,10 @@ def _sections(shelf: Unrestorable) -> None:
         texts = [{"row": 0, "text": b"+7"}]
         each = [{"rows_per_frame": n, "patterns": [], "texts": texts} for n in rows]
         notes = _Notes(build(TABLE_NOTES, {"sections": each}, "notes"))
-        add(f"notes-{name}", f"notes {purpose}", changed(notes=notes))
+        assert plain.source is not None
+        noted = replace(plain, source=replace(plain.source, notes=notes))
+        data = file_of(with_source(noted, VICON))
+        shelf.add(f"table-notes-{name}", SPEC, f"Sections of a table: notes {purpose}.", data)
 
 
 @dataclass(frozen=True)
