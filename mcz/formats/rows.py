@@ -16,7 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-from mcz.formats.layout import FRAME_NUMBER, MAX_PATTERNS, MAX_ROW_GAPS, Items, Pattern, runs_of
+from mcz.formats.layout import (
+    FRAME_NUMBER,
+    MAX_PATTERNS,
+    MAX_ROW_GAPS,
+    WORDS,
+    Items,
+    Pattern,
+    runs_of,
+)
 from mcz.formats.notes import FRAME_NUMBER_TEXT, RowNotes
 from mcz.formats.padding import find_widths, padding
 
@@ -24,7 +32,6 @@ Ints = NDArray[np.int64]
 Token = tuple[int, int, int]  # start, stop, column
 # The tokens of the frame that begins at an offset, and where it ends; None after the last frame.
 Frames = Callable[[int], tuple[list[Token], int] | None]
-Match = Callable[..., tuple[int, int]]  # as ``text_kernels.match_rows``, which it is by default
 
 SPARSE, DENSE = 16, 2  # cells a byte: where a row names its columns, and where each has a cell
 FEW_CELLS = 2**18  # that any file may have
@@ -70,13 +77,14 @@ def read_rows(
     at: int,
     n_columns: int,
     frames: Frames,
-    match: Match | None = None,
+    cells: int = WORDS,
     widths: dict[int, int] | None = None,
     room: int = SPARSE,
 ) -> Rows:
     """Read all frames of ``data`` from offset ``at`` on; ``widths``: of columns known to be padded.
 
-    ``room``: how many cells there may be for each byte of ``data``, which bounds the memory.
+    ``cells``: what a token is, as ``text_kernels.match_rows`` has it. ``room``: how many cells
+    there may be for each byte of ``data``, which bounds the memory.
 
     Raises SourceError where ``frames`` does, where the layout is too irregular to be worth
     a template, and where rows name so few columns that the table would dwarf the file.
@@ -84,10 +92,10 @@ def read_rows(
     widths = widths or {}
     for look_at in LOOK_FOR_PADDING:
         try:
-            return _Reader(data, n_columns, frames, match, widths, room, look_at).read(at)
+            return _Reader(data, n_columns, frames, cells, widths, room, look_at).read(at)
         except _Padded as padded:
             widths = padded.widths
-    return _Reader(data, n_columns, frames, match, widths, room).read(at)
+    return _Reader(data, n_columns, frames, cells, widths, room).read(at)
 
 
 class _Padded(Exception):
@@ -102,7 +110,7 @@ class _Reader:
     data: bytes
     n_columns: int
     frames: Frames
-    match: Match | None
+    cells: int
     widths: dict[int, int]  # of padded columns
     room: int
     look_at: int = MAX_PATTERNS
@@ -120,7 +128,6 @@ class _Reader:
     def read(self, at: int) -> Rows:
         from mcz.formats import text_kernels
 
-        match = self.match or text_kernels.match_rows
         text = np.frombuffer(self.data, np.uint8)
         begin, last_end = at, at
         self._allocate(min(64, self._most_rows()))
@@ -132,8 +139,9 @@ class _Reader:
             number = self.used[-1][1]
             first, at = self.row, end
             while True:
-                self.row, at = match(
-                    text, at, self.arrays[number], self.row, self.start, self.stop, self.numbers
+                self.row, at = text_kernels.match_rows(
+                    *(text, at, self.arrays[number], self.row, self.start, self.stop),
+                    *(self.numbers, self.cells),
                 )
                 if self.row < len(self.numbers):
                     break

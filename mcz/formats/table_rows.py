@@ -10,13 +10,12 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-from mcz.formats.layout import FRAME_NUMBER, MAX_WIDTH, Pattern, runs_of
+from mcz.formats.layout import BLANKS, FRAME_NUMBER, FREE, FULL, MAX_WIDTH, Pattern, runs_of
 from mcz.formats.rows import DENSE, Rows, Token, line_of, read_rows
 from mcz.numbers import Tokens, scan
 
@@ -138,13 +137,12 @@ def read_table(
 
     Raises SourceError for what is no table, and where ``read_rows`` does.
     """
-    from mcz.formats import table_kernels
 
     def attempt(blanks: bool) -> Rows:
         cells = RowCells(data, columns, separator, blanks, free)
-        mode = blanks + (blanks and free and len(columns) > 1)  # an empty line is no row
-        match = partial(_match, table_kernels.match_cells, mode)
-        return read_rows(data, at, n_columns, cells, match, _padded(data, at, cells), DENSE)
+        empty = FREE if free and len(columns) > 1 else BLANKS  # an empty line is no row
+        mode = empty if blanks else FULL
+        return read_rows(data, at, n_columns, cells, mode, _padded(data, at, cells), DENSE)
 
     rows = attempt(True)
     if not rows.n_rows:
@@ -182,10 +180,6 @@ def _padded(data: bytes, at: int, cells: RowCells) -> dict[int, int]:
         if any(n for n, _ in seen) and all(n == max(0, width - size) for n, size in seen):
             widths[column] = width
     return {column: width for column, width in widths.items() if 1 < width <= MAX_WIDTH}
-
-
-def _match(match: object, blanks: int, *arguments: object) -> tuple[int, int]:
-    return match(*arguments, blanks)  # type: ignore[operator,no-any-return]
 
 
 def _words(data: bytes, rows: Rows, blank: Bools) -> Counter[bytes]:
