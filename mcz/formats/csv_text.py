@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from mcz.formats.limits import MOST_CHANNELS, check
 from mcz.formats.text_source import BOM
 
 SEPARATORS: tuple[bytes | None, ...] = (b",", b";", b"\t", None)  # None: blanks
 NOT_THERE = (b"", b"NA", b"N/A", b"null", b"NULL", b"None")  # what programs write for no number
+MOST_CELLS = MOST_CHANNELS
 LOOKED_AT = 64  # lines in which rows of numbers have to begin
+
+_LONG = 2 * MOST_CELLS  # bytes of a line; fewer hold no more cells
 
 _NUMBER = re.compile(
     rb"(?i)[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?|nan|inf(?:inity)?"
@@ -20,8 +24,10 @@ _COMMA = re.compile(rb"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
 
 
 def cells_of(line: bytes, separator: bytes | None) -> list[bytes]:
-    """The cells of a line, without blanks and quotes around them."""
+    """The cells of a line, without blanks and quotes around them; SourceError for too many."""
     line = line.removeprefix(BOM).rstrip(b"\r\n")
+    n = len(line) // 2 if separator is None else line.count(separator)
+    check("cells in a line", n, MOST_CELLS)
     if separator is None:
         return line.split()
     if b'"' not in line:
@@ -58,6 +64,7 @@ def first_row(
         found = [
             (len(cells), separator)
             for separator in SEPARATORS
+            if len(line) < _LONG or (separator is not None and line.count(separator) < MOST_CELLS)
             if is_row(cells := cells_of(line, separator))
         ]
         if not found:
@@ -72,10 +79,13 @@ def first_row(
 
 def is_row(cells: Sequence[bytes]) -> bool:
     """Whether cells are numbers, at least one, and what stands for none."""
-    numbers = [_NUMBER.fullmatch(cell) is not None for cell in cells]
-    return any(numbers) and all(
-        known or cell in NOT_THERE for known, cell in zip(numbers, cells, strict=True)
-    )
+    found = False
+    for cell in cells:
+        if _NUMBER.fullmatch(cell):
+            found = True
+        elif cell not in NOT_THERE:
+            return False
+    return found
 
 
 def has_decimal_commas(lines: Sequence[tuple[int, bytes]]) -> bool:

@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,26 +75,31 @@ class RowCells:
         if not (self.free or begins_with_number(line)):
             raise SourceError(f"line {line_of(self.data, at)}: not a row of numbers: {line[:40]!r}")
         tokens: list[Token] = []
-        for number, (start, stop) in enumerate(self._cells(at, line)):
-            if number >= len(self.columns):
-                if start < stop:
-                    raise SourceError(
-                        f"line {line_of(self.data, at)}: more than {len(self.columns)} cells"
-                    )
-                continue
-            tokens += self._cell(start, stop, self.columns[number])
+        for (start, stop), columns in zip(self._cells(at, line), self.columns, strict=False):
+            tokens += self._cell(start, stop, columns)
         return tokens, end
 
     def _cells(self, at: int, line: bytes) -> list[tuple[int, int]]:
-        """Start and stop of every cell without its blanks; a blank cell at its end."""
+        """Start and stop of every cell without its blanks; a blank cell at its end.
+
+        More than there are columns are blank, or refused before they take memory.
+        """
+        most, first = len(self.columns), at
         if self.separator is None:
-            return [(at + m.start(), at + m.end()) for m in _WORDS.finditer(line)]
-        found = []
-        for cell in line.rstrip(b"\r\n").split(self.separator):
-            bare = cell.strip(_AROUND)
-            start = at + (cell.index(bare) if bare else len(cell))
-            found.append((start, start + len(bare)))
-            at += len(cell) + len(self.separator)
+            words = islice(_WORDS.finditer(line), most + 1)
+            found = [(at + m.start(), at + m.end()) for m in words]
+            rest = line if len(found) > most else b""
+        else:
+            cells = line.rstrip(b"\r\n").split(self.separator, most)
+            rest = cells.pop().strip(_AROUND + self.separator) if len(cells) > most else b""
+            found = []
+            for cell in cells:
+                bare = cell.strip(_AROUND)
+                start = at + (cell.index(bare) if bare else len(cell))
+                found.append((start, start + len(bare)))
+                at += len(cell) + len(self.separator)
+        if rest:
+            raise SourceError(f"line {line_of(self.data, first)}: more than {most} cells")
         return found
 
     def _cell(self, start: int, stop: int, columns: Sequence[int]) -> list[Token]:
@@ -101,12 +107,13 @@ class RowCells:
             return []
         if len(columns) == 1:
             return [(start, stop, columns[0])]
-        parts = self.data[start:stop].split(_PART)
-        if len(parts) != len(columns):
+        n_parts = self.data.count(_PART, start, stop) + 1
+        if n_parts != len(columns):
             raise SourceError(
-                f"line {line_of(self.data, start)}: {len(parts)} numbers in a cell, expected "
+                f"line {line_of(self.data, start)}: {n_parts} numbers in a cell, expected "
                 f"{len(columns)}"
             )
+        parts = self.data[start:stop].split(_PART)
         tokens, at = [], start
         for part, column in zip(parts, columns, strict=True):
             bare = part.strip(_BLANKS)

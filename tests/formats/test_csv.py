@@ -312,5 +312,8 @@ def test_memory_is_bounded_by_the_bytes_of_a_ragged_table() -> None:
         assert tracemalloc.get_traced_memory()[1] < 2**27
     finally:
         tracemalloc.stop()
-    wide = b",".join(b"c%d" % k for k in range(5000)) + b"\n" + (b"," * 4999 + b"1\n") * 200
-    assert back(wide).values.shape == (200, 5000)
+    for long in (b"a,b\n1,2\n" + b"," * 3_000_000 + b"3\n", b"1" + b",2" * 2**21, b"1 " * 2**22):
+        with pytest.raises(SourceError, match="more than|no row of numbers"):
+            FORMATS["csv"].read(long, "table")
+    wide = b",".join(b"c%d" % k for k in range(2000)) + b"\n" + (b"," * 1999 + b"1\n") * 40
+    assert back(wide).values.shape == (40, 2000)
