@@ -13,8 +13,6 @@ NOT_THERE = (b"", b"NA", b"N/A", b"null", b"NULL", b"None")  # what programs wri
 MOST_CELLS = MOST_CHANNELS
 LOOKED_AT = 64  # lines in which rows of numbers have to begin
 
-_LONG = 2 * MOST_CELLS  # bytes of a line; fewer hold no more cells
-
 _NUMBER = re.compile(
     rb"(?i)[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?|nan|inf(?:inity)?"
     rb"|[0-9]\.#[a-z]+[0-9]*)"
@@ -64,17 +62,22 @@ def first_row(
         found = [
             (len(cells), separator)
             for separator in SEPARATORS
-            if len(line) < _LONG or (separator is not None and line.count(separator) < MOST_CELLS)
-            if is_row(cells := cells_of(line, separator))
+            if is_row(cells := _some_cells(line, separator))
         ]
         if not found:
             continue
         n_cells, separator = max(found, key=lambda entry: entry[0])
         first = first or (number, separator, n_cells)
         below = next((line for _, line in lines[number + 1 :] if line.strip()), None)
-        if below is None or is_row(cells_of(below, separator)):
+        if below is None or is_row(_some_cells(below, separator)):
             return number, separator, n_cells
     return first
+
+
+def _some_cells(line: bytes, separator: bytes | None) -> list[bytes]:
+    """The cells of a line, none where these are too many."""
+    n = len(line) // 2 if separator is None else line.count(separator)
+    return cells_of(line, separator) if n < MOST_CELLS else []
 
 
 def is_row(cells: Sequence[bytes]) -> bool:

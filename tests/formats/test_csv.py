@@ -304,12 +304,12 @@ def test_hostile_notes_and_templates_are_refused(noise: bytes) -> None:
 
 def test_memory_is_bounded_by_the_bytes_of_a_ragged_table() -> None:
     """Rows that leave out most of many columns do not take what these would need."""
-    text = b",".join(b"c%d" % k for k in range(60_000)) + b"\n" + b"1,2\n" * 2000
+    text = b",".join(b"c%d" % k for k in range(20_000)) + b"\n" + b"1,2\n" * 500
     tracemalloc.start()
     try:
         with pytest.raises(SourceError, match="would dwarf the file"):
             FORMATS["csv"].read(text, "table")
-        assert tracemalloc.get_traced_memory()[1] < 2**27
+        assert tracemalloc.get_traced_memory()[1] < 2**26
     finally:
         tracemalloc.stop()
     for long in (b"a,b\n1,2\n" + b"," * 3_000_000 + b"3\n", b"1" + b",2" * 2**21, b"1 " * 2**22):
