@@ -152,7 +152,7 @@ def _sections(shelf: Unrestorable) -> None:
         add(f"signals-{name}", purpose, built(odd, details))
     again = built([*sections, sections[-1]], [*details, details[-1]])
     add("signals-twice", "a signal that another has", again, VICON + parts[-1])
-    add("rows", "signals that differ in their rows a frame", _mixed(plain), parts[0] + parts[2])
+    add("rows", "signals that differ in their rows a frame", *_mixed(plain))
     _notes(shelf, plain)
 
 
@@ -194,20 +194,21 @@ def _many(plain: Motion, more: Any) -> Motion:
     return replace(plain, signals=(*plain.signals, *signals), source=source)
 
 
-def _mixed(plain: Motion) -> Motion:
-    """The first section has another's signal behind its own, and prints nothing of it."""
-    assert plain.source is not None
-    fields = parse(TABLE_TEMPLATE, plain.source.template, "template")
-    details = parse(TABLE_DETAIL, plain.source.detail, "detail").details
+def _mixed(plain: Motion) -> tuple[Motion, bytes]:
+    """Signals of other rows a frame in a section, of no frames; and the text of the headers."""
+    signals = tuple(signal.cut(0, 0) for signal in plain.signals)
+    empty = unhashed(replace(plain, signals=signals, frame_numbers=None))
+    assert empty.source is not None
+    fields = parse(TABLE_TEMPLATE, empty.source.template, "template")
     first, other, last = fields.sections
-    sizes = [plain.signals[section.signals[0]].n_channels for section in (first, other)]
-    for run in first.patterns[0].runs:
-        if run.column == sizes[0] + 1:
-            run.column += sizes[1]
+    details = parse(TABLE_DETAIL, empty.source.detail, "detail").details
+    detail = build(TABLE_DETAIL, {"details": [details[0], details[2]]}, "detail")
+
+    def made() -> Motion:
+        template = build(TABLE_TEMPLATE, {"sections": [first, last]}, "template")
+        source = replace(plain.source, template=template, detail=detail, size=0, sha256=b"")
+        return replace(empty, source=source)
+
+    text = restored(made())
     first.signals = [*first.signals, *other.signals]
-    source = replace(
-        plain.source,
-        template=build(TABLE_TEMPLATE, {"sections": [first, last]}, "template"),
-        detail=build(TABLE_DETAIL, {"details": [details[0], details[2]]}, "detail"),
-    )
-    return replace(plain, source=source)
+    return made(), text
