@@ -188,8 +188,10 @@ def _many(plain: Motion, more: Any) -> Motion:
     signals = [replace(plain.signals[2], name=str(k)) for k in range(len(more))]
     usual = {"count": b"", "rows": 0, "gaps": [], "patterns": [], "ends": 0, "ending": b""}
     count = varint(3 + len(more))
-    template = count + b"".join(SECTION.build(s) for s in [*fields.sections, *more])
-    detail = count + b"".join(DETAIL.build(d) for d in [*own.details, *[usual] * len(more)])
+    template = count + b"".join(build(SECTION, s, "section") for s in [*fields.sections, *more])
+    detail = count + b"".join(
+        build(DETAIL, d, "detail") for d in [*own.details, *[usual] * len(more)]
+    )
     source = replace(plain.source, template=template, detail=detail)
     return replace(plain, signals=(*plain.signals, *signals), source=source)
 
