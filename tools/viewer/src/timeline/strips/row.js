@@ -1,6 +1,6 @@
 // What all strips have: a name with the value of a frame, a canvas, keys, and time below the pointer.
 
-import { inNextPicture, make, put } from "../../ui/dom.js";
+import { inNextPicture, make } from "../../ui/dom.js";
 import { sized } from "../../ui/canvas.js";
 import { count, frameNumber } from "../../ui/text.js";
 import { moved, zoomed } from "./window.js";
