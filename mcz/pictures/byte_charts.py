@@ -18,9 +18,9 @@ from mcz.errors import MczError, OptionError
 from mcz.metrics import Comparison, compare
 from mcz.metrics.sums import times
 from mcz.motion import Motion
+from mcz.pictures.chart_pages import Sheet
 from mcz.pictures.charts import Chart, legend, name_ticks, rows_of, styled
 from mcz.pictures.libraries import library
-from mcz.pictures.pages import Sheet
 from mcz.pictures.themes import Theme, rgb
 from mcz.reading.clip import Clip
 from mcz.reading.file import open
