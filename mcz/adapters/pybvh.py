@@ -97,7 +97,9 @@ class _Tree:
 
     def __init__(self, motion: Motion) -> None:
         if not np.isfinite(motion.values).all():
-            raise MotionError(f"motion {motion.name!r}: pybvh has no gaps, and some values are none")
+            raise MotionError(
+                f"motion {motion.name!r}: pybvh has no gaps, and some values are none"
+            )
         skeleton = motion.skeleton
         in_degrees = replace(skeleton, angle_unit="deg")
         if skeleton.angle_unit == "rad" and len(motion.signals) == 1 and is_bvh(in_degrees):
@@ -128,7 +130,9 @@ class _Tree:
         own = [kind for kind in kinds if kind in ROTATION_KINDS]
         rest = [kind for kind in kinds if kind not in (*ROTATION_KINDS, *POSITION_KINDS)]
         if rest or len(set(own)) < len(own):
-            raise MotionError(f"joint {self.names[joint]!r}: pybvh has no channels {' '.join(kinds)}")
+            raise MotionError(
+                f"joint {self.names[joint]!r}: pybvh has no channels {' '.join(kinds)}"
+            )
         found = np.zeros((len(self.values), 3))
         columns = [self.starts[joint] + kinds.index(kind) for kind in own]
         found[:, : len(own)] = self.values[:, columns]
