@@ -160,7 +160,7 @@ class _Tree:
         places = self._places(joint)
         if (places != places[:1]).any():
             raise MotionError(
-                f"joint {self.names[joint]!r} changes its place on its parent, and in pybvh the root "
-                "alone can"
+                f"joint {self.names[joint]!r} changes its place on its parent; in pybvh only the "
+                "root can"
             )
         return places[0] if len(places) else np.array(self.joints[joint].offset)
