@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from mcz.adapters.pybvh import from_pybvh, to_pybvh
     from mcz.adapters.rerun import to_rerun
     from mcz.bags import BagCheck, bag, check_bag
-    from mcz.conversion import Fit, convert, from_positions
+    from mcz.conversion import Fit, convert, from_positions, left_out
     from mcz.conversion.scenes import SceneFile, to_glb, to_usda
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
@@ -111,7 +111,7 @@ _HOMES = {
     "mcz.editing.outcomes": ("Outcome", "Report"),
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
-    "mcz.conversion": ("Fit", "convert", "from_positions"),
+    "mcz.conversion": ("Fit", "convert", "from_positions", "left_out"),
     "mcz.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
     "mcz.editing.protected": ("protect",),
     "mcz.editing.protecting": ("Protection",),
@@ -246,6 +246,7 @@ __all__ = [
     "from_pybvh",
     "in_positions",
     "joint_map",
+    "left_out",
     "live_frames",
     "merge",
     "mirror",

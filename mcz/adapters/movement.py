@@ -126,8 +126,7 @@ def _confidence(motion: Motion, places: Floats) -> Floats:
     for signal in motion.signals[1:]:
         if signal.name == CONFIDENCE and signal.n_channels == places.shape[1] * places.shape[2]:
             return signal.masked()
-    unknown: NDArray[np.bool_] = np.isnan(places).any(axis=3)
-    return (~unknown).astype(np.float64)
+    return np.asarray(np.isfinite(places).all(axis=3), np.float64)
 
 
 def _ordered(array: Any, dims: tuple[str, ...]) -> Any:
