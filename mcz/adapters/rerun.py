@@ -51,6 +51,24 @@ def to_rerun(moving: Moving, recording: Any = None, *, entity: str | None = None
     return recording
 
 
+def view_of(moving: Moving, entity: str) -> Any:
+    """How the viewer of rerun is to show what ``to_rerun`` logs: a figure, and curves beside it.
+
+    Residuals are there, and not shown: there are as many as points.
+    """
+    blueprint = imported("rerun.blueprint", "rerun")
+    log = _Log(imported("rerun", "rerun"), None, moving, entity)
+    origin = str(log.path())
+    figure = [blueprint.Spatial3DView(origin=origin, name=entity)] if log.figure else []
+    curves = [
+        blueprint.TimeSeriesView(origin=str(log.path(signal)), name=f"{entity} {signal}")
+        for signal, _, _, _ in log.series
+        if signal != "residuals"
+    ]
+    beside = [blueprint.Vertical(*curves)] if curves else []
+    return blueprint.Horizontal(*figure, *beside, name=entity)
+
+
 class _Log:
     """One motion on its way into a recording."""
 
@@ -72,7 +90,7 @@ class _Log:
         for start in range(0, self.moving.n_frames, step):
             self._frames(start, min(start + step, self.moving.n_frames))
 
-    def _path(self, *parts: str) -> Any:
+    def path(self, *parts: str) -> Any:
         return self.rerun.new_entity_path([*self.parts, *parts])
 
     def _send(self, path: Any, numbers: Floats, columns: Any) -> None:
@@ -89,21 +107,21 @@ class _Log:
         up = self.moving.skeleton.up_axis
         if up:
             axes = getattr(rerun.ViewCoordinates, f"RIGHT_HAND_{up.upper()}_UP")
-            log(str(self._path()), axes, static=True)
+            log(str(self.path()), axes, static=True)
         if self.figure is not None:
             for name, side in zip(self.figure.names, self.figure.sides, strict=True):
                 about = rerun.Points3D.from_fields(
                     labels=[name], show_labels=self.figure.is_markers, colors=[SIDES[side][1]]
                 )
-                log(str(self._path("points", name)), about, static=True)
+                log(str(self.path("points", name)), about, static=True)
             for side in self.figure.bones:
                 name, color = SIDES[side]
                 about = rerun.LineStrips3D.from_fields(colors=[color])
-                log(str(self._path("bones", name)), about, static=True)
+                log(str(self.path("bones", name)), about, static=True)
         for signal, _, columns, _ in self.series:
             for name, unit, _ in columns:
                 shown = f"{name} [{unit}]" if unit else name
-                log(str(self._path(signal, name)), rerun.SeriesLines(names=[shown]), static=True)
+                log(str(self.path(signal, name)), rerun.SeriesLines(names=[shown]), static=True)
         self._events()
 
     def _events(self) -> None:
@@ -114,7 +132,7 @@ class _Log:
         texts = [" ".join(filter(None, (e.context, e.label))) for e in told.events]
         times = [self.rerun.TimeColumn("time", duration=[event.time for event in told.events])]
         columns = self.rerun.TextLog.columns(text=texts)
-        self.rerun.send_columns(str(self._path("events")), times, columns, recording=self.recording)
+        self.rerun.send_columns(str(self.path("events")), times, columns, recording=self.recording)
 
     def _frames(self, start: int, stop: int) -> None:
         numbers = self.numbers[start:stop]
@@ -126,7 +144,7 @@ class _Log:
             for name, _, column in columns:
                 known = np.isfinite(values[:, column])
                 scalars = self.rerun.Scalars.columns(scalars=values[known, column])
-                self._send(self._path(signal, name), at, scalars.partition(known.astype(np.int64)))
+                self._send(self.path(signal, name), at, scalars.partition(known.astype(np.int64)))
 
     def _places(self, numbers: Floats, nodes: Floats) -> None:
         """Points and bones of some frames; ``nodes`` (n_frames, n_nodes, 3), NaN where unknown."""
@@ -135,15 +153,13 @@ class _Log:
         for name, node in zip(figure.names, figure.points, strict=True):
             known = np.isfinite(nodes[:, node]).all(axis=1)
             points = rerun.Points3D.columns(positions=nodes[known, node].astype(np.float32))
-            self._send(
-                self._path("points", name), numbers, points.partition(known.astype(np.int64))
-            )
+            self._send(self.path("points", name), numbers, points.partition(known.astype(np.int64)))
         for side, bones in figure.bones.items():
             ends = nodes[:, bones]  # (n_frames, n_bones, 2, 3)
             known = np.isfinite(ends).all(axis=(2, 3))
             strips = rerun.LineStrips3D.columns(strips=ends[known].astype(np.float32))
             self._send(
-                self._path("bones", SIDES[side][0]), numbers, strips.partition(known.sum(axis=1))
+                self.path("bones", SIDES[side][0]), numbers, strips.partition(known.sum(axis=1))
             )
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 SUFFIX = ".rrd"
 FACTS = ("rate", "unit", "up")
+MOST_BESIDE, MOST_VIEWS = 4, 64  # clips that are shown beside each other, and one at a time
 SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -95,20 +96,33 @@ def _write(shelf: Shelf, output: str, options: dict[str, Any]) -> tuple[list[dic
 
 def _log(shelf: Shelf, recording: Any, options: dict[str, Any]) -> tuple[list[dict[str, Any]], int]:
     """What was logged, and how many clips could not be."""
-    from mcz.adapters.rerun import to_rerun
+    from mcz.adapters.rerun import to_rerun, view_of
     from mcz.errors import MczError
+    from mcz.tables.labelled import imported
 
-    rows, failed = [], 0
+    rows: list[dict[str, Any]] = []
+    views: list[Any] = []
+    failed = unknown = 0
     several = len(shelf.given()) > 1
     for file, clip in _clips(shelf, options):
         entity = f"{file}/{clip.name}" if several else clip.name
         try:
-            to_rerun(_told(clip, options), recording, entity=entity)
+            moving = _told(clip, options)
+            to_rerun(moving, recording, entity=entity)
+            unknown += not moving.skeleton.up_axis
+            if len(views) < MOST_VIEWS:
+                views.append(view_of(moving, entity))
         except MczError as error:
             shelf.say(f"{file}: {clip.name}: {error}")
             failed += 1
             continue
         rows.append({"file": file, "name": clip.name, "entity": entity, "n_frames": clip.n_frames})
+    if unknown:
+        shelf.say(f"{plural(unknown, 'clip')}: which axis points up is unknown; --up says it")
+    if views:
+        blueprint = imported("rerun.blueprint", "rerun")
+        arranged = blueprint.Grid if len(views) <= MOST_BESIDE else blueprint.Tabs
+        recording.send_blueprint(blueprint.Blueprint(arranged(*views), collapse_panels=True))
     return rows, failed
 
 
