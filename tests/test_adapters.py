@@ -470,6 +470,12 @@ def test_the_viewer_of_rerun_needs_a_screen(
     assert "no screen" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("make", [mcz.from_pybvh, mcz.from_ezc3d, mcz.from_c3d, mcz.from_movement])
+def test_a_path_is_none_of_these(make: Any) -> None:
+    with pytest.raises(mcz.OptionError, match=r"no pybvh|no ezc3d|neither|no poses dataset"):
+        make("walk")
+
+
 def test_a_library_that_is_missing_is_named(
     samples: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:

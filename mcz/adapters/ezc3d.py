@@ -31,6 +31,8 @@ def from_ezc3d(c3d: Any, *, name: str = "motion") -> Motion:
     the source is not, nor events and parameters; the ``source-note`` of the metadata says so.
     Raises OptionError where ezc3d cannot write the file, and SourceError.
     """
+    if not hasattr(c3d, "write"):
+        raise OptionError(f"a {type(c3d).__name__} is no ezc3d.c3d; mcz.read reads files")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "motion.c3d")
         try:
@@ -64,7 +66,7 @@ def to_ezc3d(motion: Motion) -> Any:
             made = ezc3d.c3d(str(path))
         except REFUSED as error:
             raise MotionError(f"motion {motion.name!r}: ezc3d cannot read it: {error}") from error
-    held = _held(made, FORMATS["c3d"].read(data))
+    held = _held(made, FORMATS["c3d"].read(data, motion.name))
     for signal in plain.signals:
         if signal.name in held:
             array, chosen = held[signal.name]
@@ -87,7 +89,9 @@ def _held(c3d: Any, motion: Motion) -> Held:
     is_point = np.array([not point.groups for point in told.points] if told else [], np.bool_)
     places, samples = c3d["data"]["points"][:3].transpose(1, 0, 2), c3d["data"]["analogs"][0]
     if len(places) != len(is_point):
-        raise MotionError(f"ezc3d holds {len(places)} points, and its file has {len(is_point)}")
+        raise MotionError(
+            f"motion {motion.name!r}: ezc3d has {len(places)} points, and the C3D {len(is_point)}"
+        )
     return {
         motion.signals[0].name: (places, is_point),
         OUTPUTS: (places, ~is_point),

@@ -80,7 +80,7 @@ def from_movement(
     ``unit`` and ``up`` say what the dataset does not. Raises OptionError for another layout, and
     for times that are no frames of its rate.
     """
-    if "position" not in dataset:
+    if not hasattr(dataset, "data_vars") or "position" not in dataset:
         raise OptionError("no poses dataset of movement: it has no variable 'position'")
     found = _ordered(dataset["position"], DIMS)
     space = [str(axis) for axis in found["space"].values]

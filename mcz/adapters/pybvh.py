@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.conversion.hierarchy import is_bvh, to_bvh
-from mcz.errors import MotionError
+from mcz.errors import MotionError, OptionError
 from mcz.formats.rates import frame_rate
 from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Channel, Joint, Motion, Signal, Skeleton
 from mcz.reading.source_files import with_facts
@@ -26,6 +26,8 @@ def from_pybvh(bvh: Any, *, unit: str | None = None, up: str | None = None) -> M
     The root's positions replace its offset, as they do in pybvh. ``unit`` ("cm", "m", ...) and
     ``up`` ("x", "y", "z") say what it does not. Raises OptionError for another one.
     """
+    if not hasattr(bvh, "joint_angles"):
+        raise OptionError(f"a {type(bvh).__name__} is no pybvh.Bvh; mcz.read reads files")
     nodes = [node for node in bvh.nodes if not node.is_end_site()]
     ends = [node for node in bvh.nodes if node.is_end_site()]
     numbers = {id(node): number for number, node in enumerate(nodes)}

@@ -319,10 +319,13 @@ def _export(clip: Clip, target: str, part: Part, wanted: Wanted) -> Output:
 
 def _beside(clip: Clip, wanted: Wanted) -> tuple[str, ...]:
     """The signals that a table does not have, and --signal would write."""
-    others = [signal.name for signal in clip.signals[1:]]
-    if wanted.signal is not None or wanted.joints is not None or not others:
+    from mcz.conversion.losses import of_recording
+
+    if wanted.signal is not None or wanted.joints is not None:
         return ()
-    return (f"left out: signal {', '.join(others)} (--signal)",)
+    others = [signal.name for signal in clip.signals[1:]]
+    signals = [f"left out: signal {', '.join(others)} (--signal)"] if others else []
+    return (*signals, *of_recording(clip.recording))
 
 
 def _stem(clip: Clip | Motion) -> str:

@@ -44,6 +44,8 @@ def show_in_rerun(shelf: Shelf, output: str | None, as_json: bool, options: dict
         recording.flush()
         if as_json:
             print_json({"output": None, "clips": rows})
+        else:
+            echo(f"rerun: {plural(len(rows), 'clip')}")
     else:
         rows, failed = _write(shelf, output, options)
         size = Path(output).stat().st_size

@@ -8,7 +8,7 @@ import numpy as np
 
 from mcz.kinematics import point_set
 from mcz.motion import Motion
-from mcz.reading.recording import recording
+from mcz.reading.recording import Recording, recording
 
 MOST_NAMES = 8
 POINTS = ("c3d", "trc")  # what becomes of joints are points
@@ -35,7 +35,7 @@ def _left_out(motion: Motion, to: str) -> Iterator[str]:
     if names and to in (*POINTS, *SCENES) and point_set(motion.skeleton) != "markers":
         more = " ..." if len(names) > MOST_NAMES else ""
         yield f"left out: {', '.join(names[:MOST_NAMES])}{more}, which move nothing"
-    yield from _of_recording(motion)
+    yield from of_recording(recording(motion))
     yield from _numbers(motion, to)
     if to == "amc":
         yield from _acclaim_names(motion)
@@ -52,9 +52,8 @@ def _acclaim_names(motion: Motion) -> Iterator[str]:
         yield f"ASF cannot hold the joint names {shown}: they have _ instead"
 
 
-def _of_recording(motion: Motion) -> Iterator[str]:
+def of_recording(told: Recording | None) -> Iterator[str]:
     """Of a C3D what it says beside its numbers: no other file has it, nor does a plain C3D."""
-    told = recording(motion)
     if told is None:
         return
     counts = ((len(told.events), "event"), (len(told.platforms), "force platform"))
