@@ -81,35 +81,16 @@ ALLOWED = {
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", "pictures", ""} | DOORS,
     "": MODEL
-    | {
-        "adapters",
-        "bags",
-        "kinematics",
-        "metrics",
-        "pictures",
-        "poses",
-        "datasets",
-        "retargeting",
-        "tables",
-    }
+    | {"bags", "kinematics", "metrics", "pictures", "poses", "datasets", "retargeting", "tables"}
+    | {"adapters"}
     | {"version", "viewing"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
 
 BANNED_CONSTRUCTS = {"GreedyRange", "Enum", "Flag", "Padding", "VarInt", "Compressed"}
-HEAVY = {
-    "rerun",
-    "xarray",
-    "llvmlite",
-    "rich",
-    "fsspec",
-    "pywt",
-    "scipy",
-    "matplotlib",
-    "PIL",
-    "av",
-}
+HEAVY = {"llvmlite", "rich", "fsspec", "pywt", "scipy", "matplotlib", "PIL", "av"}
+HEAVY |= {"xarray", "rerun"}
 
 
 def name_of(path: Path) -> str:
