@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING, Any
 from mcz import version as _version
 
 if TYPE_CHECKING:
+    from mcz.adapters.c3d import from_c3d, to_c3d
+    from mcz.adapters.ezc3d import from_ezc3d, to_ezc3d
+    from mcz.adapters.movement import from_movement, to_movement
+    from mcz.adapters.pybvh import from_pybvh, to_pybvh
+    from mcz.adapters.rerun import to_rerun
     from mcz.bags import BagCheck, bag, check_bag
-    from mcz.conversion import Fit, convert, from_positions
+    from mcz.conversion import Fit, convert, from_positions, left_out
     from mcz.conversion.scenes import SceneFile, to_glb, to_usda
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
@@ -88,6 +93,11 @@ if TYPE_CHECKING:
 __version__ = _version.VERSION
 
 _HOMES = {
+    "mcz.adapters.c3d": ("from_c3d", "to_c3d"),
+    "mcz.adapters.ezc3d": ("from_ezc3d", "to_ezc3d"),
+    "mcz.adapters.movement": ("from_movement", "to_movement"),
+    "mcz.adapters.pybvh": ("from_pybvh", "to_pybvh"),
+    "mcz.adapters.rerun": ("to_rerun",),
     "mcz.bags": ("BagCheck", "bag", "check_bag"),
     "mcz.editing.describing": ("set_metadata", "set_rate"),
     "mcz.editing.exporting": ("export",),
@@ -101,7 +111,7 @@ _HOMES = {
     "mcz.editing.outcomes": ("Outcome", "Report"),
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
-    "mcz.conversion": ("Fit", "convert", "from_positions"),
+    "mcz.conversion": ("Fit", "convert", "from_positions", "left_out"),
     "mcz.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
     "mcz.editing.protected": ("protect",),
     "mcz.editing.protecting": ("Protection",),
@@ -229,9 +239,14 @@ __all__ = [
     "encode",
     "export",
     "extract",
+    "from_c3d",
+    "from_ezc3d",
+    "from_movement",
     "from_positions",
+    "from_pybvh",
     "in_positions",
     "joint_map",
+    "left_out",
     "live_frames",
     "merge",
     "mirror",
@@ -262,9 +277,14 @@ __all__ = [
     "split",
     "stream_decode",
     "stream_encode",
+    "to_c3d",
+    "to_ezc3d",
     "to_glb",
+    "to_movement",
     "to_npz",
     "to_pandas",
+    "to_pybvh",
+    "to_rerun",
     "to_usda",
     "to_xarray",
     "unpack",

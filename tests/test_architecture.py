@@ -59,6 +59,9 @@ ALLOWED = {
     "bags": GROUND | {"reading"},
     "datasets": JOINT | {"poses", "reading"},
     "writing": JOINT | {"metrics", "reading", "tables"},
+    # What other libraries hold: with the names, tables and drawings that the public has.
+    "adapters": MODEL
+    | {"conversion", "formats", "kinematics", "pictures", "poses", "reading", "tables", "units"},
     "conversion": MODEL | {"kinematics", "formats", "poses", "reading", "retargeting", "version"},
     "retargeting": MODEL | {"kinematics"},
     "editing": JOINT
@@ -71,6 +74,7 @@ ALLOWED = {
     | {"angles", "joint_errors", "metrics", "poses", "reading", "retargeting", "writing"},
     "training": MODEL | {"kinematics", "transforms", "codecs"},
     "cli": MODEL
+    | {"adapters"}
     | {"units", "kinematics", "metrics", "joint_errors", "queries", "sample", "tables", "training"}
     | {"bags", "jobs", "dask", "pictures", "poses", "viewing"}
     | DOORS,
@@ -78,6 +82,7 @@ ALLOWED = {
     "bench": JOINT | {"angles", "bjontegaard", "metrics", "pictures", ""} | DOORS,
     "": MODEL
     | {"bags", "kinematics", "metrics", "pictures", "poses", "datasets", "retargeting", "tables"}
+    | {"adapters"}
     | {"version", "viewing"}
     | DOORS,  # mcz/__init__.py
 }
@@ -85,6 +90,7 @@ COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may u
 
 BANNED_CONSTRUCTS = {"GreedyRange", "Enum", "Flag", "Padding", "VarInt", "Compressed"}
 HEAVY = {"llvmlite", "rich", "fsspec", "pywt", "scipy", "matplotlib", "PIL", "av"}
+HEAVY |= {"xarray", "rerun"}
 
 
 def name_of(path: Path) -> str:

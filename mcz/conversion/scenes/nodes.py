@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.conversion.hierarchy import loose_tails, moves, stretches
+from mcz.conversion.losses import left_out
 from mcz.errors import MotionError
 from mcz.kinematics import point_set
 from mcz.kinematics.chain import Chain, Floats, times
@@ -138,13 +139,7 @@ def _notes(motion: Motion) -> Iterator[str]:
         yield "its length unit is unknown: a unit became a meter"
     if not skeleton.up_axis:
         yield "the axis that points up is unknown: taken for y"
-    plain = [channel.label for channel in skeleton.channels if not channel.kind]
-    if plain:
-        more = " ..." if len(plain) > 8 else ""
-        yield f"left out: {', '.join(plain[:8])}{more}, which move nothing"
-    others = [signal.name for signal in motion.signals[1:]]
-    if others:
-        yield f"left out: signal {', '.join(others)}"
+    yield from left_out(motion, "glb")
 
 
 def _markers(motion: Motion, scale: float) -> Iterator[Node]:
