@@ -1,10 +1,10 @@
-"""What schemas are made of, and how each is read.
+"""What schemas are made of, and how each is read and written.
 
-A field is read from a ``Source``, the bytes of one structure. It is given the fields that its
-structure has so far, which conditions and checks may look at. What it refuses is a FormatError, a
-TruncatedError where the bytes end too early, whose ``args`` are the places on the way to it, the
-outermost first, and the message. ``parse`` makes one line of them. SPEC.md, "Conventions", is
-normative.
+A field is read from a ``Source``, the bytes of one structure, and written behind the bytes so far.
+Conditions and checks may look at the other fields of its structure; where it is read, at those
+before it. What it refuses is a FormatError, a TruncatedError where the bytes end too early, whose
+``args`` are the places on the way to it, the outermost first, and the message: ``doors`` makes one
+line of them. SPEC.md, "Conventions", is normative.
 """
 
 from __future__ import annotations
@@ -14,80 +14,14 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mcz.errors import FormatError, LimitError, MczError, TruncatedError
-from mcz.schema.varints import MAX_COUNT, read_varint
-
-
-class Fields(dict[str, Any]):
-    """The fields of a structure by name, which are attributes, too."""
-
-    __slots__ = ()
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(name) from None
-
+from mcz.errors import FormatError, MczError
+from mcz.schema.source import Fields, Source
+from mcz.schema.varints import MAX_COUNT, varint
 
 Condition = Callable[[Fields], Any]
 Check = Callable[[Any, Fields], bool]
-
-
-class Source:
-    """The bytes of a structure, ``at`` the next one.
-
-    ``left``: how many items of some kinds there may still be, see ``counted``.
-    """
-
-    __slots__ = ("at", "data", "left")
-
-    def __init__(self, data: bytes, left: dict[str, int]) -> None:
-        self.data, self.at, self.left = data, 0, left
-
-    def take(self, size: int) -> bytes:
-        """The next ``size`` bytes."""
-        stop = self.at + size
-        if stop > len(self.data):  # CONV-13
-            raise TruncatedError(f"{len(self.data) - self.at} of {size} bytes left")
-        taken = self.data[self.at : stop]
-        self.at = stop
-        return taken
-
-    def varint(self) -> int:
-        value, self.at = read_varint(self.data, self.at)
-        return value
-
-    def take_items(self, kind: str, count: int) -> None:
-        """Take ``count`` off what is left of a kind, before any of these items is read."""
-        take_items(self.left, kind, count)
-
-
-def take_items(left: dict[str, int], kind: str, count: int) -> None:
-    if count > left.get(kind, count):
-        raise LimitError(f"{kind}: {count} are over the limit, which leaves {left[kind]}")
-    if kind in left:
-        left[kind] -= count
-
-
-def parse(
-    schema: Struct, data: bytes, where: str, limits: Mapping[str, int] | None = None
-) -> Fields:
-    """The fields of ``data``, all of which ``schema`` must consume.
-
-    ``limits`` says how many items of some kinds, see ``counted``, there may be in all. Raises
-    TruncatedError, LimitError or FormatError; ``where`` opens the message.
-    """
-    source = Source(bytes(data), dict(limits or {}))
-    try:
-        fields = schema.read(source, Fields())
-        if source.at < len(source.data):  # CONV-12
-            raise FormatError(f"{len(source.data) - source.at} bytes behind its end")
-    except MczError as error:
-        *places, message = error.args
-        error.args = (": ".join(filter(None, (where, ".".join(places), message))),)
-        raise
-    return fields
+# What a value raises that is none of a field: of another type, too large, not there.
+NO_VALUE = (TypeError, ValueError, LookupError, ArithmeticError, AttributeError, struct.error)
 
 
 class Field:
@@ -95,6 +29,13 @@ class Field:
 
     def read(self, source: Source, fields: Fields) -> Any:
         """Take the next value from ``source``; ``fields`` are those before it."""
+        raise NotImplementedError
+
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        """Add the bytes of ``value`` to ``out``; ``fields`` are those of its structure.
+
+        Raises FormatError, or one of ``NO_VALUE``.
+        """
         raise NotImplementedError
 
     def __rtruediv__(self, name: str) -> Named:
@@ -128,9 +69,20 @@ class Struct(Field):
             try:
                 found[field.name] = field.item.read(source, found)
             except MczError as error:
-                error.args = (field.name, *error.args)
+                _place(error, field.name)
                 raise
         return found
+
+    def write(self, value: Mapping[str, Any], out: bytearray, fields: Fields) -> None:
+        given = Fields(value)
+        for field in self.fields:
+            try:
+                field.item.write(given[field.name], out, given)
+            except MczError as error:
+                _place(error, field.name)
+                raise
+            except NO_VALUE as error:
+                raise FormatError(field.name, f"{type(error).__name__}: {error}") from None
 
 
 class Number(Field):
@@ -143,12 +95,18 @@ class Number(Field):
         number: int | float = self.format.unpack(source.take(self.format.size))[0]
         return number
 
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        out += self.format.pack(value)
+
 
 class Varint(Field):
     """Unsigned, up to ``MAX_COUNT``: 7 bits a byte, least significant first, shortest form."""
 
     def read(self, source: Source, fields: Fields) -> int:
         return source.varint()
+
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        out += varint(value)
 
 
 class Bytes(Field):
@@ -160,12 +118,21 @@ class Bytes(Field):
     def read(self, source: Source, fields: Fields) -> bytes:
         return source.take(self.size)
 
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        if len(value) != self.size:
+            raise FormatError(f"{len(value)} bytes instead of {self.size}")
+        out += memoryview(value)
+
 
 class Sized(Field):
     """A varint length, then that many bytes."""
 
     def read(self, source: Source, fields: Fields) -> bytes:
         return source.take(source.varint())
+
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        out += varint(len(value))
+        out += memoryview(value)
 
 
 class Rest(Field):
@@ -174,12 +141,18 @@ class Rest(Field):
     def read(self, source: Source, fields: Fields) -> bytes:
         return source.take(len(source.data) - source.at)
 
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        out += memoryview(value)
+
 
 class Nothing(Field):
     """No bytes, and the value None."""
 
     def read(self, source: Source, fields: Fields) -> None:
         return None
+
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        pass
 
 
 class Array(Field):
@@ -189,7 +162,12 @@ class Array(Field):
         self.item, self.count = item, count
 
     def read(self, source: Source, fields: Fields) -> list[Any]:
-        return _items(self.item, self.count, source, fields)
+        return _read_items(self.item, self.count, source, fields)
+
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        if len(value) != self.count:
+            raise FormatError(f"{len(value)} instead of {self.count}")
+        _write_items(self.item, value, out, fields)
 
 
 class Counted(Field):
@@ -200,22 +178,39 @@ class Counted(Field):
 
     def read(self, source: Source, fields: Fields) -> list[Any]:
         count = source.varint()
-        if count > self.most:
-            raise FormatError(f"{count} are more than {self.most}")
+        self._check(count)
         if self.kind:
             source.take_items(self.kind, count)
-        return _items(self.item, count, source, fields)
+        return _read_items(self.item, count, source, fields)
+
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        self._check(len(value))
+        out += varint(len(value))
+        _write_items(self.item, value, out, fields)
+
+    def _check(self, count: int) -> None:
+        if count > self.most:
+            raise FormatError(f"{count} are more than {self.most}")
 
 
-def _items(item: Field, count: int, source: Source, fields: Fields) -> list[Any]:
+def _read_items(item: Field, count: int, source: Source, fields: Fields) -> list[Any]:
     found: list[Any] = []
     for place in range(count):
         try:
             found.append(item.read(source, fields))
         except MczError as error:
-            error.args = (str(place), *error.args)
+            _place(error, place)
             raise
     return found
+
+
+def _write_items(item: Field, values: Any, out: bytearray, fields: Fields) -> None:
+    for place, value in enumerate(values):
+        try:
+            item.write(value, out, fields)
+        except MczError as error:
+            _place(error, place)
+            raise
 
 
 def counted(item: Field, most: int = MAX_COUNT, kind: str = "") -> Counted:
@@ -240,6 +235,9 @@ class IfThenElse(Field):
     def read(self, source: Source, fields: Fields) -> Any:
         return (self.item if self.condition(fields) else self.other).read(source, fields)
 
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        (self.item if self.condition(fields) else self.other).write(value, out, fields)
+
 
 class ExprValidator(Field):
     """A field whose value must pass ``check``, which sees the fields before it, too."""
@@ -249,9 +247,16 @@ class ExprValidator(Field):
 
     def read(self, source: Source, fields: Fields) -> Any:
         value = self.item.read(source, fields)
+        self._check(value, fields)
+        return value
+
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        self._check(value, fields)
+        self.item.write(value, out, fields)
+
+    def _check(self, value: Any, fields: Fields) -> None:
         if not self.check(value, fields):
             raise FormatError(f"{value!r} is not allowed")
-        return value
 
 
 class OneOf(ExprValidator):
@@ -273,30 +278,13 @@ class Adapter(Field):
     def read(self, source: Source, fields: Fields) -> Any:
         return self.decode(self.item.read(source, fields))
 
-
-class Term:
-    """What ``this.name`` is: a condition that looks at the field ``name``."""
-
-    def __init__(self, of: Condition) -> None:
-        self.of = of
-
-    def __call__(self, fields: Fields) -> Any:
-        return self.of(fields)
-
-    def __and__(self, bits: int) -> Term:
-        return Term(lambda fields: self.of(fields) & bits)
-
-    def __eq__(self, value: object) -> Term:  # type: ignore[override]
-        return Term(lambda fields: self.of(fields) == value)
-
-    __hash__ = object.__hash__
+    def write(self, value: Any, out: bytearray, fields: Fields) -> None:
+        self.item.write(self.encode(value), out, fields)
 
 
-class This:
-    """The structure whose fields a condition looks at: ``this.flags & 1``, ``this.kind == 3``."""
-
-    def __getattr__(self, name: str) -> Term:
-        return Term(lambda fields: fields[name])
+def _place(error: MczError, place: str | int) -> None:
+    """Note that the field at fault is within that at ``place``."""
+    error.args = (str(place), *error.args)
 
 
 def _text(data: bytes) -> str:
@@ -306,7 +294,6 @@ def _text(data: bytes) -> str:
         raise FormatError(f"not UTF-8: {error}") from None
 
 
-this = This()
 Pass = Nothing()
 GreedyBytes = Rest()
 Int8ul, Float32l, Float64l = Number("<B"), Number("<f"), Number("<d")

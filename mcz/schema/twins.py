@@ -1,39 +1,26 @@
-"""Schemas in construct's classes, by which structures are built: the only doorway to construct.
+"""Schemas in the classes of construct, the library: the only module that imports it.
 
-``twin`` makes of a field of ours the same one of construct's, each once, so that tests and tools
-have an independent reader of every schema. ``build`` turns every foreign exception into one of
-ours and keeps the path of the field at fault.
+``twin`` makes of a field of ours the same one of construct's, each once::
+
+    from mcz.container.payloads import HEAD
+    twin(HEAD).parse(payload).major
+
+Nothing of the package uses it. It gives tests and tools an independent reader and writer of every
+schema, and everybody who works with construct its own schemas of the format.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import cache
 from itertools import chain
 from typing import Any
 
 import construct
-from construct import ConstructError, stream_read, stream_write
+from construct import stream_read, stream_write
 
-from mcz.errors import FormatError, MczError
 from mcz.schema import fields as own
+from mcz.schema.source import take_items
 from mcz.schema.varints import take_varint, varint
-
-
-def build(schema: own.Struct, fields: Mapping[str, Any], where: str) -> bytes:
-    """The bytes of ``fields``; raises FormatError where ``schema`` does not admit them."""
-    try:
-        return bytes(twin(schema).build(dict(fields)))
-    except MczError as error:
-        error.args = (f"{where}: {error}",)
-        raise
-    except (ConstructError, KeyError, IndexError, ValueError, TypeError, AttributeError) as error:
-        raise FormatError(f"{where}: {_plain(error)}") from None
-
-
-def _plain(error: Exception) -> str:
-    """construct's message on one line, without its own indentation."""
-    return " ".join(str(error).split()).replace("(building) -> ", "") or type(error).__name__
 
 
 @cache
@@ -105,7 +92,7 @@ def _count(field: own.Counted) -> Any:
         return count
 
     def take(n: int, context: Any) -> bool:
-        own.take_items(context._params.get("left") or {}, field.kind, n)
+        take_items(context._params.get("left") or {}, field.kind, n)
         return True
 
     return construct.ExprValidator(count, take)

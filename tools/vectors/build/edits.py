@@ -13,7 +13,8 @@ from mcz.container import payloads
 from mcz.container.segments import SegmentHeader, StreamCounts, parse_table
 from mcz.numbers import Grid, GridKind
 from mcz.schema import Field, Fields, Struct, build, varint
-from mcz.schema.fields import Counted, Source
+from mcz.schema.fields import Counted
+from mcz.schema.source import Source
 
 BAD_STEPS = {  # that no codec takes, by what their vectors are called
     "0": 0.0,
