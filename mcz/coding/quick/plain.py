@@ -28,6 +28,7 @@ from mcz.coding.quick.kernels import (
     FROM_LAST,
     HIGH,
     KIND,
+    LAST_POWER,
     LEAST,
     LEAST_STATE,
     LENGTH_BITS,
@@ -295,7 +296,7 @@ def _of_rank(rank: int, plan: list[int], powers: list[list[int]]) -> tuple[int, 
     if k > plan[DEPTH]:  # FAST-10
         return None
     mantissa, shift = m + plan[LOW], plan[LEAST] + k - plan[DIGITS]
-    unit = powers[plan[ROW]][abs(shift)]
+    unit = powers[plan[ROW]][min(abs(shift), LAST_POWER)]
     value = mantissa * unit if shift >= 0 else (mantissa + unit // 2) // unit
     ordinal = plan[FIRST] + magnitude << plan[DROP]  # FAST-09
     return (value, ordinal) if rank >= 0 else (-value, ~ordinal)
