@@ -21,12 +21,16 @@ ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 POSITION_KINDS = ("tx", "ty", "tz")
 ROTATION_KINDS = ("rx", "ry", "rz")
+QUATERNION_KINDS = ("qw", "qx", "qy", "qz")
+VECTOR_KINDS = ("vx", "vy", "vz")  # of a rotation vector: an axis times an angle
+ANGLE_KINDS = (*ROTATION_KINDS, *VECTOR_KINDS)  # whose numbers are angles
 CHANNEL_KINDS = (
     *POSITION_KINDS,
     *ROTATION_KINDS,
     *("sx", "sy", "sz"),
     "length",
-    *("qw", "qx", "qy", "qz"),
+    *QUATERNION_KINDS,
+    *VECTOR_KINDS,
 )
 
 

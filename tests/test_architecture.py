@@ -52,7 +52,7 @@ ALLOWED = {
     "codecs": MODEL | {"angles", "annexes", "kinematics", "coding", "transforms", "units"},
     "container": MODEL | {"annexes"},
     "recovery": GROUND | {"container"},
-    "formats": MODEL | {"kinematics"},
+    "formats": MODEL | {"annexes", "kinematics"},
     "sample": MODEL | {"formats"},
     "tables": MODEL | {"kinematics", "poses"},
     "reading": JOINT | {"jobs", "recovery", "poses", "queries", "tables"},

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.kinematics.chain import Floats, Link, turned
+from mcz.kinematics.chain import QUATERNION, Floats, Link, turned
 from mcz.kinematics.euler import ORDERS, euler_angles
+from mcz.kinematics.rotation_vectors import continuous, vectors_of_quaternions
 
 STARTS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
 SWEEPS = 12
@@ -17,15 +18,18 @@ def set_turns(link: Link, moment: Floats, columns: Floats, radians: float) -> No
     ``moment`` has shape (3, 3, F) and is along the joint's own axes; ``columns``, (n_channels, F)
     in source units, are written. Where ``moment`` is a rotation, R is the nearest to it.
     """
-    order = "".join("xyzq"[axis] for axis, _ in link.turns)
+    order = link.freedoms
     if order == "q":
-        columns[list(link.quaternion)] = _quaternion(_kabsch(moment))
+        columns[list(link.quaternion)] = quaternions_of(_kabsch(moment))
+    elif order == "v":
+        vectors = continuous(vectors_of_quaternions(quaternions_of(_kabsch(moment))))
+        columns[list(link.vector)] = vectors / radians
     elif order in ORDERS:
         angles = small(euler_angles(_kabsch(moment), order))
         for k, (_, column) in enumerate(link.turns):
             columns[column] = angles[:, k] / radians
     else:
-        turns = [(axis, column) for axis, column in link.turns if axis < 3]
+        turns = [(axis, column) for axis, column in link.turns if axis < QUATERNION]
         angles = _angle_by_angle([axis for axis, _ in turns], moment)
         for (_, column), angle in zip(turns, angles, strict=True):
             columns[column] = angle / radians
@@ -57,7 +61,7 @@ def centered(angles: Floats) -> Floats:
     return result
 
 
-def _quaternion(turns: Floats) -> Floats:
+def quaternions_of(turns: Floats) -> Floats:
     """The quaternions (w, x, y, z), (4, F), of rotation matrices."""
     # The greatest of the four candidates is never small.
     t = turns

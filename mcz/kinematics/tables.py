@@ -12,6 +12,7 @@ def is_elaborate(chain: Chain) -> bool:
     """Whether a joint has channels that do more than turn and move it, or one of them twice."""
     return any(
         link.quaternion
+        or link.vector
         or link.scales
         or link.lengths
         or len({component for component, _ in link.moves}) < len(link.moves)
