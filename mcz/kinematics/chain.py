@@ -73,6 +73,11 @@ class Link:
         return [each for turn in self.turns for each in self.parts(*turn)]
 
     @property
+    def is_whole(self) -> bool:
+        """Whether one of its turns can be any turn by itself."""
+        return bool(self.quaternion or self.vector)
+
+    @property
     def freedoms(self) -> str:
         """The axes of ``turns`` as letters: x y z, q of a quaternion, v of a rotation vector."""
         return "".join("xyzqv"[axis] for axis, _ in self.turns)
