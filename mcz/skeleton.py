@@ -24,6 +24,7 @@ ROTATION_KINDS = ("rx", "ry", "rz")
 QUATERNION_KINDS = ("qw", "qx", "qy", "qz")
 VECTOR_KINDS = ("vx", "vy", "vz")  # of a rotation vector: an axis times an angle
 ANGLE_KINDS = (*ROTATION_KINDS, *VECTOR_KINDS)  # whose numbers are angles
+TURNING_KINDS = (*ROTATION_KINDS, *QUATERNION_KINDS, *VECTOR_KINDS)
 CHANNEL_KINDS = (
     *POSITION_KINDS,
     *ROTATION_KINDS,
