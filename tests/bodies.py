@@ -24,7 +24,7 @@ NO_AXIS = (0.0, 0.0, 0.0)
 
 
 def turned_by(motion: Motion, form: str, dtype: type = np.float64, radians: bool = True) -> Motion:
-    """``motion`` with all turns as ``form``, "rotvec" or "quat", of axes that the world has at rest.
+    """``motion`` with all turns as ``form``, "rotvec" or "quat"; no joint has an ``axis``.
 
     Vectors follow each other; ``dtype`` is what the numbers are rounded to.
     """

@@ -77,8 +77,8 @@ ALLOWED = {
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", "pictures", ""} | DOORS,
     "": MODEL
-    | {"bags", "kinematics", "metrics", "pictures", "poses", "datasets", "retargeting", "tables"}
-    | {"version", "viewing"}
+    | {"bags", "formats", "kinematics", "metrics", "pictures", "poses", "datasets"}
+    | {"retargeting", "tables", "version", "viewing"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
