@@ -199,6 +199,19 @@ class Skeleton:
         raise MotionError(f"no joint {joint!r} among {brief.among(self.addresses(), joint)}")
 
 
+def first_columns(
+    channels: Sequence[Channel], kinds: tuple[str, ...], start: int = 0
+) -> tuple[int, ...]:
+    """The columns of kinds that turn a joint together, () where one of them is missing.
+
+    Of each kind it is the first channel; ``start`` is the column of the joint's first.
+    """
+    own = [channel.kind for channel in channels]
+    if not set(kinds) <= set(own):
+        return ()
+    return tuple(start + own.index(kind) for kind in kinds)
+
+
 Chosen = Sequence[int | str] | int | str
 Joints = Chosen | None  # None: all
 

@@ -35,7 +35,7 @@ PLAIN_FIELDS: dict[str, Any] = {
     "levels": 2,
     "borrowing": 1,
     "start": 0,
-    "refining": 0,
+    "flags": 0,
     "step": 0.03125,
     "radius": 3.0,
     "shell": 8,

@@ -85,7 +85,7 @@ def _headers(shelf: Broken) -> None:
         "borrowing-255": ("Borrowing of 255 levels", "borrowing", b"\xff"),
         "start-2": ("Start table 2", "start", b"\2"),
         "start-255": ("Start table 255", "start", b"\xff"),
-        "refining-2": ("2 for refining", "refining", b"\2"),
+        "refining-2": ("2 for refining", "flags", b"\2"),
         "step-0": ("A step of 0", "step", _binary32(0.0)),
         "step-minus": ("A negative step", "step", _binary32(-1.0)),
         "step-NaN": ("A step that is no number", "step", _binary32(math.nan)),
