@@ -48,7 +48,7 @@ POSEWAVE_HEADER = Struct(
     * "finest levels of details that take the metric of the next coarser one",
     "start" / Int8ul * "start table of the model, 0 or 1",
     "flags"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= REFINING | WHOLE_TURNS)  # PWAVE-08
+    / ExprValidator(Int8ul, lambda n, ctx: n <= 3)  # PWAVE-08
     * "bit 0: rows may have finer steps of their own; 1: whole turns are in the metric",
     "step"
     / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)  # PWAVE-09
