@@ -1,6 +1,6 @@
 """Compiled: joints that turn by a rotation vector or a quaternion, in the pose metric.
 
-SPEC.md, "Pose metric", "Whole turns", is normative. Arrays end in an axis of lanes, as those of
+SPEC.md, "Pose metric", is normative. Arrays end in an axis of lanes, as those of
 ``pose_kernels``, one a frame; ``parts`` (n, width) are the numbers of a turn.
 """
 
