@@ -51,6 +51,8 @@ if TYPE_CHECKING:
         UnsupportedError,
         WorkerError,
     )
+    from mcz.formats.body_models import offsets_from_positions, offsets_of_model
+    from mcz.formats.body_trees import body_skeleton
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
     from mcz.kinematics.rest import rest_positions
@@ -82,6 +84,7 @@ if TYPE_CHECKING:
     from mcz.reading.source_files import read_skeleton
     from mcz.retargeting.joint_maps import joint_map
     from mcz.retargeting.mirroring import mirror
+    from mcz.retargeting.offsets import with_offsets
     from mcz.retargeting.renaming import rename
     from mcz.retargeting.retargeting import retarget
     from mcz.retargeting.selection import select
@@ -162,8 +165,11 @@ _HOMES = {
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
     "mcz.reading.source_files": ("read_skeleton",),
     "mcz.kinematics.rest": ("rest_positions",),
+    "mcz.formats.body_models": ("offsets_from_positions", "offsets_of_model"),
+    "mcz.formats.body_trees": ("body_skeleton",),
     "mcz.retargeting.joint_maps": ("joint_map",),
     "mcz.retargeting.mirroring": ("mirror",),
+    "mcz.retargeting.offsets": ("with_offsets",),
     "mcz.retargeting.renaming": ("rename",),
     "mcz.retargeting.retargeting": ("retarget",),
     "mcz.retargeting.selection": ("select",),
@@ -230,6 +236,7 @@ __all__ = [
     "accelerations",
     "append",
     "bag",
+    "body_skeleton",
     "check_bag",
     "compare",
     "contacts",
@@ -250,6 +257,8 @@ __all__ = [
     "live_frames",
     "merge",
     "mirror",
+    "offsets_from_positions",
+    "offsets_of_model",
     "open",
     "pack",
     "plot",
@@ -291,6 +300,7 @@ __all__ = [
     "velocities",
     "verify",
     "view",
+    "with_offsets",
     "write",
 ]
 

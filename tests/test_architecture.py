@@ -36,8 +36,9 @@ ALLOWED = {
     "skeleton": GROUND | {"source"},
     "motion": GROUND | {"skeleton", "source"},
     "kinematics": MODEL,
-    "angles": MODEL,
-    "metrics": MODEL | {"angles", "joint_errors", "kinematics"},
+    "angles": MODEL | {"whole_turns"},
+    "whole_turns": MODEL,
+    "metrics": MODEL | {"angles", "joint_errors", "kinematics", "whole_turns"},
     "poses": MODEL | {"kinematics", "units"},
     "bjontegaard": GROUND,
     "joint_errors": MODEL | {"kinematics"},
@@ -52,7 +53,7 @@ ALLOWED = {
     "codecs": MODEL | {"angles", "annexes", "kinematics", "coding", "transforms", "units"},
     "container": MODEL | {"annexes"},
     "recovery": GROUND | {"container"},
-    "formats": MODEL | {"kinematics"},
+    "formats": MODEL | {"annexes", "kinematics"},
     "sample": MODEL | {"formats"},
     "tables": MODEL | {"kinematics", "poses"},
     "reading": JOINT | {"jobs", "recovery", "poses", "queries", "tables"},
@@ -81,9 +82,8 @@ ALLOWED = {
     # On top of all: it measures every part by itself.
     "bench": JOINT | {"angles", "bjontegaard", "metrics", "pictures", ""} | DOORS,
     "": MODEL
-    | {"bags", "kinematics", "metrics", "pictures", "poses", "datasets", "retargeting", "tables"}
-    | {"adapters"}
-    | {"version", "viewing"}
+    | {"adapters", "bags", "formats", "kinematics", "metrics", "pictures", "poses", "datasets"}
+    | {"retargeting", "tables", "version", "viewing"}
     | DOORS,  # mcz/__init__.py
 }
 COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it

@@ -267,6 +267,8 @@ class _Coder:
 class _LiveEncoder:
     """One frame a push, each a segment that needs the one before, from time to time a fresh one."""
 
+    version: int | None = None
+
     def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
         chosen = chosen_of(PRESETS, options)
         choice = live_choice(NAME, layout, options["step"], options["basis"])

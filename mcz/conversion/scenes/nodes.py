@@ -21,12 +21,11 @@ from mcz.errors import MotionError
 from mcz.kinematics import point_set
 from mcz.kinematics.chain import Chain, Floats, times
 from mcz.kinematics.frames import frame_poses_of
-from mcz.motion import ROTATION_KINDS, Motion
+from mcz.motion import TURNING_KINDS, Motion
 from mcz.poses.conversions import from_matrices
 from mcz.retargeting.sides import sides_of
 
 CM_PER_M = 100.0
-TURNING = (*ROTATION_KINDS, "qw")
 SAMPLED_FRAMES = 500  # by which the size of a set of markers is judged
 UNSIZED = 1.0  # m, the size of a scene that has none
 
@@ -240,7 +239,7 @@ class _Placed:
 
 def _turns(motion: Motion, values: Floats, index: int) -> Floats | None:
     """How a joint is turned from its parent, x y z w; None where nothing turns it."""
-    if not any(channel.kind in TURNING for channel in motion.skeleton.joints[index].channels):
+    if not any(channel.kind in TURNING_KINDS for channel in motion.skeleton.joints[index].channels):
         return None
     matrices = frame_poses_of(motion.skeleton).local(values, [index])
     if not np.isfinite(matrices).all():
