@@ -8,8 +8,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class Loaded:
 
     motion: mcz.Motion
     numbers: np.ndarray
-    rate: float | None  # of the clip's own frames
+    rate: Fraction | None  # of the clip's own frames
     notes: tuple[str, ...]
 
 
@@ -77,8 +77,7 @@ def _from_clip(clip: mcz.Clip, wanted: Wanted, notes: tuple[str, ...]) -> Loaded
         notes += (f"clip {clip.name!r} has resolutions 0 to {resolution}",)
     motion = clip.motion(frames, resolution, decimate=True)
     step = 2**resolution
-    rate = clip.frame_rate
-    return _stepped(motion, frames[0], step, wanted.step, float(rate) if rate else None, notes)
+    return _stepped(motion, frames[0], step, wanted.step, clip.frame_rate, notes)
 
 
 def _from_source(path: str, wanted: Wanted) -> Loaded:
@@ -87,11 +86,10 @@ def _from_source(path: str, wanted: Wanted) -> Loaded:
         motion = mcz.read(path, skeleton=wanted.skeleton or None)
     notes = tuple(str(w.message) for w in caught if issubclass(w.category, mcz.SkeletonWarning))
     start, stop = _range(motion.n_frames, wanted, motion.name)
-    rate = motion.frame_rate
     if (start, stop) != (0, motion.n_frames):
         signals = tuple(signal.cut(start, stop) for signal in motion.signals)
         motion = replace(motion, signals=signals, frame_numbers=None, source=None)
-    return _stepped(motion, start, 1, wanted.step, float(rate) if rate else None, notes)
+    return _stepped(motion, start, 1, wanted.step, motion.frame_rate, notes)
 
 
 def _range(n_frames: int, wanted: Wanted, name: str) -> tuple[int, int]:
@@ -102,7 +100,12 @@ def _range(n_frames: int, wanted: Wanted, name: str) -> tuple[int, int]:
 
 
 def _stepped(
-    motion: mcz.Motion, first: int, apart: int, step: int, rate: float | None, notes: Any
+    motion: mcz.Motion,
+    first: int,
+    apart: int,
+    step: int,
+    rate: Fraction | None,
+    notes: tuple[str, ...],
 ) -> Loaded:
     """Every ``step``-th frame of ``motion``, whose own are ``apart`` frames of the clip apart."""
     rows = np.arange(0, motion.n_frames, step)

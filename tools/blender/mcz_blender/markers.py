@@ -13,7 +13,7 @@ from .spaces import blender_names
 
 SIZE = 0.008  # of the box around the markers, the radius of one
 HIDDEN = ("hide_viewport", "hide_render")
-MARKER = "mcz_marker"  # property of an empty: the marker's own name
+MARKER, ORDER = "mcz_marker", "mcz_order"  # properties of an empty: its own name, its number
 
 
 def empties_of(
@@ -35,7 +35,7 @@ def empties_of(
     for number, called in enumerate(blender_names(names, "marker")):
         made = _empty(called, top, "SPHERE", collection)
         made.empty_display_size = size
-        made[MARKER] = names[number]
+        made[MARKER], made[ORDER] = names[number], number
         way = places[:, number]
         seen = np.isfinite(way).all(axis=1)
         if len(way):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
-import bpy
 import numpy as np
 
 from mcz.kinematics import point_set
@@ -51,10 +51,10 @@ def put(
         up = settings.up
         notes.append(f"{called}: the axis that points up is unknown: taken for {up}")
     if rate is None:
-        rate = settings.rate
-        notes.append(f"{called}: its frame rate is unknown: taken for {rate:g}")
+        rate = Fraction(settings.rate).limit_denominator(10**6)
+        notes.append(f"{called}: its frame rate is unknown: taken for {float(rate):g}")
     scene, scale = context.scene, unit_cm / CM_PER_M / context.scene.unit_settings.scale_length
-    frames = frames_of(scene, loaded.numbers, rate, settings)
+    frames = frames_of(scene, loaded.numbers, float(rate), settings)
     name = cut(motion.name.rpartition("/")[2], NAME_BYTES) or "motion"
     if point_set(skeleton) == "markers":
         places, names = markers_of(motion, up, scale), skeleton.addresses()
@@ -68,10 +68,10 @@ def put(
     return made, notes
 
 
-def _remember(made: Any, loaded: Loaded, unit_cm: float, up: str, rate: float) -> None:
+def _remember(made: Any, loaded: Loaded, unit_cm: float, up: str, rate: Fraction) -> None:
     """What an export of the object says again."""
-    made[NAME], made[UNIT], made[UP], made[RATE] = loaded.motion.name, unit_cm, up, rate
-    made[METADATA] = {key: value for key, value in loaded.motion.metadata.items()}
+    made[NAME], made[UNIT], made[UP], made[RATE] = loaded.motion.name, unit_cm, up, str(rate)
+    made[METADATA] = dict(loaded.motion.metadata)
 
 
 def frames_of(scene: Any, numbers: np.ndarray, rate: float, settings: Settings) -> np.ndarray:
