@@ -157,9 +157,7 @@ def markers(made: Any, skeleton: mcz.Skeleton) -> np.ndarray:
     return found
 
 
-def exported(
-    made: Any, target: str, options: dict[str, Any], motion: mcz.Motion
-) -> dict[str, Any]:
+def exported(made: Any, target: str, options: dict[str, Any], motion: mcz.Motion) -> dict[str, Any]:
     """Export, read that again: how far its positions are from those of ``motion``."""
     start = time.perf_counter()
     bpy.ops.object.select_all(action="DESELECT")

@@ -31,7 +31,7 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
 
     bl_idname = "export_anim.mcz"
     bl_label = "Export MCZ"
-    bl_options = {"PRESET"}  # noqa: RUF012 - as Blender wants it
+    bl_options = {"PRESET"}
 
     filename_ext = ".mcz"
     filter_glob: StringProperty(default="*.mcz", options={"HIDDEN"})
@@ -44,7 +44,9 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
         name="Greatest Error", min=0.001, default=0.5, description="In cm, of a lossy file"
     )
     angle_decimals: IntProperty(name="Decimals of Degrees", min=0, max=9, default=4)
-    length_decimals: IntProperty(name="Decimals of Lengths", min=0, max=9, default=4)
+    length_decimals: IntProperty(
+        name="Decimals of Lengths", min=-1, max=9, default=-1, description="-1: to a micrometer"
+    )
     unit: EnumProperty(
         name="Unit", items=[(KEEP, "Keep", "As imported, otherwise cm"), *UNITS], default=KEEP
     )

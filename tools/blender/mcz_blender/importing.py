@@ -42,7 +42,7 @@ class ImportMCZ(bpy.types.Operator, ImportHelper):
 
     bl_idname = "import_anim.mcz"
     bl_label = "Import MCZ"
-    bl_options = {"REGISTER", "UNDO", "PRESET"}  # noqa: RUF012 - as Blender wants it
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     filename_ext = ".mcz"
     filter_glob: StringProperty(default=";".join(f"*{s}" for s in SUFFIXES), options={"HIDDEN"})

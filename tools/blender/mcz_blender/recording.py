@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from .solving import Facts, Part, motion_of_bones, motion_of_markers
 from .spaces import CM_PER_M, UNITS_CM
 
 KEEP = "keep"  # what the import remembered
+MICROMETERS = -1  # as many decimals of a length as say a micrometer
+MICROMETER_CM = 1e-4
 SAME_RATE = 1e-6  # of a rate: Blender keeps it as float32
 
 
@@ -32,7 +35,7 @@ class Terms:
     unit: str = KEEP
     up: str = KEEP
     angle_decimals: int = 4
-    length_decimals: int = 4
+    length_decimals: int = MICROMETERS
 
     @property
     def frames(self) -> range:
@@ -92,7 +95,9 @@ def _facts(scene: Any, thing: Any, terms: Terms) -> Facts:
     kept = Fraction(str(thing.get(RATE, "0")))
     rate = kept if abs(rate - kept) <= SAME_RATE * kept else rate.limit_denominator(10_000)
     unit_cm = float(thing.get(UNIT, 1.0)) if terms.unit == KEEP else UNITS_CM[terms.unit]
-    metadata = thing.get(METADATA)
+    metadata, decimals = thing.get(METADATA), terms.length_decimals
+    if decimals == MICROMETERS:
+        decimals = min(9, max(0, math.ceil(math.log10(unit_cm / MICROMETER_CM) - 1e-9)))
     return Facts(
         terms.name or str(thing.get(NAME, thing.name)),
         rate,
@@ -100,7 +105,7 @@ def _facts(scene: Any, thing: Any, terms: Terms) -> Facts:
         str(thing.get(UP, "z")) if terms.up == KEEP else terms.up,
         scene.unit_settings.scale_length * CM_PER_M / unit_cm,
         terms.angle_decimals,
-        terms.length_decimals,
+        decimals,
         dict(metadata) if metadata else {},
     )
 
