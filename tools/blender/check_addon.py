@@ -46,6 +46,7 @@ def main() -> None:
     report |= compared(made, motion, numbers, options)
     if asked.job == "export":
         report["export"] = exported(made, asked.target, dict(map(option, asked.out)), motion)
+    unregister()
     print(json.dumps(report))
 
 
@@ -64,6 +65,13 @@ def register(folder: str) -> None:
     import mcz_blender
 
     mcz_blender.register()
+
+
+def unregister() -> None:
+    """As Blender disables it; bpy 4.2 crashes at its end where an operator is left."""
+    import mcz_blender
+
+    mcz_blender.unregister()
 
 
 def imported(path: str, **options: Any) -> list[Any]:
@@ -139,11 +147,16 @@ def points(made: Any, skeleton: mcz.Skeleton) -> np.ndarray:
         elif tail == 0 and bone.bone["mcz_end"]:
             place = bone.tail
         else:
-            end = " end" + (f" {tail + 1}" if tail else "")
-            (last,) = (b for b in bone.children if b.name == bone.name + end)
-            place = last.head
+            place = end_of(bone, tail).head
         found.append(matrix @ place)
     return np.array(found)
+
+
+def end_of(bone: Any, tail: int) -> Any:
+    """The bone that begins at a tail of a joint: an end of its own, or that of a child."""
+    name = f"{bone.name} end" + (f" {tail + 1}" if tail else "")
+    ends = [child for child in bone.children if child.name == name]
+    return ends[0] if ends else next(child for child in bone.children if "mcz_joint" in child.bone)
 
 
 def markers(made: Any, skeleton: mcz.Skeleton) -> np.ndarray:
