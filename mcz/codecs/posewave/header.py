@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from construct import ExprValidator, Float32l, Int8ul, Struct
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
@@ -21,7 +20,7 @@ from mcz.codecs.posewave.orders import N_ORDERS, check_orders
 from mcz.codecs.steps import code_of, ratio_of
 from mcz.errors import FormatError
 from mcz.motion import POSITION_KINDS, ROTATION_KINDS
-from mcz.schema import UVARINT, build, counted, parse
+from mcz.schema import UVARINT, ExprValidator, Float32l, Int8ul, Struct, build, counted, parse
 
 Floats = NDArray[np.float64]
 
