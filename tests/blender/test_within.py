@@ -1,6 +1,7 @@
 """The add-on in Blender itself: ``MCZ_BPY`` lists Pythons that have ``bpy``, as in .ci/full.
 
-The zip is unpacked, or installed, and what it bundles is all of MCZ that is there.
+The zip is unpacked, or installed, and what it bundles is all of MCZ that is there. Where
+``MCZ_BPY_WHEELS`` names a folder of wheels, such as llvmlite, the zip bundles them, too.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from tools.blender import build
 
 ROOT = Path(__file__).parents[2]
 BLENDERS = list(filter(None, os.environ.get("MCZ_BPY", "").split(os.pathsep)))
+WHEELS = os.environ.get("MCZ_BPY_WHEELS", "")
 NEAR = 1e-4  # of a skeleton's size
 pytestmark = [
     pytest.mark.long,
@@ -32,7 +34,9 @@ pytestmark = [
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The zip, and beside it what it holds: ``addons/mcz_blender``, its wheels in ``wheels``."""
     folder = tmp_path_factory.mktemp("addon")
-    _, data = build.built({})
+    wheels = Path(WHEELS).glob("*.whl") if WHEELS else ()
+    more = {path.name: path.read_bytes() for path in wheels}
+    _, data = build.built(more, "linux-x64" if more else None)
     (folder / "addon.zip").write_bytes(data)
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         archive.extractall(folder / "addons/mcz_blender")
@@ -64,6 +68,17 @@ def options(**given: Any) -> list[str]:
     return [word for name, value in given.items() for word in ("--option", f"{name}={value}")]
 
 
+def test_with_numpy_alone(python: str, package: Path, samples: Path, tmp_path: Path) -> None:
+    """What Blender has is enough to read and to write, without anything but ``mcz`` bundled."""
+    with zipfile.ZipFile(io.BytesIO(build.mcz_wheel()[1])) as wheel:
+        wheel.extractall(tmp_path / "wheels")
+    (tmp_path / "addons").symlink_to(package / "addons")
+    mcz.encode(samples / "walk.bvh", tmp_path / "walk.mcz")
+    words = "export", tmp_path / "walk.mcz", tmp_path / "out.mcz"
+    found = check(python, tmp_path, *words)
+    assert found["loaded"] == [] and found["export"]["same"] < NEAR
+
+
 @pytest.mark.parametrize("name", ["walk.amc", "walk.bvh", "walk.c3d"])
 def test_samples_there_and_back(
     python: str, package: Path, samples: Path, tmp_path: Path, name: str
@@ -86,6 +101,7 @@ def test_options(python: str, package: Path, samples: Path, given: dict[str, Any
     check(python, package, "import", samples / "walk.bvh", *options(**given))
 
 
+@pytest.mark.skipif(not WHEELS, reason="without llvmlite these take minutes")
 @pytest.mark.parametrize("codec", ["best", "lossy"])
 def test_codecs(python: str, package: Path, samples: Path, tmp_path: Path, codec: str) -> None:
     """A lossy file is as near as was asked for: 0.3 cm of 1 m."""

@@ -2,9 +2,9 @@
 
     python tools/blender/build.py [--wheels DIR] [--platform linux-x64] [--out dist]
 
-It holds the add-on's modules, ``mcz`` itself and construct, which only writing needs, as wheels;
-the latter as it is installed here. ``--wheels`` adds those of a folder, such as llvmlite, whose
-loops are faster; they are of one platform, which ``--platform`` names.
+It holds the add-on's modules, and ``mcz`` as a wheel, which needs nothing but Blender's NumPy.
+``--wheels`` adds those of a folder, such as llvmlite, with which loops are compiled; they are of
+one platform, which ``--platform`` names.
 """
 
 from __future__ import annotations
@@ -16,14 +16,12 @@ import io
 import re
 import zipfile
 from collections.abc import Mapping
-from importlib.metadata import distribution
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 ADDON = Path(__file__).with_name("mcz_blender")
 PLATFORMS = ("linux-x64", "macos-arm64", "macos-x64", "windows-arm64", "windows-x64")
 BEFORE_ALL = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can state
-NO_PART = {"INSTALLER", "RECORD", "REQUESTED", "direct_url.json"}  # notes of an installation
 WHEEL = b"Wheel-Version: 1.0\nGenerator: mcz\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
 
 
@@ -43,7 +41,7 @@ def main() -> None:
 
 def built(more: Mapping[str, bytes], platform: str | None = None) -> tuple[str, bytes]:
     """The name of the zip and its bytes."""
-    wheels = dict([mcz_wheel(), installed_wheel("construct"), *more.items()])
+    wheels = dict([mcz_wheel(), *more.items()])
     files = {path.relative_to(ADDON).as_posix(): path.read_bytes() for path in ADDON.rglob("*.py")}
     manifest = (ADDON / "blender_manifest.toml").read_text("utf-8")
     files["blender_manifest.toml"] = completed(manifest, sorted(wheels), platform).encode()
@@ -79,36 +77,11 @@ def mcz_wheel() -> tuple[str, bytes]:
     files = {path.relative_to(ROOT).as_posix(): path.read_bytes() for path in paths}
     files = {name: data for name, data in files.items() if not name.endswith((".pyc", ".html"))}
     about = f"Metadata-Version: 2.1\nName: mcz\nVersion: {version()}\nLicense: Apache-2.0\n"
-    return wheel("mcz", version(), files, {"METADATA": about.encode()})
-
-
-def installed_wheel(name: str) -> tuple[str, bytes]:
-    """A package of plain Python, as it is installed here."""
-    found = distribution(name)
-    files, notes = {}, {}
-    for path in found.files or ():
-        if path.suffix == ".pyc" or path.name in NO_PART or path.parts[0] == "..":
-            continue
-        data = path.read_binary()
-        if path.parts[0].endswith(".dist-info"):
-            notes["/".join(path.parts[1:])] = data
-        else:
-            files[path.as_posix()] = data
-    return wheel(name, found.version, files, notes)
-
-
-def wheel(
-    name: str, number: str, files: Mapping[str, bytes], notes: Mapping[str, bytes]
-) -> tuple[str, bytes]:
-    """A wheel of plain Python, with ``notes`` in its dist-info: its name and its bytes."""
-    folder = f"{name}-{number}.dist-info"
-    everything = dict(files) | {f"{folder}/{note}": data for note, data in notes.items()}
-    everything[f"{folder}/WHEEL"] = WHEEL
-    rows = [
-        f"{path},sha256={_digest(data)},{len(data)}" for path, data in sorted(everything.items())
-    ]
-    everything[f"{folder}/RECORD"] = "\n".join([*rows, f"{folder}/RECORD,,", ""]).encode()
-    return f"{name}-{number}-py3-none-any.whl", zipped(everything)
+    folder = f"mcz-{version()}.dist-info"
+    files |= {f"{folder}/METADATA": about.encode(), f"{folder}/WHEEL": WHEEL}
+    rows = [f"{name},sha256={_digest(data)},{len(data)}" for name, data in sorted(files.items())]
+    files[f"{folder}/RECORD"] = "\n".join([*rows, f"{folder}/RECORD,,", ""]).encode()
+    return f"mcz-{version()}-py3-none-any.whl", zipped(files)
 
 
 def _digest(data: bytes) -> str:

@@ -6,7 +6,7 @@
 ``import`` compares with ``mcz.positions`` every bone's head, and its tail where a joint's bone ends
 there, on sampled frames, evaluated by the dependency graph. ``export`` imports, exports, imports
 that and compares. The last line printed is JSON: ``distance``, the greatest in units of the
-skeleton's size, where it is, what was compared, and seconds.
+skeleton's size, where it is, what was compared, seconds, and which other packages were loaded.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from mcz.kinematics import point_set
 from mcz.kinematics.points import listed_points
 
 SAMPLED = 60  # frames at most
+OTHERS = {"click", "construct", "fsspec", "llvmlite", "pywt", "scipy"}  # not all Blenders have them
 
 
 def main() -> None:
@@ -47,6 +48,7 @@ def main() -> None:
     if asked.job == "export":
         report["export"] = exported(made, asked.target, dict(map(option, asked.out)), motion)
     unregister()
+    report["loaded"] = sorted(OTHERS & {name.partition(".")[0] for name in sys.modules})
     print(json.dumps(report))
 
 
