@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 import mcz
+from tests.blender.clips import stretching_arm
 from tools.blender import build
 
 ROOT = Path(__file__).parents[2]
@@ -87,6 +88,12 @@ def test_samples_there_and_back(
     assert found["same"] < NEAR and found["again"]["distance"] < NEAR
     assert found["names"] and (found["rate"], found["frames"]) == ("120", 240)
     assert found["up"] == ("z" if name == "walk.c3d" else "y")
+
+
+def test_bones_that_stretch(python: str, package: Path, tmp_path: Path) -> None:
+    mcz.write(stretching_arm(), tmp_path / "arm.mcz")
+    found = check(python, package, "export", tmp_path / "arm.mcz", tmp_path / "out.mcz")["export"]
+    assert found["same"] < NEAR and found["again"]["distance"] < NEAR
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ import mcz
 from mcz.kinematics import origins_of, positions_of
 from mcz.kinematics.points import listed_points
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
+from tests.blender.clips import stretching_arm
 from tests.skeletons import skeletons, values_for
 from tools.blender import build
 from tools.blender.mcz_blender import clips, placing, solving, spaces
@@ -45,10 +46,12 @@ def rest_axes(bones: list[placing.Bone], seed: int) -> list[np.ndarray]:
 
 
 def posed(bones: list[placing.Bone], rests: list[np.ndarray], n_frames: int) -> list[np.ndarray]:
-    """The matrices of bones in every frame, as Blender makes them of keys."""
+    """The matrices of bones in every frame, as Blender makes them of keys, scales left out."""
     found: list[np.ndarray] = []
     for bone, rest in zip(bones, rests, strict=True):
-        turns, shifts = placing.keys_of_bone(bone, rest[:3, :3])
+        scales = bones[bone.parent].scales if bone.parent >= 0 else None
+        above = None if scales is None else (rests[bone.parent][:3, :3], scales)
+        turns, shifts = placing.keys_of_bone(bone, rest[:3, :3], above)
         basis = np.tile(np.eye(4), (n_frames, 1, 1))
         if turns is not None:
             basis[:, :3, :3] = Rotation.from_quat(np.roll(turns, -1, axis=1)).as_matrix()
@@ -56,8 +59,11 @@ def posed(bones: list[placing.Bone], rests: list[np.ndarray], n_frames: int) -> 
             basis[:, :3, 3] = shifts
         if bone.parent < 0:
             found.append(rest @ basis)
-        else:
-            found.append(found[bone.parent] @ np.linalg.inv(rests[bone.parent]) @ rest @ basis)
+            continue
+        local = np.linalg.inv(rests[bone.parent]) @ rest @ basis
+        if scales is not None:
+            local[:, 1, 3] *= scales  # it is inherited by places, and by nothing else
+        found.append(found[bone.parent] @ local)
     return found
 
 
@@ -120,6 +126,15 @@ def test_the_way_back(skeleton: mcz.Skeleton, up: str, seed: int) -> None:
     n_points = sum(1 + len(joint.tails) for joint in again.skeleton.joints)
     n_tails = sum(bone.ends_at >= 0 for bone in bones)
     assert n_points <= len(bones) + n_tails
+
+
+def test_a_bone_that_stretches() -> None:
+    """It is scaled, so that it ends where its tail is, and its child is not."""
+    motion = stretching_arm()
+    arm, *_ = bones = placing.bones_of(motion, "y", 0.01)[1:]
+    lengths = np.linalg.norm(mcz.positions(motion)[:, 1] - mcz.positions(motion)[:, 0], axis=1)
+    assert arm.scales is not None and np.allclose(arm.scales, lengths / 10) and lengths.max() > 12
+    assert all(bone.scales is None for bone in bones[1:])
 
 
 def test_what_does_not_move_has_no_channels() -> None:

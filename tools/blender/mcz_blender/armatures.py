@@ -10,6 +10,7 @@ import numpy as np
 
 from .actions import Curves
 from .placing import Bone, keys_of_bone
+from .spaces import holdable
 
 JOINT, END = "mcz_joint", "mcz_end"  # properties of bones: the joint's own name; of which tail
 
@@ -31,7 +32,7 @@ def armature_of(name: str, bones: list[Bone], joint_names: list[str], collection
     for bone in bones:
         kept = data.bones[bone.name]
         if bone.end < 0:
-            kept[JOINT] = joint_names[bone.joint]
+            kept[JOINT] = holdable(joint_names[bone.joint])
             kept[END] = bone.ends_at >= 0
         else:
             kept[END] = True
@@ -45,6 +46,8 @@ def _edit(data: Any, bones: list[Bone]) -> None:
         edited.head, edited.tail = bone.head, bone.tail
         if bone.parent >= 0:
             edited.parent = made[bone.parent]
+            if bones[bone.parent].scales is not None:
+                edited.inherit_scale = "NONE"
         made.append(edited)
 
 
@@ -54,16 +57,26 @@ def animate(
     """Key the bones at ``frames``; ``step`` is told the share that is done."""
     curves = Curves(name)
     curves.of(made)
+    axes: list[np.ndarray] = []
     for number, bone in enumerate(bones):
         posed = made.pose.bones[bone.name]
         posed.rotation_mode = "QUATERNION"
-        rest = np.array(posed.bone.matrix_local.to_3x3(), np.float64)
-        turns, shifts = keys_of_bone(bone, rest)
-        if turns is None and shifts is None:
-            continue
-        path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"]'
-        group = curves.group(bone.name)
-        for property_, values in (("location", shifts), ("rotation_quaternion", turns)):
-            for index in range(0 if values is None else values.shape[1]):
-                curves.add(f"{path}.{property_}", index, frames, values[:, index], group)
+        axes.append(np.array(posed.bone.matrix_local.to_3x3(), np.float64))
+        parent = bones[bone.parent] if bone.parent >= 0 else None
+        scaled = parent is not None and parent.scales is not None
+        above = (axes[bone.parent], parent.scales) if scaled else None
+        turns, shifts = keys_of_bone(bone, axes[-1], above)
+        keys = {"location": shifts, "rotation_quaternion": turns}
+        if bone.scales is not None:
+            keys["scale"] = np.stack([np.ones(len(frames)), bone.scales, np.ones(len(frames))], 1)
+        _key(curves, bone.name, frames, keys)
         step((number + 1) / len(bones))
+
+
+def _key(curves: Curves, name: str, frames: np.ndarray, keys: dict[str, np.ndarray | None]) -> None:
+    """Curves of a bone's properties, in a group of its name."""
+    group = curves.group(name) if any(v is not None for v in keys.values()) else None
+    path = f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
+    for property_, values in keys.items():
+        for index in range(0 if values is None else values.shape[1]):
+            curves.add(f"{path}.{property_}", index, frames, values[:, index], group)

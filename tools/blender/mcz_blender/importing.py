@@ -144,7 +144,8 @@ def bring(
                 for note in notes:
                     operator.report({"WARNING"}, mcz_line(note))
     except mcz.MczError as error:
-        operator.report({"ERROR"}, mcz_line(str(error)))
+        name, text = Path(path).name, str(error)
+        operator.report({"ERROR"}, mcz_line(text if name in text else f"{name}: {text}"))
         return {"FINISHED"} if made else {"CANCELLED"}
     finally:
         manager.progress_end()

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from .actions import Curves
-from .spaces import blender_names
+from .spaces import blender_names, holdable
 
 SIZE = 0.008  # of the box around the markers, the radius of one
 HIDDEN = ("hide_viewport", "hide_render")
@@ -35,7 +35,7 @@ def empties_of(
     for number, called in enumerate(blender_names(names, "marker")):
         made = _empty(called, top, "SPHERE", collection)
         made.empty_display_size = size
-        made[MARKER], made[ORDER] = names[number], number
+        made[MARKER], made[ORDER] = holdable(names[number]), number
         way = places[:, number]
         seen = np.isfinite(way).all(axis=1)
         if len(way):

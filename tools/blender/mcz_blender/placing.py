@@ -2,7 +2,8 @@
 
 Every joint becomes a bone that begins where the joint is. At rest nothing is turned, so that a
 joint's axes are those of the world, whatever its bone's are; ``keys_of_bone`` goes from the one to
-the other. What stretches (lengths, scales) moves the bones at the other end: none is scaled.
+the other. What stretches (lengths, scales) moves the bones at the other end. The bone itself is
+scaled along its length, which no other bone inherits.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from mcz.retargeting.sides import sides_of
 from .spaces import TO_Z_UP, Floats, blender_names, continuous, to_quaternions
 
 SHORT = 1e-4  # of the figure: bones shorter than this are points
+FARTHEST = 2.0**60  # Blender's numbers are float32, and it squares them
+LEAST_SCALE = 1e-3
 STUB = 0.02  # of the figure, the length of the bone of a point
 UNSIZED = 1.0
 
@@ -42,6 +45,7 @@ class Bone:
     turns: Floats | None
     shifts: Floats | None
     offset: Floats
+    scales: Floats | None = None
 
 
 def size_of(skeleton: mcz.Skeleton) -> float:
@@ -75,6 +79,8 @@ class _Placed:
         self.matrix, self.scale = matrix, float(np.cbrt(np.linalg.det(matrix)))
         self.turn = matrix / self.scale
         self.size = size_of(self.skeleton) * self.scale
+        if not self.size < FARTHEST:
+            raise mcz.MotionError(f"{motion.name!r}: bones of {self.size:g} m are beyond Blender")
         self.chain = Chain(self.skeleton)
         self.links = self.chain.links
         self.tails = [self._loose(index) for index in range(len(self.links))]
@@ -162,12 +168,11 @@ class _Placed:
             tail = head + (self._stub(above) if arm is None else arm)
             turns, shifts = self.turns.get(index), self.shifts.get((index, -1))
             offset = self.offsets[index]
-            bone = Bone(
-                addresses[index], index, -1, parent, head, tail, ends_at, turns, shifts, offset
-            )
+            ends, scales = (ends_at, turns, shifts, offset), self._scales(index, tail - head)
+            bone = Bone(addresses[index], index, -1, parent, head, tail, *ends, scales)
             numbers.append(len(made))
-            ends = [self._end(bone, numbers[index], k) for k in self.tails[index] if k != ends_at]
-            made += [bone, *ends]
+            made.append(bone)
+            made += [self._end(bone, numbers[index], k) for k in self.tails[index] if k != ends_at]
         names = blender_names(bone.name for bone in made)
         return [replace(bone, name=name) for bone, name in zip(made, names, strict=True)]
 
@@ -176,10 +181,10 @@ class _Placed:
     ) -> tuple[int, Floats | None]:
         """Where a bone ends, from its head, and which tail that is; None: it has no length."""
         tails = self.skeleton.joints[index].tails
-        if tails and not self._stretches(index):
+        if tails:
             arm = self.matrix @ np.array(tails[0])
             if self._is_long(arm):
-                return 0, arm
+                return -1 if self._stretches(index) else 0, arm
         arms = {k: self.offsets[k] for k in children if self._is_long(self.offsets[k])}
         middle = [child for child in arms if not sides[child]]
         if len(middle) == 1:
@@ -188,6 +193,22 @@ class _Placed:
             return -1, None
         mean = np.mean(list(arms.values()), axis=0)
         return -1, mean if self._is_long(mean) else next(iter(arms.values()))
+
+    def _scales(self, index: int, arm: Floats) -> Floats | None:
+        """How long the bone is, at rest 1, of a joint that stretches what hangs on it."""
+        if not self._stretches(index):
+            return None
+        children = [(k, -1) for k, link in enumerate(self.links) if link.parent == index]
+        for key in [*((index, tail) for tail in self.tails[index]), *children]:
+            if np.allclose(self._at_rest(*key), arm, 0, SHORT * self.size):
+                length = np.sqrt((self.shifts[key] ** 2).sum(axis=1) / (arm @ arm))
+                return np.maximum(length, LEAST_SCALE)
+        return None
+
+    def _at_rest(self, index: int, tail: int) -> Floats:
+        """From a joint to its tail, or (-1) from its parent to it."""
+        tails = self.skeleton.joints[index].tails
+        return self.offsets[index] if tail < 0 else self.matrix @ np.array(tails[tail])
 
     def _is_long(self, arm: Floats) -> bool:
         return float(arm @ arm) > (SHORT * self.size) ** 2
@@ -209,15 +230,23 @@ class _Placed:
         return Bone(name, bone.joint, tail, number, head, head + stub, -1, None, shifts, place)
 
 
-def keys_of_bone(bone: Bone, rest: Floats) -> tuple[Floats | None, Floats | None]:
+def keys_of_bone(
+    bone: Bone, rest: Floats, above: tuple[Floats, Floats] | None
+) -> tuple[Floats | None, Floats | None]:
     """A bone's rotations (n, 4) and locations (n, 3) along its own axes, None where it has none.
 
-    ``rest`` (3, 3) has as columns the axes of the bone at rest.
+    ``rest`` (3, 3) has as columns the axes of the bone at rest; ``above`` are those of its parent,
+    and the scales of that, None where it has none.
     """
     turns, shifts = bone.turns, bone.shifts
     if turns is not None:
         turns = np.concatenate([turns[:, :1], turns[:, 1:] @ rest], axis=1)
     if shifts is not None:
+        if above is not None:  # the parent's scale moves what hangs on it
+            axes, scales = above
+            along = shifts @ axes
+            along[:, 1] /= scales
+            shifts = along @ axes.T
         shifts = (shifts - bone.offset) @ rest
     return turns, shifts
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -92,10 +93,10 @@ def _frames(context: Any, frames: range, step: Callable[[float], None]) -> Itera
 
 def _facts(scene: Any, thing: Any, terms: Terms) -> Facts:
     rate = Fraction(scene.render.fps) / Fraction(scene.render.fps_base)
-    kept = Fraction(str(thing.get(RATE, "0")))
+    kept = Fraction(str(thing.get(RATE, "1")))
     rate = kept if abs(rate - kept) <= SAME_RATE * kept else rate.limit_denominator(10_000)
     unit_cm = float(thing.get(UNIT, 1.0)) if terms.unit == KEEP else UNITS_CM[terms.unit]
-    metadata, decimals = thing.get(METADATA), terms.length_decimals
+    decimals = terms.length_decimals
     if decimals == MICROMETERS:
         decimals = min(9, max(0, math.ceil(math.log10(unit_cm / MICROMETER_CM) - 1e-9)))
     return Facts(
@@ -106,7 +107,7 @@ def _facts(scene: Any, thing: Any, terms: Terms) -> Facts:
         scene.unit_settings.scale_length * CM_PER_M / unit_cm,
         terms.angle_decimals,
         decimals,
-        dict(metadata) if metadata else {},
+        json.loads(thing.get(METADATA, "{}")),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,7 +16,7 @@ from .armatures import animate, armature_of
 from .clips import Loaded
 from .markers import empties_of
 from .placing import bones_of, markers_of
-from .spaces import CM_PER_M, NAME_BYTES, UNITS_CM, cut
+from .spaces import CM_PER_M, NAME_BYTES, UNITS_CM, cut, holdable
 
 RATE, UNIT, UP = "mcz_rate", "mcz_unit_cm", "mcz_up_axis"  # properties of what was imported
 NAME, METADATA = "mcz_clip", "mcz_metadata"
@@ -70,8 +71,9 @@ def put(
 
 def _remember(made: Any, loaded: Loaded, unit_cm: float, up: str, rate: Fraction) -> None:
     """What an export of the object says again."""
-    made[NAME], made[UNIT], made[UP], made[RATE] = loaded.motion.name, unit_cm, up, str(rate)
-    made[METADATA] = dict(loaded.motion.metadata)
+    made[NAME], made[UNIT], made[UP] = holdable(loaded.motion.name), unit_cm, up
+    made[RATE] = str(rate)
+    made[METADATA] = json.dumps(dict(loaded.motion.metadata))  # keys may be longer than Blender's
 
 
 def frames_of(scene: Any, numbers: np.ndarray, rate: float, settings: Settings) -> np.ndarray:

@@ -71,7 +71,7 @@ def blender_names(names: Iterable[str], fallback: str = "joint") -> list[str]:
     found: list[str] = []
     numbers: dict[str, int] = {}
     for name in names:
-        plain = cut(name.replace("\0", ""), NAME_BYTES) or fallback
+        plain = cut(name, NAME_BYTES) or fallback
         made = plain
         while made in taken:
             numbers[plain] = numbers.get(plain, 0) + 1
@@ -84,4 +84,9 @@ def blender_names(names: Iterable[str], fallback: str = "joint") -> list[str]:
 
 def cut(name: str, n_bytes: int) -> str:
     """As much of a name as fits, whole characters."""
-    return name.encode("utf-8", "replace")[:n_bytes].decode("utf-8", "ignore")
+    return holdable(name).encode()[:n_bytes].decode("utf-8", "ignore")
+
+
+def holdable(text: str) -> str:
+    """A text as Blender's properties take it: valid UTF-8 without zeros."""
+    return text.replace("\0", "").encode("utf-8", "replace").decode()
