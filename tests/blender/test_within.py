@@ -202,6 +202,8 @@ REAL = [
     "other/tiny/noroot.bvh",
     "other/c3d.org/sample_00/Walk1.c3d",
     "cmu/c3d/01_01.c3d",
+    "other/trc/Gait.trc",
+    "other/opensim-core/dataWithBlanksForMissingMarkers.trc",
 ]
 
 
@@ -210,3 +212,11 @@ REAL = [
 def test_real_clips(python: str, package: Path, data: Path, tmp_path: Path, name: str) -> None:
     found = check(python, package, "export", data / name, tmp_path / "out.mcz")["export"]
     assert found["same"] < NEAR and found["again"]["distance"] < NEAR and found["names"]
+
+
+@pytest.mark.real
+def test_a_clip_of_a_real_archive(python: str, package: Path, data: Path, tmp_path: Path) -> None:
+    archive = tmp_path / "runs.mcz"
+    mcz.pack(data / "other/bandai-namco", archive)
+    chosen = options(clip="dataset-2_run_normal_016", step=2)
+    assert check(python, package, "import", archive, *chosen)["loaded"] in ([], ["llvmlite"])
