@@ -214,14 +214,27 @@ def others(path: Path) -> Iterator[str]:
 
 
 def test_one_module_imports_construct() -> None:
-    """The twins of schemas, for ``schema.build``: nothing that reads imports them."""
+    """The twins of schemas, for tests and tools: nothing that reads or writes imports them."""
     assert faults(lambda path: "construct" in set(others(path))).keys() == {"schema.twins"}
-    assert faults(lambda path: "schema.twins" in imports(path)).keys() == {"schema"}
-    tree = tree_of(PACKAGE / "schema" / "__init__.py")
-    build = next(node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
-    assert build.name == "build"
-    assert "twins" in ast.unparse(build)
-    assert ast.unparse(tree).count("import twins") == 1
+    assert not faults(lambda path: "schema.twins" in imports(path))
+
+
+def test_what_is_optional_is_imported_on_use() -> None:
+    """Within functions, so that who reads needs neither; ``tests/bare.py`` reads without them."""
+
+    def at_once(path: Path) -> set[str]:
+        tops = [
+            node for node in tree_of(path).body if isinstance(node, ast.Import | ast.ImportFrom)
+        ]
+        found: set[str] = set()
+        for node in tops:
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module]
+            found |= {str(name).partition(".")[0] for name in names}
+        return found & HEAVY
+
+    assert faults(at_once).keys() == {"jit.machine", "schema.twins"}  # imported on use themselves
+    pywt = faults(lambda path: "pywt" in set(others(path)))
+    assert pywt.keys() == {"transforms.wavelets"}
 
 
 def banned_constructs(path: Path) -> set[str]:

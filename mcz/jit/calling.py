@@ -44,7 +44,8 @@ class Kernel:
         compiled = self._compiled.get(tuple(kinds))
         if compiled is None:
             if not _has_compiler():
-                return self.loop(*arguments)
+                with np.errstate(all="ignore"):  # compiled, numbers wrap and overflow silently
+                    return self.loop(*arguments)
             compiled = self._compile(tuple(kinds), arguments)
         return compiled(flat)
 
