@@ -166,6 +166,28 @@ try:
     bpy.ops.export_anim.mcz(filepath=out, clip_name="three")
 except RuntimeError as error:
     assert "cannot all be 'three'" in str(error), error
+
+# What is drawn: without a window, onto a layout that only remembers.
+from unittest.mock import MagicMock
+from bl_ext.user_default.mcz_blender import exporting, importing, panels
+
+def drawn(thing, **more):
+    layout = MagicMock()
+    thing.draw(MagicMock(layout=layout, **more), bpy.context)
+    calls = layout.prop.call_args_list + layout.box.return_value.prop.call_args_list
+    return {call.args[1] for call in calls}
+
+hidden = {"filename_ext", "filter_glob", "directory", "files"}
+asked = drawn(importing.ImportMCZ)
+assert asked == set(importing.ImportMCZ.__annotations__) - hidden, asked
+asked = drawn(exporting.ExportMCZ, codec="lossy")
+assert asked == set(exporting.ExportMCZ.__annotations__) - hidden, asked
+assert drawn(panels.MCZ_PT_archive) == {"path"}
+panels.MCZ_UL_clips.draw_item(*[MagicMock() for _ in range(9)])
+panels.import_line(MagicMock(), None), panels.export_line(MagicMock(), None)
+one = MagicMock(**{"paths.return_value": [archive]})
+assert [name for name, _ in importing.clips_like(one, None, "walk c3d")] == ["walk.c3d"]
+assert importing.clips_like(MagicMock(**{"paths.return_value": ["no.mcz"]}), None, "") == []
 bpy.ops.preferences.addon_disable(module="bl_ext.user_default.mcz_blender")
 assert not hasattr(bpy.types, "IMPORT_ANIM_OT_mcz")
 print("all well")

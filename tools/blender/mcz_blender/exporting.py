@@ -12,7 +12,7 @@ from bpy_extras.io_utils import ExportHelper
 
 import mcz
 
-from .importing import AXES, UNITS, mcz_line
+from .importing import AXES, UNITS, mcz_line, tell_what_is_slow
 from .recording import KEEP, Terms, recorded, things_of
 
 CODECS = [
@@ -56,6 +56,17 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
     @classmethod
     def poll(cls, context: Any) -> bool:
         return any(thing.type in ("ARMATURE", "EMPTY") for thing in context.selected_objects)
+
+    def draw(self, context: Any) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for name in ("adds", "clip_name", "codec"):
+            layout.prop(self, name)
+        shown = ("max_error_cm",) if self.codec == "lossy" else ()
+        for name in (*shown, "angle_decimals", "length_decimals", "unit", "up", "frames"):
+            layout.prop(self, name)
+        tell_what_is_slow(layout)
 
     def execute(self, context: Any) -> set[str]:
         manager = context.window_manager

@@ -17,6 +17,7 @@ from bpy.props import (
 from bpy_extras.io_utils import ImportHelper
 
 import mcz
+from mcz.jit import lacks_compiler
 
 from .clips import SUFFIXES, Wanted, found, loaded
 from .scenes import Settings, put
@@ -106,6 +107,7 @@ class ImportMCZ(bpy.types.Operator, ImportHelper):
                 box.prop(self, name)
         for name in SETTINGS[3:]:
             layout.prop(self, name)
+        tell_what_is_slow(layout)
 
     def execute(self, context: Any) -> set[str]:
         wanted = Wanted(
@@ -123,6 +125,12 @@ class ImportMCZ(bpy.types.Operator, ImportHelper):
             self.unit, self.up, self.rate, self.start, self.sets_rate, self.sets_range
         )
         return bring(self, context, self.paths(), wanted, settings)
+
+
+def tell_what_is_slow(layout: Any) -> None:
+    """A line where loops are not compiled."""
+    if lacks_compiler():
+        layout.label(text="Without llvmlite all but 'fast' takes long", icon="INFO")
 
 
 def bring(
