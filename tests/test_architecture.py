@@ -223,13 +223,12 @@ def test_what_is_optional_is_imported_on_use() -> None:
     """Within functions, so that who reads needs neither; ``tests/bare.py`` reads without them."""
 
     def at_once(path: Path) -> set[str]:
-        tops = [
-            node for node in tree_of(path).body if isinstance(node, ast.Import | ast.ImportFrom)
-        ]
         found: set[str] = set()
-        for node in tops:
-            names = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module]
-            found |= {str(name).partition(".")[0] for name in names}
+        for node in tree_of(path).body:
+            if isinstance(node, ast.Import):
+                found |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                found.add((node.module or "").partition(".")[0])
         return found & HEAVY
 
     assert faults(at_once).keys() == {"jit.machine", "schema.twins"}  # imported on use themselves

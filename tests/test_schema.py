@@ -257,6 +257,8 @@ def test_fields_are_read() -> None:
     assert build(TREE, full, "tree") == b"\3ab\4\5\2\7\x80\1"
     with pytest.raises(AttributeError, match="root"):
         full.root  # noqa: B018
+    full.label = b"cd"
+    assert build(TREE, full, "tree") == b"\3cd\4\5\2\7\x80\1"
     assert [(field.name, field.docs) for field in TREE.fields][-1] == ("leaves", "at most two")
 
 

@@ -189,7 +189,7 @@ class Counted(Field):
         _write_items(self.item, value, out, fields)
 
     def _check(self, count: int) -> None:
-        if count > self.most:
+        if count > self.most:  # CONV-07
             raise FormatError(f"{count} are more than {self.most}")
 
 
@@ -223,7 +223,7 @@ def counted(item: Field, most: int = MAX_COUNT, kind: str = "") -> Counted:
 
 def optional(item: Field) -> Counted:
     """A count of 0 or 1, then that many items."""
-    return Counted(item, 1, word="optional")  # CONV-07
+    return Counted(item, 1, word="optional")
 
 
 class IfThenElse(Field):

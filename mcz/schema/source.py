@@ -19,6 +19,9 @@ class Fields(dict[str, Any]):
         except KeyError:
             raise AttributeError(name) from None
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        self[name] = value
+
 
 class Source:
     """The bytes of a structure, ``at`` the next one.
