@@ -108,7 +108,7 @@ class _Placed:
         n_frames = len(self.values)
         for index, link in enumerate(self.links):
             if link.turns:
-                self.turns[index] = np.empty((n_frames, 3, 3))
+                self.turns[index] = np.empty((n_frames, 4))
             if link.moves or self._stretches(link.parent):
                 self.shifts[index, -1] = np.empty((n_frames, 3))
             if self._stretches(index):
@@ -116,7 +116,8 @@ class _Placed:
         for rows, columns, pose in self.chain.poses(self.values):
             self._block(rows, columns, pose)
         for index, turns in self.turns.items():
-            self.turns[index] = continuous(to_quaternions(turns))
+            turns[:, 1:] = turns[:, 1:] @ self.turn.T
+            self.turns[index] = continuous(turns)
         for shifts in self.shifts.values():
             shifts[:] = shifts @ self.matrix.T
 
@@ -127,8 +128,7 @@ class _Placed:
             with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
                 axes = self.chain.turned_by(self.links[index], axes, columns, [])
             turned = axes if own is None else times(axes, own.T[:, :, None])
-            turned = times(times(self.turn[:, :, None], turned), self.turn.T[:, :, None])
-            out[rows] = np.moveaxis(turned, 2, 0)
+            out[rows] = to_quaternions(np.moveaxis(turned, 2, 0))
         for (index, tail), out in self.shifts.items():
             arm = pose.arms[index] if tail < 0 else self.links[index].tails[tail][:, None]
             out[rows] = self._along_rest(index, tail, arm, columns).T

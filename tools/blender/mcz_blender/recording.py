@@ -18,7 +18,7 @@ from .armatures import END, JOINT
 from .markers import HIDDEN, MARKER, ORDER
 from .scenes import METADATA, NAME, RATE, UNIT, UP
 from .solving import Facts, Part, motion_of_bones, motion_of_markers
-from .spaces import CM_PER_M, UNITS_CM
+from .spaces import CM_PER_M, TO_Z_UP, UNITS_CM
 
 KEEP = "keep"  # what the import remembered
 MICROMETERS = -1  # as many decimals of a length as say a micrometer
@@ -92,23 +92,26 @@ def _frames(context: Any, frames: range, step: Callable[[float], None]) -> Itera
 
 
 def _facts(scene: Any, thing: Any, terms: Terms) -> Facts:
+    try:
+        kept = Fraction(thing.get(RATE, "1"))
+        unit_cm, up = float(thing.get(UNIT, 1.0)), thing.get(UP, "z")
+        metadata = dict(json.loads(thing.get(METADATA, "{}")))
+        name = terms.name or str(thing.get(NAME, thing.name))
+    except (TypeError, ValueError, ZeroDivisionError):
+        raise mcz.OptionError(
+            f"{thing.name!r}: its properties mcz_... are not as imported"
+        ) from None
+    unit_cm = unit_cm if terms.unit == KEEP else UNITS_CM[terms.unit]
+    up = up if terms.up == KEEP else terms.up
+    if not 0 < unit_cm < math.inf or up not in TO_Z_UP:
+        raise mcz.OptionError(f"{thing.name!r}: a unit of {unit_cm} cm, up is {up!r}")
     rate = Fraction(scene.render.fps) / Fraction(scene.render.fps_base)
-    kept = Fraction(str(thing.get(RATE, "1")))
     rate = kept if abs(rate - kept) <= SAME_RATE * kept else rate.limit_denominator(10_000)
-    unit_cm = float(thing.get(UNIT, 1.0)) if terms.unit == KEEP else UNITS_CM[terms.unit]
+    scale = scene.unit_settings.scale_length * CM_PER_M / unit_cm
     decimals = terms.length_decimals
     if decimals == MICROMETERS:
         decimals = min(9, max(0, math.ceil(math.log10(unit_cm / MICROMETER_CM) - 1e-9)))
-    return Facts(
-        terms.name or str(thing.get(NAME, thing.name)),
-        rate,
-        unit_cm,
-        str(thing.get(UP, "z")) if terms.up == KEEP else terms.up,
-        scene.unit_settings.scale_length * CM_PER_M / unit_cm,
-        terms.angle_decimals,
-        decimals,
-        json.loads(thing.get(METADATA, "{}")),
-    )
+    return Facts(name, rate, unit_cm, up, scale, terms.angle_decimals, decimals, metadata)
 
 
 def _places(markers: list[Any], frames: Iterator[Any], n_frames: int) -> np.ndarray:
