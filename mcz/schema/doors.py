@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mcz.errors import FormatError, MczError
-from mcz.schema.fields import Struct
+from mcz.schema.fields import Field, Struct
 from mcz.schema.source import Fields, Source
 
 
@@ -29,8 +29,11 @@ def parse(
     return fields
 
 
-def build(schema: Struct, fields: Mapping[str, Any], where: str) -> bytes:
-    """The bytes of ``fields``; raises FormatError where ``schema`` does not admit them."""
+def build(schema: Field, fields: Any, where: str) -> bytes:
+    """The bytes of ``fields``; raises FormatError where ``schema`` does not admit them.
+
+    A schema that is no ``Struct`` takes its value in their place.
+    """
     out = bytearray()
     try:
         schema.write(fields, out, Fields())
