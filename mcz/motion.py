@@ -22,10 +22,14 @@ from mcz.numbers import Grid, GridKind, ordinals_of
 from mcz.numbers.blocks import grid_blocks as grid_blocks
 from mcz.numbers.exceptions import Exceptions as Exceptions
 from mcz.numbers.scaling import Scaling
+from mcz.skeleton import ANGLE_KINDS as ANGLE_KINDS
 from mcz.skeleton import CHANNEL_KINDS as CHANNEL_KINDS
 from mcz.skeleton import ORIGIN as ORIGIN
 from mcz.skeleton import POSITION_KINDS as POSITION_KINDS
+from mcz.skeleton import QUATERNION_KINDS as QUATERNION_KINDS
 from mcz.skeleton import ROTATION_KINDS as ROTATION_KINDS
+from mcz.skeleton import TURNING_KINDS as TURNING_KINDS
+from mcz.skeleton import VECTOR_KINDS as VECTOR_KINDS
 from mcz.skeleton import Channel as Channel
 from mcz.skeleton import Joint as Joint
 from mcz.skeleton import Skeleton as Skeleton

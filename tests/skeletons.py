@@ -10,6 +10,7 @@ from mcz.motion import Channel, Joint, Skeleton
 
 KINDS = "tx ty tz rx ry rz sx sy sz length".split()
 QUATERNION = "qw qx qy qz".split()
+VECTOR = "vx vy vz".split()
 COORDINATES = st.floats(-5, 5).map(lambda x: round(x, 3) + 0.0)
 VECTORS = st.tuples(COORDINATES, COORDINATES, COORDINATES)
 
@@ -20,6 +21,9 @@ def joints(draw: st.DrawFn, number: int) -> Joint:
     if draw(st.integers(0, 3)) == 0:
         place = draw(st.integers(0, len(kinds)))
         kinds[place:place] = draw(st.permutations(QUATERNION))
+    if draw(st.integers(0, 3)) == 0:
+        place = draw(st.integers(0, len(kinds)))
+        kinds[place:place] = draw(st.permutations(VECTOR))
     names = [Channel(kind) for kind in kinds]
     if draw(st.booleans()):
         names.insert(draw(st.integers(0, len(names))), Channel("", "smile"))
@@ -51,7 +55,7 @@ def values_for(skeleton: Skeleton, n_frames: int = 7, seed: int = 0) -> np.ndarr
     """Values in a natural range of every kind."""
     random = np.random.default_rng(seed)
     turn = 170.0 if skeleton.angle_unit == "deg" else 3.0
-    spread = {"r": turn, "t": 20.0, "s": 0.4, "l": 0.5, "q": 0.5, "": 1.0}
+    spread = {"r": turn, "v": turn, "t": 20.0, "s": 0.4, "l": 0.5, "q": 0.5, "": 1.0}
     middle = {"s": 1.2, "q": 0.6}
     columns = [
         middle.get(c.kind[:1], 0.0) + spread[c.kind[:1]] * random.uniform(-1, 1, n_frames)
@@ -100,15 +104,21 @@ def _frame(joint: Joint, degrees: bool) -> Rotation:
 
 def _rotation(skeleton: Skeleton, joint: Joint, tracks: list[tuple[str, np.ndarray]]) -> Rotation:
     first = dict(reversed(tracks))
-    whole = all(kind in first for kind in QUATERNION)
-    turn, quaternion_done = Rotation.identity(len(tracks[0][1]) if tracks else 1), False
+    degrees = skeleton.angle_unit == "deg"
+    whole = {kind[0] for kind in first if kind} & {
+        kinds[0][0] for kinds in (QUATERNION, VECTOR) if all(kind in first for kind in kinds)
+    }
+    turn = Rotation.identity(len(tracks[0][1]) if tracks else 1)
     for kind, track in tracks:
         if kind[:1] == "r":
-            degrees = skeleton.angle_unit == "deg"
             step = Rotation.from_euler(kind[1], track[:, None], degrees=degrees)
-        elif kind[:1] == "q" and whole and not quaternion_done:
-            quaternion_done = True
+        elif kind[:1] == "q" and "q" in whole:
+            whole.remove("q")
             step = Rotation.from_quat(np.stack([first[q] for q in ("qx", "qy", "qz", "qw")], 1))
+        elif kind[:1] == "v" and "v" in whole:
+            whole.remove("v")
+            vectors = np.stack([first[kind] for kind in VECTOR], 1)
+            step = Rotation.from_rotvec(vectors, degrees=degrees)
         else:
             continue
         turn = turn * step if skeleton.intrinsic else step * turn

@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from construct import ExprValidator, Struct
-
 from mcz.errors import FormatError, LimitError
 from mcz.formats.layout import (
     BIT,
@@ -25,7 +23,17 @@ from mcz.formats.layout import (
     parsed_patterns,
 )
 from mcz.numbers import GRID, Grid, GridKind
-from mcz.schema import SIZED, SVARINT, UVARINT, build, counted, optional, parse
+from mcz.schema import (
+    SIZED,
+    SVARINT,
+    UVARINT,
+    ExprValidator,
+    Struct,
+    build,
+    counted,
+    optional,
+    parse,
+)
 
 NAME, NEXT, SAME, COUNT = b"\0", b"\1", b"\2", b"\3"  # marks of a header
 PHRASES = {  # and others: what stands in many headers

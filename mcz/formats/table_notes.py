@@ -10,12 +10,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from construct import ExprValidator, Struct
 
 from mcz.errors import FormatError
 from mcz.formats.notes import NUMBER_TEXT, PATTERN_RUN, RowNotes, checked_runs, checked_texts
 from mcz.formats.table_layout import MAX_SECTIONS
-from mcz.schema import UVARINT, build, counted, parse
+from mcz.schema import UVARINT, ExprValidator, Struct, build, counted, parse
 
 _POSITIVE = ExprValidator(UVARINT, lambda obj, ctx: obj >= 1)  # TABLE-09
 

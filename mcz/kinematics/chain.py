@@ -11,17 +11,28 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Joint, Skeleton
+from mcz.kinematics.rotation_vectors import matrices_of_vectors, spins_of_vectors
+from mcz.motion import (
+    ANGLE_KINDS,
+    POSITION_KINDS,
+    QUATERNION_KINDS,
+    ROTATION_KINDS,
+    VECTOR_KINDS,
+    Joint,
+    Skeleton,
+)
+from mcz.skeleton import first_columns
 
 Floats = NDArray[np.float64]
 
-QUATERNION_KINDS = ("qw", "qx", "qy", "qz")
 SCALE_KINDS = ("sx", "sy", "sz")
+QUATERNION, VECTOR = 3, 4  # as an axis of ``Link.turns``
 BLOCK_JOINTS = 2**15  # joints x frames at a time: their origins and axes take 3 MB
 LEAST_FRAMES = 16
 
@@ -33,7 +44,8 @@ class Link:
     ``change``: C_parent^-1 C, shape (3, 3, 1), None where that is the identity. ``offset``: from
     the parent's origin, (3,), along the parent's W. ``parent_back``: C_parent^-1, or None.
     ``moves`` and ``scales``: (component, column); ``turns``: (axis, column) in the order of
-    multiplication from the right; axis 3 is a quaternion, whose column is that of ``quaternion``.
+    multiplication from the right; axis QUATERNION is that of the columns ``quaternion``, axis
+    VECTOR that of the columns ``vector``, each with the first of its columns.
     ``direction``: of the first tail, None where it has no length.
     """
 
@@ -47,8 +59,35 @@ class Link:
     moves: tuple[tuple[int, int], ...]
     turns: tuple[tuple[int, int], ...]
     quaternion: tuple[int, ...]
+    vector: tuple[int, ...]
     scales: tuple[tuple[int, int], ...]
     lengths: tuple[int, ...]
+
+    @property
+    def angles(self) -> list[int]:
+        """The columns of rotations about one axis, in the order of ``turns``."""
+        return [column for axis, column in self.turns if axis < QUATERNION]
+
+    @property
+    def turning(self) -> list[int]:
+        """The columns of all that turns, in the order of ``turns``."""
+        return [each for turn in self.turns for each in self.parts(*turn)]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether one of its turns can be any turn by itself."""
+        return bool(self.quaternion or self.vector)
+
+    @property
+    def freedoms(self) -> str:
+        """The axes of ``turns`` as letters: x y z, q of a quaternion, v of a rotation vector."""
+        return "".join("xyzqv"[axis] for axis, _ in self.turns)
+
+    def parts(self, axis: int, column: int) -> tuple[int, ...]:
+        """The columns of one of ``turns``."""
+        if axis == QUATERNION:
+            return self.quaternion
+        return self.vector if axis == VECTOR else (column,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +97,8 @@ class Pose:
     Of each joint ``origins`` has its position, (3, F) or (3, 1) where that is constant; ``axes``
     its local axes as columns, (3, 3, F) or (3, 3, 1); ``arms`` the vector from its parent's origin
     along the parent's local axes before the parent's scale, (3, F) or (3, 1); ``spins`` what each
-    of its ``turns`` turns about in the world, (3, F) or (3, 1), four for a quaternion.
+    of its columns ``turning`` turns about in the world, (3, F) or (3, 1), for a unit of a
+    quaternion's part, or a radian of any other.
     """
 
     origins: list[Floats]
@@ -77,7 +117,7 @@ class Chain:
     def __init__(self, skeleton: Skeleton) -> None:
         self.skeleton = skeleton
         channels = skeleton.channels
-        turning = any(c.kind in ROTATION_KINDS for c in channels)
+        turning = any(c.kind in ANGLE_KINDS for c in channels)
         if not skeleton.angle_unit and (turning or any(any(j.axis) for j in skeleton.joints)):
             raise MotionError(
                 f"skeleton {skeleton.name!r}: its angle unit is unknown, so its rotations are, too"
@@ -103,15 +143,16 @@ class Chain:
             change = above.T if matrix is None else above.T @ matrix
         kinds = [channel.kind for channel in joint.channels]
         first = {kind: start + kinds.index(kind) for kind in kinds}
-        quaternion = tuple(first[kind] for kind in QUATERNION_KINDS if kind in first)
-        quaternion = quaternion if len(quaternion) == 4 else ()
+        quaternion = first_columns(joint.channels, QUATERNION_KINDS, start)
+        vector = first_columns(joint.channels, VECTOR_KINDS, start)
         turns = [
             (ROTATION_KINDS.index(kind), start + k)
-            if kind in ROTATION_KINDS
-            else (3, min(quaternion))
             for k, kind in enumerate(kinds)
-            if kind in ROTATION_KINDS or (quaternion and start + k == min(quaternion))
+            if kind in ROTATION_KINDS
         ]
+        turns += [(QUATERNION, min(quaternion))] if quaternion else []
+        turns += [(VECTOR, min(vector))] if vector else []
+        turns.sort(key=itemgetter(1))
         back = None if matrix is None else matrix.T
         tails = tuple(_back(back, np.array(tail)) for tail in joint.tails)
         length = float(np.sqrt(tails[0] @ tails[0])) if tails else 0.0
@@ -126,6 +167,7 @@ class Chain:
             moves=_components(kinds, POSITION_KINDS, start),
             turns=tuple(turns if self.skeleton.intrinsic else reversed(turns)),
             quaternion=quaternion,
+            vector=vector,
             scales=tuple((k, first[s]) for k, s in enumerate(SCALE_KINDS) if s in first),
             lengths=tuple(start + k for k, kind in enumerate(kinds) if kind == "length"),
         )
@@ -175,8 +217,12 @@ class Chain:
     def turned_by(self, link: Link, axes: Floats, columns: Floats, spins: list[Floats]) -> Floats:
         """``axes`` turned by the joint's channels; what each turns about is added to ``spins``."""
         for axis, column in link.turns:
-            if axis == 3:
+            if axis == QUATERNION:
                 axes = self._quaternion(axes, columns[list(link.quaternion)], spins)
+            elif axis == VECTOR:
+                vectors = columns[list(link.vector)] * self.radians
+                spins += [along(axes, spin) for spin in spins_of_vectors(vectors).swapaxes(0, 1)]
+                axes = times(axes, matrices_of_vectors(vectors))
             else:
                 spins.append(axes[:, axis])
                 axes = turned(axes, axis, columns[column] * self.radians)

@@ -221,8 +221,7 @@ class Guess:
 
 
 def _hold(link: Link, known: Floats, columns: Floats) -> None:
-    columns_of = [c for axis, c in link.turns if axis < 3] + list(link.quaternion)
-    for column in columns_of:
+    for column in link.turning:
         _hold_column(columns[column], known)
 
 

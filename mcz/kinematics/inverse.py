@@ -22,6 +22,7 @@ from mcz.kinematics.descent import refine
 from mcz.kinematics.euler import ORDERS, nearest
 from mcz.kinematics.guess import Guess
 from mcz.kinematics.nearest_turns import centered, small
+from mcz.kinematics.rotation_vectors import continuous
 from mcz.kinematics.targets import Targets
 from mcz.motion import Skeleton
 
@@ -65,9 +66,8 @@ class _Solution:
     def __init__(self, targets: Targets, seen: Floats, known: Floats) -> None:
         self.targets, self.seen, self.known = targets, seen, known
         links = targets.chain.links
-        self.angles = np.array(
-            [c for link in links for axis, c in link.turns if axis < 3], np.int64
-        )
+        self.angles = np.array([c for link in links for c in link.angles], np.int64)
+        self.vectors = np.array([c for link in links for c in link.vector], np.int64)
         self.columns = self._guess()
         self.errors = np.zeros(seen.shape[2])
 
@@ -116,18 +116,21 @@ class _Solution:
             if not len(frames):
                 return
             start = self.columns[:, frames]
-            beside = random.normal(0.0, BESIDE, (len(self.angles), len(frames)))
-            start[self.angles] += beside / self.targets.chain.radians
+            turning = np.concatenate([self.angles, self.vectors])
+            beside = random.normal(0.0, BESIDE, (len(turning), len(frames)))
+            start[turning] += beside / self.targets.chain.radians
             found = self._refined(start, start, weight, MOST_STEPS, frames)
             self._take(found, self.errors[frames], frames)
 
     def _continue(self) -> None:
-        """Make angles continuous over time, by whole turns and by the other Euler angles."""
+        """Make what turns continuous over time, by whole turns and by the other Euler angles."""
         radians = self.targets.chain.radians
         for link in self.targets.chain.links:
-            columns = [column for axis, column in link.turns if axis < 3]
+            vector, columns = list(link.vector), link.angles
+            if vector:
+                self.columns[vector] = continuous(self.columns[vector] * radians) / radians
             angles = self.columns[columns].T * radians
-            if "".join("xyzq"[axis] for axis, _ in link.turns) in ORDERS:
+            if link.freedoms in ORDERS:
                 angles = nearest(angles)
                 angles = small(np.unwrap(angles, axis=0))
             else:
@@ -151,7 +154,8 @@ class _Solution:
         What most frames do is not odd.
         """
         counts = self.known.sum(axis=0)
-        steps = np.diff(self.columns[self.angles], axis=1) * self.targets.chain.radians
+        turning = np.concatenate([self.angles, self.vectors])
+        steps = np.diff(self.columns[turning], axis=1) * self.targets.chain.radians
         jumps = np.flatnonzero((np.abs(steps) > JUMP).any(axis=0)) + 1
         reasons = (
             counts < counts.max(),

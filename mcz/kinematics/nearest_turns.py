@@ -6,29 +6,33 @@ import numpy as np
 
 from mcz.kinematics.chain import Floats, Link, turned
 from mcz.kinematics.euler import ORDERS, euler_angles
+from mcz.kinematics.rotation_vectors import continuous, vectors_of_quaternions
 
 STARTS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
 SWEEPS = 12
 
 
 def set_turns(link: Link, moment: Floats, columns: Floats, radians: float) -> None:
-    """Set the rotation channels of a joint so that their R has the greatest trace of R' ``moment``.
+    """Set what turns a joint so that its R has the greatest trace of R' ``moment``.
 
     ``moment`` has shape (3, 3, F) and is along the joint's own axes; ``columns``, (n_channels, F)
-    in source units, are written. Where ``moment`` is a rotation, R is the nearest to it.
+    in source units, are written. Where ``moment`` is a rotation, R is the nearest to it. A
+    quaternion, or else a rotation vector, makes R alone, whatever else the joint has.
     """
-    order = "".join("xyzq"[axis] for axis, _ in link.turns)
-    if order == "q":
-        columns[list(link.quaternion)] = _quaternion(_kabsch(moment))
-    elif order in ORDERS:
-        angles = small(euler_angles(_kabsch(moment), order))
+    if link.is_whole:
+        columns[link.turning] = 0.0
+        quaternions = quaternions_of(_kabsch(moment))
+        if link.quaternion:
+            columns[list(link.quaternion)] = quaternions
+        else:
+            vectors = continuous(vectors_of_quaternions(quaternions))
+            columns[list(link.vector)] = vectors / radians
+    elif link.freedoms in ORDERS:
+        angles = small(euler_angles(_kabsch(moment), link.freedoms))
         for k, (_, column) in enumerate(link.turns):
             columns[column] = angles[:, k] / radians
     else:
-        turns = [(axis, column) for axis, column in link.turns if axis < 3]
-        angles = _angle_by_angle([axis for axis, _ in turns], moment)
-        for (_, column), angle in zip(turns, angles, strict=True):
-            columns[column] = angle / radians
+        columns[link.angles] = _angle_by_angle([axis for axis, _ in link.turns], moment) / radians
 
 
 def _kabsch(moment: Floats) -> Floats:
@@ -57,7 +61,7 @@ def centered(angles: Floats) -> Floats:
     return result
 
 
-def _quaternion(turns: Floats) -> Floats:
+def quaternions_of(turns: Floats) -> Floats:
     """The quaternions (w, x, y, z), (4, F), of rotation matrices."""
     # The greatest of the four candidates is never small.
     t = turns

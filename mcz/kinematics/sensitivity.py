@@ -92,13 +92,9 @@ class _Block:
         moment = self.moments[joint] - sums[:, None] * o[None] - o[:, None] * sums[None]
         moment = moment + number * o[:, None] * o[None]
         trace = moment[0, 0] + moment[1, 1] + moment[2, 2]
-        spins = iter(self.pose.spins[joint])
-        for axis, column in link.turns:
-            columns = link.quaternion if axis == 3 else (column,)
-            unit = 1.0 if axis == 3 else self.chain.radians
-            for each in columns:
-                a = next(spins) * unit
-                yield each, trace * (a * a).sum(axis=0) - (a * along(moment, a)).sum(axis=0)
+        for column, spin in zip(link.turning, self.pose.spins[joint], strict=True):
+            a = spin if column in link.quaternion else spin * self.chain.radians
+            yield column, trace * (a * a).sum(axis=0) - (a * along(moment, a)).sum(axis=0)
 
     def _moves(self, joint: int, link: Link) -> Iterator[tuple[int, Floats]]:
         """Positions: every point below moves alike, as far as the parent's scale makes it."""

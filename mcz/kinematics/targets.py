@@ -61,8 +61,7 @@ class Targets:
             if link.direction is not None:
                 units[list(link.lengths)] = 1.0
             units[[c for _, c in link.scales] + list(link.quaternion)] = 1.0 / self.lever
-            angles = [column for axis, column in link.turns if axis < 3]
-            units[angles] = 1.0 / (self.chain.radians * self.lever)
+            units[link.angles + list(link.vector)] = 1.0 / (self.chain.radians * self.lever)
         return units
 
     def _below(self) -> list[NDArray[np.int64]]:
@@ -101,19 +100,13 @@ class Targets:
                 continue
             if link.turns:
                 arms = positions[numbers] - pose.origins[joint]
-                for column, spin in self._spins(link, pose.spins[joint]):
+                for column, spin in zip(link.turning, pose.spins[joint], strict=True):
                     made[column, numbers] = _cross(spin / self.lever, arms)
             for column, step in self._moves(link, columns, pose):
                 made[column, numbers] = step
             for column, some, step in self._stretches(joint, link, columns, pose):
                 made[column, some] += step
         return made
-
-    def _spins(self, link: Link, spins: list[Floats]) -> Iterator[tuple[int, Floats]]:
-        each = iter(spins)
-        for axis, column in link.turns:
-            for one in link.quaternion if axis == 3 else (column,):
-                yield one, next(each)
 
     def _moves(self, link: Link, columns: Floats, pose: Pose) -> Iterator[tuple[int, Floats]]:
         for component, column in link.moves:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import IDENTITY, Chain, Floats, Link, chain_of
-from mcz.kinematics.euler import euler_angles
+from mcz.kinematics.euler import ORDERS, euler_angles
+from mcz.kinematics.rotation_vectors import matrices_of_vectors, nearest_vector
 from mcz.motion import Motion, Signal, Skeleton, frame_rate_of
 from mcz.poses.conversions import from_matrices, slerp
 
@@ -36,12 +37,12 @@ class Times:
 def resample(motion: Motion, rate: Fraction | float, *, drop_signals: bool = False) -> Motion:
     """``motion`` at ``rate`` frames a second, from its first frame to at most its last.
 
-    Joints of three rotations, or of a quaternion, turn the shortest way at a constant speed from
-    frame to frame (slerp); one or two angles of a joint, and three about two axes, go the shorter
-    way round each. Positions, lengths and all else run along Catmull-Rom splines through four
-    frames. A frame that coincides with one of ``motion`` is that frame, bit for bit. No filter is
-    applied: at a lower rate what is faster than half of it folds back, as wherever frames are
-    left out. A value between frames of which one is unknown is unknown: gaps stay gaps.
+    Joints of three rotations, a quaternion or a rotation vector turn the shortest way at a constant
+    speed from frame to frame (slerp); one or two angles of a joint, and three about two axes, go
+    the shorter way round each. Positions, lengths and all else run along Catmull-Rom splines
+    through four frames. A frame that coincides with one of ``motion`` is that frame, bit for bit.
+    No filter is applied: at a lower rate what is faster than half of it folds back, as wherever
+    frames are left out. A value between frames of which one is unknown is unknown: gaps stay gaps.
 
     Other signals cannot follow: OptionError unless ``drop_signals``. The result has no source and
     no frame numbers. Raises OptionError where the rate of ``motion`` is unknown, MotionError for a
@@ -139,7 +140,7 @@ def _rows(old: Floats, frames: NDArray[np.int64]) -> Floats:
 
 
 def _turn(chain: Chain, link: Link, old: Floats, new: Floats, times: Times) -> None:
-    """Fill the angles or the quaternion of a joint in the frames that are between frames."""
+    """Fill the columns that turn a joint in the frames that are between frames."""
     between = np.flatnonzero(times.share > 0)
     before, after = times.before[between], times.after[between]
     share = times.share[between]
@@ -151,20 +152,31 @@ def _turn(chain: Chain, link: Link, old: Floats, new: Floats, times: Times) -> N
         near = (quaternions * old[np.ix_(before, columns)]).sum(axis=1)
         new[np.ix_(between, columns)] = np.where(near < 0, -1.0, 1.0)[:, None] * quaternions
         return
-    angles = np.array([column for axis, column in link.turns if axis < 3], np.int64)
     full = 2 * np.pi / chain.radians
+    if link.vector:
+        columns = np.array(link.vector, np.int64)
+        first, last = (old[np.ix_(rows, columns)] * chain.radians for rows in (before, after))
+        new[np.ix_(between, columns)] = _vectors(first, last, share) / chain.radians
+    angles = np.array(link.angles, np.int64)
     first, last = old[np.ix_(before, angles)], old[np.ix_(after, angles)]
     way = last - first
     way -= np.round(way / full) * full
     guess = first + way * share[:, None]
     new[np.ix_(between, angles)] = guess
-    order = "".join("xyz"[axis] for axis, _ in link.turns if axis < 3)
-    if len(link.turns) == 3 and len(set(order)) == 3:
+    order = link.freedoms
+    if order in ORDERS:
         turns = _matrices(chain, link, old)
         middle = slerp(turns[before], turns[after], share)
         known = np.isfinite(middle).all(axis=(1, 2))
         rows = np.ix_(between[known], angles)
         new[rows] = _angles(middle[known], order, guess[known], full)
+
+
+def _vectors(first: Floats, last: Floats, share: Floats) -> Floats:
+    """Rotation vectors (n, 3), in radians, a ``share`` of the shortest way to the last, (n,)."""
+    start, end = (np.moveaxis(matrices_of_vectors(ends.T), 2, 0) for ends in (first, last))
+    middle = from_matrices(slerp(start, end, share)[:, None], "rotvec")[:, 0]
+    return np.array([nearest_vector(*pair) for pair in zip(middle, first, strict=True)])
 
 
 def _matrices(chain: Chain, link: Link, old: Floats) -> Floats:

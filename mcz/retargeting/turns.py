@@ -41,11 +41,10 @@ def set_local_turns(chain: Chain, joint: int, wanted: Floats, columns: Floats) -
     if own is not None:
         turn = times(times(own.T[:, :, None], turn), own[:, :, None])
     set_turns(link, turn, columns, chain.radians)
-    if len(link.turns) > 1 and "".join("xyzq"[axis] for axis, _ in link.turns) not in ORDERS:
+    if len(link.turns) > 1 and not link.is_whole and link.freedoms not in ORDERS:
         polish_turns(link, turn, columns, chain.radians)
-    own_columns = [column for axis, column in link.turns if axis < 3] + list(link.quaternion)
     made = local_turns(chain, joint, columns)
-    for column in own_columns:
+    for column in link.turning:
         columns[column, ~known] = np.nan
     return made
 

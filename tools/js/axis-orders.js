@@ -9,7 +9,7 @@ const UNKNOWN_UNIT = 0;
 const RX = 4;
 const SX = 7;
 const QW = 11;
-const QZ = 14;
+const VZ = 17;
 const FULL_TURNS = [0, 360, 6.283185307179586]; // by angle unit
 const STEEP = 0.41421356237309503;
 const MAX_TURNS = 2 ** 41;
@@ -58,8 +58,8 @@ function turnsOf({ channels, firstColumn }, { intrinsic, angleUnit }) {
     sequence.push(kind - RX);
   });
   const isWhole = sequence.length === 3 && new Set(sequence).size === 3;
-  const hasQuaternion = channels.some(({ kind }) => kind >= QW && kind <= QZ);
-  if (!isWhole || hasQuaternion || angleUnit === UNKNOWN_UNIT) return null;
+  const hasOthers = channels.some(({ kind }) => kind >= QW && kind <= VZ);
+  if (!isWhole || hasOthers || angleUnit === UNKNOWN_UNIT) return null;
   return { columns, own: intrinsic ? sequence : sequence.reverse() };
 }
 

@@ -10,6 +10,11 @@ const SX = 7;
 const LENGTH = 10;
 const QW = 11;
 const QZ = 14;
+const VX = 15;
+const VZ = 17;
+
+/** Whether a channel's numbers are angles. */
+const isAngle = ({ kind }) => (kind >= RX && kind < SX) || (kind >= VX && kind <= VZ);
 
 /** Axes (0 x, 1 y, 2 z) of each axis_order, the first letter first. */
 export const AXIS_ORDERS = [
@@ -71,6 +76,16 @@ function quaternionRotation(q) {
   ];
 }
 
+/** The rotation by |v| about v, v in radians. */
+function vectorRotation(v) {
+  const angle = Math.hypot(...v);
+  if (!(angle < Infinity)) return NOWHERE;
+  const half = angle / 2;
+  // sin(half) / half is 1 to binary64 long before angle is 0.
+  const ratio = half < 1e-9 ? 0.5 : Math.sin(half) / angle;
+  return quaternionRotation([Math.cos(half), ...v.map((part) => part * ratio)]);
+}
+
 function sum(a, b) {
   return [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 }
@@ -96,10 +111,9 @@ export function pointSet({ joints, intrinsic }) {
  * @param {import("./skel.js").Skeleton} skeleton
  */
 export function hasKinematics({ joints, channels, angleUnit }) {
-  const turns = ({ kind }) => kind >= RX && kind < SX;
   const hasAxis = ({ axis }) => axis.some((angle) => angle !== 0);
-  if (angleUnit === UNKNOWN_UNIT && (channels.some(turns) || joints.some(hasAxis))) return false;
-  return channels.length === 0 || channels.some(({ kind }) => kind >= TX && kind <= QZ);
+  if (angleUnit === UNKNOWN_UNIT && (channels.some(isAngle) || joints.some(hasAxis))) return false;
+  return channels.length === 0 || channels.some(({ kind }) => kind >= TX && kind <= VZ);
 }
 
 /**
@@ -134,6 +148,7 @@ export class Kinematics {
       channels.flatMap((channel, i) => (channel.kind === kind ? [joint.firstColumn + i] : []));
     const firstOf = (kind) => columns(kind)[0];
     const quaternion = [0, 1, 2, 3].map((part) => firstOf(QW + part));
+    const vector = [0, 1, 2].map((part) => firstOf(VX + part));
     const [tail] = tails;
     const size = tail ? Math.hypot(...tail) : 0;
     return {
@@ -145,17 +160,18 @@ export class Kinematics {
       scales: [0, 1, 2].map((k) => firstOf(SX + k)),
       lengths: size > 0 ? columns(LENGTH) : [],
       direction: size > 0 ? tail.map((x) => x / size) : ORIGIN,
-      rotations: this.rotations(joint, quaternion),
+      rotations: this.rotations(joint, quaternion, vector),
     };
   }
 
-  /** The rotations of a joint in channel order: an axis and a column, or a quaternion. */
-  rotations({ channels, firstColumn }, quaternion) {
-    const whole = !quaternion.includes(undefined);
-    const start = Math.min(...quaternion);
+  /** The rotations of a joint in channel order: an axis and a column, a quaternion, a vector. */
+  rotations({ channels, firstColumn }, quaternion, vector) {
+    const startOf = (parts) => (parts.includes(undefined) ? undefined : Math.min(...parts));
+    const [quaternionStart, vectorStart] = [startOf(quaternion), startOf(vector)];
     return channels.flatMap(({ kind }, i) => {
       const column = firstColumn + i;
-      if (whole && column === start) return [{ quaternion }];
+      if (column === quaternionStart) return [{ quaternion }];
+      if (column === vectorStart) return [{ vector }];
       return kind >= RX && kind < SX ? [{ axis: kind - RX, column }] : [];
     });
   }
@@ -198,8 +214,9 @@ export class Kinematics {
     return [origins[j], ...tails[j]];
   }
 
-  matrixOf({ axis, column, quaternion }, value) {
+  matrixOf({ axis, column, quaternion, vector }, value) {
     if (quaternion) return quaternionRotation(quaternion.map(value));
+    if (vector) return vectorRotation(vector.map((part) => value(part) * this.radians));
     const angle = value(column) * this.radians;
     return Number.isFinite(angle) ? rotation(axis, angle) : NOWHERE;
   }

@@ -470,7 +470,7 @@ test("tokens", () => {
 // Kinematics
 
 const KINDS = { tx: 1, ty: 2, tz: 3, rx: 4, ry: 5, rz: 6, sx: 7, sy: 8, sz: 9, length: 10, qw: 11 };
-Object.assign(KINDS, { qx: 12, qy: 13, qz: 14 });
+Object.assign(KINDS, { qx: 12, qy: 13, qz: 14, vx: 15, vy: 16, vz: 17 });
 
 /** A skeleton of a joint for each list of channels, one below the other. */
 function skeletonOf(joints, options = {}) {
@@ -542,6 +542,20 @@ test("kinematics: quaternions, of which no size counts", () => {
   assertPoints(skeletonOf(joints), [0, 0, 0, 0], [[0, 0, 0], [NaN, NaN, NaN]]);
   const parts = [{ channels: "qw qx qy rz", tails: [[1, 0, 0]] }];
   assertPoints(skeletonOf(parts), [NaN, 1, 1, 90], [[0, 0, 0], [0, 1, 0]]);
+});
+
+test("kinematics: rotation vectors, axis times angle", () => {
+  const joints = [{ channels: "vz vx vy", tails: [[1, 0, 0]] }];
+  assertPoints(skeletonOf(joints), [90, 0, 0], [[0, 0, 0], [0, 1, 0]]);
+  assertPoints(skeletonOf(joints), [0, 0, 0], [[0, 0, 0], [1, 0, 0]]);
+  assertPoints(skeletonOf(joints), [-1e-200, 0, 360], [[0, 0, 0], [1, 0, 0]]);
+  const third = 120 / Math.sqrt(3); // x to y, y to z, z to x
+  assertPoints(skeletonOf(joints), [third, third, third], [[0, 0, 0], [0, 1, 0]]);
+  const radians = skeletonOf(joints, { angleUnit: 2 });
+  assertPoints(radians, [1e-9, 0, 0], [[0, 0, 0], [1, 1e-9, 0]]);
+  const parts = [{ channels: "vx rz vy", tails: [[1, 0, 0]] }];
+  assertPoints(skeletonOf(parts), [NaN, 90, 3], [[0, 0, 0], [0, 1, 0]]);
+  assert.ok(!hasKinematics(skeletonOf(joints, { angleUnit: 0 })));
 });
 
 test("kinematics: scale and length are not handed on", () => {

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from mcz.angles import FULL_TURN
 from mcz.codecs.posewave.turns import BEYOND, RULES
 from mcz.errors import FormatError, MotionError
-from mcz.kinematics.chain import QUATERNION_KINDS
-from mcz.motion import ROTATION_KINDS, Joint, Skeleton
+from mcz.motion import QUATERNION_KINDS, ROTATION_KINDS, VECTOR_KINDS, Joint, Skeleton
 from mcz.schema import read_varint, varint
 
 Floats = NDArray[np.float64]
@@ -57,13 +56,13 @@ def kernels() -> Any:
 def own_sequence(joint: Joint, skeleton: Skeleton) -> Sequenced | None:
     """That of a joint that can have an order; None of another.
 
-    It has three rotation channels about three axes, no quaternion, and angles of a known unit.
+    It has three rotation channels about three axes, no other, and angles of a known unit.
     """
     kinds = [channel.kind for channel in joint.channels]
     axes = [ROTATION_KINDS.index(kind) for kind in kinds if kind in ROTATION_KINDS]
     if sorted(axes) != [0, 1, 2] or not skeleton.angle_unit:
         return None
-    if any(kind in QUATERNION_KINDS for kind in kinds):
+    if any(kind in (*QUATERNION_KINDS, *VECTOR_KINDS) for kind in kinds):
         return None
     a, b, c = axes if skeleton.intrinsic else axes[::-1]
     return a, b, c

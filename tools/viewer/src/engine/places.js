@@ -116,8 +116,9 @@ export class Places {
     M.fill(0);
     M[0] = M[4] = M[8] = 1;
     let isFirst = true;
-    for (const { axis, column, quaternion } of rotations) {
+    for (const { axis, column, quaternion, vector } of rotations) {
       if (quaternion) quaternionRotation(quaternion, row, R);
+      else if (vector) vectorRotation(vector, row, this.radians, R);
       else rotation(axis, row[column] * this.radians, R);
       if (isFirst) M.set(R);
       else if (this.intrinsic) (multiply(M, R, T), M.set(T));
@@ -204,10 +205,21 @@ function quaternionRotation([qw, qx, qy, qz], row, R) {
     R.fill(NaN);
     return;
   }
-  const w = row[qw] / size;
-  const x = row[qx] / size;
-  const y = row[qy] / size;
-  const z = row[qz] / size;
+  unitQuaternionRotation(row[qw] / size, row[qx] / size, row[qy] / size, row[qz] / size, R);
+}
+
+function vectorRotation([vx, vy, vz], row, radians, R) {
+  const [x, y, z] = [row[vx] * radians, row[vy] * radians, row[vz] * radians];
+  const angle = Math.hypot(x, y, z);
+  if (!(angle < Infinity)) {
+    R.fill(NaN);
+    return;
+  }
+  const ratio = angle < 1e-9 ? 0.5 : Math.sin(angle / 2) / angle;
+  unitQuaternionRotation(Math.cos(angle / 2), x * ratio, y * ratio, z * ratio, R);
+}
+
+function unitQuaternionRotation(w, x, y, z, R) {
   R[0] = 1 - 2 * (y * y + z * z);
   R[1] = 2 * (x * y - w * z);
   R[2] = 2 * (x * z + w * y);

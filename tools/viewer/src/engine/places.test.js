@@ -5,7 +5,7 @@ import { test } from "node:test";
 import { Kinematics } from "../../../js/kinematics.js";
 import { Places } from "./places.js";
 
-const [TX, RX, SX, LENGTH, QW] = [1, 4, 7, 10, 11];
+const [TX, RX, SX, LENGTH, QW, VX] = [1, 4, 7, 10, 11, 15];
 
 /** Numbers that are the same every time: a linear congruence. */
 function numbers(seed) {
@@ -23,6 +23,7 @@ function skeletonOf(seed, { intrinsic, angleUnit }) {
     [SX, SX + 2],
     [LENGTH],
     [QW, QW + 1, QW + 2, QW + 3],
+    [VX, VX + 1, VX + 2],
     [0],
   ];
   let firstColumn = 0;

@@ -1,0 +1,95 @@
+"""Rotation vectors: an axis times an angle, the exponential map, and the way back.
+
+Vectors are (3, F) in radians, matrices (3, 3, F), active, for column vectors.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+NEAR = 0.1  # radians below which a difference of near numbers is summed as a series
+SERIES = (1 / 6, -1 / 120, 1 / 5040, -1 / 362880)  # of (t - sin t) / t^3, in t^2
+FULL_TURN = 2 * np.pi
+
+
+def matrices_of_vectors(vectors: Floats) -> Floats:
+    """The rotations by |v| about v, (3, 3, F); the identity where v is 0, NaN where not finite."""
+    angle = _length(vectors)
+    # np.sinc is sin(pi x) / (pi x), and 1 at 0: there is no division to go wrong near zero.
+    first, half = np.sinc(angle / np.pi), np.sinc(angle / FULL_TURN)
+    return _combined(vectors, first, half * half / 2, angle)
+
+
+def spins_of_vectors(vectors: Floats) -> Floats:
+    """What a change of each component turns about, after the rotation, (3, 3, F), as columns.
+
+    The left Jacobian of the exponential map: R(v + dv) = R(spins dv) R(v), to the first order.
+    """
+    angle = _length(vectors)
+    half, square = np.sinc(angle / FULL_TURN), angle * angle
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        third = (angle - np.sin(angle)) / (square * angle)
+    near = angle < NEAR
+    series = np.polynomial.polynomial.polyval(np.where(near, square, 0.0), SERIES)
+    return _combined(vectors, half * half / 2, np.where(near, series, third), angle)
+
+
+def _length(vectors: Floats) -> Floats:
+    """|v|, also where its square would be 0 or infinite."""
+    length: Floats = np.hypot(np.hypot(vectors[0], vectors[1]), vectors[2])
+    return length
+
+
+def _combined(vectors: Floats, first: Floats, second: Floats, angle: Floats) -> Floats:
+    """I + ``first`` K + ``second`` K K, K the matrix of the cross product by v."""
+    out = np.empty((3, 3, vectors.shape[1]))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[i, i] = 1 - second * (vectors[j] * vectors[j] + vectors[k] * vectors[k])
+        mixed = second * (vectors[i] * vectors[j])
+        turn = first * vectors[k]
+        out[i, j], out[j, i] = mixed - turn, mixed + turn
+    out[:, :, ~np.isfinite(angle)] = np.nan
+    return out
+
+
+def vectors_of_quaternions(quaternions: Floats) -> Floats:
+    """Of quaternions (w, x, y, z) of length 1, (4, F): vectors no longer than half a turn."""
+    w, parts = quaternions[0], quaternions[1:]
+    sine = _length(parts)
+    angle = 2 * np.arctan2(sine, np.abs(w))
+    small = sine == 0
+    ratio = np.where(small, 2.0, angle / np.where(small, 1.0, sine))
+    vectors: Floats = parts * np.where(w < 0, -ratio, ratio)
+    return vectors
+
+
+def continuous(vectors: Floats, start: Floats | None = None) -> Floats:
+    """The same rotations by vectors each near the one before, (3, F).
+
+    v and v (1 + 2 pi n / |v|) turn alike. The first is taken near ``start``, (3,), or as short as
+    it can be; each other is the one of these that is nearest to the one before. Where v is 0, any
+    axis does: that of the vector before is taken. What is not finite is passed over.
+    """
+    out = np.array(vectors, np.float64)
+    last: Any = np.zeros(3) if start is None else np.asarray(start, np.float64)
+    for frame in np.flatnonzero(np.isfinite(out).all(axis=0)).tolist():
+        out[:, frame] = last = nearest_vector(out[:, frame], last)
+    return out
+
+
+def nearest_vector(vector: Floats, wanted: Floats) -> Floats:
+    """Of the vectors (3,) that turn as ``vector`` does, the one nearest to ``wanted``."""
+    length = float(np.sqrt(vector @ vector))
+    if length:
+        axis = vector / length
+    elif (size := float(np.sqrt(wanted @ wanted))) > np.pi:
+        axis = wanted / size
+    else:
+        return vector
+    turns = np.rint((float(wanted @ axis) - length) / FULL_TURN)
+    return vector if turns == 0 else axis * (length + FULL_TURN * turns)
