@@ -42,6 +42,7 @@ MODULES = (
     "mcz.formats.layout",
     "mcz.formats.table_layout",
     "mcz.formats.notes",
+    "mcz.formats.table_notes",
     "mcz.formats.c3d_layout",
     "mcz.recovery.packets",
     "mcz.numbers",

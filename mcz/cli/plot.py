@@ -69,7 +69,7 @@ def command(
     as_json: bool,
     **options: Any,
 ) -> Exit:
-    """Draw numbers of FILE (.mcz, .bvh, .amc, .c3d, .trc, .mot or .sto), and print them.
+    """Draw numbers of FILE (.mcz, .bvh, .amc, .c3d, .trc, .mot, .sto, .csv), and print them.
 
     channels and spectrum of a --joint; error of FILE2 against FILE, the original, as mcz diff has
     it; bytes of a clip by joint and resolution, as mcz info --layout has them; rate-distortion at a

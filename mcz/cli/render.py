@@ -82,7 +82,8 @@ def command(
 ) -> Exit:
     """Draw the motion in FILE: a film, a still or a sheet of poses.
 
-    FILE is an .mcz, .bvh, .amc, .c3d or .trc; a .mot or .sto has no points to draw.
+    FILE is an .mcz, .bvh, .amc, .c3d, .trc or .csv of Motive or Vicon; a .mot, a .sto and other
+    .csv have no points to draw.
 
     A .png or .svg without --sheet shows the middle frame of --frames. A grid on the floor has its
     length, left and right have colors of their own. It needs pip install 'mcz[render]'.

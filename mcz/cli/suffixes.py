@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 CONVERSIONS = ("bvh", "amc", "c3d", "trc", "sto", "mot")
 SCENES = ("glb", "usda")  # animated nodes; mcz.conversion.scenes writes them
+CSV = ("csv", "motive", "vicon")  # source formats whose files are called .csv
 TARGETS = ("csv", "npz", *CONVERSIONS, *SCENES)
 # Formats that decode does not write; a file of that name would hold something else.
 OTHERS = {
@@ -44,6 +45,7 @@ def target_of(clip: Clip, output: str | None, *, plain: bool) -> str | None:
     """
     suffix = suffix_of(output)
     source = clip.source.format if clip.source is not None else ""
+    source = "csv" if source in CSV else source
     if suffix in TARGETS:
         return None if plain and suffix == source else suffix
     if suffix in OTHERS and not _is_own(suffix, clip):

@@ -12,6 +12,8 @@ from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, OptionError
 from mcz.formats import FORMATS
 
+SNIFFED = 2**16  # bytes that tell what a file is
+
 
 def files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
     """The files below ``root`` but for an earlier ``target``, and what else there is, in order."""
@@ -48,9 +50,27 @@ def files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
 
 def motion_files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     """The files of source formats, and the others."""
-    known = {suffix for source_format in FORMATS.values() for suffix in source_format.suffixes}
-    motions = [path for path in paths if path.suffix.lower() in known]
-    return motions, [path for path in paths if path.suffix.lower() not in known]
+    motions = [path for path in paths if _is_motion(path)]
+    chosen = set(motions)
+    return motions, [path for path in paths if path not in chosen]
+
+
+def _is_motion(path: Path) -> bool:
+    """Whether a file has the suffix of a source format and, where others use that, looks like it.
+
+    One that cannot be read counts: whoever wants it is told so.
+    """
+    suffix = path.suffix.lower()
+    for source_format in FORMATS.values():
+        if suffix in source_format.suffixes:
+            if source_format.is_motion is None:
+                return True
+            try:
+                with path.open("rb") as file:
+                    return source_format.is_motion(file.read(SNIFFED))
+            except OSError:
+                return True
+    return False
 
 
 def left_out(path: Path, root: Path) -> Outcome:

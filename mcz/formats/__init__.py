@@ -15,6 +15,7 @@ from typing import Any
 from mcz.errors import FormatError, SourceError, UnsupportedError
 from mcz.formats.line_by_line import Arriving
 from mcz.formats.notes import join_notes
+from mcz.formats.table_notes import join_table_notes
 from mcz.motion import FrameNotes, Source
 
 __all__ = ["FORMATS", "Format", "format_by_id", "format_of", "is_table", "recording_of", "sniffed"]
@@ -33,7 +34,8 @@ class Format:
     a file surely has more, None where nobody can. ``states_rate``: the template holds the frame
     rate, so that it does not suit another. ``is_table``: its header names every column, which is
     much of what is written. ``recording(name, template, detail)`` is what the source
-    says beside all numbers, None where it says nothing; see ``mcz.Recording``.
+    says beside all numbers, None where it says nothing; see ``mcz.Recording``. ``is_motion(data)``
+    says of a suffix that others use, too, whether a file that begins so seems to be of this format.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Format:
     recording: Callable[[str, bytes, bytes], Any] | None = None
     has_more_joints: Callable[..., bool] | None = None
     bones: Callable[..., dict[str, int]] | None = None
+    is_motion: Callable[[bytes], bool] | None = None
 
 
 def _of(module: str, name: str) -> Callable[..., Any]:
@@ -112,7 +115,7 @@ FORMATS: dict[str, Format] = {
                 (f".{name}",),
                 _of(module, f"read_{name}"),
                 _of(module, f"write_{name}"),
-                join_notes,
+                join_table_notes,
                 states_rate=True,
                 is_table=True,
             )
@@ -121,6 +124,20 @@ FORMATS: dict[str, Format] = {
                 (7, "mot", "storage"),
                 (8, "sto", "storage"),
             )
+        ),
+        *(  # the table gives csv for .csv; which kind a file is, its reader finds
+            Format(
+                name,
+                format_id,
+                (".csv",),
+                _of("csv_files", "read"),
+                _of("csv_files", "write"),
+                join_table_notes,
+                states_rate=True,
+                is_table=True,
+                is_motion=_of("csv_files", "is_motion"),
+            )
+            for format_id, name in ((11, "csv"), (9, "motive"), (10, "vicon"))
         ),
     )
 }
@@ -155,7 +172,10 @@ def sniffed(data: bytes) -> str | None:
         return "sto"
     if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", data):
         return "asf"
-    return "amc" if _of("amc", "is_amc")(data) else None
+    kind: str | None = _of("csv_files", "kind_of")(data)
+    if kind in ("motive", "vicon"):
+        return kind
+    return "amc" if _of("amc", "is_amc")(data) else kind
 
 
 def recording_of(source: Source | None) -> Any:

@@ -24,6 +24,8 @@ MAX_RUNS = 2**18  # of a template, and of a detail
 MAX_WIDTH = 255  # SRC-12
 MAX_ROW_GAPS = 2**20  # bytes of the gaps and the tail of one frame
 
+WORDS, FULL, BLANKS, FREE = -1, 0, 1, 2  # what the tokens of a row are: text_kernels.match_rows
+
 Ints = NDArray[np.int64]
 
 # SRC-12

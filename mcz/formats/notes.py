@@ -93,23 +93,32 @@ def join_notes(parts: Sequence[tuple[int, int, bytes]]) -> RowNotes:
             continue
         where = f"source notes of rows {start} to {stop}"
         fields = parse(NOTES, data, where)
-        _fill_patterns(patterns[start:stop], fields.patterns, where)
-        rows = _rows([entry.row for entry in fields.texts], stop - start, where)
-        texts += [(start + row, e.text) for row, e in zip(rows, fields.texts, strict=True)]
-    wrong = [text for _, text in texts if not FRAME_NUMBER_TEXT.fullmatch(text)]
-    if wrong:  # AMC-05
-        raise FormatError(f"source notes: {wrong[0][:40]!r} is not a frame number")
+        for first, last, pattern in checked_runs(fields.patterns, stop - start, where):
+            patterns[start + first : start + last] = pattern
+        found = checked_texts(fields.texts, stop - start, where)
+        texts += [(start + row, text) for row, text in found]
     return RowNotes(patterns, tuple(texts))
 
 
-def _fill_patterns(patterns: Ints, runs: Sequence[Any], where: str) -> None:
-    row = 0
+def checked_runs(runs: Sequence[Any], n_rows: int, where: str) -> list[tuple[int, int, int]]:
+    """(start, stop, pattern) of PATTERN_RUNs of ``n_rows`` rows; raises FormatError."""
+    found, row = [], 0
     for run in runs:
         # AMC-01, AMC-02
-        if run.n_rows < 1 or run.n_rows > len(patterns) - row or run.pattern >= MAX_PATTERNS:
+        if run.n_rows < 1 or run.n_rows > n_rows - row or run.pattern >= MAX_PATTERNS:
             raise FormatError(f"{where}: pattern {run.pattern} for {run.n_rows} rows from {row} on")
-        patterns[row : row + run.n_rows] = run.pattern
+        found.append((row, row + run.n_rows, run.pattern))
         row += run.n_rows
+    return found
+
+
+def checked_texts(texts: Sequence[Any], n_rows: int, where: str) -> list[tuple[int, bytes]]:
+    """(row, text) of NUMBER_TEXTs of ``n_rows`` rows; raises FormatError."""
+    rows = _rows([entry.row for entry in texts], n_rows, where)
+    wrong = [entry.text for entry in texts if not FRAME_NUMBER_TEXT.fullmatch(entry.text)]
+    if wrong:  # AMC-05
+        raise FormatError(f"{where}: {wrong[0][:40]!r} is not a frame number")
+    return [(row, entry.text) for row, entry in zip(rows, texts, strict=True)]
 
 
 def _rows(distances: Sequence[int], n_rows: int, where: str) -> list[int]:

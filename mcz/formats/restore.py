@@ -5,6 +5,7 @@ SPEC.md, "Source reconstruction", is normative.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +15,7 @@ from mcz.errors import FormatError, LimitError
 from mcz.formats.cells import Cells
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, parse_layout
 from mcz.formats.notes import RowNotes
-from mcz.motion import FrameNotes, Motion, Signal, Source
+from mcz.motion import Motion, Signal, Source
 
 Ints = NDArray[np.int64]
 
@@ -34,7 +35,12 @@ def restore(motion: Motion, source: Source) -> bytes:
     """
     signal = motion.signals[0]
     layout = parse_layout(source.template, source.detail, signal.n_channels)
-    rows = rows_text(motion, source, signal, layout)
+    limit = text_limit(source, [(signal.n_rows, signal.n_channels)])
+    notes = source.notes if isinstance(source.notes, RowNotes) else None
+    runs = pattern_runs(layout, notes, signal.n_rows)
+    if any_numbers(runs) and signal.samples_per_frame != 1:  # AMC-08
+        raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
+    rows = rows_text(signal, layout, notes, numbers_of(motion, signal.n_rows), limit)
     if len(layout.header) > 1:
         return printed_count(layout, signal.n_rows).join(layout.header) + rows
     return layout.header[0] + rows
@@ -45,25 +51,30 @@ def printed_count(layout: Layout, n_rows: int) -> bytes:
     return layout.count if layout.count and layout.rows == n_rows else b"%d" % n_rows  # AMC-06
 
 
+def text_limit(source: Source, shapes: Sequence[tuple[int, int]]) -> int:
+    """How many bytes the rows of tables of these (rows, channels) may take together."""
+    limit = max(TEXT_LIMIT, TEXT_PER_CELL * sum(rows * (columns + 1) for rows, columns in shapes))
+    return min(limit, max(TEXT_LIMIT, TEXT_PER_SIZE * source.size)) if source.size else limit
+
+
 def rows_text(
-    motion: Motion, source: Source, signal: Signal, layout: Layout, missing: bytes | None = None
+    signal: Signal,
+    layout: Layout,
+    notes: RowNotes | None,
+    numbers: Ints,
+    limit: int,
+    missing: bytes | None = None,
 ) -> bytes:
     """All rows and what follows them; ``signal`` has the columns of the patterns.
 
-    ``missing``: what stands where the signal is invalid, None where that does not matter. Raises as
-    ``restore`` does.
+    ``numbers`` are the frame numbers of the rows. ``missing``: what stands where the signal is
+    invalid, None where that does not matter. Raises as ``restore`` does.
     """
-    runs = _pattern_runs(layout, source.notes, signal.n_rows)
-    numbered = any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
-    if numbered and signal.samples_per_frame != 1:  # AMC-08
-        raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
-    limit = max(TEXT_LIMIT, TEXT_PER_CELL * signal.n_rows * (signal.n_channels + 1))
-    if source.size:
-        limit = min(limit, max(TEXT_LIMIT, TEXT_PER_SIZE * source.size))
-    numbers = numbers_of(motion, signal.n_rows)
+    runs = pattern_runs(layout, notes, signal.n_rows)
+    numbered = any_numbers(runs)
     cells = Cells(signal, numbers if numbered else None)
-    if numbered and isinstance(source.notes, RowNotes):
-        odd = (entry for entry in source.notes.texts if entry[0] < signal.n_rows)
+    if numbered and notes is not None:
+        odd = (entry for entry in notes.texts if entry[0] < signal.n_rows)
         texts = [(row, text) for row, text in odd if int(text) == numbers[row]]  # AMC-06
         rows = np.array([row for row, _ in texts], dtype=np.int64)
         cells.set(rows, np.full_like(rows, -1), [text for _, text in texts])
@@ -83,12 +94,17 @@ def numbers_of(motion: Motion, n_rows: int) -> Ints:
     return np.arange(1, n_rows + 1)
 
 
-def _pattern_runs(
-    layout: Layout, notes: FrameNotes | None, n_rows: int
+def any_numbers(runs: Sequence[tuple[Pattern, int, int]]) -> bool:
+    """Whether rows print their frame number."""
+    return any(run.column == FRAME_NUMBER for pattern, _, _ in runs for run in pattern.runs)
+
+
+def pattern_runs(
+    layout: Layout, notes: RowNotes | None, n_rows: int
 ) -> list[tuple[Pattern, int, int]]:
     """(pattern, start, stop) of each run of rows."""
     numbers = np.zeros(n_rows, np.int64)
-    if isinstance(notes, RowNotes):
+    if notes is not None:
         numbers[: len(notes.patterns)] = notes.patterns[:n_rows]
     if not n_rows:
         return []

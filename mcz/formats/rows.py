@@ -16,7 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-from mcz.formats.layout import FRAME_NUMBER, MAX_PATTERNS, MAX_ROW_GAPS, Items, Pattern, runs_of
+from mcz.formats.layout import (
+    FRAME_NUMBER,
+    MAX_PATTERNS,
+    MAX_ROW_GAPS,
+    WORDS,
+    Items,
+    Pattern,
+    runs_of,
+)
 from mcz.formats.notes import FRAME_NUMBER_TEXT, RowNotes
 from mcz.formats.padding import find_widths, padding
 
@@ -24,8 +32,9 @@ Ints = NDArray[np.int64]
 Token = tuple[int, int, int]  # start, stop, column
 # The tokens of the frame that begins at an offset, and where it ends; None after the last frame.
 Frames = Callable[[int], tuple[list[Token], int] | None]
-Match = Callable[..., tuple[int, int]]  # as ``text_kernels.match_rows``, which it is by default
 
+SPARSE, DENSE = 16, 2  # cells a byte: where a row names its columns, and where each has a cell
+FEW_CELLS = 2**18  # that any file may have
 MAX_NUMBER = 10**15  # of a frame, either sign
 LOOK_FOR_PADDING = (8, 64)  # numbers of patterns at which to look for padded columns
 _TAIL = re.compile(rb"[\x00-\x09\x0b-\x20]*\n?")
@@ -68,10 +77,14 @@ def read_rows(
     at: int,
     n_columns: int,
     frames: Frames,
-    match: Match | None = None,
+    cells: int = WORDS,
     widths: dict[int, int] | None = None,
+    room: int = SPARSE,
 ) -> Rows:
     """Read all frames of ``data`` from offset ``at`` on; ``widths``: of columns known to be padded.
+
+    ``cells``: what a token is, as ``text_kernels.match_rows`` has it. ``room``: how many cells
+    there may be for each byte of ``data``, which bounds the memory.
 
     Raises SourceError where ``frames`` does, where the layout is too irregular to be worth
     a template, and where rows name so few columns that the table would dwarf the file.
@@ -79,10 +92,10 @@ def read_rows(
     widths = widths or {}
     for look_at in LOOK_FOR_PADDING:
         try:
-            return _Reader(data, n_columns, frames, match, widths, look_at).read(at)
+            return _Reader(data, n_columns, frames, cells, widths, room, look_at).read(at)
         except _Padded as padded:
             widths = padded.widths
-    return _Reader(data, n_columns, frames, match, widths).read(at)
+    return _Reader(data, n_columns, frames, cells, widths, room).read(at)
 
 
 class _Padded(Exception):
@@ -97,8 +110,9 @@ class _Reader:
     data: bytes
     n_columns: int
     frames: Frames
-    match: Match | None
+    cells: int
     widths: dict[int, int]  # of padded columns
+    room: int
     look_at: int = MAX_PATTERNS
     start: Ints = field(init=False)
     stop: Ints = field(init=False)
@@ -114,10 +128,9 @@ class _Reader:
     def read(self, at: int) -> Rows:
         from mcz.formats import text_kernels
 
-        match = self.match or text_kernels.match_rows
         text = np.frombuffer(self.data, np.uint8)
         begin, last_end = at, at
-        self._allocate(64)
+        self._allocate(min(64, self._most_rows()))
         while (found := self.frames(at)) is not None:
             tokens, end = found
             if self.row + 1 >= len(self.numbers):
@@ -126,8 +139,9 @@ class _Reader:
             number = self.used[-1][1]
             first, at = self.row, end
             while True:
-                self.row, at = match(
-                    text, at, self.arrays[number], self.row, self.start, self.stop, self.numbers
+                self.row, at = text_kernels.match_rows(
+                    *(text, at, self.arrays[number], self.row, self.start, self.stop),
+                    *(self.numbers, self.cells),
                 )
                 if self.row < len(self.numbers):
                     break
@@ -141,15 +155,21 @@ class _Reader:
         self.stop = np.zeros((n_rows, self.n_columns), np.int64)
         self.numbers = np.zeros(n_rows, np.int64)
 
+    def _most_rows(self) -> int:
+        """How many rows there may be: more would take memory that no bytes stand for."""
+        return (self.room * len(self.data) + FEW_CELLS) // max(1, self.n_columns) + 2
+
     def _grow(self, done: int, size: int) -> None:
         """Make room for as many rows as the file seems to have, going by the ``done`` bytes."""
-        if self.row * self.n_columns > 16 * len(self.data) + 2**20:
+        most = self._most_rows()
+        if self.row + 2 > most:
             raise SourceError(
                 f"frame {self.row}: most of the {self.n_columns} channels are missing from most "
                 f"frames; a table of all of them would dwarf the file"
             )
         expected = int((self.row + 1) * size / max(1, done) * 1.01) + 64
         n_rows = max(min(expected, 4 * len(self.numbers)), len(self.numbers) * 3 // 2)
+        n_rows = max(min(n_rows, most), self.row + 2)
         old = self.start, self.stop, self.numbers
         self._allocate(n_rows)
         for new, array in zip((self.start, self.stop, self.numbers), old, strict=True):

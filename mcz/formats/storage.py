@@ -16,7 +16,7 @@ from mcz.formats.table_plain import plain_storage
 from mcz.formats.table_restore import beside, restore_table
 from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.formats.table_signals import read_columns
-from mcz.formats.table_source import named_count, names_in, table_source
+from mcz.formats.table_source import named_count, names_in, section_of, table_source
 from mcz.formats.text_source import check_text, text_encoding
 from mcz.formats.times import half_digit_of, stated_rate, uniform_rate
 from mcz.motion import Channel, Joint, Motion, Skeleton
@@ -78,13 +78,10 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
     stated = stated_rate(header.values.get("datarate", ""))
     rate, exact = uniform_rate(times, half_digit_of(tokens), [stated] if stated else [])
     start, stop = header.labels
-    marked = b"".join(
-        (
-            named_count(data, 0, start, header.count, rows.n_rows),
-            names_in(data[start:stop], names),
-            data[stop : header.rows],
-        )
-    )
+    counted = named_count(data, 0, start, header.count, rows.n_rows)
+    marked = counted + names_in(data[start:stop], names) + data[stop : header.rows]
+    text = marked, data[: header.rows]
+    section = section_of(text, (table.missing, None), rows, names, [0])
     return Motion(
         skeleton,
         (signal,),
@@ -92,9 +89,7 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
         exact,
         name,
         _metadata(encoding, header.values, rows.n_rows),
-        table_source(
-            format_name, data, (marked, data[: header.rows]), (table.missing, None), rows, names
-        ),
+        table_source(format_name, data, [(section, rows, 1)]),
     )
 
 

@@ -1,6 +1,6 @@
-"""How a table of numbers is laid out: its header, its patterns, what stands for a missing value.
+"""How tables of numbers are laid out: sections, each with a header, patterns, and what is missing.
 
-TRC, MOT and STO share this; SPEC.md, "The text of tables", is normative.
+TRC, MOT, STO and CSV files share this; SPEC.md, "The text of tables", is normative.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from mcz.errors import FormatError, LimitError
 from mcz.formats.layout import (
@@ -65,6 +66,7 @@ PHRASES = {  # and others: what stands in many headers
 }
 MOST = 2**62  # of ordinals, so that they fit an int64
 MAX_HEADER = 2**26  # bytes of a header with its marks filled
+MAX_SECTIONS = 64  # TABLE-07
 DECIMALS = (GridKind.FIXED, GridKind.TRIMMED)  # of times that follow from frame numbers
 _MARKS = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f]")
 _PHRASES = re.compile(b"|".join(map(re.escape, sorted(PHRASES.values(), key=len, reverse=True))))
@@ -77,7 +79,8 @@ CLOCK = Struct(
     "denominator" / _POSITIVE * "what that is divided by, at least 1",
     "offset" / SVARINT * "what is added before",
 )
-TABLE_TEMPLATE = Struct(
+SECTION = Struct(
+    "signals" / counted(UVARINT) * "numbers of the signals that its columns come from, at least 1",
     "header" / SIZED * "text before the rows",
     "marks" / BIT * "1: control codes of the header are marks; 0: they are text",
     "missing" / SIZED * "what stands where a value is invalid",
@@ -86,6 +89,12 @@ TABLE_TEMPLATE = Struct(
     "patterns"
     / counted(PATTERN, MAX_PATTERNS)
     * "none, or the most common pattern, which is number 0",
+)
+TABLE_TEMPLATE = Struct(
+    "sections" / counted(SECTION, MAX_SECTIONS) * "the sections in the order of the file, 1 to 64",
+)
+TABLE_DETAIL = Struct(
+    "details" / counted(DETAIL, MAX_SECTIONS) * "what each section leaves open, as many",
 )
 
 
@@ -107,48 +116,68 @@ class Clock:
 
 
 @dataclass(frozen=True, slots=True)
-class TableLayout:
-    """A template and a detail of a table, parsed. ``rows`` has the patterns and the ending."""
+class Section:
+    """A section of a table. ``signals`` are numbers of signals, whose channels are its columns.
 
+    ``rows`` has the patterns and the ending.
+    """
+
+    signals: tuple[int, ...]
     header: bytes
     marked: bool
     missing: bytes
     clock: Clock | None
     rows: Layout
 
-    def build(self) -> tuple[bytes, bytes]:
-        """The bytes of the template and of the detail; LimitError for too many runs."""
-        shared, own = numbered_patterns(self.rows.patterns)
+
+def build_table(sections: Sequence[Section]) -> tuple[bytes, bytes]:
+    """The bytes of the template and of the detail; LimitError for too many runs."""
+    templates, details = [], []
+    for section in sections:
+        shared, own = numbered_patterns(section.rows.patterns)
         names = ("grid", "numerator", "denominator", "offset")
-        clock = [{name: getattr(self.clock, name) for name in names}] if self.clock else []
-        template = {
-            "header": self.header,
-            "marks": int(self.marked),
-            "missing": self.missing,
-            "clock": clock,
-            **shared,
-        }
-        return build(TABLE_TEMPLATE, template, "source template"), build(
-            DETAIL, self.rows.detail_fields(own), "source detail"
+        clock = section.clock
+        templates.append(
+            {
+                "signals": section.signals,
+                "header": section.header,
+                "marks": int(section.marked),
+                "missing": section.missing,
+                "clock": [{name: getattr(clock, name) for name in names}] if clock else [],
+                **shared,
+            }
         )
+        details.append(section.rows.detail_fields(own))
+    return build(TABLE_TEMPLATE, {"sections": templates}, "source template"), build(
+        TABLE_DETAIL, {"details": details}, "source detail"
+    )
 
 
-def parse_table(template: bytes, detail: bytes, n_columns: int) -> TableLayout:
-    """The layout of a table of ``n_columns`` columns, that of a clock among them where it has one.
+def parse_table(template: bytes, detail: bytes, sizes: Sequence[int]) -> list[Section]:
+    """The sections of a table of signals that have ``sizes`` channels; FormatError on bad bytes."""
+    shared = parse(TABLE_TEMPLATE, template, "source template", {"runs": MAX_RUNS}).sections
+    own = parse(TABLE_DETAIL, detail, "source detail", {"runs": MAX_RUNS}).details
+    if not shared or len(shared) != len(own):  # TABLE-07
+        raise FormatError(f"source template: {len(shared)} sections, {len(own)} details")
+    numbers = [number for fields in shared for number in fields.signals]
+    if max(numbers, default=0) >= len(sizes) or len(set(numbers)) < len(numbers):  # TABLE-08
+        raise FormatError(f"source template: signals {numbers[:8]} of {len(sizes)}")
+    return [_section(*fields, sizes) for fields in zip(shared, own, strict=False)]
 
-    Raises FormatError on bad bytes.
-    """
-    shared = parse(TABLE_TEMPLATE, template, "source template", {"runs": MAX_RUNS})
-    own = parse(DETAIL, detail, "source detail", {"runs": MAX_RUNS})
+
+def _section(shared: Any, own: Any, sizes: Sequence[int]) -> Section:
+    if not shared.signals:  # TABLE-08
+        raise FormatError("source template: a section without signals")
     clock = None
     if shared.clock:
         fields = shared.clock[0]
         if fields.grid.kind not in DECIMALS:  # TABLE-02
             raise FormatError(f"source template: times on a grid {fields.grid.kind.name}")
         clock = Clock(fields.grid, fields.numerator, fields.denominator, fields.offset)
-    n_columns += clock is not None  # TABLE-01
+    n_columns = sum(sizes[number] for number in shared.signals) + 1 + len(shared.clock)  # TABLE-01
     rows = parsed_patterns((shared.header,), shared, own, n_columns)
-    return TableLayout(shared.header, bool(shared.marks), shared.missing, clock, rows)
+    signals = tuple(shared.signals)
+    return Section(signals, shared.header, bool(shared.marks), shared.missing, clock, rows)
 
 
 def fill(header: bytes, names: Sequence[str], count: bytes) -> bytes:

@@ -9,7 +9,7 @@ from fractions import Fraction
 from mcz.errors import MotionError
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.restore import numbers_of
-from mcz.formats.table_layout import Clock, TableLayout
+from mcz.formats.table_layout import Clock, Section, build_table
 from mcz.motion import POSITION_KINDS, Motion, Skeleton, Source
 from mcz.numbers import Grid, GridKind
 
@@ -86,7 +86,7 @@ def _with_source(
     """
     clock = None if timed else _clock(motion)
     rows = Layout((), (Pattern(runs_of(items), b"\n"),))
-    template, detail = TableLayout(header.encode(), True, missing, clock, rows).build()
+    template, detail = build_table([Section((0,), header.encode(), True, missing, clock, rows)])
     source = Source(format_name, template, detail)
     return replace(motion, signals=motion.signals[:1], source=source)
 

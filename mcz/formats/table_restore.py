@@ -8,11 +8,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mcz.errors import FormatError
-from mcz.formats.restore import numbers_of, printed_count, rows_text
-from mcz.formats.table_layout import Clock, fill, parse_table
+from mcz.formats.restore import numbers_of, printed_count, rows_text, text_limit
+from mcz.formats.table_layout import Section, fill, parse_table
+from mcz.formats.table_notes import TableNotes
 from mcz.motion import Exceptions, Motion, Signal
+from mcz.numbers import Grid, GridKind
+
+Ints = NDArray[np.int64]
+
+INTEGERS = Grid(GridKind.FIXED)
 
 
 def restore_table(motion: Motion) -> bytes:
@@ -21,20 +28,49 @@ def restore_table(motion: Motion) -> bytes:
     Raises FormatError where the source does not belong to such a motion, and LimitError for a text
     beyond the limits of ``restore``.
     """
-    source = motion.source
+    source, signals = motion.source, motion.signals
     assert source is not None
-    if any(signal.samples_per_frame != 1 for signal in motion.signals):  # TABLE-06
-        raise FormatError("source template: a table has one row a frame in every signal")
-    signal = beside(motion.signals)
-    layout = parse_table(source.template, source.detail, signal.n_channels)
-    if layout.clock is not None:
-        signal = _with_clock(signal, layout.clock, numbers_of(motion, motion.n_frames).tolist())
-    rows = rows_text(motion, source, signal, layout.rows, layout.missing)
-    header = layout.header
-    if layout.marked:
-        names = [joint.name for joint in motion.skeleton.joints]
-        header = fill(header, names, printed_count(layout.rows, signal.n_rows))
-    return header + rows
+    sizes = [signal.n_channels for signal in signals]
+    sections = parse_table(source.template, source.detail, sizes)
+    notes = source.notes if isinstance(source.notes, TableNotes) else TableNotes(())
+    if len(notes.sections) > len(sections):  # TABLE-09
+        raise FormatError(f"source notes: of {len(notes.sections)} sections, not {len(sections)}")
+    tables = [_columns(motion, section) for section in sections]
+    limit = text_limit(source, [table.values.shape for table, _ in tables])
+    names = [joint.name for joint in motion.skeleton.joints]
+    out = []
+    for k, (section, (table, numbers)) in enumerate(zip(sections, tables, strict=True)):
+        mine = notes.of(k, table.samples_per_frame, table.n_rows)
+        rows = rows_text(table, section.rows, mine, numbers, limit, section.missing)
+        limit -= len(rows)
+        header = section.header
+        if section.marked:
+            header = fill(header, names, printed_count(section.rows, table.n_rows))
+        out += [header, rows]
+    return b"".join(out)
+
+
+def _columns(motion: Motion, section: Section) -> tuple[Signal, Ints]:
+    """The columns of a section, and the number of the frame of each row."""
+    signals = [motion.signals[number] for number in section.signals]
+    n_each = signals[0].samples_per_frame
+    if any(signal.samples_per_frame != n_each for signal in signals):  # TABLE-06
+        raise FormatError("source template: signals of a section differ in their rows a frame")
+    signal = beside(signals)
+    frame, within = np.divmod(np.arange(signal.n_rows), n_each)
+    numbers = numbers_of(motion, motion.n_frames)[frame]
+    more, grids = [], []
+    if section.clock is not None:
+        counted = [n * n_each + k for n, k in zip(numbers.tolist(), within.tolist(), strict=True)]
+        ordinals = np.array(section.clock.ordinals(counted), np.int64)
+        more.append(section.clock.grid.values(ordinals))
+        grids.append(section.clock.grid)
+    last = signal.n_channels + len(more)
+    runs = (run for pattern in section.rows.patterns for run in pattern.runs)
+    if any(run.column + run.n_columns > last for run in runs):
+        more.append(within.astype(np.float64))
+        grids.append(INTEGERS)
+    return _with_columns(signal, more, grids), numbers
 
 
 def beside(signals: Sequence[Signal]) -> Signal:
@@ -48,6 +84,7 @@ def beside(signals: Sequence[Signal]) -> Signal:
     return Signal(
         np.hstack([signal.values.astype(np.float64, copy=False) for signal in signals]),
         tuple(grid for signal in signals for grid in signal.grids),
+        samples_per_frame=signals[0].samples_per_frame,
         mask=None if mask.all() else mask,
         exceptions=_exceptions(placed),
         grid_changes=tuple(
@@ -66,15 +103,19 @@ def _exceptions(placed: Sequence[tuple[int, Signal]]) -> Exceptions:
     return Exceptions(rows[order], channels[order], tuple(texts[k] for k in order.tolist()))
 
 
-def _with_clock(signal: Signal, clock: Clock, numbers: Sequence[int]) -> Signal:
-    """``signal`` with the times of the clock as its last column."""
-    ordinals = np.array(clock.ordinals(numbers), np.int64).reshape(-1, 1)
+def _with_columns(
+    signal: Signal, more: Sequence[NDArray[np.float64]], grids: Sequence[Grid]
+) -> Signal:
+    """``signal`` with more columns behind its own."""
+    if not more:
+        return signal
     mask = signal.mask
     if mask is not None:
-        mask = np.hstack([mask, np.ones((len(mask), 1), np.bool_)])
+        mask = np.hstack([mask, np.ones((len(mask), len(more)), np.bool_)])
     return Signal(
-        np.hstack([signal.values, clock.grid.values(ordinals)]),
-        (*signal.grids, clock.grid),
+        np.column_stack([signal.values, *more]),
+        (*signal.grids, *grids),
+        samples_per_frame=signal.samples_per_frame,
         mask=mask,
         exceptions=signal.exceptions,
         grid_changes=signal.grid_changes,

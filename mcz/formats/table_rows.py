@@ -10,20 +10,22 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-from mcz.formats.layout import FRAME_NUMBER, MAX_WIDTH, Pattern, runs_of
-from mcz.formats.rows import Rows, Token, line_of, read_rows
+from mcz.formats.layout import BLANKS, FRAME_NUMBER, FREE, FULL, MAX_WIDTH, Pattern, runs_of
+from mcz.formats.rows import DENSE, Rows, Token, line_of, read_rows
 from mcz.numbers import Tokens, scan
 
 Bools = NDArray[np.bool_]
 
 LOOKED_AT = 64  # rows, for columns that are padded
 _BLANKS = b" \t\r\n"
+_AROUND = _BLANKS + b'"'  # of a cell
+_NONE = (b"NA", b"N/A", b"null", b"NULL", b"None")  # what is no number, and stands for one
 _WORDS = re.compile(rb"[^ \t\r\n]+")
 _PART = b","  # between the numbers of a cell
 _FIRST = re.compile(rb"[ \t]*([-+]?(?:[0-9]|\.[0-9])[^ \t\r\n,;]*)")
@@ -47,7 +49,7 @@ class RowCells:
     """The tokens of the row that begins at an offset; see ``rows.Frames``.
 
     ``columns``: of each cell its columns, several where it holds several numbers. ``separator``
-    None: blanks. ``blanks``: cells may be empty.
+    None: blanks. ``blanks``: cells may be empty. ``free``: the first one, too.
     """
 
     def __init__(
@@ -56,9 +58,10 @@ class RowCells:
         columns: Sequence[Sequence[int]],
         separator: bytes | None,
         blanks: bool = True,
+        free: bool = False,
     ) -> None:
         self.data, self.columns, self.separator = data, columns, separator
-        self.blanks = blanks
+        self.blanks, self.free = blanks, free
 
     def __call__(self, at: int) -> tuple[list[Token], int] | None:
         while True:
@@ -69,29 +72,34 @@ class RowCells:
             if end == len(self.data):
                 return None
             at = end
-        if not begins_with_number(line):
+        if not (self.free or begins_with_number(line)):
             raise SourceError(f"line {line_of(self.data, at)}: not a row of numbers: {line[:40]!r}")
         tokens: list[Token] = []
-        for number, (start, stop) in enumerate(self._cells(at, line)):
-            if number >= len(self.columns):
-                if start < stop:
-                    raise SourceError(
-                        f"line {line_of(self.data, at)}: more than {len(self.columns)} cells"
-                    )
-                continue
-            tokens += self._cell(start, stop, self.columns[number])
+        for (start, stop), columns in zip(self._cells(at, line), self.columns, strict=False):
+            tokens += self._cell(start, stop, columns)
         return tokens, end
 
     def _cells(self, at: int, line: bytes) -> list[tuple[int, int]]:
-        """Start and stop of every cell without its blanks; a blank cell at its end."""
+        """Start and stop of every cell without its blanks; a blank cell at its end.
+
+        More than there are columns are blank, or refused before they take memory.
+        """
+        most, first = len(self.columns), at
         if self.separator is None:
-            return [(at + m.start(), at + m.end()) for m in _WORDS.finditer(line)]
-        found = []
-        for cell in line.rstrip(b"\r\n").split(self.separator):
-            bare = cell.strip(_BLANKS)
-            start = at + (cell.index(bare) if bare else len(cell))
-            found.append((start, start + len(bare)))
-            at += len(cell) + len(self.separator)
+            words = islice(_WORDS.finditer(line), most + 1)
+            found = [(at + m.start(), at + m.end()) for m in words]
+            rest = line if len(found) > most else b""
+        else:
+            cells = line.rstrip(b"\r\n").split(self.separator, most)
+            rest = cells.pop().strip(_AROUND + self.separator) if len(cells) > most else b""
+            found = []
+            for cell in cells:
+                bare = cell.strip(_AROUND)
+                start = at + (cell.index(bare) if bare else len(cell))
+                found.append((start, start + len(bare)))
+                at += len(cell) + len(self.separator)
+        if rest:
+            raise SourceError(f"line {line_of(self.data, first)}: more than {most} cells")
         return found
 
     def _cell(self, start: int, stop: int, columns: Sequence[int]) -> list[Token]:
@@ -99,12 +107,13 @@ class RowCells:
             return []
         if len(columns) == 1:
             return [(start, stop, columns[0])]
-        parts = self.data[start:stop].split(_PART)
-        if len(parts) != len(columns):
+        n_parts = self.data.count(_PART, start, stop) + 1
+        if n_parts != len(columns):
             raise SourceError(
-                f"line {line_of(self.data, start)}: {len(parts)} numbers in a cell, expected "
+                f"line {line_of(self.data, start)}: {n_parts} numbers in a cell, expected "
                 f"{len(columns)}"
             )
+        parts = self.data[start:stop].split(_PART)
         tokens, at = [], start
         for part, column in zip(parts, columns, strict=True):
             bare = part.strip(_BLANKS)
@@ -123,18 +132,24 @@ class TableRows:
 
 
 def read_table(
-    data: bytes, at: int, n_columns: int, columns: Sequence[Sequence[int]], separator: bytes | None
+    data: bytes,
+    at: int,
+    n_columns: int,
+    columns: Sequence[Sequence[int]],
+    separator: bytes | None,
+    *,
+    free: bool = False,
 ) -> TableRows:
-    """Read all rows of ``data`` from offset ``at`` on.
+    """Read all rows of ``data`` from offset ``at`` on; ``free``: they may begin with none.
 
     Raises SourceError for what is no table, and where ``read_rows`` does.
     """
-    from mcz.formats import table_kernels
 
     def attempt(blanks: bool) -> Rows:
-        cells = RowCells(data, columns, separator, blanks)
-        match = partial(_match, table_kernels.match_cells, int(blanks))
-        return read_rows(data, at, n_columns, cells, match, _padded(data, at, cells))
+        cells = RowCells(data, columns, separator, blanks, free)
+        empty = FREE if free and len(columns) > 1 else BLANKS  # an empty line is no row
+        mode = empty if blanks else FULL
+        return read_rows(data, at, n_columns, cells, mode, _padded(data, at, cells), DENSE)
 
     rows = attempt(True)
     if not rows.n_rows:
@@ -174,18 +189,18 @@ def _padded(data: bytes, at: int, cells: RowCells) -> dict[int, int]:
     return {column: width for column, width in widths.items() if 1 < width <= MAX_WIDTH}
 
 
-def _match(match: object, blanks: int, *arguments: object) -> tuple[int, int]:
-    return match(*arguments, blanks)  # type: ignore[operator,no-any-return]
-
-
 def _words(data: bytes, rows: Rows, blank: Bools) -> Counter[bytes]:
     """How often each spelling of a number that is none occurs."""
+    found: Counter[bytes] = Counter()
+    for word in _NONE:
+        if word in data and (n := int(np.count_nonzero(_are(data, rows, word)))):
+            found[word] = n
     if re.search(rb"(?i)nan|#", data) is None:
-        return Counter()
+        return found
     chosen = (rows.stop > 0) & ~blank
     tokens = scan(data, rows.start[chosen], rows.stop[chosen])
     nan = _are_nan(tokens)
-    return Counter(tokens[nan].texts().tolist())
+    return found + Counter(tokens[nan].texts().tolist())
 
 
 def _are_nan(tokens: Tokens) -> Bools:
@@ -232,13 +247,14 @@ def without_zeros(data: bytes, rows: Rows, groups: Sequence[Sequence[int]]) -> R
     ending = rows.ending
     moved = [_moved(pattern, zeros) for pattern in rows.patterns]
     if ending is not None:
-        last = rows.patterns[_last_pattern(rows)].runs
+        last = rows.patterns[last_pattern(rows)].runs
         column = last[-1].column + last[-1].n_columns - 1 if last else FRAME_NUMBER
         ending = zeros.get(column, b"") + ending
     return replace(rows, stop=rows.stop - less, patterns=tuple(moved), ending=ending)
 
 
-def _last_pattern(rows: Rows) -> int:
+def last_pattern(rows: Rows) -> int:
+    """The number of the pattern of the last row."""
     if rows.notes is None or not len(rows.notes.patterns):
         return 0
     return int(rows.notes.patterns[-1])

@@ -69,6 +69,7 @@ def _better(
     present = np.flatnonzero(rows.stop[:, column])
     tokens = scan(data, rows.start[present, column], rows.stop[present, column])
     values = signal.values[present, column]
+    tokens.known.append(values)
     if not len(values) or (values == values[0]).all():
         return None  # a constant costs nothing
     grid, _, known = fit(tokens)

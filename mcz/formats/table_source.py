@@ -9,7 +9,17 @@ from collections.abc import Sequence
 from mcz.errors import FormatError, LimitError
 from mcz.formats.layout import Layout
 from mcz.formats.rows import Rows
-from mcz.formats.table_layout import COUNT, NAME, Clock, TableLayout, any_mark, fill, with_phrases
+from mcz.formats.table_layout import (
+    COUNT,
+    NAME,
+    Clock,
+    Section,
+    any_mark,
+    build_table,
+    fill,
+    with_phrases,
+)
+from mcz.formats.table_notes import table_notes
 from mcz.motion import Source
 
 
@@ -35,30 +45,37 @@ def named_count(data: bytes, at: int, stop: int, count: tuple[int, int], n_rows:
     return data[at : count[0]] + COUNT + data[count[1] : stop]
 
 
-def table_source(
-    format_name: str,
-    data: bytes,
+def section_of(
     header: tuple[bytes, bytes],
     beside: tuple[bytes, Clock | None],
     rows: Rows,
     names: Sequence[str],
-) -> Source:
-    """The source of a table.
+    signals: Sequence[int],
+) -> Section:
+    """A section of a table whose columns are those of ``signals``.
 
     ``header``: with marks, and as it is; the second is taken where the first does not give it.
     ``beside``: what stands for a missing value, and the clock.
     """
     marked, whole = with_phrases(header[0]), header[1]
     fits = not any_mark(whole) and _fills(marked, names, b"%d" % rows.n_rows, whole)
-    layout = TableLayout(
+    return Section(
+        tuple(signals),
         marked if fits else whole,
         fits,
         *beside,
         Layout((), rows.patterns, ending=rows.ending),
     )
-    template, detail = layout.build()
+
+
+def table_source(
+    format_name: str, data: bytes, sections: Sequence[tuple[Section, Rows, int]]
+) -> Source:
+    """The source of a table of sections, each with its rows, so many a frame."""
+    template, detail = build_table([section for section, _, _ in sections])
     digest = hashlib.sha256(data).digest()
-    return Source(format_name, template, detail, rows.notes, size=len(data), sha256=digest)
+    notes = table_notes([(n_each, rows.notes) for _, rows, n_each in sections])
+    return Source(format_name, template, detail, notes, size=len(data), sha256=digest)
 
 
 def _fills(header: bytes, names: Sequence[str], count: bytes, whole: bytes) -> bool:

@@ -8,13 +8,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.formats.layout import Items
+from mcz.formats.layout import BLANKS, FREE, WORDS, Items
 from mcz.jit import kernel
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 
-BLANK = 0x20
+BLANK, QUOTE, COMMA, SEMICOLON = 0x20, 0x22, 0x2C, 0x3B
 MINUS, PLUS, HASH, ZERO, NINE, LF = 0x2D, 0x2B, 0x23, 0x30, 0x39, 0x0A
 
 
@@ -30,8 +30,15 @@ def _is_at(text: Bytes, at: int, gaps: Bytes, start: int, stop: int) -> bool:
 
 
 @kernel
-def _token_end(text: Bytes, at: int) -> int:
-    while at < len(text) and text[at] > BLANK:
+def _token_end(text: Bytes, at: int, cells: int) -> int:
+    if cells == WORDS:
+        while at < len(text) and text[at] > BLANK:
+            at += 1
+        return at
+    while at < len(text):
+        byte = text[at]
+        if byte <= BLANK or byte == COMMA or byte == SEMICOLON or byte == QUOTE:
+            break
         at += 1
     return at
 
@@ -76,21 +83,24 @@ def _begins_frame(text: Bytes, at: int) -> bool:
 
 
 @kernel
-def _match_token(text: Bytes, at: int, width: int) -> tuple[int, int, int]:
-    """Start and stop of the token at ``at`` and the offset after its padding; start -1: none."""
+def _match_token(text: Bytes, at: int, width: int, cells: int) -> tuple[int, int, int]:
+    """Start and stop of the token at ``at`` and the offset after its padding; start -1: none.
+
+    A cell may be empty.
+    """
     fail = (-1, -1, -1)
     blanks = 0
     if width > 0:
         blanks = _blanks(text, at)
         at += blanks
-    stop = _token_end(text, at)
-    if stop == at or text[at] == HASH:
+    stop = _token_end(text, at, cells)
+    if cells == WORDS and (stop == at or text[at] == HASH):
         return fail
     if width == 0:
         return at, stop, stop
     size = stop - at
     if width == 1:
-        signed = text[at] == MINUS or text[at] == PLUS
+        signed = size > 0 and (text[at] == MINUS or text[at] == PLUS)
         return (at, stop, stop) if blanks == (0 if signed else 1) else fail
     if width > 1:
         return (at, stop, stop) if blanks == max(0, width - size) else fail
@@ -99,7 +109,9 @@ def _match_token(text: Bytes, at: int, width: int) -> tuple[int, int, int]:
 
 
 @kernel
-def _match_row(text: Bytes, at: int, items: Items, start: Ints, stop: Ints) -> tuple[int, int]:
+def _match_row(
+    text: Bytes, at: int, items: Items, start: Ints, stop: Ints, cells: int
+) -> tuple[int, int]:
     """The offset after a row of the pattern at ``at`` and its frame number; offset -1: no match.
 
     Fills ``start`` and ``stop`` (n_columns,) of its tokens.
@@ -109,8 +121,8 @@ def _match_row(text: Bytes, at: int, items: Items, start: Ints, stop: Ints) -> t
     for k in range(len(columns)):
         if not _is_at(text, at, gaps, gap_start[k], gap_stop[k]):
             return -1, 0
-        first, last, at = _match_token(text, at + gap_stop[k] - gap_start[k], widths[k])
-        if first < 0:
+        first, last, at = _match_token(text, at + gap_stop[k] - gap_start[k], widths[k], cells)
+        if first < 0 or (first == last and cells < (FREE if k == 0 else BLANKS)):
             return -1, 0
         if columns[k] >= 0:
             start[columns[k]] = first
@@ -127,17 +139,20 @@ def _match_row(text: Bytes, at: int, items: Items, start: Ints, stop: Ints) -> t
 
 @kernel
 def match_rows(
-    text: Bytes, at: int, items: Items, row: int, start: Ints, stop: Ints, numbers: Ints
+    text: Bytes, at: int, items: Items, row: int, start: Ints, stop: Ints, numbers: Ints, cells: int
 ) -> tuple[int, int]:
     """Match as many rows of one pattern as possible from offset ``at`` and row ``row`` on.
 
-    Fills ``start`` and ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,). Returns the row and
-    the offset of the first row that does not match, or for which there is no room.
+    ``cells``: what a token is. One of ``WORDS`` ends at a blank. Those of tables end at separators
+    and quotes, too: none is empty where ``FULL``, all but the first may be where ``BLANKS``, and
+    all where ``FREE``. Fills ``start`` and ``stop`` (n_rows, n_columns) and ``numbers`` (n_rows,).
+    Returns the row and the offset of the first row that does not match, or for which there is no
+    room.
     """
     columns = items.columns
-    numbered = len(columns) > 0 and columns[0] == -1
+    numbered = cells == WORDS and len(columns) > 0 and columns[0] == -1
     while row < len(numbers):
-        end, number = _match_row(text, at, items, start[row], stop[row])
+        end, number = _match_row(text, at, items, start[row], stop[row], cells)
         if end <= at or (numbered and not _begins_frame(text, end)):
             break
         numbers[row] = number

@@ -8,28 +8,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from fractions import Fraction
-
-import numpy as np
+from dataclasses import dataclass
 
 from mcz.errors import SourceError
 from mcz.formats.layout import FRAME_NUMBER
 from mcz.formats.rows import Rows
-from mcz.formats.table_layout import NEXT, SAME, Clock
+from mcz.formats.table_layout import NEXT, SAME
 from mcz.formats.table_plain import plain_trc
 from mcz.formats.table_restore import restore_table
 from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
 from mcz.formats.table_signals import read_columns
-from mcz.formats.table_source import named_count, names_in, table_source
+from mcz.formats.table_source import named_count, names_in, section_of, table_source
+from mcz.formats.table_times import Times, read_times
 from mcz.formats.text_source import check_text, text_encoding
-from mcz.formats.times import find_clock, half_digit_of, stated_rate, uniform_rate
-from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
-from mcz.numbers import scan
+from mcz.formats.times import stated_rate
+from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Skeleton
 
 UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54, "ft": 30.48}
 POSITION = tuple(Channel(kind) for kind in POSITION_KINDS)
-TIME = (Channel("", "time", "s"),)
 
 _LABELS = re.compile(rb"(?i)[ \t]*frame#?[ \t]")
 _AXES = re.compile(rb"([Xx])([0-9]+)|([YyZz])([0-9]+)")
@@ -66,16 +62,18 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
     joints = tuple(Joint(marker, channels=POSITION) for marker in names)
     unit_cm = UNIT_CM.get(header.values.get("units", "").lower())
     skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="")
-    clock, times, rate, exact, note = _times(data, rows, time, header.values)
+    times, note = _times(data, rows, time, header.values)
     text = _marked(data, header, rows.n_rows, names[: len(labels)])
+    signals = range(1 + len(times.signals))
+    section = section_of(text, (table.missing, times.clock), rows, names, signals)
     return Motion(
         skeleton,
-        (motion, *times),
-        rate,
-        exact,
+        (motion, *times.signals),
+        times.rate,
+        times.exact,
         name,
         _metadata(encoding, [*note, *_notes(header.values, len(labels), rows.n_rows)]),
-        table_source("trc", data, text, (table.missing, clock), rows, names),
+        table_source("trc", data, [(section, rows, 1)]),
         rows.numbers,
     )
 
@@ -118,36 +116,18 @@ def _widest(data: bytes, at: int) -> int:
     return max(0, -(-(cells - 1) // 3))
 
 
-def _times(
-    data: bytes, rows: Rows, column: int, values: dict[str, str]
-) -> tuple[Clock | None, tuple[Signal, ...], Fraction | None, bool, list[str]]:
-    """The clock, or a signal of times; the frame rate, whether it is exact, and what is odd."""
-    present = np.flatnonzero(rows.stop[:, column])
-    tokens = scan(data, rows.start[present, column], rows.stop[present, column])
-    whole = len(tokens) == rows.n_rows and not tokens.bad().any()
-    numbers = rows.numbers if rows.numbers is not None else np.arange(1, rows.n_rows + 1)
+def _times(data: bytes, rows: Rows, column: int, values: dict[str, str]) -> tuple[Times, list[str]]:
+    """The times, and what is odd about them."""
     stated = [
         rate for key in ("datarate", "camerarate") if (rate := stated_rate(values.get(key, "")))
     ]
-    clock = find_clock(tokens, numbers, stated) if whole else None
-    used = {run.column for pattern in rows.patterns for run in pattern.runs}
-    if clock is not None:
-        signals: tuple[Signal, ...] = ()
-    elif column in used:
-        signals = (replace(read_columns(data, rows, [column]), name="time", channels=TIME),)
-    else:
-        signals = ()
-    rate, exact = (
-        uniform_rate(tokens.values(), half_digit_of(tokens), stated) if whole else (None, True)
-    )
-    if rate is None and rows.n_rows < 2 and stated:
-        return clock, signals, stated[0], True, []
-    odd = []
+    times = read_times(data, rows, column, stated)
+    rate, odd = times.rate, []
     if stated and rate is None:
         odd = ["the times are not uniform"]
     elif stated and rate is not None and rate not in stated:
         odd = [f"DataRate is {values['datarate'][:40]}, the times are {float(rate):g} a second"]
-    return clock, signals, rate, exact, odd
+    return times, odd
 
 
 def _marked(data: bytes, header: _Header, n_rows: int, names: Sequence[str]) -> tuple[bytes, bytes]:

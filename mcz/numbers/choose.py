@@ -121,6 +121,8 @@ def fit(tokens: Tokens, prefer: Sequence[Grid] = ()) -> tuple[Grid, Ints, Bools]
     With it, what its ``ordinals_of_tokens`` gives. The first of ``prefer`` without exceptions is
     taken at once, and the first that has no more exceptions than the best of all others.
     """
+    if not (tokens.known or tokens.bad().any()):
+        tokens.values()  # several grids ask for them, and for those of some of the tokens
     wanted = []
     for grid in prefer:
         wanted.append((grid, *grid.ordinals_of_tokens(tokens)))

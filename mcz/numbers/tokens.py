@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -55,8 +55,17 @@ class Texts:
         same_length = np.array_equal(self.offsets, other.offsets)
         if same_length and np.array_equal(self.buffer, other.buffer):
             return np.ones(len(self), np.bool_)
-        pairs = zip(self.tolist(), other.tolist(), strict=True)
-        return np.array([a == b for a, b in pairs], np.bool_)
+        sizes = np.diff(self.offsets)
+        same: Bools = sizes == np.diff(other.offsets)
+        chosen = np.flatnonzero(same & (sizes > 0))
+        if len(chosen):
+            n = sizes[chosen]
+            first = np.cumsum(n) - n
+            within = np.arange(first[-1] + n[-1]) - np.repeat(first, n)
+            mine = self.buffer[within + np.repeat(self.offsets[chosen], n)]
+            theirs = other.buffer[within + np.repeat(other.offsets[chosen], n)]
+            same[chosen] = ~np.logical_or.reduceat(mine != theirs, first)
+        return same
 
     def tolist(self) -> list[bytes]:
         whole = self.buffer.tobytes()
@@ -75,6 +84,7 @@ class Tokens:
     start: Ints
     stop: Ints
     fields: Ints  # columns as in mcz.numbers.kernels
+    known: list[Floats] = field(default_factory=list, repr=False)  # the values, once they are asked
 
     def __len__(self) -> int:
         return len(self.start)
@@ -82,8 +92,10 @@ class Tokens:
     def __getitem__(self, index: Any) -> Tokens:
         if isinstance(index, int | np.integer):
             raise TypeError("a single token is a slice of one, or token(i)")
-        chosen = (np.ascontiguousarray(a[index]) for a in (self.start, self.stop, self.fields))
-        return Tokens(self.text, *chosen)
+        start, stop, fields = (
+            np.ascontiguousarray(a[index]) for a in (self.start, self.stop, self.fields)
+        )
+        return Tokens(self.text, start, stop, fields, [values[index] for values in self.known])
 
     def token(self, index: int) -> bytes:
         """The text of one token."""
@@ -103,6 +115,11 @@ class Tokens:
 
     def values(self) -> Floats:
         """The nearest binary64 of each token; SourceError names the first that is no number."""
+        if not self.known:
+            self.known.append(self._values())
+        return self.known[0].copy()
+
+    def _values(self) -> Floats:
         loops = kernels()
         mantissa, power, shape = self.fields.T
         odd = shape & (loops.BAD | loops.SPECIAL | loops.LONG)

@@ -43,6 +43,9 @@ def source_info(
     if taken.remark:
         warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
     motion = taken.motion
+    if motion.source is not None and source_format.is_table:  # of .csv there are several
+        source_format = FORMATS[motion.source.format]
+        document["format"] = source_format.name
     clip = _clip_facts(motion, source_format, path.name, data)
     clip["skeleton_file"] = _file_of(taken.skeleton)
     return document | {"skeletons": [_skeleton_facts(motion.skeleton)], "clips": [clip]}

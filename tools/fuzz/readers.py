@@ -20,6 +20,7 @@ from mcz.reading.report import validate
 from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tools.fuzz.guard import hold
 from tools.fuzz.seeds import sources
+from tools.vectors.build import table_files
 
 FRAMES = 3  # of a sample, as a seed
 STORED = 3  # one of so many motions that are read is stored, too, which takes long
@@ -56,6 +57,12 @@ WORDS = {
         "DataType=Vec3 DataType=Quaternion DataRate=100 version=3 endheader time \\x09 , 0,0,0 "
         "0.8304999999999999 nan \\x0a\\x0a -1 1e-320 1e300 \\x00 \\x01 \\x03"
     ),
+    "csv": (
+        "Format|Version,1.21 Rotation|Type,XYZ Length|Units,Meters Coordinate|Space,Local "
+        "Frame,Time Frame,Sub|Frame Devices Trajectories Segments Model|Outputs Rotation Position "
+        "Marker|Quality ,X,Y,Z ,,,, ; \\x09 \\x0d\\x0a \\x0a\\x0a \\x22 \\x22\\x22 "
+        "NA nan 1,5 -0 1e300 1e-320 time_ms frame \\xef\\xbb\\xbf"
+    ),
 }
 
 
@@ -72,6 +79,8 @@ def seeds(name: str) -> dict[str, bytes]:
 def _sample(name: str) -> bytes:
     if name == "asf":
         return asf.write(acclaim_walk().skeleton)
+    if name == "csv":
+        return table_files.VICON
     walk = {"amc": acclaim_walk, "c3d": marker_walk, "trc": marker_walk}.get(name, bvh_walk)()
     signal = walk.signals[0]
     mask = None if signal.mask is None else signal.mask[:FRAMES]
@@ -97,6 +106,10 @@ def check_mot(data: bytes) -> bool:
 
 def check_sto(data: bytes) -> bool:
     return _check("sto", data)
+
+
+def check_csv(data: bytes) -> bool:
+    return _check("csv", data)
 
 
 def check_amc(data: bytes) -> bool:

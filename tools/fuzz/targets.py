@@ -80,6 +80,7 @@ TARGETS: dict[str, Target] = {
         _reader("trc", readers.check_trc),
         _reader("mot", readers.check_mot),
         _reader("sto", readers.check_sto),
+        _reader("csv", readers.check_csv),
         Target(
             "mcz",
             "whole files: strict, in parts, salvaged, live, verified",

@@ -12,6 +12,9 @@ const SOURCE_FORMATS = new Map([
   [6, { name: "trc", of: "clip" }],
   [7, { name: "mot", of: "clip" }],
   [8, { name: "sto", of: "clip" }],
+  [9, { name: "motive", of: "clip" }],
+  [10, { name: "vicon", of: "clip" }],
+  [11, { name: "csv", of: "clip" }],
 ]);
 
 /** Names of the source formats that this decoder restores. */

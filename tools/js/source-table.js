@@ -1,4 +1,4 @@
-// SPEC.md, "Template of tables" and "The text of tables": TRC, MOT and STO files.
+// SPEC.md, "Template of tables" and "The text of tables": TRC, MOT, STO and CSV files.
 
 import { ByteReader } from "./bytes.js";
 import { ByteWriter } from "./byte-writer.js";
@@ -6,16 +6,21 @@ import { Refused } from "./errors.js";
 import { FIXED, TRIMMED, parseGrid } from "./grids.js";
 import {
   Tokens,
+  USUAL,
   countText,
   numberOf,
-  readDetail,
   readGaps,
   readPatterns,
+  readRowNotes,
+  rowsLimit,
+  takeDetail,
   writeRows,
 } from "./source-text.js";
 import { latin1, textOfOrdinal } from "./text.js";
 
 const MAX_HEADER_BYTES = 2 ** 26;
+const MAX_SECTIONS = 64;
+const MAX_RUNS = 2 ** 18;
 
 const NAME = 0;
 const NEXT_NUMBER = 1;
@@ -66,42 +71,113 @@ const PHRASES = new Map([
  * @throws {Refused}
  */
 export function restoreTable(source, signals, numbers, names, maxBytes) {
-  for (const { signal } of signals) {
-    if (signal.samplesPerFrame !== 1) {
-      throw new Refused(`a table: ${signal.samplesPerFrame} rows a frame of ${signal.name}`);
-    }
-  }
-  const template = readTableTemplate(source.template.data);
-  const detail = readDetail(source.detail);
-  const [motion] = signals;
+  const templates = readTableTemplate(source.template.data, signals.length);
+  const details = readTableDetail(source.detail, templates.length);
+  const sections = templates.map((template, at) => {
+    const cells = new Cells(template, signals, numbers);
+    return { template, detail: details[at], cells };
+  });
+  const parts = framesOf(signals[0], sections);
   const out = new ByteWriter(maxBytes, "a restored table");
-  if (template.marks) writeHeader(out, template.header, names, countText(detail, motion.nRows));
-  else out.write(template.header);
-  const cells = new Cells(signals, template, numbers);
-  const nColumns = cells.nChannels + (template.clock ? 1 : 0);
-  const tokenOf = (row, column) => cells.of(row, column);
-  const numberOfFrame = numberOf(numbers);
-  writeRows(out, { source, template, detail, motion, nColumns, numberOfFrame, tokenOf });
+  let left = rowsLimit(
+    source.size,
+    sections.map(({ cells }) => cells),
+  );
+  sections.forEach((section, at) => {
+    const { template, detail, cells } = section;
+    if (template.marks) writeHeader(out, template.header, names, countText(detail, cells.nRows));
+    else out.write(template.header);
+    const before = out.size;
+    out.limit = Math.min(maxBytes, before + left);
+    writeRows(out, {
+      template,
+      detail,
+      parts: parts.map((part) => rowsOf(part, at, cells.rowsPerFrame)),
+      nRows: cells.nRows,
+      nColumns: cells.nColumns,
+      numberOfRow: cells.numberOfRow(numberOf(numbers)),
+      tokenOf: (row, column) => cells.of(row, column),
+    });
+    left -= out.size - before;
+    out.limit = maxBytes;
+  });
   return out.content();
 }
 
-/** The cells of all columns, row after row: those of the signals, then the clock's. */
+/** The parts of the motion in frames, each with the notes of its segment, section by section. */
+function framesOf(motion, sections) {
+  const { samplesPerFrame } = motion.signal;
+  return motion.parts.map((part) => ({
+    firstFrame: part.firstRow / samplesPerFrame,
+    nFrames: part.nRows / samplesPerFrame,
+    skippedFrames: part.skippedRows / samplesPerFrame,
+    notes: readTableNotes(part.frameNotes, part.segmentRows / samplesPerFrame, sections),
+  }));
+}
+
+/** The part of a section that goes with a part of the motion. */
+function rowsOf({ firstFrame, nFrames, skippedFrames, notes }, at, rowsPerFrame) {
+  return {
+    firstRow: firstFrame * rowsPerFrame,
+    nRows: nFrames * rowsPerFrame,
+    skippedRows: skippedFrames * rowsPerFrame,
+    notes: notes[at] ?? USUAL,
+  };
+}
+
+function readTableNotes(bytes, nFrames, sections) {
+  if (bytes.length === 0) return [];
+  const reader = new ByteReader(bytes, "frame notes of a table");
+  let at = 0;
+  const notes = reader.counted(() => {
+    if (at === sections.length) reader.refuse(`notes of more sections than ${at}`);
+    const rowsPerFrame = reader.varint();
+    if (rowsPerFrame !== sections[at++].cells.rowsPerFrame) {
+      reader.refuse(`${rowsPerFrame} rows a frame in section ${at - 1}`);
+    }
+    return readRowNotes(reader, nFrames * rowsPerFrame);
+  });
+  reader.end();
+  return notes;
+}
+
+/** The cells of a section, row after row: its signals, the clock, the rows within their frame. */
 class Cells {
-  constructor(signals, template, numbers) {
-    this.places = signals.flatMap((decoded) => {
+  constructor(template, signals, numbers) {
+    const mine = template.signals.map((number) => signals[number]);
+    this.rowsPerFrame = mine[0].signal.samplesPerFrame;
+    this.nRows = mine[0].nRows;
+    for (const { signal } of mine) {
+      if (signal.samplesPerFrame !== this.rowsPerFrame) {
+        throw new Refused(`a table: ${signal.samplesPerFrame} rows a frame of ${signal.name}`);
+      }
+    }
+    this.places = mine.flatMap((decoded) => {
       const tokens = new Tokens(decoded);
       return decoded.signal.channels.map((_, channel) => ({ tokens, channel, decoded }));
     });
     this.nChannels = this.places.length;
+    this.nColumns = this.nChannels + (template.clock ? 2 : 1);
     this.missing = latin1(template.missing);
     this.clock = template.clock;
-    this.numberOfFrame = numberOf(numbers);
-    if (this.clock) this.checkTimes(signals[0].nRows, numbers);
+    this.numberOf = this.numberOfRow(numberOf(numbers));
+    if (this.clock) this.checkTimes(this.numberOfRow(numberOf(numbers)));
+  }
+
+  /** The number of the frame of a row; rows are asked for in order. */
+  numberOfRow(numberOfFrame) {
+    return (row) => numberOfFrame(Math.floor(row / this.rowsPerFrame));
+  }
+
+  /** What the clock counts. */
+  count(row, number) {
+    return number * BigInt(this.rowsPerFrame) + BigInt(row % this.rowsPerFrame);
   }
 
   of(row, column) {
+    if (column === this.nColumns - 1) return String(row % this.rowsPerFrame);
     if (column === this.nChannels) {
-      const ordinal = timeOf(this.clock, this.numberOfFrame(row));
+      const ordinal = timeOf(this.clock, this.count(row, this.numberOf(row)));
       return textOfOrdinal(
         this.clock.grid,
         Number(ordinal & 0xffffffffn),
@@ -115,9 +191,10 @@ class Cells {
   }
 
   /** Every time is an ordinal, also of rows that do not print theirs. */
-  checkTimes(nRows, numbers) {
-    const number = numberOf(numbers);
-    for (let row = 0; row < nRows; row++) timeOf(this.clock, number(row));
+  checkTimes(numberOfRow) {
+    for (let row = 0; row < this.nRows; row++) {
+      timeOf(this.clock, this.count(row, numberOfRow(row)));
+    }
   }
 }
 
@@ -160,8 +237,28 @@ function writeHeader(out, header, names, count) {
   out.limit = limit;
 }
 
-function readTableTemplate(bytes) {
+/** The sections of a template. */
+function readTableTemplate(bytes, nSignals) {
   const reader = new ByteReader(bytes, "a template of a table");
+  const mayHave = { runs: MAX_RUNS };
+  const used = new Set();
+  const sections = reader.counted(() => {
+    const numbers = reader.counted(() => reader.varint());
+    if (numbers.length === 0) reader.refuse("a section without signals");
+    for (const number of numbers) {
+      if (number >= nSignals) reader.refuse(`signal ${number} of ${nSignals}`);
+      if (used.has(number)) reader.refuse(`signal ${number} twice`);
+      used.add(number);
+    }
+    return { signals: numbers, ...readSection(reader, mayHave) };
+  });
+  reader.end();
+  if (sections.length === 0) reader.refuse("no section");
+  if (sections.length > MAX_SECTIONS) reader.refuse(`${sections.length} sections`);
+  return sections;
+}
+
+function readSection(reader, mayHave) {
   const header = reader.sized();
   const marks = reader.varint();
   if (marks > 1) reader.refuse(`marks is ${marks}`);
@@ -169,9 +266,17 @@ function readTableTemplate(bytes) {
   const clocks = reader.counted(() => readClock(reader));
   if (clocks.length > 1) reader.refuse(`${clocks.length} clocks`);
   const gaps = readGaps(reader);
-  const patterns = readPatterns(reader, 1);
-  reader.end();
+  const patterns = readPatterns(reader, 1, mayHave);
   return { header, marks: marks === 1, missing, clock: clocks[0] ?? null, gaps, patterns };
+}
+
+function readTableDetail(bytes, nSections) {
+  const reader = new ByteReader(bytes, "the detail of a table");
+  const mayHave = { runs: MAX_RUNS };
+  const details = reader.counted(() => takeDetail(reader, mayHave));
+  reader.end();
+  if (details.length !== nSections) reader.refuse(`${details.length} of ${nSections} sections`);
+  return details;
 }
 
 function readClock(reader) {

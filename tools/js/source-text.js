@@ -41,9 +41,11 @@ export function restoreText(source, motion, numbers, maxBytes) {
   }
   const tokens = new Tokens(motion);
   const nColumns = motion.signal.channels.length;
-  const numberOfFrame = numberOf(numbers);
+  const numberOfRow = motion.signal.samplesPerFrame === 1 ? numberOf(numbers) : null;
   const tokenOf = (row, channel) => tokens.of(row, channel);
-  writeRows(out, { source, template, detail, motion, nColumns, numberOfFrame, tokenOf });
+  const parts = motion.parts.map((part) => ({ ...part, notes: readNotes(part) }));
+  out.limit = Math.min(out.limit, out.size + rowsLimit(source.size, [{ nRows: n, nColumns }]));
+  writeRows(out, { template, detail, parts, nRows: n, nColumns, numberOfRow, tokenOf });
   return out.content();
 }
 
@@ -56,53 +58,57 @@ export function countText(detail, n) {
 /**
  * Writes all rows of a text and what follows them.
  *
- * @param {ByteWriter} out its limit becomes that of the rows
+ * @param {ByteWriter} out whose limit is that of the rows
  * @param {object} text
- * @param {object} text.source of CLIP
  * @param {{gaps: Uint8Array[], patterns: object[]}} text.template
  * @param {object} text.detail as readDetail has read it
- * @param {object} text.motion the first signal, whose parts have the notes
+ * @param {{firstRow: number, nRows: number, skippedRows: number, notes: object}[]} text.parts of
+ *   segments: skippedRows of the segment come before; notes as readRowNotes has read them
+ * @param {number} text.nRows of all parts
  * @param {number} text.nColumns beside that of frame numbers
- * @param {(frame: number) => bigint} text.numberOfFrame asked in order
+ * @param {((row: number) => bigint) | null} text.numberOfRow asked in order; null: there are none
  * @param {(row: number, column: number) => string} text.tokenOf asked row by row
  * @throws {Refused}
  */
 export function writeRows(out, text) {
-  const { source, template, detail, motion, nColumns, numberOfFrame, tokenOf } = text;
+  const { template, detail, parts, nRows, nColumns, numberOfRow, tokenOf } = text;
   const gaps = [...template.gaps, ...detail.gaps];
   const patterns = [...template.patterns, ...detail.patterns];
   checkPatterns(template, detail, patterns, gaps, nColumns);
-  const n = motion.nRows;
-  const { samplesPerFrame } = motion.signal;
-  out.limit = Math.min(out.limit, out.size + rowsLimit(source.size, n, nColumns));
-  for (const part of motion.parts) {
-    const notes = readNotes(part.frameNotes, part.segmentRows);
-    for (let i = 0; i < part.nRows; i++) {
-      const row = part.firstRow + i;
-      const pattern = patterns[notes.patternOf(part.skippedRows + i)];
+  for (const { firstRow, nRows: nHere, skippedRows, notes } of parts) {
+    for (let i = 0; i < nHere; i++) {
+      const row = firstRow + i;
+      const pattern = patterns[notes.patternOf(skippedRows + i)];
       if (!pattern) throw new Refused(`a source: row ${row} has a pattern that there is not`);
       for (const run of pattern.runs) {
-        if (run.column === 0 && samplesPerFrame !== 1) {
-          throw new Refused(`a source: frame numbers of ${samplesPerFrame} rows a frame`);
+        if (run.column === 0 && !numberOfRow) {
+          throw new Refused("a source: frame numbers of several rows a frame");
         }
         for (let c = run.column; c < run.column + run.nColumns; c++) {
           out.write(gaps[run.gap]);
           const token =
             c === 0
-              ? numberToken(numberOfFrame(row), notes.texts.get(part.skippedRows + i))
+              ? numberToken(numberOfRow(row), notes.texts.get(skippedRows + i))
               : tokenOf(row, c - 1);
           writePadded(out, token, run.width);
         }
       }
-      if (row < n - 1 || !detail.ends) out.write(gaps[pattern.tail]);
+      if (row < nRows - 1 || !detail.ends) out.write(gaps[pattern.tail]);
     }
   }
   if (detail.ends) out.write(detail.ending);
 }
 
-/** Bytes that the rows of a text may take: a limit, not a fault. */
-function rowsLimit(size, n, nChannels) {
-  const byValues = Math.max(FREE_TEXT_BYTES, VALUE_BYTES * n * (nChannels + 1));
+/**
+ * Bytes that the rows of a text may take: a limit, not a fault.
+ *
+ * @param {number} size of the source file, 0: unknown
+ * @param {{nRows: number, nColumns: number}[]} tables whose rows these are, together
+ */
+export function rowsLimit(size, tables) {
+  let nCells = 0;
+  for (const { nRows, nColumns } of tables) nCells += nRows * (nColumns + 1);
+  const byValues = Math.max(FREE_TEXT_BYTES, VALUE_BYTES * nCells);
   const bySize = size === 0 ? Infinity : Math.max(FREE_TEXT_BYTES, SOURCE_RATIO * size);
   return Math.min(byValues, bySize);
 }
@@ -201,15 +207,21 @@ function readTextTemplate(bytes) {
   return { header, gaps, patterns };
 }
 
-export function readDetail(bytes) {
+function readDetail(bytes) {
   const reader = new ByteReader(bytes, "the detail of a source");
+  const detail = takeDetail(reader);
+  reader.end();
+  return detail;
+}
+
+/** DETAIL, at a reader; `mayHave` counts the runs down where several share the limit. */
+export function takeDetail(reader, mayHave = { runs: MAX_RUNS }) {
   const count = reader.sized();
   const rows = reader.varint();
   const gaps = readGaps(reader);
-  const patterns = readPatterns(reader);
+  const patterns = readPatterns(reader, Infinity, mayHave);
   const ends = reader.varint();
   const ending = reader.sized();
-  reader.end();
   if (count.length === 0 && rows !== 0) reader.refuse(`no count, but for ${rows} rows`);
   if (ends > 1) reader.refuse(`ends is ${ends}`);
   if (ends === 0 && ending.length > 0) reader.refuse("an ending, but ends is 0");
@@ -222,12 +234,11 @@ export function readGaps(reader) {
   return gaps;
 }
 
-export function readPatterns(reader, most = Infinity) {
-  let nRuns = 0;
+export function readPatterns(reader, most = Infinity, mayHave = { runs: MAX_RUNS }) {
   const patterns = reader.counted(() => {
     const runs = reader.counted(readRun);
-    nRuns += runs.length;
-    if (nRuns > MAX_RUNS) reader.refuse(`more than ${MAX_RUNS} runs`);
+    mayHave.runs -= runs.length;
+    if (mayHave.runs < 0) reader.refuse(`more than ${MAX_RUNS} runs`);
     return { runs, tail: reader.varint() };
   });
   if (patterns.length > most) reader.refuse(`${patterns.length} patterns`);
@@ -275,17 +286,27 @@ function checkColumns(runs, nChannels) {
 
 // Frame notes
 
+/** What is said of rows that are usual. */
+export const USUAL = { patternOf: () => 0, texts: new Map() };
+
+/** The frame notes of a segment; empty: all is as usual. */
+function readNotes({ frameNotes, segmentRows }) {
+  if (frameNotes.length === 0) return USUAL;
+  const reader = new ByteReader(frameNotes, "frame notes");
+  const notes = readRowNotes(reader, segmentRows);
+  reader.end();
+  return notes;
+}
+
 /**
- * Reads the frame notes of a segment.
+ * Reads the notes of rows.
  *
- * @param {Uint8Array} bytes empty: all is as usual
+ * @param {ByteReader} reader
  * @param {number} nRows of the whole segment
  * @returns {{patternOf: (row: number) => number, texts: Map<number, string>}} rows are those of
  *   the segment; patternOf is asked in order
  */
-function readNotes(bytes, nRows) {
-  if (bytes.length === 0) return { patternOf: () => 0, texts: new Map() };
-  const reader = new ByteReader(bytes, "frame notes");
+export function readRowNotes(reader, nRows) {
   const ends = [];
   let end = 0;
   reader.counted(() => {
@@ -298,7 +319,6 @@ function readNotes(bytes, nRows) {
     ends.push({ end, pattern });
   });
   const texts = readNumberTexts(reader, nRows);
-  reader.end();
   let at = 0;
   const patternOf = (row) => {
     while (at < ends.length && ends[at].end <= row) at++;

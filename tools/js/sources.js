@@ -11,7 +11,7 @@ import { restoreTable } from "./source-table.js";
 import { restoreText } from "./source-text.js";
 
 const C3D_FORMATS = ["c3d", "c3d-outputs"];
-const TABLES = ["trc", "mot", "sto"];
+const TABLES = ["trc", "mot", "sto", "motive", "vicon", "csv"];
 
 /**
  * The source file of a clip. Of a clip whose codecs are lossless it is told by size and hash.

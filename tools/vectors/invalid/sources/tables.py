@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 from mcz.formats.layout import DETAIL
-from mcz.formats.table_layout import CLOCK, TABLE_TEMPLATE
+from mcz.formats.table_layout import CLOCK, SECTION, TABLE_DETAIL, TABLE_TEMPLATE
+from mcz.formats.table_notes import TABLE_NOTES
 from mcz.motion import Motion
 from mcz.numbers import GRID, Grid, GridKind
 from mcz.schema import build, parse, varint
 from tools.vectors.build.edits import Edit, plus, put
 from tools.vectors.build.files import Unrestorable, file_of
 from tools.vectors.build.source_files import restored, unhashed, with_source, with_template
-from tools.vectors.build.table_files import MARKERS, QUATERNIONS, SPEC, TIMES
+from tools.vectors.build.table_files import MARKERS, SPEC, TIMES, VICON
 from tools.vectors.valid.sources.tables import take_table
 
 
@@ -22,13 +24,11 @@ def add(shelf: Unrestorable) -> None:
     _fields(shelf, plain, times)
     _clocks(shelf, plain)
     _headers(shelf, plain)
-    sto = take_table(QUATERNIONS, "plain.sto")
-    rows = replace(sto, signals=(replace(sto.signals[0], samples_per_frame=3),))
-    shelf.add("table-rows", SPEC, "A table of three rows a frame.", file_of(rows))
+    _sections(shelf)
 
 
 def _field(path: str, new: bytes) -> Edit:
-    return put(TABLE_TEMPLATE, path, new)
+    return put(TABLE_TEMPLATE, f"sections.0.{path}", new)
 
 
 def _fields(shelf: Unrestorable, plain: Motion, times: Motion) -> None:
@@ -37,8 +37,8 @@ def _fields(shelf: Unrestorable, plain: Motion, times: Motion) -> None:
         ("cut", "it ends early", plain, lambda data: data[:-1]),
         ("marks", "marks is 2", plain, _field("marks", b"\2")),
         ("two-clocks", "two clocks", plain, _two_clocks),
-        ("column", "a column behind that of the clock", plain, _column(b"\x08")),
-        ("no-clock", "the column of a clock that there is not", times, _column(b"\5")),
+        ("column", "a column behind the last", plain, _column(b"\x09")),
+        ("no-clock", "a column behind the last, without a clock", times, _column(b"\6")),
         ("gap", "a gap beyond the last", plain, _field("patterns.0.tail", b"\x63")),
         ("width", "a width of -1", plain, _field("patterns.0.runs.1.width", b"\1")),
     )  # fmt: skip
@@ -46,7 +46,7 @@ def _fields(shelf: Unrestorable, plain: Motion, times: Motion) -> None:
         data = file_of(motion, SRCE=with_template(edit))
         shelf.add(f"table-{name}", SPEC, f"A template of a table: {purpose}.", data)
     assert plain.source is not None
-    detail = put(DETAIL, "ends", b"\2")(plain.source.detail)
+    detail = put(TABLE_DETAIL, "details.0.ends", b"\2")(plain.source.detail)
     data = file_of(replace(plain, source=replace(plain.source, detail=detail)))
     shelf.add("table-ends", SPEC, "A detail of a table: ends is 2.", data)
 
@@ -111,7 +111,106 @@ def build_grid(grid: Grid) -> bytes:
 
 def _headers(shelf: Unrestorable, plain: Motion) -> None:
     assert plain.source is not None
-    header = parse(TABLE_TEMPLATE, plain.source.template, "template").header
+    header = parse(TABLE_TEMPLATE, plain.source.template, "template").sections[0].header
     edit = _field("header", varint(len(header) + 1) + header + b"\0")
     data = file_of(with_source(plain, MARKERS), SRCE=with_template(edit))
     shelf.add("table-names", SPEC, "A template of a table: three names of two joints.", data)
+
+
+def _sections(shelf: Unrestorable) -> None:
+    """Sections, their signals and their notes at fault."""
+    plain = take_table(VICON, "sections.csv")
+    assert plain.source is not None
+
+    def add(name: str, purpose: str, motion: Motion, text: bytes = VICON) -> None:
+        data = file_of(with_source(motion, text))
+        shelf.add(f"table-{name}", SPEC, f"Sections of a table: {purpose}.", data)
+
+    sections = parse(TABLE_TEMPLATE, plain.source.template, "template").sections
+    details = parse(TABLE_DETAIL, plain.source.detail, "detail").details
+
+    def built(chosen: Any, own: Any) -> Motion:
+        template = build(TABLE_TEMPLATE, {"sections": chosen}, "template")
+        detail = build(TABLE_DETAIL, {"details": own}, "detail")
+        return replace(plain, source=replace(plain.source, template=template, detail=detail))
+
+    parts = VICON.split(b"\n\n")
+    parts[1:] = [b"\n" + part for part in parts[1:]]
+    parts[0] += b"\n"
+    parts[1] += b"\n"
+    add("sections-none", "there are none", built([], []), b"")
+    blank = {**sections[0], "header": b"", "patterns": [], "gaps": []}
+    more = [{**blank, "signals": [k]} for k in range(3, 65)]
+    add("sections-65", "there are 65", _many(plain, more))
+    fewer = built(sections, details[:-1])
+    add("sections-details", "a detail is missing", fewer, parts[0] + parts[1])
+    for name, purpose, numbers in (
+        ("none", "one has no signals", []),
+        ("beyond", "a signal that there is not", [1, 3]),
+    ):
+        odd = [{**sections[0], "signals": numbers}, *sections[1:]]
+        add(f"signals-{name}", purpose, built(odd, details))
+    again = built([*sections, sections[-1]], [*details, details[-1]])
+    add("signals-twice", "a signal that another has", again, VICON + parts[-1])
+    add("rows", "signals that differ in their rows a frame", *_mixed(plain))
+    _notes(shelf, plain)
+
+
+def _notes(shelf: Unrestorable, plain: Motion) -> None:
+    for name, purpose, rows in (
+        ("rows", "of other rows a frame", [1]),
+        ("more", "of 4", [2, 1, 1, 1]),
+    ):
+        texts = [{"row": 0, "text": b"+7"}]
+        each = [{"rows_per_frame": n, "patterns": [], "texts": texts} for n in rows]
+        notes = _Notes(build(TABLE_NOTES, {"sections": each}, "notes"))
+        assert plain.source is not None
+        noted = replace(plain, source=replace(plain.source, notes=notes))
+        data = file_of(with_source(noted, VICON))
+        shelf.add(f"table-notes-{name}", SPEC, f"Sections of a table: notes {purpose}.", data)
+
+
+@dataclass(frozen=True)
+class _Notes:
+    """The same bytes for every segment."""
+
+    data: bytes
+
+    def cut(self, start: int, stop: int) -> bytes:
+        return self.data
+
+
+def _many(plain: Motion, more: Any) -> Motion:
+    """As many sections of signals that say nothing."""
+    assert plain.source is not None
+    fields = parse(TABLE_TEMPLATE, plain.source.template, "template")
+    own = parse(TABLE_DETAIL, plain.source.detail, "detail")
+    signals = [replace(plain.signals[2], name=str(k)) for k in range(len(more))]
+    usual = {"count": b"", "rows": 0, "gaps": [], "patterns": [], "ends": 0, "ending": b""}
+    count = varint(3 + len(more))
+    template = count + b"".join(build(SECTION, s, "section") for s in [*fields.sections, *more])
+    detail = count + b"".join(
+        build(DETAIL, d, "detail") for d in [*own.details, *[usual] * len(more)]
+    )
+    source = replace(plain.source, template=template, detail=detail)
+    return replace(plain, signals=(*plain.signals, *signals), source=source)
+
+
+def _mixed(plain: Motion) -> tuple[Motion, bytes]:
+    """Signals of other rows a frame in a section, of no frames; and the text of the headers."""
+    signals = tuple(signal.cut(0, 0) for signal in plain.signals)
+    empty = unhashed(replace(plain, signals=signals, frame_numbers=None))
+    assert empty.source is not None
+    fields = parse(TABLE_TEMPLATE, empty.source.template, "template")
+    first, other, last = fields.sections
+    details = parse(TABLE_DETAIL, empty.source.detail, "detail").details
+    detail = build(TABLE_DETAIL, {"details": [details[0], details[2]]}, "detail")
+
+    def made() -> Motion:
+        template = build(TABLE_TEMPLATE, {"sections": [first, last]}, "template")
+        source = replace(plain.source, template=template, detail=detail, size=0, sha256=b"")
+        return replace(empty, source=source)
+
+    text = restored(made())
+    first.signals = [*first.signals, *other.signals]
+    return made(), text

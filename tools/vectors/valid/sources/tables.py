@@ -1,4 +1,4 @@
-"""TRC, MOT and STO: files, and what their templates can say beside."""
+"""TRC, MOT, STO and CSV: files, and what their templates can say beside."""
 
 from __future__ import annotations
 
@@ -9,16 +9,36 @@ from typing import Any
 import numpy as np
 
 from mcz.formats import FORMATS
-from mcz.formats.layout import DETAIL
-from mcz.formats.table_layout import PHRASES, TABLE_TEMPLATE
+from mcz.formats.table_layout import PHRASES, TABLE_DETAIL, TABLE_TEMPLATE
 from mcz.motion import Motion
+from mcz.numbers import Grid, GridKind
 from mcz.schema import build, parse
 from tools.vectors.build.edits import put
 from tools.vectors.build.files import Whole, file_of
 from tools.vectors.build.source_files import BOTH, called, path_of, restored, unhashed
-from tools.vectors.build.table_files import FORCES, MARKERS, QUATERNIONS, SPEC, TIMES
+from tools.vectors.build.table_files import (
+    COLUMNS,
+    DEVICES,
+    EULER,
+    FORCES,
+    MARKERS,
+    MOTIVE,
+    ODD_SECTIONS,
+    QUATERNIONS,
+    SPEC,
+    TIMES,
+    VICON,
+)
 
 KINDS = {"trc": MARKERS, "mot": FORCES, "sto": QUATERNIONS}
+CSV = {
+    "motive": (MOTIVE, "Motive: a bone, a marker that is lost, names with commas."),
+    "motive-euler": (EULER, "Motive: angles in another order than their columns."),
+    "vicon": (VICON, "Vicon: sections of one and two rows a frame, in segments of two frames."),
+    "vicon-devices": (DEVICES, "Vicon: devices alone; the motion has no channel."),
+    "vicon-odd": (ODD_SECTIONS, "Vicon: sub frames that do not count, layouts of single rows."),
+    "csv": (COLUMNS, "Columns of numbers with names and units, no line end at the end."),
+}
 
 
 def add(shelf: Whole) -> None:
@@ -29,7 +49,10 @@ def add(shelf: Whole) -> None:
     assert len(times.signals) == 2
     _hold(shelf, "trc-times", "Times that follow from nothing are a signal.", times)
     _hold(shelf, "trc-times-segments", "The same, in segments.", times, segment_frames=1)
+    for name, (text, purpose) in CSV.items():
+        _hold(shelf, name, purpose, take_table(text, f"{name}.csv"), segment_frames=2)
     _clocks(shelf)
+    _sections(shelf)
     _headers(shelf)
     _missing(shelf)
     _patterns(shelf)
@@ -58,6 +81,44 @@ def with_fields(motion: Motion, edit: Callable[[Any], Any]) -> Motion:
     return replace(motion, source=replace(motion.source, template=template))
 
 
+def _first(fields: Any) -> Any:
+    """The first section."""
+    return fields.sections[0]
+
+
+def _sections(shelf: Whole) -> None:
+    """Signals of sections in another order, clocks of rows within frames, sections without text."""
+    plain = take_table(VICON, "sections.csv")
+    assert len(plain.signals) == 3
+    twice = with_fields(plain, lambda fields: fields.sections.reverse())
+    _hold(shelf, "sections-order", "The sections in another order.", twice)
+    _hold(shelf, "sections-signals", "Two sections with each other's signals.", _turned(plain))
+    clock = {"grid": Grid(GridKind.FIXED, 3), "numerator": 5, "denominator": 1, "offset": 0}
+
+    def timed(fields: Any) -> None:
+        section = fields.sections[0]
+        section.clock.append(clock)
+        runs = section.patterns[0].runs  # what was the number within the frame is the time now
+        last = max(run.column + run.n_columns for run in runs)
+        runs.append({**runs[-1], "column": last, "n_columns": 1})
+
+    purpose = "A clock of two rows a frame, and the numbers within frames behind."
+    _hold(shelf, "sections-clock", purpose, with_fields(plain, timed))
+
+
+def _turned(plain: Motion) -> Motion:
+    def edit(fields: Any) -> None:
+        one, other = fields.sections[1:3]
+        one.signals, other.signals = list(other.signals), list(one.signals)
+        for section, count in ((one, 6), (other, 3)):
+            runs = section.patterns[0].runs
+            gap = runs[-1].gap
+            kept = [run for run in runs if run.column == 0]
+            runs[:] = [*kept, {"gap": gap, "column": 1, "n_columns": count, "width": 0}]
+
+    return with_fields(plain, edit)
+
+
 def _clocks(shelf: Whole) -> None:
     """Times of frames that have other numbers, and of other clocks."""
     plain = take_table(MARKERS, "clock.trc")
@@ -75,7 +136,7 @@ def _clocks(shelf: Whole) -> None:
             fields: Any, given: tuple[int, int, int] = (offset, numerator, denominator)
         ) -> None:
             names = ("offset", "numerator", "denominator")
-            fields.clock[0].update(zip(names, given, strict=True))
+            fields.sections[0].clock[0].update(zip(names, given, strict=True))
 
         purpose = f"A clock that is {name}: its quotients are rounded down."
         _hold(shelf, f"clock-{name}", purpose, with_fields(plain, edit))
@@ -84,17 +145,17 @@ def _clocks(shelf: Whole) -> None:
 def _headers(shelf: Whole) -> None:
     plain = take_table(MARKERS, "marks.trc")
     every = b"".join(bytes((mark,)) + b"|" for mark in (*range(4), *PHRASES, 2, 1, 3, 0))
-    marked = with_fields(plain, lambda fields: fields.update({"header": every, "marks": 1}))
+    marked = with_fields(plain, lambda fields: _first(fields).update({"header": every, "marks": 1}))
     _hold(shelf, "odd-marks", "Every mark of a header.", marked)
-    text = with_fields(plain, lambda fields: fields.update({"header": every, "marks": 0}))
+    text = with_fields(plain, lambda fields: _first(fields).update({"header": every, "marks": 0}))
     _hold(shelf, "odd-no-marks", "The same bytes, which are text.", text)
-    empty = with_fields(plain, lambda fields: fields.update({"header": b"", "marks": 1}))
+    empty = with_fields(plain, lambda fields: _first(fields).update({"header": b"", "marks": 1}))
     _hold(shelf, "odd-no-header", "No header at all.", empty)
     for rows, what in ((plain.n_frames, "these"), (plain.n_frames + 1, "other")):
         assert marked.source is not None
-        fields = parse(DETAIL, marked.source.detail, "detail")
-        fields.update({"count": b"0x5", "rows": rows})
-        source = replace(marked.source, detail=build(DETAIL, fields, "detail"))
+        fields = parse(TABLE_DETAIL, marked.source.detail, "detail")
+        fields.details[0].update({"count": b"0x5", "rows": rows})
+        source = replace(marked.source, detail=build(TABLE_DETAIL, fields, "detail"))
         purpose = f"A count as printed for {what} rows."
         _hold(shelf, f"odd-count-{what}", purpose, replace(marked, source=source))
 
@@ -104,13 +165,15 @@ def _missing(shelf: Whole) -> None:
     forces = take_table(FORCES, "missing.mot")
     assert forces.signals[0].mask is not None
     for name, word in (("long", b"a word that is longer than its column"), ("empty", b"")):
-        motion = with_fields(forces, lambda fields, word=word: fields.update({"missing": word}))
+        motion = with_fields(
+            forces, lambda fields, word=word: _first(fields).update({"missing": word})
+        )
         _hold(shelf, f"missing-{name}", f"Padded columns, {name} where invalid.", motion)
 
     def signs(fields: Any) -> None:
-        for run in fields.patterns[0].runs:
+        for run in _first(fields).patterns[0].runs:
             run.width = 1
-        fields.missing = b""
+        _first(fields).missing = b""
 
     purpose = "A blank where the sign would be, also of nothing."
     _hold(shelf, "missing-sign", purpose, with_fields(forces, signs))
@@ -124,13 +187,13 @@ def _patterns(shelf: Whole) -> None:
     def edit(fields: Any) -> None:
         runs = [(n, 1, 8), (0, 1, -4), (2, n - 2, 0)]
         names = ("gap", "column", "n_columns", "width")
-        fields.patterns[0].runs[:] = [
+        _first(fields).patterns[0].runs[:] = [
             dict(zip(names, (1, column, count, width), strict=True))
             for column, count, width in runs
         ]
 
     motion = with_fields(times, edit)
     assert motion.source is not None
-    detail = put(DETAIL, "ends", b"\1")(motion.source.detail)
+    detail = put(TABLE_DETAIL, "details.0.ends", b"\1")(motion.source.detail)
     motion = replace(motion, source=replace(motion.source, detail=detail))
     _hold(shelf, "odd-order", "Channels of two signals in another order; one is left out.", motion)

@@ -1,0 +1,195 @@
+"""CSV files of Motive (OptiTrack), format version 1.2x: bytes -> Motion.
+
+SPEC.md, "The text of tables", is normative for the way back. Every rigid body, bone and marker is
+a joint: with its rotation and position, and with what the file says of their quality.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mcz.errors import SourceError
+from mcz.formats.csv_text import cells_of, texts_of
+from mcz.formats.layout import FRAME_NUMBER
+from mcz.formats.rows import line_of
+from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
+from mcz.formats.table_signals import read_columns
+from mcz.formats.table_source import named_count, names_in, section_of, table_source
+from mcz.formats.table_times import Times, read_times
+from mcz.formats.text_source import check_text, text_encoding
+from mcz.formats.times import stated_rate
+from mcz.motion import Channel, Joint, Motion, Skeleton
+
+UNITS = {
+    "meters": 100.0,
+    "centimeters": 1.0,
+    "millimeters": 0.1,
+    "inches": 2.54,
+    "feet": 30.48,
+}
+LOCAL = ("local", "parent")  # coordinate spaces in which a bone is seen from its parent
+MAX_HEAD = 32  # lines above the rows
+
+_AXIS = re.compile(rb'"?Frame"?,"?Time')
+_ORDER = re.compile(r"(?i)(?=.*x)(?=.*y)(?=.*z)[xyz]{3}")
+_COUNT = re.compile(rb"(?i),\"?Total Exported Frames\"?,([0-9]+)")
+
+
+@dataclass(frozen=True, slots=True)
+class _Head:
+    """What stands above the rows. ``columns``: of each what is said of it, one row a line."""
+
+    said: dict[str, str]
+    columns: list[tuple[str, ...]]  # type, name, id, parent, kind, axis
+    labels: tuple[int, int]
+    rows: int
+
+
+@dataclass(slots=True)
+class _Object:
+    name: str
+    id: str
+    parent: str
+    columns: list[int]
+    channels: list[Channel]
+
+
+def read_motive(data: bytes, name: str = "motion") -> Motion:
+    """The motion in a CSV file of Motive; ``name`` becomes its name; the up axis is unknown.
+
+    Raises SourceError, with the number of the line.
+    """
+    check_text(data)
+    encoding = text_encoding(data)
+    head = _head(data, encoding)
+    objects = _objects(head)
+    order = [column for found in objects for column in found.columns]
+    place = {column: k for k, column in enumerate(order)}
+    time = len(order)
+    cells = [[FRAME_NUMBER], [time], *([place[column]] for column in range(time))]
+    table = read_table(data, head.rows, time + 1, cells, b",")
+    rows = without_zeros(data, table.rows, ([time], range(time)))
+    stated = [
+        rate
+        for key in ("export frame rate", "capture frame rate")
+        if (rate := stated_rate(head.said.get(key, "")))
+    ]
+    times = read_times(data, rows, time, stated)
+    names = [found.name for found in objects]
+    text = _marked(data, head, names, rows.n_rows), data[: head.rows]
+    signals = range(1 + len(times.signals))
+    section = section_of(text, (table.missing, times.clock), rows, names, signals)
+    return Motion(
+        _skeleton(head, objects),
+        (read_columns(data, rows, range(time)), *times.signals),
+        times.rate,
+        times.exact,
+        name,
+        _metadata(encoding, head.said, rows.n_rows, times, bool(stated)),
+        table_source("motive", data, [(section, rows, 1)]),
+        rows.numbers,
+    )
+
+
+def _marked(data: bytes, head: _Head, names: Sequence[str], n_rows: int) -> bytes:
+    """What stands above the rows, with marks for the first of each name and the number of rows."""
+    start, stop = head.labels
+    match = _COUNT.search(data, 0, start)
+    count = match.span(1) if match else (0, 0)
+    labels = names_in(data[start:stop], names)
+    return named_count(data, 0, start, count, n_rows) + labels + data[stop : head.rows]
+
+
+def _head(data: bytes, encoding: str) -> _Head:
+    lines = [entry for entry in lines_from(data, 0)[:MAX_HEAD] if entry[1].strip()]
+    axis = next((k for k, (_, line) in enumerate(lines) if _AXIS.match(line)), None)
+    if axis is None or axis < 3:
+        raise SourceError(f"line {len(lines)}: no line Frame,Time below names; no Motive file")
+    if axis + 1 == len(lines) or not begins_with_number(lines[axis + 1][1]):
+        at = lines[axis][0]
+        raise SourceError(f"line {line_of(data, at) + 1}: no row of numbers after Frame,Time")
+    first = texts_of(lines[0][1], b",", encoding)
+    said = {key.lower(): value for key, value in zip(first[::2], first[1::2], strict=False)}
+    rows = [texts_of(line, b",", encoding) for _, line in lines[1 : axis + 1]]
+    width = max(len(rows[-1]), len(cells_of(lines[axis + 1][1], b",")))
+    numbers = _numbers(rows)
+    columns = [
+        tuple(rows[n][k] if n is not None and k < len(rows[n]) else "" for n in numbers)
+        for k in range(2, width)
+    ]
+    at, line = lines[1 + (numbers[1] or 0)]
+    return _Head(said, columns, (at, at + len(line)), lines[axis + 1][0])
+
+
+def _numbers(rows: Sequence[Sequence[str]]) -> tuple[int | None, ...]:
+    """Which row has the type, name, id, parent, kind and axis; None: no row."""
+    last = len(rows) - 1
+    called = {row[1].lower(): k for k, row in enumerate(rows[:-1]) if len(row) > 1 and row[1]}
+    if "name" in called:
+        return *(called.get(key) for key in ("type", "name", "id", "parent")), last - 1, last
+    plain: tuple[int | None, ...] = (0, 1, 2 if last > 3 else None, 3 if last > 4 else None)
+    return *plain, last - 1, last
+
+
+def _objects(head: _Head) -> list[_Object]:
+    """The joints, each of neighboring columns of one type, name and id."""
+    order = head.said.get("rotation type", "").upper()
+    found: list[_Object] = []
+    before: tuple[str, ...] | None = None
+    for column, (kind, name, id_, parent, what, axis) in enumerate(head.columns):
+        channel = _channel(what, axis, euler=_ORDER.fullmatch(order) is not None)
+        mine = kind, name, id_
+        if mine != before or channel in found[-1].channels:
+            found.append(_Object(name or f"column {column + 3}", id_, parent, [], []))
+        before = mine
+        found[-1].columns.append(column)
+        found[-1].channels.append(channel)
+    if _ORDER.fullmatch(order):
+        for one in found:
+            _sort_rotations(one, order.lower())
+    return found
+
+
+def _channel(what: str, axis: str, *, euler: bool) -> Channel:
+    kind, letter = what.lower(), axis.lower()
+    if kind == "position" and letter in ("x", "y", "z"):
+        return Channel(f"t{letter}")
+    if kind == "rotation" and letter in ("x", "y", "z", "w") and not (euler and letter == "w"):
+        return Channel(f"{'r' if euler else 'q'}{letter}")
+    return Channel("", " ".join(filter(None, (what, axis))) or "value")
+
+
+def _sort_rotations(one: _Object, order: str) -> None:
+    """Put the angles of Euler into the order in which they turn."""
+    places = [k for k, channel in enumerate(one.channels) if channel.kind[:1] == "r"]
+    turned = sorted(places, key=lambda k: order.index(one.channels[k].kind[1]))
+    columns, channels = one.columns.copy(), one.channels.copy()
+    for place, source in zip(places, turned, strict=True):
+        one.columns[place], one.channels[place] = columns[source], channels[source]
+
+
+def _skeleton(head: _Head, objects: Sequence[_Object]) -> Skeleton:
+    """Joints without a parent where all is seen from one origin."""
+    is_local = head.said.get("coordinate space", "").lower() in LOCAL
+    by_id: dict[str, int] = {}
+    joints = []
+    for number, one in enumerate(objects):
+        parent = by_id.get(one.parent, -1) if is_local and one.parent else -1
+        joints.append(Joint(one.name, parent, channels=tuple(one.channels)))
+        by_id.setdefault(one.id, number)
+    return Skeleton(tuple(joints), unit_cm=UNITS.get(head.said.get("length units", "").lower()))
+
+
+def _metadata(
+    encoding: str, said: dict[str, str], n_rows: int, times: Times, is_stated: bool
+) -> dict[str, str]:
+    notes = []
+    declared = said.get("total exported frames", "")
+    if declared and declared != str(n_rows):
+        notes.append(f"{declared[:40]} frames are declared, {n_rows} are there")
+    if is_stated and times.rate is None:
+        notes.append("the times are not uniform")
+    metadata = {"name-encoding": encoding} if encoding != "utf-8" else {}
+    return metadata | ({"source-note": "; ".join(notes)} if notes else {})

@@ -1,0 +1,69 @@
+"""What the column of times of a table says: a clock, or a signal of their own, and a frame rate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from mcz.formats.rows import Rows
+from mcz.formats.table_layout import Clock
+from mcz.formats.table_signals import read_columns
+from mcz.formats.times import find_clock, half_digit_of, uniform_rate
+from mcz.motion import Channel, Signal
+from mcz.numbers import scan
+
+SECOND = Fraction(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """``signals``: one of times where there are some that no clock gives, named ``time``.
+
+    ``rate`` is None where times are not uniform. ``exact``: it is a round or a stated one.
+    """
+
+    clock: Clock | None
+    signals: tuple[Signal, ...]
+    rate: Fraction | None
+    exact: bool
+
+
+def read_times(
+    data: bytes,
+    rows: Rows,
+    column: int,
+    stated: Sequence[Fraction] = (),
+    unit: Fraction = SECOND,
+    name: str = "time",
+) -> Times:
+    """The times in a column; ``stated``: rates that the file states; ``unit`` in seconds."""
+    present = np.flatnonzero(rows.stop[:, column])
+    tokens = scan(data, rows.start[present, column], rows.stop[present, column])
+    whole = len(tokens) == rows.n_rows and not tokens.bad().any()
+    numbers = rows.numbers if rows.numbers is not None else np.arange(1, rows.n_rows + 1)
+    clock = find_clock(tokens, numbers, [rate * unit for rate in stated]) if whole else None
+    used = any(
+        run.column <= column < run.column + run.n_columns
+        for pattern in rows.patterns
+        for run in pattern.runs
+    )
+    signals: tuple[Signal, ...] = ()
+    if clock is None and used:
+        channels = (Channel("", name, _symbol(unit)),)
+        signals = (replace(read_columns(data, rows, [column]), name="time", channels=channels),)
+    rate, exact = None, True
+    if whole:
+        half = half_digit_of(tokens)
+        rate, exact = uniform_rate(tokens.values(), half, [rate * unit for rate in stated])
+    if rate is not None:
+        rate /= unit
+    elif rows.n_rows < 2 and stated:
+        rate = stated[0]
+    return Times(clock, signals, rate, exact)
+
+
+def _symbol(unit: Fraction) -> str:
+    return {3: "ms", 6: "us", 9: "ns"}.get(len(str(unit.denominator)) - 1, "s")

@@ -1,0 +1,292 @@
+"""CSV files of Vicon Nexus (its ASCII export), which have several sections: bytes -> Motion.
+
+SPEC.md, "The text of tables", is normative for the way back. The trajectories are the motion, every
+marker a joint without a parent; the other sections are signals, of several rows a frame where the
+file has sub frames.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import SourceError
+from mcz.formats.csv_text import cells_of, texts_of
+from mcz.formats.layout import FRAME_NUMBER
+from mcz.formats.rows import Rows, line_of
+from mcz.formats.table_layout import MAX_SECTIONS, Section
+from mcz.formats.table_rows import (
+    TableRows,
+    begins_with_number,
+    last_pattern,
+    read_table,
+    without_zeros,
+)
+from mcz.formats.table_signals import read_columns
+from mcz.formats.table_source import names_in, section_of, table_source
+from mcz.formats.text_source import check_text, text_encoding
+from mcz.formats.times import stated_rate
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.numbers import scan
+
+Ints = NDArray[np.int64]
+
+UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54, "ft": 30.48}
+MOTIONS = ("trajectories", "segments")  # sections whose positions are points, the first first
+
+_AXIS = re.compile(rb'(?im)^[ \t]*"?Frame"?([,;\t])[ \t]*"?Sub Frame"?(?=[,;\t\r\n])[^\n]*\n?')
+_END = re.compile(rb"(?m)^(?![ \t]*[-+]?[0-9])")
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A section as it is found: where it lies, its title, its rate, what its columns are called."""
+
+    start: int
+    rows: int
+    stop: int
+    separator: bytes
+    title: str
+    rate: str
+    labels: tuple[int, int]
+    groups: list[tuple[str, list[tuple[str, str]]]]  # name, and axis and unit of each column
+
+    @property
+    def n_columns(self) -> int:
+        return sum(len(columns) for _, columns in self.groups)
+
+
+@dataclass(slots=True)
+class _Read:
+    """A section with its rows; ``numbers`` are the frames of these.
+
+    ``n_each``: rows a frame. ``spare``: the sub frames do not count 0, 1, 2, ...
+    """
+
+    part: _Part
+    table: TableRows
+    rows: Rows
+    numbers: Ints
+    n_each: int
+    spare: bool
+
+
+def read_vicon(data: bytes, name: str = "motion") -> Motion:
+    """The motion in a CSV file of Vicon; ``name`` becomes its name; the up axis is unknown.
+
+    Raises SourceError, with the number of the line, also where sections differ in their frames.
+    """
+    check_text(data)
+    encoding = text_encoding(data)
+    parts = _parts(data, encoding)
+    found = [_read(data, part) for part in parts]
+    found[-1].rows = _followed_by(found[-1].rows, data[parts[-1].stop :])
+    first = _motion_of(found)
+    rated = found[first or 0]
+    numbers = rated.numbers[:: rated.n_each]
+    for one in found:
+        _check_frames(data, one, numbers)
+    signals, of_section = _signals(data, found, first, len(numbers))
+    joints = _joints(found[first].part) if first is not None else ()
+    sections = []
+    for k, one in enumerate(found):
+        names = [joint.name for joint in joints] if k == first else []
+        sections.append((_section(data, one, names, of_section[k]), one.rows, one.n_each))
+    usual = np.array_equal(numbers, np.arange(1, len(numbers) + 1))
+    rate = stated_rate(rated.part.rate)
+    return Motion(
+        Skeleton(
+            joints,
+            unit_cm=None if first is None else _unit_cm(parts[first]),
+            angle_unit="",
+        ),
+        signals,
+        rate and rate / rated.n_each,
+        True,
+        name,
+        {"name-encoding": encoding} if encoding != "utf-8" else {},
+        table_source("vicon", data, sections),
+        None if usual else numbers,
+    )
+
+
+def _parts(data: bytes, encoding: str) -> list[_Part]:
+    """The sections: each line Frame,Sub Frame with the lines above it and the rows below."""
+    parts: list[_Part] = []
+    at = 0
+    for match in _AXIS.finditer(data):
+        if match.start() < at:
+            continue
+        rows, end = match.end(), match.end()
+        for _ in range(2):  # a line of units may come between
+            if begins_with_number(data[rows : data.find(b"\n", rows) + 1 or len(data)]):
+                break
+            rows = data.find(b"\n", rows) + 1 or len(data)
+        if not begins_with_number(data[rows : rows + 64]):
+            raise SourceError(f"line {line_of(data, end)}: no row of numbers below Frame,Sub Frame")
+        stop = _END.search(data, rows)
+        if len(parts) == MAX_SECTIONS:
+            raise SourceError(
+                f"line {line_of(data, end)}: more sections than {MAX_SECTIONS}, the limit"
+            )
+        lines = (match[1], match.start(), match.end(), rows)
+        parts.append(_part(data, at, lines, stop.start() if stop else len(data), encoding))
+        at = parts[-1].stop
+    if not parts:
+        raise SourceError("line 1: no line that begins with Frame,Sub Frame; no file of Vicon")
+    return parts
+
+
+def _part(
+    data: bytes, start: int, lines: tuple[bytes, int, int, int], stop: int, encoding: str
+) -> _Part:
+    separator, axis, below, rows = lines
+    above: list[tuple[int, int]] = []
+    end = axis
+    while len(above) < 3 and end > start:
+        begin = data.rfind(b"\n", start, end - 1) + 1 or start
+        above.append((begin, end))
+        end = begin
+    above += [(start, start)] * (3 - len(above))
+    labels, rate, title = above
+    names = texts_of(data[slice(*labels)], separator, encoding)
+    axes = texts_of(data[axis:below], separator, encoding)
+    units = texts_of(data[below:rows], separator, encoding) if rows > below else []
+    line = data[rows : data.find(b"\n", rows) + 1 or len(data)]
+    width = max(len(axes), len(cells_of(line, separator)))
+    groups: list[tuple[str, list[tuple[str, str]]]] = []
+    for k in range(2, width):
+        name = names[k] if k < len(names) else ""
+        if (name and not (groups and groups[-1][0] == name)) or not groups:
+            groups.append((name or f"column {k + 1}", []))
+        axis_name = axes[k] if k < len(axes) else ""
+        groups[-1][1].append((axis_name or f"{k + 1}", units[k] if k < len(units) else ""))
+    texts = [texts_of(data[slice(*place)], separator, encoding) for place in (title, rate)]
+    said, stated = ((text[0] if text else "") for text in texts)
+    return _Part(start, rows, stop, separator, said or "section", stated, labels, groups)
+
+
+def _read(data: bytes, part: _Part) -> _Read:
+    """The rows of a section, with the frame of each and how many rows a frame has."""
+    n = part.n_columns
+    cells = [[FRAME_NUMBER], [n], *([k] for k in range(n))]
+    table = read_table(data[: part.stop], part.rows, n + 1, cells, part.separator)
+    rows = without_zeros(data, table.rows, (range(n),))
+    numbers = rows.numbers if rows.numbers is not None else np.arange(1, rows.n_rows + 1)
+    steps = np.flatnonzero(np.diff(numbers))
+    n_each = int(steps[0]) + 1 if len(steps) else rows.n_rows
+    counted = rows.n_rows % n_each == 0 and all(
+        np.array_equal(numbers[k::n_each], numbers[::n_each]) for k in range(n_each)
+    )
+    if not counted:
+        raise SourceError(
+            f"line {line_of(data, part.rows)}: section {part.title[:40]!r}: its {rows.n_rows} rows "
+            f"are not as many a frame in all frames"
+        )
+    tokens = scan(data, rows.start[:, n], rows.stop[:, n])
+    texts = [b"%d" % k for k in range(n_each)]
+    in_order = tokens.texts().tolist() == texts * (rows.n_rows // n_each)
+    return _Read(part, table, rows, numbers, n_each, not in_order)
+
+
+def _followed_by(rows: Rows, rest: bytes) -> Rows:
+    """``rows`` of the last section, with what follows it."""
+    ending = rows.patterns[last_pattern(rows)].tail if rows.ending is None else rows.ending
+    return replace(rows, ending=ending + rest) if rest else rows
+
+
+def _motion_of(found: Sequence[_Read]) -> int | None:
+    """Which section is the motion: trajectories, else segments, else one of a row a frame."""
+    able = [k for k, one in enumerate(found) if one.n_each == 1]
+    for title in MOTIONS:
+        for k in able:
+            if found[k].part.title.lower() == title:
+                return k
+    return next(iter(able), None)
+
+
+def _check_frames(data: bytes, one: _Read, numbers: Ints) -> None:
+    own = one.numbers[:: one.n_each]
+    if not np.array_equal(own, numbers):
+        raise SourceError(
+            f"line {line_of(data, one.part.rows)}: section {one.part.title[:40]!r} has "
+            f"{len(own)} frames from {own[0]} on, another {len(numbers)} from {numbers[0]} on"
+        )
+
+
+def _signals(
+    data: bytes, found: Sequence[_Read], first: int | None, n_frames: int
+) -> tuple[tuple[Signal, ...], list[list[int]]]:
+    """The motion and the signals of all other sections; which signals are those of each section."""
+    motion = Signal(np.zeros((n_frames, 0)), ())
+    if first is not None:
+        motion = read_columns(data, found[first].rows, range(found[first].part.n_columns))
+    signals, numbers = [motion], []
+    for k, one in enumerate(found):
+        part, mine = one.part, []
+        n = part.n_columns
+        if k == first:
+            mine = [0]
+        elif n:
+            channels = tuple(
+                Channel("", f"{name}.{axis}", unit)
+                for name, columns in part.groups
+                for axis, unit in columns
+            )
+            mine = [len(signals)]
+            signals.append(_signal(data, one, range(n), part.title, channels))
+        if one.spare or not mine:
+            channel = Channel("", "Sub Frame")
+            mine.append(len(signals))
+            signals.append(_signal(data, one, [n], f"{part.title} sub frames", (channel,)))
+        numbers.append(mine)
+    return tuple(signals), numbers
+
+
+def _signal(
+    data: bytes, one: _Read, columns: Sequence[int], name: str, channels: tuple[Channel, ...]
+) -> Signal:
+    signal = read_columns(data, one.rows, columns)
+    return replace(signal, name=name, channels=channels, samples_per_frame=one.n_each)
+
+
+def _joints(part: _Part) -> tuple[Joint, ...]:
+    return tuple(
+        Joint(
+            name,
+            channels=tuple(
+                Channel(kind) if (kind := _kind(part, axis)) else Channel("", axis, unit)
+                for axis, unit in columns
+            ),
+        )
+        for name, columns in part.groups
+    )
+
+
+def _unit_cm(part: _Part) -> float | None:
+    """The unit of the positions in cm, None where there are none, or of several units."""
+    units = {
+        unit.lower() for _, columns in part.groups for axis, unit in columns if _kind(part, axis)
+    }
+    return UNIT_CM.get(units.pop()) if len(units) == 1 else None
+
+
+def _kind(part: _Part, axis: str) -> str:
+    """The kind of a channel, "" of a plain scalar: how segments are turned, no file says."""
+    kinds = {
+        "trajectories": {"x": "tx", "y": "ty", "z": "tz"},
+        "segments": {"tx": "tx", "ty": "ty", "tz": "tz"},
+    }
+    return kinds.get(part.title.lower(), {}).get(axis.lower(), "")
+
+
+def _section(data: bytes, one: _Read, names: Sequence[str], signals: Sequence[int]) -> Section:
+    part = one.part
+    start, stop = part.labels
+    whole = data[part.start : part.rows]
+    marked = data[part.start : start] + names_in(data[start:stop], names) + data[stop : part.rows]
+    return section_of((marked, whole), (one.table.missing, None), one.rows, names, signals)

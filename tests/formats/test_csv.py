@@ -1,0 +1,322 @@
+"""CSV files of Motive, of Vicon and of columns: bytes -> Motion -> the same bytes."""
+
+from __future__ import annotations
+
+import io
+import tracemalloc
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import mcz
+from mcz.errors import FormatError, LimitError, MczError, MotionError, SourceError
+from mcz.formats import FORMATS, sniffed
+from mcz.formats.csv_files import is_motion, kind_of
+from mcz.formats.csv_text import cells_of
+from mcz.formats.notes import RowNotes
+from mcz.formats.table_notes import join_table_notes, table_notes
+from mcz.motion import Motion
+from mcz.sample import bvh_walk
+from tests.formats.csv_files import column_files, motive_files, vicon_files
+from tools.vectors.build.table_files import COLUMNS, DEVICES, EULER, MOTIVE, ODD_SECTIONS, VICON
+
+SMALL = {"motive": MOTIVE, "vicon": VICON, "csv": COLUMNS}
+
+
+def back(data: bytes) -> Motion:
+    """The motion, which is written as the same bytes."""
+    motion: Motion = FORMATS["csv"].read(data, "table")
+    assert FORMATS["csv"].write(motion) == data
+    return motion
+
+
+def said(motion: Motion) -> str:
+    assert motion.source is not None
+    return motion.source.format
+
+
+@given(motive_files())
+def test_any_motive_file_comes_back(data: bytes) -> None:
+    motion = back(data)
+    assert said(motion) == "motive"
+    assert motion.skeleton.unit_cm in (100, 1, 0.1)
+    assert {c.kind[:1] for c in motion.skeleton.channels} <= {"", "t", "q", "r"}
+    assert not any(joint.parent >= 0 for joint in motion.skeleton.joints) or b"Local" in data
+
+
+@given(vicon_files())
+def test_any_vicon_file_comes_back(data: bytes) -> None:
+    motion = back(data)
+    assert said(motion) == "vicon"
+    titles = [line for line in data.splitlines() if line in (b"Trajectories", b"Segments")]
+    if titles:
+        assert motion.skeleton.channels[-1].kind == "tz"
+
+
+@given(column_files())
+def test_any_columns_come_back(data: bytes) -> None:
+    motion = back(data)
+    assert said(motion) == "csv"
+    assert {channel.kind for channel in motion.skeleton.channels} <= {""}
+
+
+@given(motive_files() | vicon_files() | column_files(), st.data())
+def test_what_is_cut_off_is_read_exactly_or_refused(data: bytes, choice: st.DataObject) -> None:
+    cut = data[: choice.draw(st.integers(0, len(data)))]
+    try:
+        motion = FORMATS["csv"].read(cut, "table")
+    except SourceError as error:
+        assert "\n" not in str(error)
+    else:
+        assert FORMATS["csv"].write(motion) == cut
+
+
+@given(st.sampled_from([MOTIVE, EULER, VICON, DEVICES, ODD_SECTIONS, COLUMNS]), st.data())
+def test_what_is_damaged_is_read_exactly_or_refused(data: bytes, choice: st.DataObject) -> None:
+    at, bit = choice.draw(st.integers(0, len(data) - 1)), choice.draw(st.integers(0, 7))
+    damaged = data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :]
+    try:
+        motion = FORMATS["csv"].read(damaged, "table")
+    except (SourceError, LimitError) as error:
+        assert "\n" not in str(error)
+    else:
+        assert FORMATS["csv"].write(motion) == damaged
+
+
+@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("effort", ["fast", "best"])
+def test_stored_and_restored(name: str, effort: str, tmp_path: Path) -> None:
+    source, target = tmp_path / "table.csv", io.BytesIO()
+    source.write_bytes(SMALL[name])
+    mcz.encode(source, target, effort=effort)
+    again = back(SMALL[name])
+    with mcz.open(target.getvalue()) as file:
+        clip = file.only_clip()
+        assert clip.source_bytes() == SMALL[name]
+        assert clip.source is not None and clip.source.format == name
+        motion = clip.motion()
+    assert np.array_equal(motion.values, again.values, equal_nan=True)
+    assert motion.skeleton.joints == again.skeleton.joints
+    for mine, theirs in zip(motion.signals, again.signals, strict=True):
+        assert np.array_equal(mine.masked(), theirs.masked(), equal_nan=True)
+
+
+def test_motive_says_its_bones_and_markers() -> None:
+    motion = back(MOTIVE)
+    hip, marker = motion.skeleton.joints
+    assert (hip.name, marker.name) == ("A, B:Hip", "Unlabeled 7")
+    assert [c.kind for c in hip.channels] == ["qx", "qy", "qz", "qw", "tx", "ty", "tz"]
+    assert [c.label for c in marker.channels] == ["tx", "ty", "tz", "Marker Quality"]
+    assert (motion.frame_rate, motion.frame_rate_exact, motion.skeleton.unit_cm) == (120, True, 0.1)
+    assert len(motion.signals) == 1  # the times follow from the numbers
+    points = mcz.positions(motion)
+    assert points[1].tolist() == [[60.004, 19.161, 76.594], [9.99, 19.158, 9.789]]
+    assert np.isnan(points[0, 1]).all() and np.isnan(points[3, 0]).all()
+
+
+def test_angles_of_motive_turn_in_the_order_that_it_says() -> None:
+    motion = back(EULER)
+    (box,) = motion.skeleton.joints
+    kinds = ["rz", "rx", "ry", "tx", "ty", "tz", ""]
+    assert [channel.kind for channel in box.channels] == kinds
+    assert motion.values[0, :3].tolist() == [90.5, -0.3125, 1.25]
+    turned = motion.values.copy()
+    turned[:, 0] += 1
+    assert b"11,0.110000,-0.6250,1.50,92.25" not in FORMATS["csv"].write(motion)
+    assert b"-0.625,1.5,92.25,0.060004" in FORMATS["csv"].write(motion.with_values(turned))
+
+
+def test_bones_that_are_seen_from_their_parents_have_them() -> None:
+    text = MOTIVE.replace(b"Global", b"Local").replace(b'"A0","A0","A0","A0"\r\n,Parent', b"X")
+    local = back(MOTIVE.replace(b"Coordinate Space,Global", b"Coordinate Space,Local"))
+    assert [joint.parent for joint in local.skeleton.joints] == [-1, -1]  # there is no 0:0
+    text = MOTIVE.replace(b"Global", b"Local").replace(b'"0:0","0:0","0:0","0:0"\r', b'"1:1",,,\r')
+    assert [joint.parent for joint in back(text).skeleton.joints] == [-1, 0]
+    world = text.replace(b"Local", b"Global")
+    assert [joint.parent for joint in back(world).skeleton.joints] == [-1, -1]
+
+
+def test_sections_of_vicon_are_signals() -> None:
+    motion = back(VICON)
+    assert [joint.name for joint in motion.skeleton.joints] == ["Ann:LASI", "Ann:RASI"]
+    assert motion.frame_numbers is not None and motion.frame_numbers.tolist() == [7, 8, 9]
+    assert (motion.frame_rate, motion.skeleton.unit_cm) == (100, 0.1)
+    devices, outputs = motion.signals[1:]
+    assert (devices.name, devices.samples_per_frame, outputs.name) == (
+        "Devices",
+        2,
+        "Model Outputs",
+    )
+    assert devices.channels is not None and outputs.channels is not None
+    assert [(c.name, c.unit) for c in devices.channels[2:]] == [
+        ("Plate #1 - Force.Fz", "N"),
+        ("EMG - Left.1", "V"),
+    ]
+    assert outputs.channels[0].name == "Ann:LKnee.X"
+    assert devices.masked()[1].tolist() == [1, -0.5, 613.25, -2.25e-05]
+    assert np.isnan(devices.masked()[3, 3]) and np.isnan(motion.values[1, 3:]).all()
+    assert mcz.positions(motion).shape == (3, 2, 3)
+
+
+@pytest.mark.parametrize("length", [1, 2, 80])
+def test_part_of_a_clip_has_that_part_of_every_section(length: int, tmp_path: Path) -> None:
+    target, part = tmp_path / "whole.mcz", tmp_path / "part.mcz"
+    mcz.write(back(ODD_SECTIONS), target, codec="lossless", segment_frames=length)
+    mcz.extract(target, part, frames=(1, 3))
+    with mcz.open(target) as file, mcz.open(part) as cut:
+        text = file.only_clip().source_bytes((1, 3))
+        assert cut.only_clip().source_bytes() == text
+        again = back(text)
+    assert text.count(b"\n+2,") == 1 and b"\n02,0" in text and b"\n1,1" not in text
+    assert text.endswith(b"3,1,616.5\n3,2,617.25\n# the end\n")
+    assert again.frame_numbers is not None and again.frame_numbers.tolist() == [2, 3]
+
+
+def test_devices_alone_have_a_motion_without_channels() -> None:
+    motion = back(DEVICES)
+    assert motion.values.shape == (3, 0)
+    assert (motion.frame_rate, motion.signals[1].samples_per_frame) == (500, 2)
+
+
+def test_columns_say_their_names_and_units() -> None:
+    motion = back(COLUMNS)
+    assert [joint.name for joint in motion.skeleton.joints] == ["knee angle", "force"]
+    assert [channel.unit for channel in motion.skeleton.channels] == ["deg", "N"]
+    assert (motion.frame_rate, len(motion.signals)) == (100, 1)
+    assert np.isnan(motion.values[0, 1]) and motion.values[1].tolist() == [-1.5, 3.75]
+
+
+@pytest.mark.parametrize(
+    ("text", "rate", "numbers"),
+    [
+        ("frame,time,a\n4,0.00,1\n5,0.02,2\n6,0.04,3\n", 50, [4, 5, 6]),
+        ("t,a\n0,1\n0.1,2\n0.5,3\n", None, None),
+        ("1,2\n3,4\n", None, None),
+        (",a,b\n0,1,NA\n1,NA,2\n2,3,4\n", None, [0, 1, 2]),
+        ("# x, y\n1.0 2.0\n3.0 4.0\n", None, None),
+        ("a,b\n,1\n2,\n", None, None),
+        ('"1.5","2"\n"2.5","3"\n', None, None),
+    ],
+)
+def test_columns_of_many_programs(text: str, rate: int | None, numbers: list[int] | None) -> None:
+    motion = back(text.encode())
+    assert motion.frame_rate == rate
+    found = motion.frame_numbers
+    assert (None if found is None else found.tolist()) == numbers
+    if rate is None and text.startswith("t"):
+        assert motion.signals[1].values.ravel().tolist() == [0, 0.1, 0.5]
+
+
+REFUSED = {
+    b"": "no row of numbers",
+    b"a,b\nx,y\n": "no row of numbers",
+    b"a;b\n1,5;2,5\n": "decimal commas",
+    b"a,b\n1,2\n3,x\n": "line 3: b'x' is not a number",
+    b"a,b\n1,2\n3,4,5\n": "line 3: more than 2 cells",
+    b"Format Version,1.21\n": "no line Frame,Time",
+    EULER[: EULER.index(b"10,0.1")]: "line 8: no row of numbers after Frame,Time",
+    EULER + b"the end\n": "line 11: not a row of numbers",
+    VICON.replace(b"\n9,0,11.75,0.75,-1.5", b""): "line 18: section 'Model Outputs' has 2 frames",
+    VICON.replace(b"\n9,1,", b"\n10,0,"): "are not as many a frame in all frames",
+    b"Devices\n1\n,,a\nFrame,Sub Frame,x\n,,N\n": "no row of numbers below Frame,Sub Frame",
+    b"\xff\xfeF\0": "UTF-16",
+}
+
+
+@pytest.mark.parametrize("data", REFUSED)
+def test_what_is_no_table_is_refused_with_the_reason(data: bytes) -> None:
+    with pytest.raises(SourceError) as caught:
+        FORMATS["csv"].read(data, "table")
+    assert REFUSED[data] in str(caught.value)
+
+
+def test_a_motion_from_elsewhere_is_no_csv_file() -> None:
+    with pytest.raises(MotionError, match="comes from no CSV file"):
+        FORMATS["csv"].write(bvh_walk())
+
+
+@pytest.mark.parametrize("data", [MOTIVE, VICON, DEVICES, COLUMNS, b"1 2\n"])
+def test_kinds_of_files(data: bytes) -> None:
+    assert kind_of(data) == said(back(data)) == sniffed(data)
+
+
+INDEX = b'"Subject","Trial #","Description"\n1,1,"forward jumps, turn"\n1,2,"climb"\n'
+
+
+def test_a_folder_leaves_out_tables_of_words(tmp_path: Path) -> None:
+    assert is_motion(VICON) and is_motion(MOTIVE) and is_motion(COLUMNS)
+    assert not is_motion(INDEX) and not is_motion(b"a,b\n1,2\n3,x\n") and not is_motion(b"")
+    folder = tmp_path / "takes"
+    folder.mkdir()
+    (folder / "index.csv").write_bytes(INDEX)
+    (folder / "take.csv").write_bytes(MOTIVE)
+    report = mcz.pack(folder, tmp_path / "takes.mcz")
+    results = {outcome.path: outcome.result for outcome in report.outcomes}
+    assert results == {"take.csv": "parsed", "index.csv": "skipped"}
+    kept = mcz.pack(folder, tmp_path / "kept.mcz", keep_all=True)
+    assert {outcome.result for outcome in kept.outcomes} == {"parsed", "verbatim"}
+
+
+@given(st.binary(max_size=60))
+def test_quotes_and_separators(line: bytes) -> None:
+    for separator in (b",", b";", b"\t", None):
+        cells = cells_of(line, separator)
+        assert separator is None or len(cells) >= 1
+    plain = line.translate(None, b'"\r\n,').strip().removeprefix(b"\xef\xbb\xbf")
+    assert cells_of(b'x,"' + plain + b',",y', b",") == [b"x", plain + b",", b"y"]
+
+
+@given(st.lists(st.integers(0, 3), min_size=1, max_size=12), st.data())
+def test_notes_of_sections_are_cut_and_joined(patterns: list[int], data: st.DataObject) -> None:
+    n, rows = len(patterns), np.array(patterns)
+    notes = table_notes([(1, None), (2, RowNotes(np.repeat(rows, 2), ((1, b"+1"),)))])
+    assert notes is not None
+    cut = sorted(data.draw(st.sets(st.integers(1, n - 1)) if n > 1 else st.just(set())))
+    edges = [0, *cut, n]
+    parts = [(a, b, notes.cut(a, b)) for a, b in zip(edges, edges[1:], strict=False)]
+    again = join_table_notes(parts)
+    found = again.of(1, 2, 2 * n)
+    assert found is not None and found.texts == ((1, b"+1"),)
+    assert np.array_equal(found.patterns, np.repeat(rows, 2))
+    with pytest.raises(FormatError, match="rows a frame"):
+        again.of(1, 3, 3 * n)
+
+
+@given(st.binary(max_size=40))
+def test_hostile_notes_and_templates_are_refused(noise: bytes) -> None:
+    motion = back(VICON)
+    assert motion.source is not None
+    for key in ("template", "detail"):
+        given_bytes = getattr(motion.source, key)
+        for damaged in (noise, given_bytes[: len(noise)] + noise + given_bytes[2 * len(noise) :]):
+            source = replace(motion.source, **{key: damaged})
+            try:
+                FORMATS["csv"].write(replace(motion, source=source))
+            except (FormatError, LimitError):
+                continue
+    try:
+        source = replace(motion.source, notes=join_table_notes([(0, 3, noise)]))
+        FORMATS["csv"].write(replace(motion, source=source))
+    except MczError as error:
+        assert "\n" not in str(error)
+
+
+def test_memory_is_bounded_by_the_bytes_of_a_ragged_table() -> None:
+    """Rows that leave out most of many columns do not take what these would need."""
+    text = b",".join(b"c%d" % k for k in range(20_000)) + b"\n" + b"1,2\n" * 500
+    tracemalloc.start()
+    try:
+        with pytest.raises(SourceError, match="would dwarf the file"):
+            FORMATS["csv"].read(text, "table")
+        assert tracemalloc.get_traced_memory()[1] < 2**26
+    finally:
+        tracemalloc.stop()
+    for long in (b"a,b\n1,2\n" + b"," * 3_000_000 + b"3\n", b"1" + b",2" * 2**21, b"1 " * 2**22):
+        with pytest.raises(SourceError, match="more than|no row of numbers"):
+            FORMATS["csv"].read(long, "table")
+    wide = b",".join(b"c%d" % k for k in range(2000)) + b"\n" + (b"," * 1999 + b"1\n") * 40
+    assert back(wide).values.shape == (40, 2000)
