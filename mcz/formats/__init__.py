@@ -122,6 +122,17 @@ FORMATS: dict[str, Format] = {
                 (8, "sto", "storage"),
             )
         ),
+        Format(
+            "npy", 12, (".npy",), _of("arrays.read", "read_npy"), _of("arrays.read", "write_arrays")
+        ),
+        Format(
+            "npz",
+            13,
+            (".npz",),
+            _of("arrays.read", "read_npz"),
+            _of("arrays.read", "write_arrays"),
+            states_rate=True,
+        ),
     )
 }
 
@@ -144,6 +155,10 @@ def is_table(path: str | Path) -> bool:
 
 def sniffed(data: bytes) -> str | None:
     """The name of the format that ``data`` seems to be of, None where it seems to be of none."""
+    if data.startswith(b"\x93NUMPY"):
+        return "npy"
+    if data.startswith(b"PK\3\4"):
+        return "npz"
     start = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:16].upper()
     if start.startswith(b"HIERARCHY"):
         return "bvh"
