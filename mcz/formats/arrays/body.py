@@ -26,6 +26,9 @@ FACE_SIZE, HANDS_SIZE = 9, 90  # numbers of a face and of two hands that have al
 BODY_SIZES = {63: "smplh", 69: "smpl"}  # numbers of a body without its root, and its model
 WITHOUT_HANDS = 22  # joints that SMPL-H and SMPL-X share
 POSITION = 3  # channels of the root before its rotation
+WITH_FACE = 165  # numbers of SMPL-X
+PARTS = {**dict.fromkeys(ROOT, 0), **dict.fromkeys(BODY, 3)}  # where parts of all joints begin
+FACES = {"pose_jaw": 66, "jaw_pose": 66, "pose_eye": 69, "leye_pose": 69, "reye_pose": 72}
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,16 +106,19 @@ def _repeated(
 ) -> Iterator[tuple[int, Sequence[int]]]:
     """Arrays that repeat columns of ``whole``, whose channels begin with ``first``."""
     words = arrays[whole].numbers
-    at, has_face = 0, words.shape[1] == 165
-    for names in (ROOT, BODY, *(FACE if has_face else ()), *HANDS):
-        index = next((named[n] for n in names if n in named), None)
+    starts = PARTS | dict.fromkeys(("pose_hand", "left_hand_pose"), 66)
+    starts["right_hand_pose"] = 66 + HANDS_SIZE // 2
+    if words.shape[1] == WITH_FACE:
+        hands = [name for names in HANDS for name in names]
+        starts = {n: at + FACE_SIZE * (n in hands) for n, at in starts.items()} | FACES
+    for name, at in starts.items():
+        index = named.get(name)
         if index is None:
             continue
         part = arrays[index].numbers
         stop = at + part.shape[1]
         if stop <= words.shape[1] and _same(words[:, at:stop], part):
             yield index, range(first + at, first + stop)
-            at = stop
 
 
 def _same(one: NDArray[Any], other: NDArray[Any]) -> bool:
