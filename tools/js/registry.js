@@ -12,6 +12,8 @@ const SOURCE_FORMATS = new Map([
   [6, { name: "trc", of: "clip" }],
   [7, { name: "mot", of: "clip" }],
   [8, { name: "sto", of: "clip" }],
+  [12, { name: "npy", of: "clip" }],
+  [13, { name: "npz", of: "clip" }],
 ]);
 
 /** Names of the source formats that this decoder restores. */

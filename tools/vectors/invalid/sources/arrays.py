@@ -1,0 +1,108 @@
+"""Templates of arrays at fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from mcz.formats.arrays.layout import ARRAY_DETAIL, ARRAY_TEMPLATE, Kind, Piece
+
+from mcz.motion import Motion, Signal, Source
+from mcz.schema import build
+from tools.vectors.build.array_files import SPEC, floats, npy, pieces_of, plain_npz, take_arrays
+from tools.vectors.build.edits import Edit, plus, put
+from tools.vectors.build.files import Unrestorable, file_of
+from tools.vectors.build.source_files import with_source, with_template
+
+
+def add(shelf: Unrestorable) -> None:
+    plain = take_arrays(npy(floats(4, 2)), "plain.npy")
+    _fields(shelf, plain)
+    _lists(shelf, plain)
+    _numbers(shelf)
+
+
+def _put(path: str, new: bytes) -> Edit:
+    return put(ARRAY_TEMPLATE, f"pieces.{path}", new)
+
+
+def _fields(shelf: Unrestorable, plain: Motion) -> None:
+    """Pieces of an NPY file are text, a count, text, numbers."""
+    assert [piece.kind for piece in pieces_of(plain)] == [0, 2, 0, 3]
+    whole = npy(floats(4, 2))
+    cases: tuple[tuple[str, str, Edit], ...] = (
+        ("tail", "a byte behind it, which is closed", plus(b"\0")),
+        ("cut", "it ends early", lambda data: data[:-1]),
+        ("kind", "a piece of kind 7", lambda data: b"\5" + data[1:] + b"\7"),
+        ("type", "numbers of type 12", _put("3.type", b"\x0c")),
+        ("flags", "flags of 4", _put("3.flags", b"\4")),
+        ("signal-of-count", "the count of a signal that there is not", _put("1.signal", b"\1")),
+        ("signal", "numbers of a signal that there is not", _put("3.signal", b"\1")),
+        ("channel", "a channel behind the last", _put("3.runs.0.channel", b"\1")),
+        ("run", "a run of no channels behind all", _put("3.runs", b"\2\0\2\2\0")),
+        ("count", "no room for the count", _put("1.size", b"\1")),
+    )
+    for name, purpose, edit in cases:
+        data = file_of(with_source(plain, whole), SRCE=with_template(edit))
+        shelf.add(f"arrays-{name}", SPEC, f"A template of arrays: {purpose}.", data)
+
+
+def _made(plain: Motion, pieces: list[Piece], parts: list[bytes], whole: bytes) -> Motion:
+    """``plain`` with pieces that ``build_arrays`` would not be given."""
+    fields = [
+        {
+            **{name: getattr(piece, name) for name in Piece.__slots__},
+            "kind": int(piece.kind),
+            "runs": [{"channel": c, "n_channels": n} for c, n in piece.runs],
+        }
+        for piece in pieces
+    ]
+    template = build(ARRAY_TEMPLATE, {"pieces": fields}, "template")
+    detail = build(ARRAY_DETAIL, {"parts": parts}, "detail")
+    assert plain.source is not None
+    source = Source(plain.source.format, template, detail, path=plain.source.path)
+    return with_source(replace(plain, source=source), whole)
+
+
+def _lists(shelf: Unrestorable, plain: Motion) -> None:
+    """What pieces say of others; what a reader restores that overlooks it is as it is stated."""
+    text = Piece(Kind.TEXT, b"abc")
+    zero = b"\0\0\0\0"
+    crc_abc = (0x352441C2).to_bytes(4, "little")
+    sums = (Kind.CRC, Kind.SIZE4, Kind.SIZE8)
+    cases: list[tuple[str, str, list[Piece], list[bytes], bytes]] = [
+        ("parts", "a part too many", [text], [b"x"], b"abc"),
+        ("no-parts", "a part too few", [text, Piece(Kind.OWN)], [], b"abc"),
+    ]
+    for kind in sums:
+        name = kind.name.lower()
+        size = bytes(8 if kind == Kind.SIZE8 else 4)
+        back = [Piece(kind, start=1, stop=0), text]
+        far = [text, Piece(kind, start=3, stop=3)]
+        cases += [
+            (f"back-{name}", f"a {kind.name} from behind", back, [], size + b"abc"),
+            (f"far-{name}", f"a {kind.name} beyond the end", far, [], b"abc" + size),
+        ]
+    itself = [Piece(Kind.CRC, start=0, stop=1)]
+    nested = [text, Piece(Kind.CRC, start=0, stop=1), Piece(Kind.CRC, start=1, stop=2)]
+    over = [text, text, Piece(Kind.CRC, start=0, stop=2), Piece(Kind.CRC, start=1, stop=2)]
+    inside = [text, text, Piece(Kind.CRC, start=0, stop=1), Piece(Kind.CRC, start=0, stop=2)]
+    both = (0x726E994C).to_bytes(4, "little")
+    cases += [
+        ("crc-of-itself", "a CRC-32 of itself", itself, [], zero),
+        ("crc-of-crc", "a CRC-32 of a CRC-32", nested, [], b"abc" + crc_abc + zero),
+        ("crc-overlap", "CRC-32s that overlap", over, [], b"abcabc" + both + crc_abc),
+        ("crc-inside", "a CRC-32 within another", inside, [], b"abcabc" + crc_abc + both),
+    ]
+    for name, purpose, pieces, parts, whole in cases:
+        data = file_of(_made(plain, pieces, parts, whole))
+        shelf.add(f"arrays-{name}", SPEC, f"A template of arrays: {purpose}.", data)
+
+
+def _numbers(shelf: Unrestorable) -> None:
+    many = take_arrays(plain_npz({"a": floats(3, 2), "b": floats(3, 1)}), "many.npz")
+    assert many.source is not None
+    ints = Signal(np.arange(3).reshape(3, 1), name="b", channels=many.signals[1].channels)
+    wrong = replace(many, signals=(many.signals[0], ints))
+    data = file_of(wrong)
+    shelf.add("arrays-hash", SPEC, "An NPZ file: another array than the hash is of.", data)
