@@ -402,7 +402,8 @@ def test_invalid_sources_need_every_format_unless_stated() -> None:
     (request,) = manifest.all_requests(vector)
     some = Capabilities(sources=frozenset(("bvh", "asf")))
     assert some.lacks(request) == [
-        f"source {name}" for name in ("amc", "c3d", "c3d-outputs", "trc", "mot", "sto", "npy", "npz")
+        f"source {name}"
+        for name in ("amc", "c3d", "c3d-outputs", "trc", "mot", "sto", "npy", "npz")
     ]
     vector["formats"] = ["bvh"]
     assert some.lacks(request) == []

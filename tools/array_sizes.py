@@ -74,7 +74,9 @@ def measure(path: Path, folder: Path, times: dict[str, float]) -> dict[str, int]
 
 
 def main(arguments: list[str]) -> None:
-    paths = [p for a in map(Path, arguments) for p in (sorted(a.glob("*.npz")) if a.is_dir() else [a])]
+    paths = [
+        p for a in map(Path, arguments) for p in (sorted(a.glob("*.npz")) if a.is_dir() else [a])
+    ]
     sums, times = dict.fromkeys(NAMES, 0), dict.fromkeys(EFFORTS, 0.0)
     with tempfile.TemporaryDirectory() as folder:
         for path in paths:

@@ -103,7 +103,9 @@ def encode(
     if up is not None and path.suffix.lower() == ".asf":
         raise OptionError(f"{path}: a skeleton alone is kept as it is; say the up axis of its AMC")
     coded = chosen(codec, effort)
-    terms = Terms(coded, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up, arrays=arrays)
+    terms = Terms(
+        coded, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up, arrays=arrays
+    )
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with limited(threads), replacing(target, force=force, inputs=inputs) as stream:

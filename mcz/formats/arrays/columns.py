@@ -75,7 +75,8 @@ def columns_of(words: NDArray[Any]) -> Columns:
     """The columns of numbers (rows, columns) that are not ``unfit``."""
     if words.dtype.kind != "f":
         return Columns(words.astype(np.int64), (INTEGER,) * words.shape[1])
-    values = np.require(words, np.float64, ("C", "A"))  # members lie at any offset
+    with np.errstate(invalid="ignore"):  # of NaNs that signal
+        values = np.require(words, np.float64, ("C", "A"))  # members lie at any offset
     grids = (BINARY32,) * words.shape[1] if words.dtype.itemsize < 8 else _grids_of(values)
     nan = np.isnan(values)
     if not nan.any() or words.dtype.itemsize == 2:

@@ -11,12 +11,11 @@ from fractions import Fraction
 from itertools import product
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
 from mcz.formats.arrays.body import Body, body_of
-from mcz.formats.arrays.facts import TIMES, facts_of, rate_of
+from mcz.formats.arrays.facts import SHAPE, TIMES, facts_of, rate_of
 from mcz.formats.arrays.files import Array
 from mcz.motion import Channel, Joint, Skeleton
 
@@ -58,7 +57,7 @@ def meaning_of(arrays: Sequence[Array]) -> Meaning:
     else:
         _add_motion(meaning, arrays, n_frames)
     for index, array in enumerate(arrays):
-        if index in meaning.places or array.kept:
+        if index in meaning.places or array.kept or array.name == SHAPE:
             continue
         per_frame, rest = divmod(len(array.numbers), n_frames)
         if rest or per_frame > (1 if n_frames < 2 else MAX_PER_FRAME) or not per_frame:

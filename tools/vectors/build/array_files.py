@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from mcz.formats.arrays.layout import Kind, Piece, build_arrays, parse_arrays
 from numpy.typing import NDArray
 
 from mcz.formats import FORMATS
+from mcz.formats.arrays.layout import Kind, Piece, build_arrays, parse_arrays
 from mcz.motion import Motion
+from mcz.schema import varint
 from tools.vectors.build.source_files import called, unhashed
 
 SPEC = "Template of arrays; The bytes of arrays"
@@ -126,6 +127,25 @@ def with_pieces(motion: Motion, pieces: Sequence[Piece]) -> Motion:
     assert motion.source is not None
     template, detail = build_arrays(pieces)
     return replace(motion, source=replace(motion.source, template=template, detail=detail))
+
+
+def raw(piece: Piece, **fields: Any) -> bytes:
+    """The bytes of a piece with other fields, also those that no schema admits."""
+    piece = replace(piece, **fields)
+    kind = bytes((piece.kind,))
+    match piece.kind:
+        case Kind.TEXT:
+            return kind + varint(len(piece.text)) + piece.text
+        case Kind.OWN:
+            return kind
+        case Kind.COUNT:
+            after = varint(len(piece.after)) + piece.after
+            return kind + varint(piece.signal) + after + varint(piece.size)
+        case Kind.DATA:
+            runs = b"".join(varint(channel) + varint(n) for channel, n in piece.runs)
+            said = bytes((piece.type, piece.flags)) + varint(len(piece.runs))
+            return kind + varint(piece.signal) + said + runs
+    return kind + varint(piece.start) + varint(piece.stop)
 
 
 def number_piece(signal: int, type_: int, *runs: tuple[int, int], flags: int = 0) -> Piece:

@@ -5,12 +5,20 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from mcz.formats.arrays.layout import ARRAY_DETAIL, ARRAY_TEMPLATE, Kind, Piece
 
+from mcz.formats.arrays.layout import ARRAY_DETAIL, Kind, Piece
 from mcz.motion import Motion, Signal, Source
-from mcz.schema import build
-from tools.vectors.build.array_files import SPEC, floats, npy, pieces_of, plain_npz, take_arrays
-from tools.vectors.build.edits import Edit, plus, put
+from mcz.schema import build, varint
+from tools.vectors.build.array_files import (
+    SPEC,
+    floats,
+    npy,
+    pieces_of,
+    plain_npz,
+    raw,
+    take_arrays,
+)
+from tools.vectors.build.edits import plus
 from tools.vectors.build.files import Unrestorable, file_of
 from tools.vectors.build.source_files import with_source, with_template
 
@@ -22,44 +30,43 @@ def add(shelf: Unrestorable) -> None:
     _numbers(shelf)
 
 
-def _put(path: str, new: bytes) -> Edit:
-    return put(ARRAY_TEMPLATE, f"pieces.{path}", new)
-
-
 def _fields(shelf: Unrestorable, plain: Motion) -> None:
     """Pieces of an NPY file are text, a count, text, numbers."""
-    assert [piece.kind for piece in pieces_of(plain)] == [0, 2, 0, 3]
+    head, count, text, numbers = pieces_of(plain)
+    assert (count.kind, numbers.kind) == (Kind.COUNT, Kind.DATA)
     whole = npy(floats(4, 2))
-    cases: tuple[tuple[str, str, Edit], ...] = (
+    cases: tuple[tuple[str, str, list[bytes]], ...] = (
+        ("kind", "a piece of kind 7", [*map(raw, (head, count, text, numbers)), b"\7"]),
+        ("type", "numbers of type 12", [raw(numbers, type=12)]),
+        ("flags", "flags of 4", [raw(numbers, flags=4)]),
+        ("signal-of-count", "the count of a signal that there is not", [raw(count, signal=1)]),
+        ("signal", "numbers of a signal that there is not", [raw(numbers, signal=1)]),
+        ("channel", "a channel behind the last", [raw(numbers, runs=((1, 2),))]),
+        ("run", "a run of no channels behind all", [raw(numbers, runs=((0, 2), (2, 0)))]),
+        ("count", "no room for the count", [raw(count, size=len(count.after))]),
+    )
+    for name, purpose, parts in cases:
+        if len(parts) == 1:
+            is_count = parts[0][0] == Kind.COUNT
+            changed = (
+                [*parts, raw(text), raw(numbers)] if is_count else [raw(count), raw(text), *parts]
+            )
+            parts = [raw(head), *changed]
+        template = varint(len(parts)) + b"".join(parts)
+        data = file_of(_stated(plain, template, [], whole))
+        shelf.add(f"arrays-{name}", SPEC, f"A template of arrays: {purpose}.", data)
+    for name, purpose, edit in (
         ("tail", "a byte behind it, which is closed", plus(b"\0")),
         ("cut", "it ends early", lambda data: data[:-1]),
-        ("kind", "a piece of kind 7", lambda data: b"\5" + data[1:] + b"\7"),
-        ("type", "numbers of type 12", _put("3.type", b"\x0c")),
-        ("flags", "flags of 4", _put("3.flags", b"\4")),
-        ("signal-of-count", "the count of a signal that there is not", _put("1.signal", b"\1")),
-        ("signal", "numbers of a signal that there is not", _put("3.signal", b"\1")),
-        ("channel", "a channel behind the last", _put("3.runs.0.channel", b"\1")),
-        ("run", "a run of no channels behind all", _put("3.runs", b"\2\0\2\2\0")),
-        ("count", "no room for the count", _put("1.size", b"\1")),
-    )
-    for name, purpose, edit in cases:
-        data = file_of(with_source(plain, whole), SRCE=with_template(edit))
+    ):
+        data = file_of(plain, SRCE=with_template(edit))
         shelf.add(f"arrays-{name}", SPEC, f"A template of arrays: {purpose}.", data)
 
 
-def _made(plain: Motion, pieces: list[Piece], parts: list[bytes], whole: bytes) -> Motion:
-    """``plain`` with pieces that ``build_arrays`` would not be given."""
-    fields = [
-        {
-            **{name: getattr(piece, name) for name in Piece.__slots__},
-            "kind": int(piece.kind),
-            "runs": [{"channel": c, "n_channels": n} for c, n in piece.runs],
-        }
-        for piece in pieces
-    ]
-    template = build(ARRAY_TEMPLATE, {"pieces": fields}, "template")
-    detail = build(ARRAY_DETAIL, {"parts": parts}, "detail")
+def _stated(plain: Motion, template: bytes, parts: list[bytes], whole: bytes) -> Motion:
+    """``plain`` with a source of these parts that states size and hash of ``whole``."""
     assert plain.source is not None
+    detail = build(ARRAY_DETAIL, {"parts": parts}, "detail")
     source = Source(plain.source.format, template, detail, path=plain.source.path)
     return with_source(replace(plain, source=source), whole)
 
@@ -95,7 +102,8 @@ def _lists(shelf: Unrestorable, plain: Motion) -> None:
         ("crc-inside", "a CRC-32 within another", inside, [], b"abcabc" + crc_abc + both),
     ]
     for name, purpose, pieces, parts, whole in cases:
-        data = file_of(_made(plain, pieces, parts, whole))
+        template = varint(len(pieces)) + b"".join(map(raw, pieces))
+        data = file_of(_stated(plain, template, parts, whole))
         shelf.add(f"arrays-{name}", SPEC, f"A template of arrays: {purpose}.", data)
 
 

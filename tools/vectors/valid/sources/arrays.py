@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from mcz.formats.arrays.layout import TYPES, Kind, Piece
 
+from mcz.formats.arrays.layout import TYPES, Kind, Piece
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from tools.vectors.build import wavelet_clips
@@ -176,7 +176,7 @@ def _lossy(shelf: Whole) -> None:
     for code in ("<f4", ">f2", "<f8"):
         whole = take_arrays(npy(floats(len(thirds), 3).astype(code)), f"lossy-{code[1:]}.npy")
         signal = replace(whole.signals[0], values=values, mask=mask, ordinals=None)
-        motion = unhashed(replace(whole, signals=(signal,)))
+        motion = replace(whole, signals=(signal,))
         made = {"codec": wavelet_clips.codec_of(plan, channels), "grouping": "channel"}
         purpose = f"A lossy clip of {code[1:]}, with gaps."
         _hold(shelf, f"lossy-{code[1:]}", purpose, motion, **made)
