@@ -2,9 +2,9 @@
 
     python tools/amass_like.py FOLDER_OF_AMC OUT [--float32]
 
-AMASS itself may not be passed on, so what is measured on such files is measured on these. Turns and
-positions are those of the AMC, through SciPy; hands have none, and are 0. Members, their order, names
-and types are those of AMASS, as ``numpy.savez`` writes them.
+AMASS itself may not be passed on, so what is measured on such files is measured on these. Turns
+and positions are those of the AMC, through SciPy; hands have none, and are 0. Members, their order,
+names and types are those of AMASS, as ``numpy.savez`` writes them.
 """
 
 from __future__ import annotations

@@ -59,7 +59,8 @@ def pack(
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
-    relative to ``directory``. ``arrays`` is that of ``mcz.read``. ``effort``, ``copies`` and ``threads`` are those of ``mcz.write``;
+    relative to ``directory``. ``arrays`` is that of ``mcz.read``; ``effort``, ``copies`` and
+    ``threads`` are those of ``mcz.write``;
     ``jobs`` processes may work at once, by default one: the bytes are the same. ``mtimes`` keeps
     when each file was last changed as metadata of its clip, so that the same files give other
     bytes later. An earlier MCZ file of the target's name is no part of the new one; any other file

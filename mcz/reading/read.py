@@ -33,8 +33,9 @@ def read(
     found stands in the metadata, and a SkeletonWarning tells of one whose name or dofs do not fit.
     ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
     ("x", "y", "z"), say what the file does not. ``arrays`` says what the numbers of a plain NPY or
-    NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". Of an MCZ file ``clip`` is read, with
-    ``max_decoded`` and ``threads`` as in ``open``. Raises SourceError, FormatError or OptionError.
+    NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". Of an MCZ
+    file ``clip`` is read, with ``max_decoded`` and ``threads`` as in ``open``. Raises SourceError,
+    FormatError or OptionError.
     """
     path = Path(path)
     if path.suffix.lower() == ".mcz":

@@ -126,5 +126,5 @@ def _same(one: NDArray[Any], other: NDArray[Any]) -> bool:
     if one.dtype != other.dtype or one.shape != other.shape:
         return False
     kind = f"u{one.dtype.itemsize}"
-    plain = (np.ascontiguousarray(words).view(kind) for words in (one, other))
-    return bool(np.array_equal(*plain))
+    words = [np.ascontiguousarray(each).view(kind) for each in (one, other)]
+    return np.array_equal(words[0], words[1])

@@ -65,7 +65,7 @@ def _round(value: float, dtype: np.dtype[np.generic]) -> tuple[Fraction, bool]:
 
 def facts_of(arrays: Sequence[Array]) -> dict[str, str]:
     """Metadata ``x-NAME`` of all single words and numbers; how many betas there are."""
-    facts = {}
+    facts: dict[str, str] = {}
     for array in arrays:
         key = "x-" + "-".join(_KEY.findall(array.name.lower()))
         text = None if array.name.lower() in RATES else _text(array)

@@ -1,4 +1,4 @@
-"""What the numbers of plain arrays are, where somebody says it: positions or rotations of joints."""
+"""What the numbers of plain arrays are, where somebody says it: positions or rotations."""
 
 from __future__ import annotations
 

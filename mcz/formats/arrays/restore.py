@@ -112,8 +112,7 @@ def array_words(signal: Signal, piece: Piece) -> memoryview:
         words = _integers(values, kind, size)
     if piece.flags & BY_COLUMNS:
         words = words.T
-    words = np.ascontiguousarray(words, words.dtype.newbyteorder(piece.dtype[0]))
-    return memoryview(words.reshape(-1).view(np.uint8))
+    return np.ascontiguousarray(words, piece.dtype).reshape(-1).view(np.uint8).data
 
 
 def _floats(signal: Signal, values: NDArray[Any], columns: Any, type_: str) -> NDArray[Any]:
@@ -152,5 +151,5 @@ def _integers(values: NDArray[Any], kind: str, size: int) -> NDArray[Any]:
     high = 2 ** (8 * size) - 1 if kind == "u" else high
     if values.dtype == np.float64:
         values = np.rint(np.where(np.isnan(values), 0, values))
-    limited = np.clip(values, max(low, -WIDEST), min(high, WIDEST))  # ARRAY-14
+    limited: NDArray[Any] = np.clip(values, max(low, -WIDEST), min(high, WIDEST))  # ARRAY-14
     return limited.astype(f"{'u' if kind == 'b' else kind}{size}")
