@@ -136,6 +136,7 @@ ARGUED: dict[str, str] = {
     "SALV-03": _SALVAGE + "test_container.py::test_salvage_goes_on_behind_garbage",
     "SALV-04": _SALVAGE + "test_container.py::test_open_data_cut_anywhere_salvages_whole_packets",
     "SALV-05": _SALVAGE + "test_live.py::test_a_lost_frame_costs_those_up_to_the_next_fresh_one",
+    "ARRAY-12": "a file that breaks it has more than 4 GiB",
     "LIMIT-06": "a file that breaks it has more than 64 MiB, and raw deflate does not shorten MODL",
     "SALV-06": _SALVAGE + "test_copies.py::test_a_bad_byte_costs_nothing_that_has_a_copy",
     "SALV-07": _SALVAGE + "test_copies.py::test_a_bad_byte_costs_nothing_that_has_a_copy",

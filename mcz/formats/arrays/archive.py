@@ -159,7 +159,8 @@ def _check_local(data: bytes, member: Member, raw: bytes) -> None:
     if _number(data, at + 8, 2) != member.method:
         raise SourceError(f"offset {at + 8}: member {member.name!r} has two methods")
     packed, where, _ = _local_sizes(data, member)[1]
-    if packed != member.stop - member.start and not _number(data, at + 6, 2) & DESCRIBED:
+    is_open = packed == FULL32 or _number(data, at + 6, 2) & DESCRIBED  # said elsewhere
+    if packed != member.stop - member.start and not is_open:
         raise SourceError(
             f"offset {where}: member {member.name!r} has {packed} bytes and "
             f"{member.stop - member.start}"

@@ -78,14 +78,15 @@ def _add_body(meaning: Meaning, body: Body) -> None:
 
 
 def _frames_of(arrays: Sequence[Array]) -> int:
-    """The number of frames: that of the times, else the longest first axis of an array of rows."""
+    """The number of frames: that of the times, else the longest first axis of an array of joints."""
     numbers = [array for array in arrays if not array.kept]
     times = [array.n_rows for array in numbers if array.name in TIMES and len(array.head.shape) < 2]
     if times and any(array.n_rows == times[0] for array in numbers if array.name not in TIMES):
         return times[0]
-    rows = [array.n_rows for array in numbers if len(array.head.shape) > 1]
-    if rows:
-        return max(rows)
+    for n_axes in (3, 2):  # a mesh or a model has rows, too, but seldom three axes
+        rows = [array.n_rows for array in numbers if len(array.head.shape) >= n_axes]
+        if rows:
+            return max(rows)
     raise SourceError("; ".join(("no array has a row for each frame", *_reasons(arrays))))
 
 
