@@ -42,6 +42,7 @@ MODULES = (
     "mcz.codecs.posewave.contact_plan",
     "mcz.formats.layout",
     "mcz.formats.table_layout",
+    "mcz.formats.arrays.layout",
     "mcz.formats.notes",
     "mcz.formats.c3d_layout",
     "mcz.recovery.packets",

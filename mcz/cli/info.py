@@ -93,7 +93,8 @@ def command(
 ) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz.
 
-    Of a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto) it shows the skeleton and the clip.
+    Of a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .npy, .npz) it
+    shows the skeleton and the clip.
     """
     from mcz.reading import report, source_report
 

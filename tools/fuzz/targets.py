@@ -80,6 +80,8 @@ TARGETS: dict[str, Target] = {
         _reader("trc", readers.check_trc),
         _reader("mot", readers.check_mot),
         _reader("sto", readers.check_sto),
+        _reader("npy", readers.check_npy),
+        _reader("npz", readers.check_npz),
         Target(
             "mcz",
             "whole files: strict, in parts, salvaged, live, verified",
