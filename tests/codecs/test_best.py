@@ -17,7 +17,8 @@ import mcz
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless import best, best_streams
 from mcz.codecs.lossless.best_choices import choose_links
-from mcz.codecs.lossless.best_streams import LINKED, MAX_LINKS, MAX_SEEN, Link
+from mcz.codecs.lossless.best_streams import ECHOED, LINKED, MAX_LINKS, MAX_SEEN, Link
+from mcz.codecs.lossless.echoes import Echo, build_echoes, find_echoes
 from mcz.coding.ordinals.streams import plan_stream
 from mcz.errors import FormatError
 from mcz.motion import Signal
@@ -131,8 +132,8 @@ def test_part_equals_whole() -> None:
         np.testing.assert_array_equal(clip.read((30, 40), ["knee"]), whole[30:40, 9:])
 
 
-@given(st.binary(max_size=60), st.sampled_from(GRIDS), st.booleans())
-def test_any_bytes_decode_or_are_refused(stream: bytes, grid: Grid, method: bool) -> None:
+@given(st.binary(max_size=60), st.sampled_from(GRIDS), st.integers(0, 2))
+def test_any_bytes_decode_or_are_refused(stream: bytes, grid: Grid, method: int) -> None:
     try:
         out = decoded(bytes((method,)) + stream, 30, 2, grid)
     except FormatError:
@@ -233,3 +234,61 @@ def test_interpreted(tmp_path: Path) -> None:
         check=True,
     )
     assert done.stdout.strip() == canonical_sha256(path)
+
+
+@st.composite
+def some_echoes(draw: st.DrawFn, n_rows: int, n_channels: int) -> list[Echo]:
+    found, left = [], n_rows * n_channels
+    for _ in range(draw(st.integers(1, 5))):
+        row = draw(st.integers(1, n_rows - 1))
+        height = draw(st.integers(1, n_rows - row))
+        width = draw(st.integers(1, n_channels))
+        first, source = (draw(st.integers(0, n_channels - width)) for _ in range(2))
+        left -= height * width
+        if left >= 0:
+            lag = draw(st.integers(1, row))
+            found.append(Echo(row, height, first, width, lag, source, draw(st.booleans())))
+    return found
+
+
+@given(st.data())
+@settings(max_examples=60)
+def test_echoes_are_what_was_there_before(data: st.DataObject) -> None:
+    n_rows, n_channels = 12, 4
+    values = data.draw(st.lists(st.integers(-(10**6), 10**6), min_size=48, max_size=48))
+    wanted = np.array(values, np.int64).reshape(n_rows, n_channels)
+    wanted[0] = range(n_channels)  # no copies
+    wanted[1] = 5
+    echoes = data.draw(some_echoes(n_rows, n_channels))
+    for row in range(n_rows):
+        for echo in echoes:
+            if echo.row <= row < echo.row + echo.n_rows:
+                source = wanted[row - echo.lag, echo.source : echo.source + echo.n_channels].copy()
+                block = slice(echo.channel, echo.channel + echo.n_channels)
+                wanted[row, block] = -1 - source if echo.minus else source
+    heads, plans, coded = plan_stream(wanted, [(FIXED, FIXED)] * n_channels, 0, {})
+    if len(plans) < n_channels:
+        return
+    links = [Link(4, 9, ())] * n_channels
+    bits = best_streams.code(coded, plans, links, echoes)
+    linked = b"".join(link.head() for link in links)
+    stream = bytes((ECHOED,)) + heads + build_echoes(echoes) + linked + bits
+    if echoes:
+        np.testing.assert_array_equal(decoded(stream, n_rows, n_channels, FIXED), wanted)
+
+
+def test_what_is_played_twice_is_coded_once() -> None:
+    rng = np.random.default_rng(5)
+    once = rng.integers(-(10**9), 10**9, (40, 6))
+    mirrored = np.concatenate([once, -1 - once[:, [1, 0, 3, 2, 4, 5]]])
+    for twice in (np.concatenate([once, once]), mirrored):
+        own = [(FIXED, FIXED)] * 6
+        stream = best_streams.build_stream(twice, own, 0, {})
+        assert stream[0] == ECHOED
+        assert len(stream) < 1.1 * len(best_streams.build_stream(once, own, 0, {}))
+        np.testing.assert_array_equal(decoded(stream, 80, 6, FIXED), twice)
+
+
+def test_smooth_motion_has_no_echoes() -> None:
+    ordinals = FIXED.ordinals(smooth(600).values)[0]
+    assert find_echoes(ordinals, [True] * ordinals.shape[1]) == []

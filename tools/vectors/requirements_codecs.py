@@ -39,6 +39,16 @@ VECTORS: dict[str, tuple[str, ...]] = {
         "invalid/best/links-9",
         "invalid/best/links-15",
     ),
+    "BEST-18": ("invalid/best/echoes-*", "invalid/best/echo-numbers-41"),
+    "BEST-19": ("invalid/best/echo-row*",),
+    "BEST-20": ("invalid/best/echo-lag-*",),
+    "BEST-21": (
+        "invalid/best/echo-channel*",
+        "invalid/best/echo-source*",
+        "invalid/best/echo-*-multiples",
+    ),
+    "BEST-22": ("invalid/best/echo-flags-*",),
+    "BEST-23": ("valid/best/echo-*",),
     "BEST-13": (
         "invalid/best/value-beyond",
         "invalid/best/value-below",

@@ -151,6 +151,14 @@ def is_due(row: int, channel: int) -> bool:
     return row % 2 == 0 if row < OFTEN_ROWS else (row + channel) % 4 == 0
 
 
+@inner
+def echo_of(ordinals: Ints, place: int) -> int:
+    """The number at ``place``, counted through from 1; of the other sign where that is below 0."""
+    at = abs(place) - 1
+    found = int(ordinals[at // ordinals.shape[1], at % ordinals.shape[1]])
+    return found if place > 0 else -1 - found
+
+
 @kernel
 def code_rows(
     state: Ints,
@@ -160,11 +168,12 @@ def code_rows(
     powers: Ints,
     links: Ints,
     n_sums: int,
+    echoes: Ints,
 ) -> int:
     """Code all rows of (n_rows, n_channels) ordinals in place; return the row of a fault or -1.
 
     ``powers`` has the powers of 2 in row 0 and those of 10 in row 1; ``n_sums`` is where the sums
-    of all channels end.
+    of all channels end. ``echoes`` are those of ``table_of``.
     """
     n_channels = len(plans)
     tracks = np.zeros((n_channels, TRACK_SIZE), np.int64)
@@ -188,6 +197,10 @@ def code_rows(
         flow[NEAR], flow[OTHER] = 0, 3
         to_next_row(steps, levels)
         for channel in range(n_channels):
+            if len(echoes) > 0 and echoes[row, channel] != 0:  # BEST-23
+                ordinals[row, channel] = echo_of(ordinals, echoes[row, channel])
+                steps[channel, 0] = 0.0
+                continue
             plan, track, link = plans[channel], tracks[channel], links[channel]
             unit, reach = float(powers[0, link[UNIT]]), float(powers[0, link[REACH]])
             n_near, n_bend = n_nearby(link[N_SEEN]), n_bent(link[N_SEEN])

@@ -1,4 +1,4 @@
-"""The stream of a group of codec 12: heads as codec 1 has them, links, then bits.
+"""The stream of a group of codec 12: heads as codec 1 has them, echoes, links, then bits.
 
 SPEC.md, "Codec 12: best", is normative; the names below are its field names.
 """
@@ -7,14 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.codecs.lossless.best_choices import choose_links
+from mcz.codecs.lossless.echoes import Echo, build_echoes, find_echoes, read_echoes, table_of
 from mcz.coding.ordinals import streams
+from mcz.coding.ordinals.heads import CODED, read_heads
 from mcz.coding.ordinals.streams import Own, Seen, plan_stream, powers
 from mcz.coding.start import start_states
 from mcz.errors import FormatError
@@ -23,7 +25,7 @@ from mcz.schema import read_varint, varint
 
 Ints = NDArray[np.int64]
 
-AS_CODEC_1, LINKED = 0, 1  # method
+AS_CODEC_1, LINKED, ECHOED = range(3)  # method
 HEADS = 1  # the version of codec 1 that has them
 MAX_UNIT = 44
 MAX_SEEN = 8
@@ -44,39 +46,60 @@ class Link:
 
 
 def build_stream(ordinals: Ints, grids: Sequence[Own], group: int, seen: Seen | None) -> bytes:
-    """One stream, as ``mcz.coding.ordinals.streams.build_stream``: the shorter of both methods."""
+    """One stream, as ``mcz.coding.ordinals.streams.build_stream``: the shortest of all methods."""
     seen_before = None if seen is None else dict(seen)
     heads, plans, coded = plan_stream(ordinals, grids, group, seen, HEADS, fitted=False)
     simple = streams.build_stream(ordinals, grids, group, seen_before, HEADS)
     if not plans:
         return bytes((AS_CODEC_1,)) + simple
     links = [Link(*link) for link in choose_links(coded, plans, MAX_LINKS)]
-    bits = code(coded, plans, links)
-    linked = heads + b"".join(link.head() for link in links) + bits
-    return min(bytes((AS_CODEC_1,)) + simple, bytes((LINKED,)) + linked, key=len)
+    link_heads = b"".join(link.head() for link in links)
+    linked = bytes((LINKED,)) + heads + link_heads + code(coded, plans, links)
+    found = [bytes((AS_CODEC_1,)) + simple, linked]
+    own = _may_echo(heads, [grid for _, grid in grids])
+    echoes = find_echoes(coded[:, : len(own)], own)
+    if echoes:
+        bits = code(coded, plans, links, echoes)
+        found.append(bytes((ECHOED,)) + heads + build_echoes(echoes) + link_heads + bits)
+    return min(found, key=len)
+
+
+def _may_echo(stream: bytes, grids: Sequence[Grid]) -> list[bool]:
+    """Of each coded channel, but for rests, whether its numbers are ordinals."""
+    heads, _ = read_heads(stream, grids, HEADS)
+    return [found[1] is None for kind, found, _ in heads if kind == CODED]
 
 
 def parse_stream(
     stream: bytes, grids: Sequence[Grid], n_rows: int
 ) -> tuple[Ints, dict[int, tuple[int, int]]]:
     """The ordinals of a group, (n_rows, channels), and which channels are copies of which."""
-    if not stream or stream[0] > LINKED:  # BEST-02
+    if not stream or stream[0] > ECHOED:  # BEST-02
         raise FormatError(f"best: method {stream[:1].hex() or 'missing'}")
-    uncode = None if stream[0] == AS_CODEC_1 else _uncode
-    return streams.parse_stream(stream[1:], grids, n_rows, uncode, version=HEADS)
+    method, stream = stream[0], stream[1:]
+    if method == AS_CODEC_1:
+        return streams.parse_stream(stream, grids, n_rows, version=HEADS)
+    may_echo = _may_echo(stream, grids) if method == ECHOED else None
+    uncode = partial(_uncode, may_echo=may_echo)
+    return streams.parse_stream(stream, grids, n_rows, uncode, version=HEADS)
 
 
-def _uncode(data: bytes, plans: Sequence[Ints], n_rows: int) -> Ints:
-    """The numbers of the coded channels, (n_rows, len(plans))."""
+def _uncode(data: bytes, plans: Sequence[Ints], n_rows: int, may_echo: list[bool] | None) -> Ints:
+    """The numbers of the coded channels, (n_rows, len(plans)); None: there are no echoes."""
     if not plans:  # BEST-03
-        raise FormatError("best: no channel is coded, and yet the method is 1")
+        raise FormatError("best: no channel is coded, and yet there are links")
+    echoes: list[Echo] = []
+    if may_echo is not None:
+        rests = [False] * (len(plans) - len(may_echo))
+        echoes, end = read_echoes(data, n_rows, may_echo + rests)
+        data = data[end:]
     links, end = read_links(data, len(plans))
     bits = np.frombuffer(data[end:], np.uint8).copy()
     _, coding = loops()
     state = start_states("best")[0].copy()  # BEST-08
     rows = np.zeros((n_rows, len(plans)), np.int64)
     coding.start(state, bits, 0)
-    fault = run(state, bits, rows, plans, links)
+    fault = run(state, bits, rows, plans, links, echoes)
     if fault >= 0:
         raise FormatError(f"best: row {fault} cannot be decoded")
     if coding.coded_size(state) != len(bits):  # BEST-09, RANGE-04
@@ -117,7 +140,9 @@ def loops() -> tuple[Any, Any]:
     return best_kernels, mixing
 
 
-def code(coded: Ints, plans: Sequence[Ints], links: Sequence[Link]) -> bytes:
+def code(
+    coded: Ints, plans: Sequence[Ints], links: Sequence[Link], echoes: Sequence[Echo] = ()
+) -> bytes:
     """The bits of the coded channels, at least one."""
     _, coding = loops()
     size = 4 * coded.size + 1024
@@ -125,7 +150,7 @@ def code(coded: Ints, plans: Sequence[Ints], links: Sequence[Link]) -> bytes:
         data = np.zeros(size, np.uint8)
         state = start_states("best")[0].copy()
         coding.start(state, data, 1)
-        fault = run(state, data, coded.copy(), plans, links)
+        fault = run(state, data, coded.copy(), plans, links, echoes)
         used = coding.finish(state, data)
         if fault >= 0:
             raise AssertionError(f"best: row {fault} has no code")
@@ -135,7 +160,12 @@ def code(coded: Ints, plans: Sequence[Ints], links: Sequence[Link]) -> bytes:
 
 
 def run(
-    state: Ints, data: NDArray[np.uint8], rows: Ints, plans: Sequence[Ints], links: Sequence[Link]
+    state: Ints,
+    data: NDArray[np.uint8],
+    rows: Ints,
+    plans: Sequence[Ints],
+    links: Sequence[Link],
+    echoes: Sequence[Echo],
 ) -> int:
     """Code ``rows`` in place; return the row of a fault or -1."""
     own, _ = loops()
@@ -146,5 +176,6 @@ def run(
         row[: own.SEEN] = link.unit, link.reach, end, end + near, len(link.seen)
         row[own.SEEN : own.SEEN + len(link.seen)] = link.seen
         end += near + bent
+    repeats = table_of(echoes, *rows.shape)
     with np.errstate(all="ignore"):  # what is no number is no estimate
-        return int(own.code_rows(state, data, rows, np.stack(plans), powers(), table, end))
+        return int(own.code_rows(state, data, rows, np.stack(plans), powers(), table, end, repeats))

@@ -3,7 +3,7 @@
 import { ByteReader } from "../bytes.js";
 import { RangeDecoder, clamp } from "../entropy.js";
 import { Refused } from "../errors.js";
-import { CODED, withRests } from "../heads.js";
+import { CODED, MULTIPLES, PRODUCTS, COUNTS, withRests } from "../heads.js";
 import { setHalves } from "../int64.js";
 import { SignalDecoder } from "../ordinal-streams.js";
 import { Learner, bounded } from "../regressions.js";
@@ -16,6 +16,7 @@ export const version = 0;
 
 const AS_CODEC_1 = 0;
 const LINKED = 1;
+const ECHOED = 2;
 const MAX_UNIT = 44;
 const MAX_OTHERS = 8;
 const MAX_LINKS = 4096;
@@ -58,20 +59,68 @@ class BestDecoder extends SignalDecoder {
   constructor(layout, segments) {
     super(CODEC, layout, segments);
     this.linked = new LinkedDecoder(this.ordinals);
+    this.echoed = new LinkedDecoder(this.ordinals, readEchoes);
   }
 
   decoderOf(reader) {
     const method = reader.u8();
-    if (method > LINKED) reader.refuse(`method ${method}`);
-    return method === AS_CODEC_1 ? this.bits : this.linked;
+    if (method > ECHOED) reader.refuse(`method ${method}`);
+    if (method === AS_CODEC_1) return this.bits;
+    return method === LINKED ? this.linked : this.echoed;
   }
 
   decodeBits(group, nRows, firstRow) {
-    if (group.bits === this.linked && !group.heads.some(({ kind }) => kind === CODED)) {
+    if (group.bits !== this.bits && !group.heads.some(({ kind }) => kind === CODED)) {
       group.reader.refuse("no channel is coded");
     }
     super.decodeBits(group, nRows, firstRow);
   }
+}
+
+/**
+ * Blocks of numbers that repeat earlier ones.
+ *
+ * @returns {Float64Array} of each number of the coded channels, row after row: 0, or 1 + the place
+ *     that it repeats, less than 0 for the other sign
+ */
+function readEchoes(reader, heads, nRows) {
+  const count = reader.varint();
+  const width = heads.length;
+  let left = nRows * width;
+  if (count < 1 || count > left) reader.refuse(`${count} echoes`);
+  const table = new Float64Array(left);
+  for (let i = 0; i < count; i++) {
+    const row = reader.varint();
+    const rows = reader.varint();
+    const channel = reader.varint();
+    const channels = reader.varint();
+    const lag = reader.varint();
+    const source = reader.varint();
+    const flags = reader.u8();
+    if (rows < 1 || row + rows > nRows) reader.refuse(`an echo in rows from ${row} on`);
+    if (lag < 1 || lag > row) reader.refuse(`an echo in row ${row} of ${lag} rows before`);
+    for (const first of [channel, source]) {
+      const own = heads.slice(first, first + channels);
+      if (channels < 1 || own.length !== channels || own.some(isNoOrdinal)) {
+        reader.refuse(`an echo of ${channels} channels from ${first} on`);
+      }
+    }
+    if (flags > 1) reader.refuse(`flags ${flags} of an echo`);
+    left -= rows * channels;
+    if (left < 0) reader.refuse("more echoes than there are numbers");
+    for (let r = row; r < row + rows; r++) {
+      for (let c = 0; c < channels; c++) {
+        const place = (r - lag) * width + source + c + 1;
+        table[r * width + channel + c] = flags === 1 ? -place : place;
+      }
+    }
+  }
+  return table;
+}
+
+/** Whether what is coded of a channel are no ordinals. */
+function isNoOrdinal({ form, restsOf }) {
+  return Boolean(restsOf) || [MULTIPLES, PRODUCTS, COUNTS].includes(form);
 }
 
 /** The coded channels with their links. */
@@ -176,13 +225,21 @@ class LinkedChannel extends CodedChannel {
 
 /** Decodes the coded channels of a group in a segment. */
 class LinkedDecoder extends BitDecoder {
-  constructor(ordinals) {
+  /**
+   * @param {BigInt64Array} ordinals where they go
+   * @param {(reader: ByteReader, heads: object[], nRows: number) => ?Float64Array} echoesOf reads
+   *     the echoes in front of the links
+   */
+  constructor(ordinals, echoesOf = () => null) {
     super(ordinals, "best_start.json", [RESIDUALS, 0]);
+    this.echoesOf = echoesOf;
   }
 
   decodeGroup(heads, data, nRows, nChannels, firstIndex, what) {
     const reader = new ByteReader(data, what);
-    const channels = readLinks(reader, withRests(heads));
+    const every = withRests(heads);
+    this.echoes = this.echoesOf(reader, every, nRows);
+    const channels = readLinks(reader, every);
     restart(this.model, this.startModel);
     this.coder = new RangeDecoder(reader.rest());
     this.decode(channels, nRows, nChannels, firstIndex);
@@ -195,6 +252,11 @@ class LinkedDecoder extends BitDecoder {
       this.other = 3;
       for (const channel of channels) channel.nextRow();
       channels.forEach((channel, c) => {
+        const echo = this.echoes?.[r * channels.length + c];
+        if (echo) {
+          this.echo(channels, channel, r, Math.abs(echo) - 1, echo < 0, nChannels, firstIndex);
+          return;
+        }
         const { last, stepUnit } = channel;
         const guess = channel.guess(r);
         const predicted = clamp(Math.floor(last + guess * stepUnit + 0.5), -TWO_44, TWO_44);
@@ -203,6 +265,15 @@ class LinkedDecoder extends BitDecoder {
         channel.learn(r, c, guess, last);
       });
     }
+  }
+
+  /** Takes the number at a place for that of a channel in row r. */
+  echo(channels, channel, r, place, minus, nChannels, firstIndex) {
+    const row = Math.floor(place / channels.length);
+    const { column } = channels[place % channels.length];
+    const o = this.ordinals[firstIndex + row * nChannels + column];
+    this.ordinals[firstIndex + r * nChannels + channel.column] = minus ? -1n - o : o;
+    channel.steps[0] = 0;
   }
 
   number(channel, index, predicted) {

@@ -13,7 +13,8 @@ import numpy as np
 
 from mcz.codecs.contract import Codec, Encoded, Segment
 from mcz.codecs.lossless import best, best_streams
-from mcz.codecs.lossless.best_streams import AS_CODEC_1, LINKED, Link
+from mcz.codecs.lossless.best_streams import AS_CODEC_1, ECHOED, LINKED, Link
+from mcz.codecs.lossless.echoes import Echo, build_echoes
 from mcz.coding.start import start_states
 from mcz.motion import Motion
 from mcz.numbers import Grid
@@ -26,7 +27,10 @@ Links = Sequence[Link]
 
 
 def codec_of(
-    heads: Sequence[Head] = (), links: Links = (), methods: Sequence[int] = (LINKED,)
+    heads: Sequence[Head] = (),
+    links: Links = (),
+    methods: Sequence[int] = (LINKED,),
+    echoes: Sequence[Echo] = (),
 ) -> Codec:
     """Codec 12 with these heads, channel by channel, and links, coded channel by coded channel.
 
@@ -51,6 +55,7 @@ def codec_of(
                     [every[channel] for channel in group],
                     links,
                     method=methods[min(number, len(methods) - 1)],
+                    echoes=echoes,
                 )
                 for number, group in enumerate(layout.groups)
             )
@@ -73,9 +78,10 @@ def build_stream(
     links: Links = (),
     *,
     method: int = LINKED,
+    echoes: Sequence[Echo] = (),
     faulty: bool = False,
 ) -> bytes:
-    """The stream of a group; of method 0 where no channel is coded.
+    """The stream of a group; of method 0 where no channel is coded, of method 2 with ``echoes``.
 
     ``faulty``: an ordinal has no code, and the bits end with the fault.
     """
@@ -85,6 +91,9 @@ def build_stream(
     every = [*links, *map(usual, range(len(links), len(plans)))][: len(plans)]
     code = _code_to_the_fault if faulty else best_streams.code
     linked = b"".join(link.head() for link in every)
+    if echoes:
+        bits = best_streams.code(coded, plans, every, echoes)
+        return bytes((ECHOED,)) + data + build_echoes(echoes) + linked + bits
     return bytes((LINKED,)) + data + linked + code(coded, plans, every)
 
 
@@ -94,7 +103,7 @@ def _code_to_the_fault(coded: Ints, plans: Sequence[Ints], links: Links) -> byte
     data, state = np.zeros(UNEXAMINED, np.uint8), start_states("best")[0].copy()
     coding.start(state, data, 1)
     rows = np.ascontiguousarray(coded).copy()
-    assert best_streams.run(state, data, rows, plans, links) >= 0
+    assert best_streams.run(state, data, rows, plans, links, ()) >= 0
     return data[: coding.finish(state, data)].tobytes()
 
 
@@ -112,6 +121,7 @@ class Streams(Whole):
         **rest: Any,
     ) -> None:
         parts, methods = rest.pop("parts", ()), rest.pop("methods", (LINKED,))
+        codec = codec_of(heads, links, methods, rest.pop("echoes", ()))
         rest = {"grouping": "all", **rest}
-        data = file_of(motion, codec=codec_of(heads, links, methods), **rest)
+        data = file_of(motion, codec=codec, **rest)
         self.hold(name, spec, purpose, data, motion, parts=parts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,22 @@ import numpy as np
 from mcz.codecs.lossless import best_numbers as numbers
 from mcz.codecs.lossless import best_streams
 from mcz.codecs.lossless.best_streams import Link
+from mcz.codecs.lossless.echoes import Echo, build_echoes
 from mcz.coding.start import start_states
 from mcz.container import payloads
 from mcz.motion import Motion
 from tools.vectors.build.best_clips import HEADING, build_stream, codec_of
 from tools.vectors.build.edits import Edit, at, flip, plus, put, stream
 from tools.vectors.build.files import Broken, Vector, file_of
-from tools.vectors.build.lossless_clips import SIX, UNEXAMINED, WHOLE, Coded, Constant
+from tools.vectors.build.lossless_clips import (
+    MULTIPLES,
+    SINGLE,
+    SIX,
+    UNEXAMINED,
+    WHOLE,
+    Coded,
+    Constant,
+)
 from tools.vectors.build.motions import HUNDREDTHS, column, dance, panel, wave
 from tools.vectors.invalid.common import every_codec
 
@@ -25,6 +35,7 @@ def vectors() -> Iterable[Vector]:
     shelf = Broken("invalid/best")
     _heads(shelf)
     _links(shelf)
+    _echoes(shelf)
     _sizes(shelf)
     _numbers(shelf)
     _signal(shelf)
@@ -45,7 +56,7 @@ def _heads(shelf: Broken) -> None:
     data = _with(motion, b"\1" + constant[1:])
     shelf.add("constants-linked", HEADING, "Method 1 of a constant alone.", data)
     motion, codec = column(wave(9), HUNDREDTHS), codec_of()
-    for method in (2, 255):
+    for method in (3, 255):
         data = file_of(motion, codec=codec, segments=stream(0, at(0, bytes((method,)))))
         shelf.add(f"method-{method}", HEADING, f"A method {method}.", data)
 
@@ -80,6 +91,55 @@ def _links(shelf: Broken) -> None:
     linked = b"".join(link.head() for link in links)
     data = good[: 1 + 2 * n] + linked + good[1 + 4 * n :]
     shelf.add("links-4104", HEADING, "More than 4096 links in a stream.", _with(wide, data))
+
+
+def _echoes(shelf: Broken) -> None:
+    once = wave(10)
+    motion = panel([once + once, wave(20, 1)], (HUNDREDTHS,) * 2, (2,))
+    good = Echo(10, 10, 0, 1, 10, 0, False)
+    links = [Link(4, 9, ())] * 2
+    data = build_stream(_ordinals(motion), (HUNDREDTHS,) * 2, [Coded()] * 2, links, echoes=[good])
+    heads, rest = data[:5], data[5 + len(build_echoes([good])) :]
+    cases = {
+        "rows-0": ("no rows", [replace(good, n_rows=0)]),
+        "rows-beyond": ("a row behind the last", [replace(good, n_rows=11)]),
+        "row-beyond": ("rows behind the last alone", [replace(good, row=20, n_rows=1)]),
+        "lag-0": ("what it is itself", [replace(good, lag=0)]),
+        "lag-beyond": ("a row before the first", [replace(good, lag=11)]),
+        "channels-0": ("no channels", [replace(good, n_channels=0)]),
+        "channels-beyond": ("a channel that is not", [replace(good, channel=1, n_channels=2)]),
+        "channel-beyond": ("a channel that is not, alone", [replace(good, channel=2)]),
+        "source-beyond": ("what a channel had that is not", [replace(good, source=2)]),
+        "sources-beyond": ("of two channels, one not", [replace(good, n_channels=2, source=1)]),
+        "numbers-41": ("41 of 40 numbers", [good] * 4 + [replace(good, row=19, n_rows=1)]),
+    }
+    for name, (what, echoes) in cases.items():
+        stream = heads + build_echoes(echoes) + rest
+        shelf.add(f"echo-{name}", HEADING, f"An echo of {what}.", _with(motion, stream))
+    for flags in (2, 3, 128):
+        stream = heads + build_echoes([good])[:-1] + bytes((flags,)) + rest
+        shelf.add(f"echo-flags-{flags}", HEADING, f"Flags {flags}.", _with(motion, stream))
+    shelf.add("echoes-0", HEADING, "Method 2 without echoes.", _with(motion, heads + b"\0" + rest))
+    shelf.add(
+        "echoes-41", HEADING, "41 echoes of 40 numbers.", _with(motion, heads + b"\x29" + rest)
+    )
+    for size in (5, 8, 12):
+        purpose = f"The stream ends in the echoes, {size - 5} bytes behind the heads."
+        shelf.add(f"cut-in-echoes-{size - 5}", HEADING, purpose, _with(motion, data[:size]))
+    counts = tuple(round(50 * v) for v in once) * 2
+    values = [0.25 * count for count in counts]
+    motion = panel([values, values], (SINGLE, HUNDREDTHS), (2,))
+    own = [Coded(MULTIPLES, unit=0.25, multiples=counts), Coded()]
+    data = build_stream(_ordinals(motion), (SINGLE, HUNDREDTHS), own, links)
+    end = data.index(b"".join(link.head() for link in links))
+    heads, rest = data[1:end], data[end:]
+    for name, echo in {
+        "in-multiples": replace(good, source=1),
+        "of-multiples": replace(good, channel=1),
+    }.items():
+        stream = b"\2" + heads + build_echoes([echo]) + rest
+        purpose = f"An echo {name.replace('-', ' ')}, which are no ordinals."
+        shelf.add(f"echo-{name}", HEADING, purpose, _with(motion, stream))
 
 
 def _ordinals(motion: Motion) -> Any:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.codecs.lossless.best_streams import AS_CODEC_1, LINKED, Link
+from mcz.codecs.lossless.echoes import Echo
 from mcz.coding.ordinals.counts import Law
 from mcz.coding.ordinals.degrees import of_products
 from mcz.motion import Motion
@@ -48,6 +49,7 @@ def vectors() -> Iterable[Vector]:
     _counts(shelf)
     _methods(shelf)
     _links(shelf)
+    _echoes(shelf)
     _degenerate(shelf)
     _classes(shelf)
     _rows(shelf)
@@ -157,6 +159,70 @@ def _links(shelf: Streams) -> None:
     taps = ((41, -13, 5, -1), (511, -480), (-511,), (64, -32), ())
     heads = [Coded(from_last=place % 2, taps=t) for place, t in enumerate(taps)]
     shelf.code("taps", purpose, motion, heads)
+
+
+def _echoes(shelf: Streams) -> None:
+    """Numbers that were there before; what is coded around them has learned nothing of them."""
+    once = [wave(20), wave(20, 1), wave(20, 2)]
+    loop = [[*one, *one, 9.5, *one[:5]] for one in once]
+    twice = Echo(20, 20, 0, 3, 20, 0, False), Echo(41, 5, 0, 3, 21, 0, False)
+    grids = (HUNDREDTHS,) * 3
+    cases = {
+        "loop": ("A loop that is played twice, and begun again.", loop, twice),
+        "halves": (
+            "A gait whose second half is the first of the other side, one channel mirrored.",
+            [once[0] + once[1], once[1] + once[0], once[2] + [-v for v in once[2]]],
+            (
+                Echo(20, 20, 0, 1, 20, 1, False),
+                Echo(20, 20, 1, 1, 20, 0, False),
+                Echo(20, 20, 2, 1, 20, 2, True),
+            ),
+        ),
+        "middle": (
+            "Echoes in the middle of channels, which others look at.",
+            [once[0], [*once[1][:8], *once[0][3:9], *once[1][14:]], once[2]],
+            (Echo(8, 6, 1, 1, 5, 0, False),),
+        ),
+        "last-counts": (
+            "Two echoes of the same numbers: the last one counts.",
+            loop,
+            (Echo(30, 3, 1, 1, 7, 2, True), *twice),
+        ),
+        "one-row": (
+            "An echo of the row before, which is an echo of the one before, with the other sign.",
+            [[0.5, -0.5, 0.5, 1.25], [0.5, 0.5, 2.5, 1.25], [1.0, 2.0, 2.5, 0.0]],
+            (Echo(1, 2, 0, 1, 1, 0, True), Echo(1, 1, 1, 1, 1, 0, False)),
+        ),
+    }
+    for name, (purpose, columns, echoes) in cases.items():
+        motion = panel(columns, grids, (3,))
+        shelf.code(f"echo-{name}", purpose, motion, [Coded()] * 3, echoes=echoes)
+    classes = [Coded(form=6), Coded(), Coded(form=PLAIN, drop=3)]
+    whole = [[8.0 * round(40 * v) for v in one] for one in once]
+    motion = panel([one + one for one in whole], (SIX, SIX, WHOLE), (3,))
+    every = (Echo(20, 20, 0, 3, 20, 0, False),)
+    shelf.code(
+        "echo-forms",
+        "Echoes of numbers in classes, and with a drop.",
+        motion,
+        classes,
+        echoes=every,
+    )
+    zeros = panel([[0.0, 1.5, -0.0, -1.5]], (SIX,), (1,))
+    shelf.code(
+        "echo-zero",
+        "The other sign of zero.",
+        zeros,
+        [Coded()],
+        echoes=(Echo(2, 2, 0, 1, 2, 0, True),),
+    )
+    counts = tuple(round(50 * v) for v in wave(20)) * 2
+    motion = panel([[0.25 * count for count in counts], loop[0][:40]], (SINGLE, HUNDREDTHS), (2,))
+    heads = [Coded(MULTIPLES, unit=0.25, multiples=counts), Coded()]
+    purpose = "An echo beside a channel of multiples, which can have none."
+    shelf.code(
+        "echo-beside-multiples", purpose, motion, heads, echoes=(Echo(20, 20, 1, 1, 20, 1, False),)
+    )
 
 
 def _degenerate(shelf: Streams) -> None:

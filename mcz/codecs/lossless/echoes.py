@@ -1,0 +1,194 @@
+"""Echoes of codec 12: runs of numbers that were there before, of the same channel or another.
+
+A loop that is played twice has them, and a gait of which half was computed and half mirrored.
+SPEC.md, "Codec 12: best", is normative for what they say. How they are found is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import FormatError
+from mcz.schema import read_varint, varint
+
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+FIELDS = 6  # of an echo, before its flags
+MINUS = 1  # flag
+
+VOTES = 8  # equal numbers that make an echo worth a look
+LOOKS = 16  # at echoes, for each channel
+COST = 56  # bits that one takes
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """A block of numbers that repeats what lies ``lag`` rows above it, or that with other signs."""
+
+    row: int
+    n_rows: int
+    channel: int
+    n_channels: int
+    lag: int
+    source: int
+    minus: bool
+
+    def data(self) -> bytes:
+        fields = self.row, self.n_rows, self.channel, self.n_channels, self.lag, self.source
+        return b"".join(map(varint, fields)) + bytes((MINUS * self.minus,))
+
+    def covers(self, other: Echo) -> bool:
+        """Whether ``other`` has the rows, the lag and the signs of this one."""
+        return (self.row, self.n_rows, self.lag, self.minus) == (
+            other.row,
+            other.n_rows,
+            other.lag,
+            other.minus,
+        )
+
+
+def build_echoes(echoes: Sequence[Echo]) -> bytes:
+    return varint(len(echoes)) + b"".join(echo.data() for echo in echoes)
+
+
+def read_echoes(data: bytes, n_rows: int, may_echo: Sequence[bool]) -> tuple[list[Echo], int]:
+    """The echoes that ``data`` begins with, and the offset after them.
+
+    ``may_echo``: of each coded channel, whether its numbers are ordinals.
+    """
+    count, at = read_varint(data, 0)
+    left = n_rows * len(may_echo)
+    if not 1 <= count <= left:  # BEST-18
+        raise FormatError(f"best: {count} echoes")
+    echoes = []
+    for _ in range(count):
+        fields = []
+        for _ in range(FIELDS):
+            field, at = read_varint(data, at)
+            fields.append(field)
+        if at >= len(data):
+            raise FormatError("best: the stream ends in the echoes")
+        if data[at] > MINUS:  # BEST-22
+            raise FormatError(f"best: flags {data[at]:#04x} of an echo")
+        row, rows, channel, channels, lag, source = fields
+        echo = Echo(row, rows, channel, channels, lag, source, data[at] == MINUS)
+        at += 1
+        _check(echo, n_rows, may_echo)
+        left -= echo.n_rows * echo.n_channels
+        if left < 0:  # BEST-18
+            raise FormatError("best: more echoes than there are numbers")
+        echoes.append(echo)
+    return echoes, at
+
+
+def _check(echo: Echo, n_rows: int, may_echo: Sequence[bool]) -> None:
+    if not 1 <= echo.n_rows <= n_rows - echo.row:  # BEST-19
+        raise FormatError(f"best: an echo in {echo.n_rows} of {n_rows} rows from {echo.row} on")
+    if not 1 <= echo.lag <= echo.row:  # BEST-20
+        raise FormatError(f"best: an echo in row {echo.row} of what was {echo.lag} rows before")
+    for first in (echo.channel, echo.source):
+        own = may_echo[first : first + echo.n_channels]
+        if not 1 <= echo.n_channels == len(own) or not all(own):  # BEST-21
+            raise FormatError(f"best: an echo of {echo.n_channels} channels from {first} on")
+
+
+def table_of(echoes: Sequence[Echo], n_rows: int, n_channels: int) -> Ints:
+    """Of each number the place that it repeats, counted from 1, less than 0 for other signs.
+
+    (n_rows, n_channels); 0 where a number is coded. Without echoes (0, n_channels).
+    """
+    table = np.zeros((n_rows if echoes else 0, n_channels), np.int64)
+    for echo in echoes:
+        rows = np.arange(echo.row, echo.row + echo.n_rows)[:, None]
+        channels = np.arange(echo.n_channels)
+        places = (rows - echo.lag) * n_channels + echo.source + channels + 1
+        table[rows, echo.channel + channels] = -places if echo.minus else places
+    return table
+
+
+# How they are found
+
+
+def find_echoes(numbers: Ints, may_echo: Sequence[bool]) -> list[Echo]:
+    """Echoes in ``numbers`` (rows, channels) that are likely to pay; mostly none.
+
+    Numbers of which one was there before vote for how far and in which channel that was.
+    """
+    usable = np.flatnonzero(may_echo)
+    if len(usable) == 0 or len(numbers) < 2 * VOTES:
+        return []
+    own = np.ascontiguousarray(numbers[:, usable])
+    changes = np.empty(own.shape, bool)
+    changes[0] = True
+    np.not_equal(own[1:], own[:-1], out=changes[1:])
+    weights = _bits(own)
+    taken = np.zeros(own.shape, bool)
+    found: list[Echo] = []
+    for lag, channel, source, minus in _candidates(own, changes):
+        before = own[:-lag, source]
+        same = own[lag:, channel] == (-1 - before if minus else before)
+        same &= ~taken[lag:, channel]
+        for start, stop in _runs(same):
+            rows = slice(lag + start, lag + stop)
+            if np.count_nonzero(changes[rows, channel]) * weights[channel] > COST:
+                taken[rows, channel] = True
+                place = int(usable[channel]), 1, lag, int(usable[source])
+                found.append(Echo(lag + start, stop - start, *place, minus))
+    return _merged(found)
+
+
+def _bits(numbers: Ints) -> NDArray[np.float64]:
+    """Of each channel the bits that a number may take, roughly."""
+    bends = np.abs(np.diff(numbers.astype(np.float64), n=2, axis=0, prepend=numbers[:2]))
+    return np.asarray(np.log2(np.median(bends, axis=0) + 1) + 1)
+
+
+def _candidates(numbers: Ints, changes: Bools) -> Iterator[tuple[int, int, int, bool]]:
+    """Lag, channel, source and signs of echoes, those with most votes first."""
+    n_channels = numbers.shape[1]
+    places = np.flatnonzero(changes)
+    flat = numbers.ravel()[places]
+    sizes = np.where(flat < 0, -1 - flat, flat)
+    order = np.argsort(sizes, kind="stable")
+    equal = np.flatnonzero(sizes[order[1:]] == sizes[order[:-1]])
+    earlier, later = order[equal], order[equal + 1]
+    minus = (flat[earlier] < 0) != (flat[later] < 0)
+    row, channel = np.divmod(places[later], n_channels)
+    source_row, source = np.divmod(places[earlier], n_channels)
+    lags = row - source_row
+    keys = ((lags * n_channels + channel) * n_channels + source) * 2 + minus
+    keys, votes = np.unique(keys[lags > 0], return_counts=True)
+    keys, votes = keys[votes >= VOTES], votes[votes >= VOTES]
+    for key in keys[np.argsort(-votes, kind="stable")][: LOOKS * n_channels].tolist():
+        key, sign = divmod(key, 2)
+        key, source_of = divmod(key, n_channels)
+        lag, channel_of = divmod(key, n_channels)
+        yield lag, channel_of, source_of, bool(sign)
+
+
+def _runs(same: Bools) -> Iterator[tuple[int, int]]:
+    """Where runs of True begin and end."""
+    edges = np.flatnonzero(np.diff(same.astype(np.int8), prepend=0, append=0))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+
+
+def _merged(echoes: list[Echo]) -> list[Echo]:
+    """The same with those of neighboring channels in one."""
+    merged: list[Echo] = []
+    for echo in sorted(echoes, key=lambda e: (e.lag, e.row, e.n_rows, e.minus, e.channel)):
+        last = merged[-1] if merged else None
+        if (
+            last is not None
+            and last.covers(echo)
+            and echo.channel == last.channel + last.n_channels
+            and echo.source == last.source + last.n_channels
+        ):
+            merged[-1] = replace(last, n_channels=last.n_channels + 1)
+        else:
+            merged.append(echo)
+    return merged
