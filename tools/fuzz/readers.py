@@ -40,12 +40,13 @@ WORDS = {
         "nan 1e300 0.30000000000000004 \\x0d\\x0a \\x09"
     ),
     "npy": (
-        "\\x93NUMPY descr fortran_order shape True False '<f8' '>f4' '|O' '<i8' '|b1' (3,2) (6,) () "
-        "\\x00\\x00\\x00\\x00\\x00\\x00\\xf8\\x7f"
+        "\\x93NUMPY descr fortran_order shape True False '<f8' '>f4' '|O' '<i8' '|b1' (3,2) (6,) "
+        "() \\x00\\x00\\x00\\x00\\x00\\x00\\xf8\\x7f"
     ),
     "npz": (
-        "PK\\x03\\x04 PK\\x01\\x02 PK\\x05\\x06 PK\\x06\\x06 PK\\x06\\x07 PK\\x07\\x08 poses.npy "
-        "trans.npy root_orient.npy times.npy mocap_framerate.npy \\xff\\xff\\xff\\xff \\x01\\x00\\x10\\x00"
+        "PK\\x03\\x04 PK\\x01\\x02 PK\\x05\\x06 PK\\x06\\x06 PK\\x06\\x07 PK\\x07\\x08 "
+        "poses.npy trans.npy root_orient.npy times.npy mocap_framerate.npy "
+        "\\xff\\xff\\xff\\xff \\x01\\x00\\x10\\x00"
     ),
     "c3d": (
         "POINT ANALOG USED SCALE RATE DATA_START FRAMES LABELS LABELS2 DESCRIPTIONS UNITS OFFSET "

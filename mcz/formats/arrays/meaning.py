@@ -78,7 +78,7 @@ def _add_body(meaning: Meaning, body: Body) -> None:
 
 
 def _frames_of(arrays: Sequence[Array]) -> int:
-    """The number of frames: that of the times, else the longest first axis of an array of joints."""
+    """The number of frames: that of the times, else the longest first axis of joints."""
     numbers = [array for array in arrays if not array.kept]
     times = [array.n_rows for array in numbers if array.name in TIMES and len(array.head.shape) < 2]
     if times and any(array.n_rows == times[0] for array in numbers if array.name not in TIMES):
