@@ -1,10 +1,11 @@
 """AMCs as NPZ files like those of AMASS: rotation vectors of SMPL-H, positions, betas, a rate.
 
-    python tools/amass_like.py FOLDER_OF_AMC OUT [--float32]
+    python tools/amass_like.py FOLDER_OF_AMC OUT [--float32] [--clean]
 
 AMASS itself may not be passed on, so what is measured on such files is measured on these. Turns
 and positions are those of the AMC, through SciPy; hands have none, and are 0. Members, their order,
-names and types are those of AMASS, as ``numpy.savez`` writes them.
+names and types are those of AMASS, as ``numpy.savez`` writes them. A joint that turns about one
+axis has rounding errors of some 1e-16 about the others; with --clean they are 0.
 """
 
 from __future__ import annotations
@@ -42,7 +43,10 @@ BONES = {  # of joints of SMPL-H, the bones of CMU's ASFs
 }
 
 
-def amass_like(path: Path, dtype: str) -> dict[str, np.ndarray]:
+ROUNDING = 1e-12  # radians
+
+
+def amass_like(path: Path, dtype: str, clean: bool = False) -> dict[str, np.ndarray]:
     """The arrays of one AMC, floats of type ``dtype``."""
     motion = mcz.read(path)
     body = tree("smplh")
@@ -54,6 +58,8 @@ def amass_like(path: Path, dtype: str) -> dict[str, np.ndarray]:
         if bone in names:
             matrices = turns[:, names.index(bone)]
             poses[:, joint] = Rotation.from_matrix(matrices).as_rotvec()
+    if clean:
+        poses[np.abs(poses) < ROUNDING] = 0
     meters = (motion.skeleton.unit_cm or 1.0) / 100
     rng = np.random.default_rng(int.from_bytes(path.stem.split("_")[0].encode(), "big"))
     return {
@@ -70,12 +76,13 @@ def main() -> None:
     parser.add_argument("amcs", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--float32", action="store_true")
+    parser.add_argument("--clean", action="store_true")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", mcz.SkeletonWarning)
         for path in sorted(args.amcs.glob("*.amc")):
-            arrays = amass_like(path, "f4" if args.float32 else "f8")
+            arrays = amass_like(path, "f4" if args.float32 else "f8", args.clean)
             np.savez(args.out / f"{path.stem}_poses.npz", **arrays)
 
 

@@ -17,7 +17,16 @@ from mcz.formats.line_by_line import Arriving
 from mcz.formats.notes import join_notes
 from mcz.motion import FrameNotes, Source
 
-__all__ = ["FORMATS", "Format", "format_by_id", "format_of", "is_table", "recording_of", "sniffed"]
+__all__ = [
+    "FORMATS",
+    "Format",
+    "arrays_of",
+    "format_by_id",
+    "format_of",
+    "is_table",
+    "recording_of",
+    "sniffed",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +191,17 @@ def recording_of(source: Source | None) -> Any:
     if source is None or read is None:
         return None
     return read(source.format, source.template, source.detail)
+
+
+def arrays_of(source: Source | None, signals: Sequence[str]) -> list[dict[str, Any]] | None:
+    """What became of the arrays of a source, see ``arrays.listing``; None where it has none.
+
+    ``signals`` are the names of the clip's signals. Raises FormatError on bad bytes.
+    """
+    if source is None or source.format not in ("npy", "npz"):
+        return None
+    found: list[dict[str, Any]] = _of("arrays.listing", "arrays_listed")(source, signals)
+    return found
 
 
 def format_by_id(format_id: int, *, of_skeleton: bool = False) -> Format:

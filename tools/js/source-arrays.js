@@ -19,6 +19,9 @@ const BY_COLUMNS = 2;
 
 const LEAST_LIMIT = 2 ** 26;
 const BYTES_PER_VALUE = 64;
+const MAX_PIECES = 2 ** 16;
+const MAX_RUNS = 2 ** 18;
+const MAX_COLUMNS = 2 ** 22;
 const TWO_32 = 2 ** 32;
 const TWO_53 = 2 ** 53;
 
@@ -78,15 +81,28 @@ function readPieces(template, detail) {
   const parts = own.counted(() => own.sized());
   own.end();
   const reader = new ByteReader(template, "a template of arrays");
-  const pieces = reader.counted(() => readPiece(reader));
+  const left = { pieces: MAX_PIECES, runs: MAX_RUNS };
+  const pieces = reader.counted(() => {
+    if (left.pieces-- === 0) reader.refuse(`more than ${MAX_PIECES} pieces`);
+    return readPiece(reader, left);
+  });
   reader.end();
+  checkColumns(pieces);
   let used = 0;
   for (const piece of pieces) if (piece.kind === OWN) piece.text = parts[used++];
   if (used !== parts.length) own.refuse(`${parts.length} parts of ${used} pieces`);
   return pieces;
 }
 
-function readPiece(reader) {
+function checkColumns(pieces) {
+  let nColumns = 0;
+  for (const { runs } of pieces) {
+    for (const { nChannels } of runs ?? []) nColumns += nChannels;
+  }
+  if (nColumns > MAX_COLUMNS) throw new LimitExceeded(`arrays: ${nColumns} columns`);
+}
+
+function readPiece(reader, left) {
   const kind = reader.u8();
   switch (kind) {
     case TEXT:
@@ -96,7 +112,7 @@ function readPiece(reader) {
     case COUNT:
       return { kind, signal: reader.varint(), after: reader.sized(), size: reader.varint() };
     case DATA:
-      return readData(reader);
+      return readData(reader, left);
     case CRC:
     case SIZE4:
     case SIZE8:
@@ -106,13 +122,14 @@ function readPiece(reader) {
   }
 }
 
-function readData(reader) {
+function readData(reader, left) {
   const signal = reader.varint();
   const type = reader.u8();
   if (type >= TYPES.length) reader.refuse(`numbers of type ${type}`);
   const flags = reader.u8();
   if (flags > 3) reader.refuse(`flags ${flags} of numbers`);
   const runs = reader.counted(() => {
+    if (left.runs-- === 0) reader.refuse(`more than ${MAX_RUNS} runs`);
     const channel = reader.varint();
     const nChannels = reader.varint();
     if (nChannels === 0) reader.refuse("a run of no channels");

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from itertools import accumulate
 
+import numpy as np
 from construct import Construct, ExprValidator, If, Int8ul, OneOf, Struct
+from numpy.typing import NDArray
 
 from mcz.errors import FormatError
 from mcz.schema import SIZED, UVARINT, build, counted, parse
@@ -18,6 +20,7 @@ from mcz.schema import SIZED, UVARINT, build, counted, parse
 # Types of NumPy by their number in a template: |b1 to <f8, without byte order.
 TYPES = ("b1", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
 BIG_ENDIAN, BY_COLUMNS = 1, 2  # flags of a DATA piece
+MAX_PIECES, MAX_RUNS = 2**16, 2**18  # of a file
 
 
 class Kind(IntEnum):
@@ -57,12 +60,16 @@ ARRAY_PIECE = Struct(
     "flags"
     / _if((Kind.DATA,), OneOf(Int8ul, (0, 1, 2, 3)))  # ARRAY-04
     * "DATA only: bit 0: big-endian; 1: column after column",
-    "runs" / _if((Kind.DATA,), counted(ARRAY_RUN)) * "DATA only: its columns, in order",
+    "runs"
+    / _if((Kind.DATA,), counted(ARRAY_RUN, kind="runs"))
+    * "DATA only: its columns, in order",
     "start" / _if(_OF_PIECES, UVARINT) * "CRC and SIZE only: first piece",
     "stop" / _if(_OF_PIECES, UVARINT) * "CRC and SIZE only: the piece behind the last",
 )
-ARRAY_TEMPLATE = Struct("pieces" / counted(ARRAY_PIECE) * "the file, piece by piece")
-ARRAY_DETAIL = Struct("parts" / counted(SIZED) * "bytes of the OWN pieces, in order")
+ARRAY_TEMPLATE = Struct(
+    "pieces" / counted(ARRAY_PIECE, MAX_PIECES) * "the file, piece by piece"  # ARRAY-17
+)
+ARRAY_DETAIL = Struct("parts" / counted(SIZED, MAX_PIECES) * "bytes of the OWN pieces, in order")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +88,14 @@ class Piece:
     stop: int = 0
 
     @property
-    def columns(self) -> list[int]:
+    def n_columns(self) -> int:
+        return sum(n for _, n in self.runs)
+
+    @property
+    def columns(self) -> NDArray[np.int64]:
         """The channels of all runs, in order."""
-        return [c for first, n in self.runs for c in range(first, first + n)]
+        runs = [np.arange(first, first + n) for first, n in self.runs]
+        return np.concatenate(runs) if runs else np.zeros(0, np.int64)
 
     @property
     def dtype(self) -> str:
@@ -110,7 +122,8 @@ def build_arrays(pieces: Sequence[Piece]) -> tuple[bytes, bytes]:
 
 def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
     """The inverse of ``build_arrays``; raises FormatError on bad bytes."""
-    fields = parse(ARRAY_TEMPLATE, template, "source template").pieces
+    limits = {"runs": MAX_RUNS}  # ARRAY-17
+    fields = parse(ARRAY_TEMPLATE, template, "source template", limits).pieces
     parts = list(parse(ARRAY_DETAIL, detail, "source detail").parts)
     wanted = sum(entry.kind == Kind.OWN for entry in fields)
     if wanted != len(parts):  # ARRAY-05

@@ -9,11 +9,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 
-from mcz.errors import MotionError
+from mcz.errors import MotionError, SourceError
 from mcz.formats.arrays.archive import Archive
 from mcz.formats.arrays.columns import columns_of, signal_of
 from mcz.formats.arrays.files import Array, npy_array, npz_arrays
-from mcz.formats.arrays.layout import Piece, build_arrays
+from mcz.formats.arrays.layout import MAX_PIECES, MAX_RUNS, Piece, build_arrays
 from mcz.formats.arrays.meaning import Meaning, meaning_of
 from mcz.formats.arrays.pieces import Placed, pieces_of
 from mcz.formats.arrays.restore import restore_arrays
@@ -43,7 +43,13 @@ def _motion(
     format_name: str, data: bytes, name: str, arrays: Sequence[Array], archive: Archive
 ) -> Motion:
     meaning = meaning_of(arrays)
-    template, detail = build_arrays(_pieces(data, arrays, archive, meaning))
+    pieces = _pieces(data, arrays, archive, meaning)
+    n_runs = sum(len(piece.runs) for piece in pieces)
+    if len(pieces) > MAX_PIECES or n_runs > MAX_RUNS:
+        raise SourceError(
+            f"{len(arrays)} arrays of {len(pieces)} pieces and {n_runs} runs are many"
+        )
+    template, detail = build_arrays(pieces)
     digest = hashlib.sha256(data).digest()
     return Motion(
         meaning.skeleton,

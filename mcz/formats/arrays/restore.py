@@ -20,6 +20,7 @@ from mcz.numbers import Grid, GridKind
 
 SIZE_LIMIT = 2**26  # a file may always be that large,
 SIZE_PER_VALUE = 64  # or that large for each value of the clip
+MAX_COLUMNS = 2**22  # of all arrays
 WIDEST = 2**53  # integers beyond it are on no grid
 BINARY = {4: Grid(GridKind.BINARY32), 8: Grid(GridKind.BINARY64)}
 
@@ -40,6 +41,9 @@ def restore_arrays(motion: Motion) -> bytes:
     most = max(SIZE_LIMIT, SIZE_PER_VALUE * sum(signal.values.size for signal in signals))
     if starts[-1] > most:  # LIMIT-12
         raise LimitError(f"source template: a file of {starts[-1]} bytes, limit {most}")
+    n_columns = sum(piece.n_columns for piece in pieces)
+    if n_columns > MAX_COLUMNS:
+        raise LimitError(f"source template: {n_columns} columns, limit {MAX_COLUMNS}")
     out = bytearray(starts[-1])
     for piece, at, size in zip(pieces, starts, sizes, strict=False):
         if piece.kind != Kind.CRC:
@@ -69,7 +73,7 @@ def _size(piece: Piece, signals: Sequence[Signal]) -> int:
                     f"source template: a run beyond the {signal.n_channels} channels of signal "
                     f"{signal.name!r}"
                 )
-            return signal.n_rows * sum(n for _, n in piece.runs) * int(TYPES[piece.type][1])
+            return signal.n_rows * piece.n_columns * int(TYPES[piece.type][1])
     return 8 if piece.kind == Kind.SIZE8 else 4
 
 
@@ -101,9 +105,7 @@ def array_words(signal: Signal, piece: Piece) -> memoryview:
     """The numbers of a DATA piece, as it stores them."""
     kind, size = TYPES[piece.type][0], int(TYPES[piece.type][1])
     columns: Any = piece.columns
-    if columns == list(range(signal.n_channels)):
-        columns = slice(None)
-    elif len(piece.runs) == 1:
+    if len(piece.runs) == 1:
         columns = slice(piece.runs[0][0], sum(piece.runs[0]))
     values = signal.values[:, columns]
     if kind == "f":

@@ -28,6 +28,7 @@ def add(shelf: Unrestorable) -> None:
     plain = take_arrays(npy(floats(4, 2)), "plain.npy")
     _fields(shelf, plain)
     _lists(shelf, plain)
+    _runs(shelf)
     _numbers(shelf)
 
 
@@ -103,10 +104,21 @@ def _lists(shelf: Unrestorable, plain: Motion) -> None:
         ("crc-overlap", "CRC-32s that overlap", over, [], b"abcabc" + both + crc_abc),
         ("crc-inside", "a CRC-32 within another", inside, [], b"abcabc" + crc_abc + both),
     ]
+    many = [Piece(Kind.TEXT)] * (2**16 + 1)
+    cases.append(("many-pieces", "2^16 + 1 pieces", many, [], b""))
     for name, purpose, pieces, parts, whole in cases:
         template = varint(len(pieces)) + b"".join(map(raw, pieces))
         data = file_of(_stated(plain, template, parts, whole))
         shelf.add(f"arrays-{name}", SPEC, f"A template of arrays: {purpose}.", data)
+
+
+def _runs(shelf: Unrestorable) -> None:
+    ones = take_arrays(npy(np.ones((1, 1), np.int8)), "ones.npy")
+    count = 2**18 + 1
+    pieces = [Piece(Kind.DATA, type=5, runs=((0, 1),) * count)]
+    template = varint(1) + raw(pieces[0])
+    data = file_of(_stated(ones, template, [], b"\1" * count))
+    shelf.add("arrays-many-runs", SPEC, "A template of arrays: 2^18 + 1 runs.", data)
 
 
 def _numbers(shelf: Unrestorable) -> None:
