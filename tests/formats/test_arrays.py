@@ -145,6 +145,11 @@ def test_every_bit_flip_and_prefix(data: bytes) -> None:
         assert FORMATS[suffix].write(motion) == changed
 
 
+def test_blanks_of_a_head_end_where_the_numbers_begin() -> None:
+    head = b"\x93NUMPY\1\0\x40\0{'descr': '|u1', 'fortran_order': False, 'shape': (2, 2)}"
+    back(head.ljust(74) + b"    ", "npy")
+
+
 def test_a_zip_that_was_written_forward() -> None:
     stream = Forward()
     with zipfile.ZipFile(stream, "w") as archive:

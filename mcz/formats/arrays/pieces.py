@@ -74,7 +74,7 @@ def _of_array(data: bytes, array: Placed) -> list[tuple[int, int, Piece]]:
     head = array.head
     low = head.rows_at[0]
     high = head.end
-    while data[high : high + 1] == b" ":
+    while high < head.start and data[high : high + 1] == b" ":
         high += 1
     after = data[head.rows_at[1] : head.end]
     count = Piece(Kind.COUNT, signal=array.signal, after=after, size=high - low)
