@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -252,6 +253,9 @@ def test_whole_run_with_report(
         assert f">{table['title']}</h2>" in page
     assert page.count("<img") == page.count('src="data:image/png;base64,')
     assert page.count("<img") == (2 if plots.can_draw() else 0)
+    assert page.count('prefers-color-scheme: dark)" srcset') == page.count("<img")
+    pictures = re.findall(r'(?:src|srcset)="(data:[^"]*)"', page)
+    assert len(set(pictures)) == 2 * page.count("<img")  # dark ones are others
     assert "http" not in page.replace("http-equiv", "")  # all is in it
     assert page.count("default-src 'none'") == 1
     assert "<script" not in page

@@ -14,6 +14,7 @@ import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
 from mcz.codecs import CODECS, by_name
+from mcz.container.clip_head import ClipHead, clip_head
 from mcz.container.writer import Writer
 from mcz.errors import FormatError, OptionError
 from mcz.queries import Query
@@ -209,6 +210,27 @@ def test_twenty_thousand_clips(archive: Path) -> None:
         assert len(many) == 20_000
         assert len(many.find(query + " and n_channels == 10 and lossless == true")) == 1990
         assert not calls
+
+
+def test_metadata_of_clips_are_read_once(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the clips are others by then, and for a key that nobody has."""
+    calls: list[str] = []
+
+    def counted(payload: bytes, where: str) -> ClipHead:
+        calls.append(where)
+        return clip_head(payload, where)
+
+    monkeypatch.setattr("mcz.container.metadata.clip_head", counted)
+    for most in (2**20, 0):  # bytes that are kept
+        monkeypatch.setattr("mcz.container.metadata.MOST_KEPT", most)
+        calls.clear()
+        with mcz.open(archive) as file:
+            for _ in range(2):
+                file.clips._alive.clear()
+                file.clips._last.clear()
+                with pytest.raises(OptionError, match="neither"):
+                    file.find("x-none == 1")
+        assert (len(calls) == len(set(calls)) == 4) == (most > 0)
 
 
 def test_damage_is_no_unknown(archive: Path) -> None:

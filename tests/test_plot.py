@@ -25,9 +25,9 @@ from mcz.errors import MczError, MotionError, OptionError
 from mcz.joint_errors import joint_errors
 from mcz.motion import Motion
 from mcz.pictures.channel_charts import density
+from mcz.pictures.chart_pages import STYLE, ChartPage, Sheet
 from mcz.pictures.charts import MOST_POINTS, number, thinned
 from mcz.pictures.error_charts import errors_between
-from mcz.pictures.pages import STYLE, Page, Sheet, page
 from mcz.pictures.plotting import KINDS, plot
 from mcz.reading.report import info, layout
 from mcz.reading.shares import byte_shares
@@ -269,11 +269,11 @@ def test_a_page_holds_all_and_no_markup_of_names(tmp_path: Path) -> None:
 
 
 def test_pages_escape_every_text() -> None:
-    found = Page(HOSTILE, [HOSTILE])
+    found = ChartPage(HOSTILE, [HOSTILE])
     found.add_picture(HOSTILE, '"><script>', '"><script>')
     for number_ in range(4):
         found.add_table(Sheet(f"{HOSTILE}{number_}", [[HOSTILE], [HOSTILE]], "r", HOSTILE))
-    tags = Tags(page(found))
+    tags = Tags(found.html())
     assert not tags.of("script")
     assert [a["href"] for a in tags.of("a")] == ["#part1", "#part2", "#part3", "#part4"]
     (image,) = tags.of("img")

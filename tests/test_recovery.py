@@ -269,6 +269,28 @@ def test_rewriting_in_place_protects_anew(archive: bytes, tmp_path: Path) -> Non
     assert mcz.verify(path) == []
 
 
+def test_what_protected_files_are_merged_to_is_protected(archive: bytes, tmp_path: Path) -> None:
+    a, b, bare = (tmp_path / f"{name}.mcz" for name in ("a", "b", "bare"))
+    a.write_bytes(archive)
+    b.write_bytes(archive)
+    mcz.protect(b, 0.2, anew=True)
+    mcz.extract(a, bare, frames=(0, 9), copies=False)
+    report = mcz.merge([a, b], tmp_path / "c.mcz", rename=True)
+    assert report.left_out == []
+    assert report.size == (tmp_path / "c.mcz").stat().st_size
+    with mcz.open(tmp_path / "c.mcz") as file:
+        ((_, shape),) = protections(file.container)
+    assert (shape.start, shape.stop) == (0, report.size)
+    assert shape.n_recovery >= 0.2 * shape.n_blocks  # the greatest share of all
+    assert mcz.verify(tmp_path / "c.mcz") == []
+    report = mcz.merge([bare, b], tmp_path / "d.mcz", rename=True)
+    assert [text.split(":")[0] for text in report.left_out] == [str(b)]
+    report = mcz.append([b], a, rename=True)  # which protects what is added
+    assert report.left_out == []
+    with mcz.open(a) as file:
+        assert protections(file.container)[-1].shape.stop == a.stat().st_size
+
+
 def test_protecting_twice_does_nothing(archive: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.mcz"
     path.write_bytes(archive)

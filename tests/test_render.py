@@ -23,9 +23,9 @@ from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.pictures import libraries, tracks
 from mcz.pictures.bodies import MIDDLE, body_of, fitted
 from mcz.pictures.cameras import VIEWS, Viewport, axes_of, framed
+from mcz.pictures.capsules import Shapes, capsules
 from mcz.pictures.rendering import drawn_frames
-from mcz.pictures.scenes import scene_of
-from mcz.pictures.solids import Shapes, capsules
+from mcz.pictures.stages import stage_of
 from mcz.pictures.themes import THEMES, rgb
 from tests.motions import motions, smooth
 
@@ -71,9 +71,9 @@ def test_left_and_right_are_where_they_belong(
 def test_the_floor_is_below_the_feet_and_all_is_seen(walk: Motion) -> None:
     track = tracks.track_of(walk, np.arange(0, 240, 8), "cm", None)
     for view in VIEWS:
-        scene = scene_of(track, THEMES["light"], view, Viewport(10, 20, 300, 200), None, 15.0)
+        stage = stage_of(track, THEMES["light"], view, Viewport(10, 20, 300, 200), None, 15.0)
         for number, (_, nodes) in enumerate(track):
-            seen, _ = scene.camera_of(number).seen(nodes[track.body.shown])
+            seen, _ = stage.camera_of(number).seen(nodes[track.body.shown])
             assert ((seen > (10, 20)) & (seen < (310, 220))).all()
             assert nodes[track.body.shown, 2].min() > track.floor - 0.05 * track.size
     assert track.unit == "cm"
@@ -114,10 +114,10 @@ def test_every_up_axis_gives_the_same_picture(tmp_path: Path) -> None:
 
 def pieces_drawn(motion: Motion, frame: int = 0) -> int:
     track = tracks.track_of(motion, np.arange(motion.n_frames), None, "y")
-    scene = scene_of(track, THEMES["light"], "front", Viewport(0, 0, 100, 100), None, 1.0)
+    stage = stage_of(track, THEMES["light"], "front", Viewport(0, 0, 100, 100), None, 1.0)
     shadows, figures = Shapes(), Shapes()
     nodes = dict(track)[frame]
-    scene.add(shadows, figures, scene.camera_of(frame), nodes)
+    stage.add(shadows, figures, stage.camera_of(frame), nodes)
     return len(shadows.arrays()[0])
 
 

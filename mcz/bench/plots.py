@@ -4,23 +4,54 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from mcz.bench.sweep import ClipResult, Curve
+from mcz.pictures.themes import THEMES, Theme, theme_of
+
+Figures = Callable[[Path], Iterator[Path]]  # draws into a folder, says what it drew
 
 MISSING = "no plots: matplotlib is not installed (pip install 'mcz[plot]')"
 MARKS = "osD^vP*X<>"
 PUBLISHED = (0, (4, 2))  # dashes of presets that follow a paper
 PEER = (0, (1, 1.5))
+LINES = ("blue", "orange", "green", "red", "purple", "brown", "pink", "gray", "olive", "cyan")
+BRIGHTER = 0.3  # of the way to white, lines on dark ground
 LONG = 3.2  # decades of an axis
 MOST_WIDE = 2  # times the greatest size of our codecs: how far to the right a peer is drawn
 
 
 def can_draw() -> bool:
     return find_spec("matplotlib") is not None
+
+
+def drawn(figures: Iterable[Figures], folder: Path, theme: str) -> list[Path]:
+    """What all ``figures`` draw into a folder, in the colors of a theme, "light" or "dark"."""
+    from matplotlib import rc_context
+
+    with rc_context(_colors(theme_of(theme))):
+        return [path for each in figures for path in each(folder)]
+
+
+def _colors(theme: Theme) -> Any:
+    """Settings of matplotlib: ten colors of lines, brighter where the ground is dark."""
+    from cycler import cycler
+    from matplotlib.colors import to_rgb
+
+    share = BRIGHTER if theme is THEMES["dark"] else 0.0
+    lines = [tuple(c + share * (1 - c) for c in to_rgb(f"tab:{name}")) for name in LINES]
+    ground = ("figure.facecolor", "axes.facecolor", "savefig.facecolor")
+    quiet = ("xtick.color", "ytick.color", "axes.edgecolor", "axes.labelcolor")
+    return {
+        **dict.fromkeys(ground, theme.ground),
+        **dict.fromkeys(quiet, theme.quiet),
+        "text.color": theme.ink,
+        "grid.color": theme.grid,
+        "axes.prop_cycle": cycler(color=lines),
+    }
 
 
 def draw(clips: Sequence[ClipResult], folder: Path) -> Iterator[Path]:
@@ -95,7 +126,7 @@ def _panel(
             linestyle=style,
             marker=MARKS[number % len(MARKS)],
             markersize=4.5,
-            markerfacecolor="white" if published else None,
+            markerfacecolor=axes.get_facecolor() if published else None,
             linewidth=1.4,
             color=f"C{number}" if curve.variant else "0.5",
             label=curve.label,
@@ -109,7 +140,7 @@ def _panel(
         plain_ticks(axes.yaxis)
     axes.set_xlabel("coded bytes, payload and overhead")
     axes.set_ylabel(text)
-    axes.grid(True, which="both", color="0.9", linewidth=0.6)
+    axes.grid(True, which="both", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=8)
     above = axes.secondary_xaxis(
@@ -149,5 +180,5 @@ def _label_points(axes: Any, curve: Curve, key: str, published: bool) -> None:
                 xytext=(4, -9 if published else 4),
                 textcoords="offset points",
                 fontsize=6.5,
-                color="0.35",
+                alpha=0.8,
             )

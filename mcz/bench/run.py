@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -14,9 +14,7 @@ from mcz.bench.cases import find_cases, named, variants_of
 from mcz.bench.sweep import ClipResult
 from mcz.bench.tables import Table
 from mcz.bench.tasks import Runner
-from mcz.pictures import pages
-
-Figures = Callable[[Path], Iterator[Path]]  # draws into a folder, says what it drew
+from mcz.pictures.chart_pages import ChartPage, Sheet, data_uri
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +23,7 @@ class Outcome:
 
     clips: list[ClipResult] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
-    figures: list[Figures] = field(default_factory=list)
+    figures: list[plots.Figures] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def document(self) -> dict[str, Any]:
@@ -51,16 +49,16 @@ class Outcome:
         for table in self.tables:
             yield from table.markdown()
 
-    def page(self, plots: Sequence[Path]) -> bytes:
-        """One page with all tables and the ``plots``, which are inside of it; UTF-8."""
+    def page(self, plots: Sequence[tuple[Path, Path]]) -> bytes:
+        """One page with all tables and the ``plots``, on light and on dark ground; UTF-8."""
         known = f"By mcz {mcz.__version__}; its SPEC.md defines sizes, ratios and metrics."
-        page = pages.Page("Codecs compared", [known, *self.notes])
-        for plot in plots:
-            page.add_picture(plot.stem, pages.data_uri(plot.read_bytes(), "png"))
+        page = ChartPage("Codecs compared", [known, *self.notes])
+        for pair in plots:
+            light, dark = (data_uri(plot.read_bytes(), "png") for plot in pair)
+            page.add_picture(pair[0].stem, light, dark)
         for table in self.tables:
-            sheet = pages.Sheet(table.title, table.cells(), table.right, table.caption)
-            page.add_table(sheet)
-        return pages.page(page)
+            page.add_table(Sheet(table.title, table.cells(), table.right, table.caption))
+        return page.html()
 
 
 def bench(

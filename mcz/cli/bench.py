@@ -131,14 +131,16 @@ def _write(outcome: Outcome, folder: Path) -> list[str]:
         folder.mkdir(parents=True, exist_ok=True)
         drawn: list[Path] = []
         if plots.can_draw():
-            drawn = [path for figures in outcome.figures for path in figures(folder)]
+            drawn = plots.drawn(outcome.figures, folder, "light")
         elif outcome.figures:
             outcome.notes.append(plots.MISSING)
         text = "\n".join(outcome.markdown([path.name for path in drawn]))
         report, results = folder / "report.md", folder / "results.json"
         page = folder / "index.html"
         report.write_text(text, "utf-8")
-        page.write_bytes(outcome.page(drawn))
+        with TemporaryDirectory() as other:
+            dark = plots.drawn(outcome.figures, Path(other), "dark") if drawn else []
+            page.write_bytes(outcome.page(list(zip(drawn, dark, strict=True))))
         document = json.dumps(outcome.document(), indent=1, ensure_ascii=False, allow_nan=False)
         results.write_text(document + "\n", "utf-8")
     except OSError as error:

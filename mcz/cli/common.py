@@ -228,11 +228,12 @@ def _give_up_output() -> None:
 
 
 def reason(error: Exception) -> str:
-    """What an error says, on one line, without Python's decorations."""
+    """What an error says, on one line and in words of the command line."""
     if isinstance(error, OSError) and error.strerror:
         named = f"{error.filename}: " if error.filename is not None else ""
         return f"{named}{error.strerror}"
-    return " ".join(str(error).split()) or type(error).__name__
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text.replace("; use force to", "; use --force to")
 
 
 def code_of(error: Exception) -> Exit:
@@ -259,7 +260,8 @@ def about(path: str, *others: str) -> Iterator[None]:
 def existing(path: str) -> None:
     """Raise Failure where a local ``path`` is no file."""
     if path != "-" and "://" not in path and not Path(path).is_file():
-        what = "not a file" if Path(path).exists() else "no such file"
+        is_there = "a folder" if Path(path).is_dir() else "not a file"
+        what = is_there if Path(path).exists() else "no such file"
         raise Failure(f"{path or repr(path)}: {what}", path=path, kind="AccessError")
 
 
@@ -297,7 +299,7 @@ def damage_of(path: str, damage: Sequence[str]) -> Exit:
 
 def exists(path: Path) -> Failure:
     """That a file is there, and nobody said that it may be replaced."""
-    text = f"{path}: exists; --force overwrites it"
+    text = f"{path} exists; use --force to replace it"
     return Failure(text, Exit.USAGE, path=str(path), kind="ExistsError")
 
 
@@ -381,17 +383,6 @@ def to_rate(ctx: click.Context, param: click.Parameter, value: str | None) -> Fr
     if rate <= 0:
         raise click.BadParameter(f"{value!r} is not a rate such as 120, 29.97 or 30000/1001")
     return rate
-
-
-def to_bytes(ctx: click.Context, param: click.Parameter, value: str | None) -> int | None:
-    """Callback of a number of bytes: ``200000000``, ``200M`` or ``2G``; K, M, G, T are binary."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"([0-9]{1,15})([KMGT]?)(?:i?B)?", value, re.IGNORECASE)
-    if not match:
-        raise click.BadParameter(f"{value!r} is not a number of bytes such as 200M or 2G")
-    factor: int = 1024 ** " KMGT".index(match[2].upper() or " ")
-    return int(match[1]) * factor
 
 
 def to_params(

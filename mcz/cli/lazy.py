@@ -39,11 +39,30 @@ def lazy_group(prefix: str, names: Sequence[str]) -> type[click.Group]:
     return Commands
 
 
+# What else people call our commands.
+OTHER_NAMES = {
+    "check": "verify",
+    "compare": "diff",
+    "compress": "encode",
+    "convert": "decode --to",
+    "cut": "extract",
+    "find": "list --where",
+    "ls": "list",
+    "play": "view",
+    "remove": "delete",
+    "search": "list --where",
+    "show": "view",
+    "trim": "extract",
+}
+
+
 def unknown(name: str, names: Sequence[str]) -> str:
     """That there is no such command, and which are called nearly so."""
     from difflib import get_close_matches
 
     near = get_close_matches(name.lower(), names, 3, 0.7)
+    if (meant := OTHER_NAMES.get(name.lower(), "")) and meant.split()[0] in names:
+        return f"no command {name!r}; that is {meant}"
     near += [known for known in names if known.startswith(name) and known not in near][:3]
     hint = f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join(names)}"
     return f"no command {name!r}; {hint}"

@@ -55,8 +55,7 @@ def command(
 ) -> Exit:
     """List the clips and attachments of FILE.mcz; only its index is read.
 
-    With --where the clips alone that it takes; that, --columns and --sort read as much as they ask
-    for.
+    With --where, --columns and --sort as much more is read as they ask for.
     """
     if as_csv and as_json:
         raise Failure("--csv or --json, not both", Exit.USAGE)

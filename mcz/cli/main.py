@@ -47,7 +47,8 @@ COMMANDS = (
 
 @click.command(
     cls=lazy_group("mcz.cli.", COMMANDS),
-    help="Motion capture files (ASF, AMC, BVH, C3D), compressed and given back byte for byte.\n\n"
+    help="Motion capture files (BVH, ASF, AMC, C3D, TRC, MOT, STO), compressed and given back byte "
+    "for byte.\n\n"
     "Every command has its own --help. Nothing is overwritten without --force.",
     epilog=EXIT_CODES,
 )

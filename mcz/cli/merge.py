@@ -36,7 +36,7 @@ def command(
     """Put all that the files hold into OUT.mcz; chunks are copied, what they share once.
 
     A name that two of them have is refused, unless --rename or --skip-identical says what becomes
-    of it.
+    of it. Where all files have recovery data (mcz protect), OUT.mcz has its own.
     """
     import mcz
 

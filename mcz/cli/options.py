@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import wraps
 from typing import Any
 
 import click
 
-from mcz.cli.common import echo, to_bytes, to_params, to_rate
+from mcz.cli.common import echo, to_params, to_rate
 
 EFFORTS = ("fast", "normal", "best")  # as in mcz.codecs, which takes longer to import
 UNITS = ("mm", "cm", "dm", "m", "in", "ft")
 Function = Callable[..., Any]
+
+
+def to_bytes(ctx: click.Context, param: click.Parameter, value: str | None) -> int | None:
+    """Callback of a number of bytes: ``200000000``, ``200M`` or ``2G``; K, M, G, T are binary."""
+    if value is None:
+        return None
+    match = re.fullmatch(r"([0-9]{1,15})([KMGT]?)(?:i?B)?", value, re.IGNORECASE)
+    if not match:
+        raise click.BadParameter(f"{value!r} is not a number of bytes such as 200M or 2G")
+    factor: int = 1024 ** " KMGT".index(match[2].upper() or " ")
+    return int(match[1]) * factor
 
 
 def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
@@ -114,7 +126,7 @@ clips_option = click.option(
     "clips",
     metavar="NAME",
     multiple=True,
-    help="This clip alone; may be repeated. Default: all.",
+    help="Only this clip; may be repeated. Default: all.",
 )
 
 
@@ -131,8 +143,8 @@ where_option = click.option(
     "--where",
     metavar="QUERY",
     callback=_to_query,
-    help="The clips alone that it takes, such as \"subject == '05' and n_frames > 500\"; with "
-    "--clip those that are both. docs/queries.md has all of it.",
+    help="Only clips of which this is true, such as \"subject == '05' and n_frames > 500\"; "
+    "docs/queries.md has all of it.",
 )
 
 token_option = click.option(

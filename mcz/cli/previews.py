@@ -90,20 +90,22 @@ def bar(share: float, blocks: bool | None = None) -> str:
 def bars_of(payload: Sequence[dict[str, Any]]) -> tuple[list[Bar], list[Bar]]:
     """What the bars are of, and the rest: the joints that take most, or of one group its
     resolutions."""
-    groups: dict[str, int] = {}
-    parts: dict[str, int] = {}
-    several = len({share["signal"] for share in payload}) > 1
-    for share in payload:
-        of = share["joints"] or "frame notes"
-        name = f"{share['signal']}: {of}" if several else of
-        groups[name] = groups.get(name, 0) + share["bytes"]
-        level = share["resolution"]
-        part = "exceptions, masks" if level is None else f"resolution {level}"
-        part += ", coarsest" if level == 0 else ""
-        parts[part] = parts.get(part, 0) + share["bytes"]
+    from mcz.reading.shares import Share, by_group
+
+    groups = by_group(
+        Share(of["signal"], None, of["joints"], of["resolution"], of["bytes"]) for of in payload
+    )
     if len(groups) == 1:
-        return list(parts.items()), []
-    ordered = sorted(groups.items(), key=lambda each: -each[1])
+        ((_, parts),) = groups.items()
+        return [(_called(resolution), n) for resolution, n in parts.items()], []
+    sums = {name: sum(parts.values()) for name, parts in groups.items()}
+    ordered = sorted(sums.items(), key=lambda each: -each[1])
     rest = ordered[MOST_BARS:]
     others = [(f"{len(rest)} others", sum(n for _, n in rest))] if rest else []
     return ordered[:MOST_BARS], others
+
+
+def _called(resolution: int | None) -> str:
+    if resolution is None:
+        return "exceptions, masks"
+    return f"resolution {resolution}" + (", coarsest" if resolution == 0 else "")

@@ -17,7 +17,6 @@ from mcz.cli.common import (
     plural,
     print_json,
     say,
-    to_bytes,
     to_rate,
 )
 from mcz.cli.options import (
@@ -30,6 +29,7 @@ from mcz.cli.options import (
     param_option,
     salvage_option,
     threads_option,
+    to_bytes,
     up_option,
     where_option,
 )
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 SAID = ("skeleton", "rate", "unit", "up")  # what a file may not say itself
 OF_PAGE = ("clips", "where", "codec", "effort", "params", "max_decoded", "most", "force")
+PAGES = (".html", ".htm")
 OF_SERVER = ("no_browser", "keep", "host", "port")
 LOOPBACK = "127.0.0.1"
 
@@ -128,6 +129,8 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
 
 def _check_use(output: str | None, options: dict[str, Any]) -> None:
     """Raise Failure for options of a page without -o, and of a server with it."""
+    if output is not None and output != "-" and not output.lower().endswith(PAGES):
+        raise Failure(f"{output}: a page is a .html; mcz render draws films", Exit.USAGE)
     if output == "-":
         raise Failure("a page is written to a file, not to standard output", Exit.USAGE)
     if output is not None:

@@ -7,16 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from sys import intern
 
 from mcz.container import payloads
 from mcz.container.chunks import Chunk
+from mcz.container.clip_head import clip_head
 from mcz.container.cursor import Cursor
+from mcz.container.directory import ClipRow
 from mcz.container.limits import MIB, check, metadata_limit
 from mcz.container.metadata_keys import INTERPRETED
 from mcz.container.packed import smallest
 from mcz.container.strict import decoded
 from mcz.errors import FormatError
 from mcz.schema import build, parse, varint
+
+MOST_KEPT = 16 * MIB  # bytes, about: 40,000 clips of three keys
+PAIR = 100  # bytes that Python takes for a pair, beside its letters
 
 # Each record in a META: (name, type, meaning).
 META_RECORD_FIELDS = (
@@ -39,6 +45,25 @@ class Record:
 
 
 Placed = dict[str, list[tuple[int, Record]]]  # by name, each with where its META begins
+
+
+class Remembered:
+    """What the CLIPs of a file say, for later questions; beyond ``MOST_KEPT`` nothing is kept."""
+
+    def __init__(self) -> None:
+        self._pairs: dict[str, dict[str, str]] = {}
+        self._size = 0
+
+    def of(self, row: ClipRow, payload: Callable[[Chunk], bytes]) -> Mapping[str, str]:
+        """What the CLIP of ``row`` says; its payload is asked for where that is not kept."""
+        found = self._pairs.get(row.name)
+        if found is None:
+            said = clip_head(payload(row.clip), row.clip.label).metadata
+            found = {intern(key): value for key, value in said.items()}
+            self._size += PAIR + sum(PAIR + len(key) + len(found[key]) for key in found)
+            if self._size <= MOST_KEPT:
+                self._pairs[row.name] = found
+        return found
 
 
 def applied(pairs: Mapping[str, str], records: Iterable[Record]) -> dict[str, str]:

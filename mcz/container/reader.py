@@ -28,7 +28,6 @@ from mcz.container.chunks import (
     read_chunk,
     read_payload,
 )
-from mcz.container.clip_head import clip_head
 from mcz.container.copies import Copy, copy_chunks, uncopied
 from mcz.container.directory import (
     AttachmentRow,
@@ -40,7 +39,7 @@ from mcz.container.directory import (
 )
 from mcz.container.index import parse_index
 from mcz.container.limits import BASE, Profile, check, check_decoded, index_limit, output_limit
-from mcz.container.metadata import Placed, Record, applied, records_in
+from mcz.container.metadata import Placed, Record, Remembered, applied, records_in
 from mcz.container.overlay import Overlay
 from mcz.container.packed import parse_skel
 from mcz.container.packets import (
@@ -100,6 +99,7 @@ class Container:
         self.unverified = 0
         self.runs = Runs()
         self.index: Foot | None = None
+        self._said = Remembered()
         self._skeletons: dict[bytes, tuple[Any, Skeleton]] = {}
         self.directory = self._salvage() if salvage else self._open()
         self.profile: Profile = parse_head(self.directory.head)
@@ -199,8 +199,7 @@ class Container:
 
     def metadata(self, row: ClipRow) -> dict[str, str]:
         """What CLIP says of a clip, and META chunks behind it."""
-        said = clip_head(self.payload(row.clip), row.clip.label).metadata
-        return applied(said, self.said_of(row.name))
+        return applied(self._said.of(row, self.payload), self.said_of(row.name))
 
     def copies(self) -> list[Chunk]:
         """The COPY chunks of the file, in order."""

@@ -13,6 +13,7 @@ from mcz.codecs import chosen
 from mcz.container import payloads
 from mcz.container.metadata import Record
 from mcz.editing.appending import growing
+from mcz.editing.carrying import UNPROTECTED
 from mcz.editing.coded_parts import Far, ahead
 from mcz.editing.folders import files_below, left_out, motion_files, size_of, sources_named
 from mcz.editing.merging import add_files
@@ -189,7 +190,8 @@ def append(
         if growth.tail.kept or any(outcome.result != "present" for outcome in report.outcomes):
             redundancy = redundancy_of(container)
             draft.finish()
-    still_protect(target, redundancy)
+    if still_protect(target, redundancy):
+        report.left_out = [text for text in report.left_out if not text.endswith(UNPROTECTED)]
     report.size = Path(target).stat().st_size
     report.note(notes_on(draft.paths))
     report.outcomes += others

@@ -128,7 +128,8 @@ class Carrier:
             self.writer.ancillary(chunk.type, self.container.payload(chunk))
             return True
         if chunk.type == RECOVERY:
-            self.left_out.append(UNPROTECTED)
+            if UNPROTECTED not in self.left_out:  # there is one more for each part that was added
+                self.left_out.append(UNPROTECTED)
         elif chunk.type != COPY:  # those are made anew where they are wanted
             self.left_out.append(f"chunk {chunk.label}, which is not safe to copy")
         return False

@@ -17,8 +17,9 @@ from typing import Any
 from mcz.brief import counted, shown
 from mcz.container import payloads
 from mcz.container.writer import Writer
-from mcz.editing.carrying import Change
+from mcz.editing.carrying import UNPROTECTED, Change
 from mcz.editing.outcomes import Outcome, Report
+from mcz.editing.protecting import protect_written, redundancy_of
 from mcz.editing.rewriting import (
     Plan,
     carry,
@@ -55,6 +56,9 @@ def merge(
     name of its file, "walk" of day2.mcz becomes "day2/walk", and so is its source. The own files
     of skeletons that are the same under one name are always taken once. Raises OptionError, which
     names what is double; nothing is left under the target's name then.
+
+    Recovery data are of one file. Where all files have some, the new one has its own, in the
+    greatest share of theirs; where only some have, the report says so.
     """
     if not sources:
         raise OptionError("nothing to merge: name MCZ files")
@@ -70,10 +74,21 @@ def merge(
             writer = writer_like(stream, files)
             report.left_out += carried(list(zip(files, plans, strict=True)), writer, progress)
             writer.finish()
+            report.size = writer.offset
             if getattr(stream, "readable", bool)():
                 check_written(stream, writer.offset)
-        report.size = writer.offset
+                if share := _share_of_all(files):
+                    protect_written(stream, share)
+                    report.size = stream.tell()
+                    report.left_out = [t for t in report.left_out if not t.endswith(UNPROTECTED)]
     return report
+
+
+def _share_of_all(files: Sequence[File]) -> float | None:
+    """The greatest share of recovery data that a file has; None where not all have some."""
+    shares = [redundancy_of(file.container) for file in files]
+    known = [share for share in shares if share is not None]
+    return max(known) if len(known) == len(shares) else None
 
 
 def carried(

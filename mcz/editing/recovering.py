@@ -88,7 +88,6 @@ class _Set:
     sections: dict[int, bytes] = field(default_factory=dict)
     blocks: dict[int, int] = field(default_factory=dict)  # where their bodies lie
     shifts: dict[int, None] = field(default_factory=dict)  # in the order of being found
-    at_place: int = 0  # packets that lie where they belong
 
     @property
     def shape(self) -> Shape:
@@ -121,7 +120,6 @@ def _keep(one: _Set, packet: Packet, place: int | None) -> None:
     else:
         one.sections[packet.index] = packet.body
     shift = packet.offset - place
-    one.at_place += shift == 0
     if len(one.shifts) < MOST_SHIFTS:
         one.shifts[shift] = None
 

@@ -18,13 +18,13 @@ from mcz.errors import MczError, OptionError
 from mcz.metrics import Comparison, compare
 from mcz.metrics.sums import times
 from mcz.motion import Motion
+from mcz.pictures.chart_pages import Sheet
 from mcz.pictures.charts import Chart, legend, name_ticks, rows_of, styled
 from mcz.pictures.libraries import library
-from mcz.pictures.pages import Sheet
 from mcz.pictures.themes import Theme, rgb
 from mcz.reading.clip import Clip
 from mcz.reading.file import open
-from mcz.reading.shares import byte_shares
+from mcz.reading.shares import by_group, byte_shares
 from mcz.reading.sizes import clip_sizes
 from mcz.writing.clip_writer import write_clip
 from mcz.writing.positions import as_codec_wants
@@ -38,14 +38,15 @@ MIDDLING_CM = 0.1  # mean error that a dial is first set for
 FIGURES = ("mean_position_error", "max_position_error")
 
 
-Parts = dict[str, int]  # bytes by resolution, and of what is no codec's
+Sort = int | None  # a resolution; None: what is no codec's
+Parts = dict[Sort, int]  # bytes
 
 
 def bytes_chart(clip: Clip) -> Chart:
     """The payload of a clip by group of channels and resolution; figures of ``mcz info``."""
-    groups = groups_of(clip)
+    groups = by_group(byte_shares(clip))
     found = {sort for own in groups.values() for sort in own}
-    sorts = sorted(found, key=lambda sort: (sort == OTHER, len(sort), sort))
+    sorts = sorted(found, key=lambda sort: (sort is None, sort))
     total = sum(sum(own.values()) for own in groups.values())
     ordered = sorted(groups.items(), key=lambda each: -sum(each[1].values()))
     if len(groups) == 1 and len(sorts) > 1:  # of one group its resolutions are what differs
@@ -69,24 +70,12 @@ def bytes_chart(clip: Clip) -> Chart:
     return Chart(title, (WIDTH, 110 + 24 * max(3, len(bars))), draw, (table,))
 
 
-def groups_of(clip: Clip) -> dict[str, Parts]:
-    """The payload of a clip by the joints of a group, and by resolution."""
-    groups: dict[str, Parts] = {}
-    for share in byte_shares(clip):
-        of = share.name or "frame notes"
-        name = f"{share.signal}: {of}" if len(clip.signals) > 1 else of
-        sort = OTHER if share.resolution is None else f"{share.resolution}"
-        own = groups.setdefault(name, {})
-        own[sort] = own.get(sort, 0) + share.n_bytes
-    return groups
-
-
-def called(sort: str) -> str:
-    return sort if sort == OTHER else f"resolution {sort}"
+def called(sort: Sort) -> str:
+    return OTHER if sort is None else f"resolution {sort}"
 
 
 def _draw_bars(
-    figure: Any, theme: Theme, *, bars: Sequence[tuple[str, Parts]], sorts: Sequence[str]
+    figure: Any, theme: Theme, *, bars: Sequence[tuple[str, Parts]], sorts: Sequence[Sort]
 ) -> None:
     axes = styled(figure.subplots(), theme, x="bytes")
     places, left = np.arange(len(bars))[::-1], np.zeros(len(bars))
@@ -102,11 +91,11 @@ def _draw_bars(
         legend(axes, theme, loc="lower right")
 
 
-def _with_rest(ordered: Sequence[tuple[str, dict[str, int]]]) -> list[tuple[str, dict[str, int]]]:
+def _with_rest(ordered: Sequence[tuple[str, Parts]]) -> list[tuple[str, Parts]]:
     """The greatest, and all others as one."""
     shown, rest = list(ordered[:MOST_BARS]), ordered[MOST_BARS:]
     if rest:
-        sums: dict[str, int] = {}
+        sums: Parts = {}
         for _, own in rest:
             for sort, size in own.items():
                 sums[sort] = sums.get(sort, 0) + size
@@ -114,11 +103,11 @@ def _with_rest(ordered: Sequence[tuple[str, dict[str, int]]]) -> list[tuple[str,
     return shown
 
 
-def _ramp(theme: Theme, sorts: Sequence[str]) -> dict[str, Any]:
+def _ramp(theme: Theme, sorts: Sequence[Sort]) -> dict[Sort, Any]:
     """Colors: resolutions from strong to pale, what is no codec's in another."""
     strong, pale = np.array(rgb(theme.series[0])), np.array(rgb(theme.grid))
-    levels = [sort for sort in sorts if sort.isdigit()]
-    found: dict[str, Any] = dict.fromkeys(sorts, theme.series[1])
+    levels = [sort for sort in sorts if sort is not None]
+    found: dict[Sort, Any] = dict.fromkeys(sorts, theme.series[1])
     for number, sort in enumerate(levels):
         share = 0.8 * number / max(1, len(levels) - 1)
         found[sort] = tuple(strong * (1 - share) + pale * share)

@@ -14,8 +14,8 @@ from mcz.brief import printable
 from mcz.errors import MczError, MotionError
 from mcz.kinematics.chain import Floats
 from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Channel, Motion
+from mcz.pictures.chart_pages import Sheet
 from mcz.pictures.charts import Chart, legend, line, rows_of, styled
-from mcz.pictures.pages import Sheet
 from mcz.pictures.themes import Theme
 from mcz.poses import velocities
 

@@ -14,8 +14,8 @@ import numpy as np
 from mcz.brief import printable
 from mcz.errors import OptionError
 from mcz.kinematics.chain import Floats
+from mcz.pictures.chart_pages import ChartPage, Sheet, data_uri
 from mcz.pictures.libraries import new_figure, quietly
-from mcz.pictures.pages import Page, Sheet, data_uri, page
 from mcz.pictures.themes import THEMES, Theme, theme_of
 from mcz.writing.atomic import replacing
 
@@ -81,11 +81,11 @@ def html(chart: Chart, size: tuple[int, int]) -> bytes:
         name: data_uri(drawn(chart, theme, size, "svg", titled=False), "svg+xml")
         for name, theme in THEMES.items()
     }
-    found = Page(chart.title, chart.notes)
+    found = ChartPage(chart.title, chart.notes)
     found.add_picture(chart.title, pictures["light"], pictures["dark"])
     for table in chart.tables:
         found.add_table(table)
-    return page(found)
+    return found.html()
 
 
 def styled(axes: Any, theme: Theme, *, x: str = "", y: str = "", title: str = "") -> Any:

@@ -17,12 +17,12 @@ from mcz.metrics.sums import Distances, times
 from mcz.motion import Motion
 from mcz.pictures.bodies import MIDDLE
 from mcz.pictures.cameras import Viewport
+from mcz.pictures.capsules import Shapes, add_figure, add_shadow, pieces_of
 from mcz.pictures.channel_charts import times_of
+from mcz.pictures.chart_pages import Sheet
 from mcz.pictures.charts import Chart, legend, line, name_ticks, number, rows_of, styled
 from mcz.pictures.libraries import library
-from mcz.pictures.pages import Sheet
-from mcz.pictures.scenes import scene_of
-from mcz.pictures.solids import Shapes, add_figure, add_shadow, pieces_of
+from mcz.pictures.stages import stage_of
 from mcz.pictures.themes import Theme
 from mcz.pictures.tracks import Track, track_of
 
@@ -243,7 +243,7 @@ def _draw_figure(
 def _add_polygons(axes: Any, track: Track, colors: Floats, theme: Theme) -> None:
     """The one frame of a track, its nodes in these colors (n_nodes, 3)."""
     port = Viewport(0, 0, 420, 560)
-    camera = scene_of(track, theme, "front", port, None, 1.0).camera
+    camera = stage_of(track, theme, "front", port, None, 1.0).camera
     ((_, nodes),) = track
     pieces = pieces_of(track, nodes, colors)
     shadows, figures = Shapes(), Shapes()

@@ -17,8 +17,8 @@ from mcz.pictures.cameras import Viewport
 from mcz.pictures.canvases import Canvas
 from mcz.pictures.encoders import film
 from mcz.pictures.libraries import library
-from mcz.pictures.scenes import AROUND, Scene, drawing_of, scene_of, words_around
 from mcz.pictures.sheets import sheet_drawing, sheet_size
+from mcz.pictures.stages import AROUND, Stage, drawing_of, stage_of, words_around
 from mcz.pictures.themes import Theme, theme_of
 from mcz.pictures.tracks import track_of
 from mcz.poses.moving import Frames, Moving, frame_range
@@ -193,39 +193,39 @@ class _Job:
         width, height = self.look.size or (SIZE if suffix != ".gif" else SIZE_OF_GIF)
         if suffix != ".gif":
             width, height = width // 2 * 2, height // 2 * 2  # as these codecs want it
-        scene = self._scene(frames, width, height, float(fps))
+        stage = self._stage(frames, width, height, float(fps))
         canvas = Canvas(width, height, self.look.theme)
         with replacing(self.path, force=self.force) as stream:
             with film(stream, suffix[1:], width, height, fps) as taken:
-                for number, (frame, nodes) in enumerate(scene.track):
+                for number, (frame, nodes) in enumerate(stage.track):
                     self.progress(number, len(frames), f"frame {frame}")
-                    words = words_around(scene, width, height, self.moving.name, self._when(frame))
-                    canvas.draw(drawing_of(scene, number, nodes, words))
+                    words = words_around(stage, width, height, self.moving.name, self._when(frame))
+                    canvas.draw(drawing_of(stage, number, nodes, words))
                     taken.add(canvas.pixels())
             size = stream.tell()
         return self._rendered(size, len(frames), width, height, float(fps))
 
     def still(self, frames: Ints) -> Rendered:
         width, height = self.look.size or SIZE
-        scene = self._scene(frames, width, height, 1.0)
+        stage = self._stage(frames, width, height, 1.0)
         canvas = Canvas(width, height, self.look.theme)
-        ((frame, nodes),) = scene.track
-        words = words_around(scene, width, height, self.moving.name, self._when(frame))
-        canvas.draw(drawing_of(scene, 0, nodes, words))
+        ((frame, nodes),) = stage.track
+        words = words_around(stage, width, height, self.moving.name, self._when(frame))
+        canvas.draw(drawing_of(stage, 0, nodes, words))
         return self._rendered(self._written(canvas), 1, width, height, None)
 
     def sheet(self, frames: Ints) -> Rendered:
         layout = sheet_size(len(frames), self.look.size)
         port = Viewport(0, 0, *layout.cell)
         # Each pose is looked at where it is, from the same side and as far.
-        scene = self._scene(frames, *layout.cell, rate=0.0, follow=True, port=port, around=0.6)
+        stage = self._stage(frames, *layout.cell, rate=0.0, follow=True, port=port, around=0.6)
         canvas = Canvas(layout.width, layout.height, self.look.theme)
         title = f"{self.moving.name}"
-        canvas.draw(sheet_drawing(scene, layout, title, self._when))
+        canvas.draw(sheet_drawing(stage, layout, title, self._when))
         size = self._written(canvas)
         return self._rendered(size, len(frames), layout.width, layout.height, None)
 
-    def _scene(
+    def _stage(
         self,
         frames: Ints,
         width: int,
@@ -234,14 +234,14 @@ class _Job:
         follow: bool | None = None,
         port: Viewport | None = None,
         around: float = AROUND,
-    ) -> Scene:
+    ) -> Stage:
         track = track_of(self.moving, frames, *self.facts)
         if track.up_assumed:
             self.notes.append(f"its up axis is unknown: {track.up} up assumed (--up)")
         if port is None:
             port = Viewport(0, 0.06 * height, width, 0.87 * height)
         follow = self.look.follow if follow is None else follow
-        return scene_of(track, self.look.theme, self.look.view, port, follow, rate, around)
+        return stage_of(track, self.look.theme, self.look.view, port, follow, rate, around)
 
     def _when(self, frame: int) -> str:
         if self.rate is None:

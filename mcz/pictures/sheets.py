@@ -13,8 +13,8 @@ from mcz.kinematics.chain import Floats
 from mcz.pictures.bodies import LEFT, RIGHT, Flags
 from mcz.pictures.cameras import Viewport
 from mcz.pictures.canvases import Drawing, Word
-from mcz.pictures.scenes import Scene, shortened
-from mcz.pictures.solids import Shapes
+from mcz.pictures.capsules import Shapes
+from mcz.pictures.stages import Stage, shortened
 
 CELL = (220, 300)  # pixels of a pose
 WIDE = 1.9  # of a whole sheet, how much wider than high it gets about
@@ -50,41 +50,41 @@ def sheet_size(count: int, size: tuple[int, int] | None) -> Layout:
     return Layout(*size, columns, rows, cell)
 
 
-def sheet_drawing(scene: Scene, layout: Layout, title: str, when: Callable[[int], str]) -> Drawing:
+def sheet_drawing(stage: Stage, layout: Layout, title: str, when: Callable[[int], str]) -> Drawing:
     """The sheet as a drawing; ``when`` says of a frame what is written below it."""
     shadows, figures, lines, colors, words = Shapes(), Shapes(), [], [], []
-    letter, theme = 12.0, scene.theme
+    letter, theme = 12.0, stage.theme
     small = min(letter, layout.cell[0] / 12)
-    for number, (frame, nodes) in enumerate(scene.track):
+    for number, (frame, nodes) in enumerate(stage.track):
         row, column = divmod(number, layout.columns)
         left = column * layout.cell[0]
         bottom = layout.height - HEAD - row * (layout.cell[1] + LABEL) - layout.cell[1]
-        camera = replace(scene.camera_of(number), view=Viewport(left, bottom, *layout.cell))
-        pixels, shades = scene.floor(camera)
+        camera = replace(stage.camera_of(number), view=Viewport(left, bottom, *layout.cell))
+        pixels, shades = stage.floor(camera)
         inside = _inside(pixels, left, bottom, layout.cell)
         lines.append(pixels[inside])
         colors.append(shades[inside])
-        scene.add(shadows, figures, camera, nodes)
+        stage.add(shadows, figures, camera, nodes)
         middle = left + layout.cell[0] / 2
         words.append(Word(middle, bottom - 0.62 * LABEL, when(frame), theme.quiet, small, "center"))
     top = layout.height - 0.64 * HEAD
-    words += _heading(scene, layout, title, top, letter + 2)
+    words += _heading(stage, layout, title, top, letter + 2)
     return Drawing(
         (np.concatenate(lines), np.concatenate(colors)), shadows.arrays(), figures.arrays(), words
     )
 
 
-def _heading(scene: Scene, layout: Layout, title: str, top: float, letter: float) -> list[Word]:
-    theme, edge = scene.theme, 14.0
+def _heading(stage: Stage, layout: Layout, title: str, top: float, letter: float) -> list[Word]:
+    theme, edge = stage.theme, 14.0
     fits = max(4, int((layout.width - 260) / (0.66 * letter)))
     words = [Word(edge, top, shortened(title, fits), theme.ink, letter, bold=True)]
     x = layout.width - edge
-    notes = [scene.grid_text]
-    notes += [f"{scene.track.up} up assumed"] if scene.track.up_assumed else []
+    notes = [stage.grid_text]
+    notes += [f"{stage.track.up} up assumed"] if stage.track.up_assumed else []
     for note in notes:
         words.append(Word(x, top, note, theme.quiet, letter - 2, "right"))
         x -= (len(note) + 2) * 0.62 * (letter - 2)
-    sides = scene.track.body.sides[scene.track.body.shown]
+    sides = stage.track.body.sides[stage.track.body.shown]
     if (sides == LEFT).any() and (sides == RIGHT).any():
         for text, color in (("right", theme.right), ("left", theme.left)):
             words.append(Word(x, top, f"\u25cf {text}", color, letter - 2, "right"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from mcz.container.segments import StreamTable
@@ -46,6 +46,21 @@ def byte_shares(clip: Clip) -> list[Share]:
             if total
         ]
     return shares
+
+
+def by_group(shares: Iterable[Share]) -> dict[str, dict[int | None, int]]:
+    """The bytes by the joints of a group, then by resolution, in the order of ``shares``.
+
+    The names begin with that of the signal where several have bytes.
+    """
+    shares = list(shares)
+    several = len({share.signal for share in shares}) > 1
+    groups: dict[str, dict[int | None, int]] = {}
+    for share in shares:
+        of = share.name or "frame notes"
+        own = groups.setdefault(f"{share.signal}: {of}" if several else of, {})
+        own[share.resolution] = own.get(share.resolution, 0) + share.n_bytes
+    return groups
 
 
 def _streams(table: StreamTable) -> Iterator[tuple[tuple[int | None, int | None], int | None]]:

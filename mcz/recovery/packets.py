@@ -90,16 +90,3 @@ def find_packets(source: ByteSource) -> Iterator[tuple[Key, Packet]]:
             if found is not None:
                 yield found
         start += WINDOW
-
-
-def placed_packets(source: ByteSource, offset: int) -> Iterator[tuple[Key, Packet]]:
-    """The packets of the RECV whose payload begins at ``offset``; FormatError for a bad one."""
-    first = read_packet(source, offset)
-    if first is None:
-        raise FormatError(f"RECV: no packet at {offset}")
-    key = first[0]
-    for kind, index, at in key.shape.packets():
-        found = read_packet(source, at) if at < source.size else None
-        if found is None or found[0] != key or (found[1].kind, found[1].index) != (kind, index):
-            raise FormatError(f"RECV: the packet at {at} is damaged, or another one")
-        yield found

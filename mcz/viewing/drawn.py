@@ -59,7 +59,7 @@ def figure(skeleton: Skeleton) -> Figure:
         why = f"at most {MOST_POINTS:,} are drawn" if points else "there is nothing to draw"
         raise MotionError(f"{len(points):,} points: {why}")
     sides = [("", "left", "right").index(side) for side in sides_of(skeleton.addresses())]
-    return Figure(bones_of(skeleton), [sides[joint] for joint, _ in points])
+    return Figure(lines_of(skeleton), [sides[joint] for joint, _ in points])
 
 
 def drawn(moving: Moving, most_frames: int, every: int = 1) -> Drawn:
@@ -111,8 +111,11 @@ def _words(places: NDArray[np.float64]) -> tuple[Words, float, NDArray[np.float6
     return np.where(np.isnan(scaled), MISSING, scaled).astype("<i2"), step, middle
 
 
-def bones_of(skeleton: Skeleton) -> list[tuple[int, int]]:
-    """The points at both ends of each line: of a joint and its parent, and of its end sites."""
+def lines_of(skeleton: Skeleton) -> list[tuple[int, int]]:
+    """The points at both ends of each line: of a joint and its parent, and of its end sites.
+
+    Pictures have nodes instead, see ``mcz.pictures.bodies``: they show origins that are no points.
+    """
     firsts = first_points(skeleton)
     found = []
     for point, (joint, _) in enumerate(listed_points(skeleton)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -24,6 +24,8 @@ from mcz.writing.clip_writer import Progress, write_skeleton
 from mcz.writing.draft import Draft
 from mcz.writing.names import alias_once, check_name, clip_name
 from mcz.writing.tuning import write_tuned
+
+SAME_RATE = 1e-3  # relative: 120 frames a second are what 0.0083333 seconds mean
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,7 @@ class Entry:
         self._note(taken)
         terms = self.terms
         motion = with_facts(taken.motion, terms.rate, terms.unit, terms.up, terms.arrays)
+        self.notes += tuple(_contradictions(taken.motion, motion))
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
         if taken.skeleton is not None:
@@ -142,6 +145,13 @@ class Entry:
         if motion.skeleton.base is None and motion.skeleton.up_axis == skeleton.up_axis:
             return motion
         return replace(motion, skeleton=replace(motion.skeleton, base=id_))
+
+
+def _contradictions(said: Motion, told: Motion) -> Iterator[str]:
+    """Where the frame rate that the file states is not the one that was asked for."""
+    theirs, ours = said.frame_rate, told.frame_rate
+    if theirs is not None and ours is not None and abs(theirs / ours - 1) > SAME_RATE:
+        yield f"its {float(theirs):g} frames a second are kept as {float(ours):g}, as was asked for"
 
 
 def _refuse_early(source_format: Format, data: bytes, profile: Profile) -> None:

@@ -13,6 +13,7 @@ import pytest
 
 import mcz
 from mcz.cli.common import OUT_OF_MEMORY, Exit, Failure, about, run, table, write_output
+from mcz.cli.lazy import OTHER_NAMES
 from mcz.cli.main import COMMANDS, cli
 from mcz.cli.progress import Progress
 from mcz.errors import ChecksumError, MczError, OptionError
@@ -146,6 +147,13 @@ def test_h_is_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_command_is_suggested(given: str, meant: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(cli, "mcz", [given]) == 2
     assert f"no command '{given}'; did you mean {meant}" in capsys.readouterr().err
+
+
+def test_a_command_by_another_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(cli, "mcz", ["cut"]) == 2
+    assert "no command 'cut'; that is extract" in capsys.readouterr().err
+    for meant in OTHER_NAMES.values():
+        assert meant.split()[0] in COMMANDS
 
 
 def test_a_command_unlike_all_lists_them(capsys: pytest.CaptureFixture[str]) -> None:

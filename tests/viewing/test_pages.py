@@ -190,8 +190,12 @@ def test_a_page_that_is_too_large_is_not_written(samples: Path, tmp_path: Path, 
 def test_an_input_is_no_page(samples: Path, tmp_path: Path, call: Call) -> None:
     shutil.copy(samples / "walk.bvh", tmp_path)
     before = (tmp_path / "walk.bvh").read_bytes()
-    code, _, errors = call(tmp_path / "walk.bvh", "-o", tmp_path / "walk.bvh", "--force")
+    (tmp_path / "walk.html").symlink_to("walk.bvh")
+    code, _, errors = call(tmp_path / "walk.bvh", "-o", tmp_path / "walk.html", "--force")
     assert (code, "it is the input itself" in errors) == (2, True)
+    for other in ("walk.bvh", "walk.mp4"):
+        code, _, errors = call(tmp_path / "walk.bvh", "-o", tmp_path / other, "--force")
+        assert (code, "a page is a .html" in errors) == (2, True)
     assert (tmp_path / "walk.bvh").read_bytes() == before
 
 

@@ -21,7 +21,7 @@ from mcz.errors import FormatError
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 from mcz.viewing import drawn as drawn_module
-from mcz.viewing.drawn import bones_of
+from mcz.viewing.drawn import lines_of
 from mcz.viewing.player import MOST_BYTES
 from tests.motions import motions, smooth
 
@@ -92,7 +92,7 @@ def test_a_figure_has_sides_and_bones(samples: Path) -> None:
 def test_bones_of_acclaim_go_from_end_to_end(samples: Path) -> None:
     motion = mcz.read(samples / "walk.amc")
     names = mcz.point_names(motion)
-    bones = {(names[a], names[b]) for a, b in bones_of(motion.skeleton)}
+    bones = {(names[a], names[b]) for a, b in lines_of(motion.skeleton)}
     assert ("root", "lhipjoint") in bones
     assert ("lfemur", "ltibia") in bones
 

@@ -10,7 +10,7 @@ const MOST_BLOCKS = 255;
 const WORD_OF_DATA = 16; // offset in the header: first block of the data
 const MOST_CONTINUED = 4096; // parameters that go on with another
 
-export const TEXT = -1;
+const TEXT = -1;
 const BYTE = 1;
 const INTEGER = 2;
 const FLOAT = 4;
@@ -64,7 +64,7 @@ export class Order {
 }
 
 /** The parameters of a file by group and name, both in capitals. */
-export class Parameters {
+class Parameters {
   /**
    * @param {Order} order
    * @param {Map<string, {type: number, dims: number[], data: Uint8Array}>} found by "GROUP:NAME"

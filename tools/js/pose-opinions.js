@@ -3,7 +3,7 @@
 import { GREATEST_COUNT, GREATEST_WEIGHT, NODES, RATE, SQUASH, STRETCH } from "./entropy.js";
 
 /** Contexts that have an opinion on a decision. */
-export const N_OPINIONS = 4;
+const N_OPINIONS = 4;
 
 /** Decisions on one integer, one after the other: each context, set and second thought has 12. */
 export const N_SLOTS = 12;

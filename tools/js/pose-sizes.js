@@ -8,18 +8,18 @@ import { N_FEATURES } from "./pose-start.js";
 // Features of a channel: magnitudes that are known before its integer is.
 export const BEFORE_1 = 0;
 export const BEFORE_2 = 1;
-export const BEFORE_3 = 2;
-export const GRAND = 3;
+const BEFORE_3 = 2;
+const GRAND = 3;
 export const PARENT = 4;
 export const PARENT_NEXT = 5;
-export const PARENT_LAST = 6;
-export const SIDE_1 = 7;
-export const SIDE_2 = 8;
-export const SIDE_3 = 9;
-export const SIDE_4 = 10;
+const PARENT_LAST = 6;
+const SIDE_1 = 7;
+const SIDE_2 = 8;
+const SIDE_3 = 9;
+const SIDE_4 = 10;
 export const ROW = 11;
-export const ROW_BEFORE = 12;
-export const ROW_PARENT = 13;
+const ROW_BEFORE = 12;
+const ROW_PARENT = 13;
 export const USUAL = 14;
 export const SCALED = 15;
 

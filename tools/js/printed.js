@@ -2,7 +2,7 @@
 
 import { decimals, rounded } from "./decimals.js";
 
-export const SHORT_FIXED = 64;
+const SHORT_FIXED = 64;
 export const SIGNIFICANT = 128;
 export const EXPONENT = 192;
 

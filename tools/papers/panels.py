@@ -97,6 +97,6 @@ def _finish(axes: Any, figure: Panels, title: str) -> None:
     axes.set_title(title, fontsize=10)
     axes.set_xlabel(figure.axes[0], fontsize=9)
     axes.set_ylabel(figure.axes[1], fontsize=9)
-    axes.grid(True, which="both", color="0.9", linewidth=0.6)
+    axes.grid(True, which="both", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.tick_params(which="both", labelsize=8)

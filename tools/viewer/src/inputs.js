@@ -56,7 +56,7 @@ const formatsText = (page) => {
  * @returns {Promise<object>} the entry of `files`
  * @throws {Error} with the name and message of the decoder's
  */
-export async function addFile({ store, engine }, where, { name, url = null, ...options }) {
+async function addFile({ store, engine }, where, { name, url = null, ...options }) {
   const opened = options.salvage
     ? await engine.open(where, { name, ...options })
     : await openedStrictlyOrNot({ store, engine }, where, { name, ...options });

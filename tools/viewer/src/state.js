@@ -16,6 +16,7 @@ export function initial() {
     trails: false,
     contacts: false,
     names: false,
+    neighbors: false,
     follow: false,
     up: null,
     view: { name: "three-quarter" },

@@ -8,7 +8,7 @@ import { serve } from "./helpers/server.js";
 
 let browser, server, page;
 before(async () => {
-  const names = ["walk.mcz", "walk-small.mcz", "markers.mcz", "steps.mcz", "bvh.mcz"];
+  const names = ["walk.mcz", "walk-small.mcz", "markers.mcz", "steps.mcz", "bvh.mcz", "numbered.mcz"];
   server = await serve({ files: names.map((name) => fixture(name)) });
   browser = await launch();
   page = await open(browser, server.url);
@@ -66,6 +66,29 @@ test("the wheel zooms all strips about the pointer; Shift moves; 0 shows all", a
   assert.match(await ruler(), /Frames 1 to 240/);
 });
 
+test("two fingers zoom: each stays on its frame, and nothing is clicked", async () => {
+  const box = await speed().boundingBox();
+  const before = await place();
+  const client = await page.context().newCDPSession(page);
+  const touch = (type, ...xs) =>
+    client.send("Input.dispatchTouchEvent", {
+      type,
+      touchPoints: xs.map((x, id) => ({ x: box.x + x * box.width, y: box.y + 20, id })),
+    });
+  await touch("touchStart", 0.4);
+  await touch("touchStart", 0.4, 0.6);
+  for (const by of [0.1, 0.2, 0.3]) await touch("touchMove", 0.4 - by, 0.6 + by);
+  await touch("touchEnd", 0.1);
+  await touch("touchEnd");
+  await settled(page);
+  const [, from, to] = (await ruler()).match(/Frames (\d+) to (\d+)/).map(Number);
+  assert.ok(Math.abs(from - 91) < 3 && Math.abs(to - 150) < 3, `${from} ${to}`);
+  assert.equal(await place(), before);
+  await speed().focus();
+  await page.keyboard.press("0");
+  await settled(page);
+});
+
 test("keys on a strip go through frames, and what is shown follows", async () => {
   await speed().focus();
   await page.keyboard.press("Home");
@@ -92,6 +115,26 @@ test("more curves: positions, channels; each can be taken away", async () => {
   );
   await page.click("button[aria-label^='Take away: Channels']");
   await page.locator(".strip.curves", { hasText: "Channels" }).waitFor({ state: "detached" });
+});
+
+test("lines between markers that keep their distance, where their names say nothing", async () => {
+  const page = await open(browser, server.url);
+  const box = page.locator("#view-menu >> text=Lines between markers");
+  await page.click("button[aria-label='View']");
+  assert.ok(!(await box.isVisible())); // a skeleton has bones
+  await page.keyboard.press("Escape");
+  await page.locator("#clips .tree-row", { hasText: "numbered.mcz" }).click();
+  await page.waitForFunction(() => /numbered\.mcz/.test(document.title));
+  const nLines = () => page.evaluate(() => mczViewer.stage.shown.body.bones.length);
+  assert.equal(await nLines(), 0);
+  await page.click("button[aria-label='View']");
+  await box.click();
+  await page.waitForFunction(() => mczViewer.stage.shown.body.bones.length > 8);
+  await box.click();
+  await settled(page);
+  assert.equal(await nLines(), 0);
+  assert.deepEqual(page.faults, []);
+  await page.context().close();
 });
 
 // As `mcz.contacts` has them.
@@ -121,6 +164,14 @@ test("contacts of feet are those of mcz.contacts; strip and rings have the same"
     await page.evaluate((at) => mczViewer.store.set({ frame: at }), frame);
     await page.waitForFunction((k) => mczViewer.stage.contacts.mesh.count === k, n);
   }
+  // What is compared has rings, and what is chosen in one is chosen in the other.
+  await page.evaluate(async () => {
+    const { engine, store } = mczViewer;
+    const { fileId, index } = store.get("shown");
+    store.set({ compared: await engine.clip(fileId, index), layout: "side", selection: [4], frame: 40 });
+  });
+  await page.waitForFunction(() => mczViewer.stage.contactsOfOther.mesh.count === 1);
+  assert.deepEqual(await page.evaluate(() => mczViewer.stage.chosenOther()), [4]);
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });

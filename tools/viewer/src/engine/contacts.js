@@ -21,7 +21,7 @@ export function isFoot(name) {
 }
 
 /** The first points of the joints that are parts of feet. */
-export function feetOf({ joints, points }) {
+function feetOf({ joints, points }) {
   const firsts = new Map();
   points.forEach(({ joint }, point) => firsts.has(joint) || firsts.set(joint, point));
   return joints.flatMap(({ name }, joint) =>

@@ -47,6 +47,10 @@ export class Engine {
     return this.#ofClip(clip, this.#call("contacts", [clip.key, wanted]));
   }
 
+  neighbors(clip) {
+    return this.#ofClip(clip, this.#call("neighbors", [clip.key]));
+  }
+
   errors(shown, compared, onProgress) {
     return this.#call("errors", [shown.key, compared.key], onProgress);
   }

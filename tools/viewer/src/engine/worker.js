@@ -13,6 +13,7 @@ import { contactsOf } from "./contacts.js";
 import { curvesOf } from "./curves.js";
 import { errorsBetween } from "./distances.js";
 import { Clips } from "./clips.js";
+import { neighborsOf } from "./neighbors.js";
 import { openFile } from "./open.js";
 
 /** Names of errors, which the build shortens. */
@@ -60,6 +61,8 @@ const METHODS = {
   curves: async (key, wanted) => curvesOf(await clips.get(key), wanted),
 
   contacts: async (key, wanted) => contactsOf(await clips.get(key), wanted),
+
+  neighbors: async (key) => neighborsOf(await clips.get(key)),
 
   errors: async (a, b, progress) => errorsBetween(await clips.get(a), await clips.get(b), progress),
 

@@ -54,7 +54,7 @@ function vector(words, number) {
 }
 
 /** @returns {import("../../../js/skel.js").Skeleton} */
-export function readAsf(text) {
+function readAsf(text) {
   const asf = { section: "", name: "", length: "", angle: "deg", bones: new Map(), links: [] };
   asf.root = { name: "root", dofs: USUAL, axis: [0, 0, 0], order: "XYZ", position: [0, 0, 0] };
   for (const { number, words } of linesOf(text)) {

@@ -21,6 +21,7 @@ const DRAWN = [
   ["trails", "Trails of selected points"],
   ["contacts", "Foot contacts"],
   ["names", "Names"],
+  ["neighbors", "Lines between markers that keep their distance"],
   ["follow", "Follow the figure"],
 ];
 
@@ -82,11 +83,22 @@ function viewMenu({ store }) {
   const boxes = DRAWN.map(([key, text]) => {
     const box = toggle({ text, value: store.get(key), onChange: (on) => store.set({ [key]: on }) });
     store.watch([key], () => box.set(store.get(key)));
+    if (key === "neighbors") showWhereGuessed(store, box.element);
     return box.element;
   });
   store.watch(["colors"], () => colors.set(store.get("colors")));
   put(body, make("div", { class: "grid-2" }, views), colors.element, boxes);
   return element;
+}
+
+/** Shows a box only where a clip has markers whose names say nothing of lines. */
+function showWhereGuessed(store, box) {
+  const place = () => {
+    const { isMarkers, bones } = store.get("shown") ?? {};
+    box.hidden = !isMarkers || bones.length > 0;
+  };
+  store.watch(["shown"], place);
+  place();
 }
 
 function themeMenu(theme) {

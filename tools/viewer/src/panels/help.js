@@ -19,7 +19,7 @@ const GROUPS = [
     "Curves",
     [
       ["← →", "a frame back, on"],
-      ["+ −", "zoom; with the mouse the wheel"],
+      ["+ −", "zoom; with the mouse the wheel, on a touch screen two fingers"],
       ["Shift ← →", "move along"],
       ["0", "all of the clip"],
       ["Enter", "in errors: go to the greatest one"],

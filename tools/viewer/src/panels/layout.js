@@ -8,7 +8,7 @@ const PANELS = [
   ["inspector", "Details", "details"],
   ["curves", "Curves", "curves"],
 ];
-export const NARROW = "(max-width: 45rem)";
+const NARROW = "(max-width: 45rem)";
 const WIDE = "(min-width: 68rem)";
 
 /** `{ place(), toggle(name), show(name) }`; style reads `data-clips` and the like of the body. */

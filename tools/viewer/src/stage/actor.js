@@ -22,6 +22,7 @@ export class Actor {
     this.poses = new Poses(engine, clip, onArrival);
     this.standing = new Standing(engine, clip, onArrival);
     this.samples = [];
+    this.neighbors = null; // lines that were guessed, where they are wanted
     this.body = null;
     this.axes = null;
     this.hasFigure = clip.points.length > 0 && clip.nFrames > 0;
@@ -78,8 +79,30 @@ export class Actor {
 
   build(look) {
     this.body?.dispose();
-    this.body = new Body(this.clip, this.anatomy, this.#fullest(), look);
+    const bones = this.neighbors ?? this.anatomy.bones;
+    this.body = new Body(this.clip, { ...this.anatomy, bones }, this.#fullest(), look);
     return this.body;
+  }
+
+  /** Whether its lines can only be guessed: it has markers whose names say nothing. */
+  get hasNoLines() {
+    return this.clip.isMarkers && this.clip.bones.length === 0;
+  }
+
+  /**
+   * Lines between markers that stay as far apart as they are; without `isWanted` none.
+   *
+   * @returns {Promise<string>} why there are none, where they are wanted
+   */
+  async guessLines(isWanted) {
+    if (!isWanted || !this.hasNoLines) {
+      this.neighbors = null;
+      return "";
+    }
+    this.guess ??= this.engine.neighbors(this.clip);
+    const { lines, why } = await this.guess;
+    this.neighbors = Array.from({ length: lines.length / 2 }, (_, k) => [lines[2 * k], lines[2 * k + 1]]);
+    return why;
   }
 
   /** The sample with the most points. */

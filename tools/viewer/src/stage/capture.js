@@ -30,7 +30,7 @@ export function stagePicture() {
 }
 
 /** The type of film that this browser makes; null: none. */
-export function videoType() {
+function videoType() {
   if (typeof MediaRecorder === "undefined") return null;
   return TYPES.find((type) => MediaRecorder.isTypeSupported(type)) ?? null;
 }

@@ -16,6 +16,15 @@ const MOST = 1200; // pieces of all trails
 const MOST_RINGS = 24;
 const APART = 0.13; // of rings: of points that are nearer one has a ring
 
+const MOST_TRAILS = 8;
+const ENDS = /hand|wrist|foot|toe|ankle|head/i;
+
+/** The points that leave a trail: the chosen ones, else hands and feet. */
+export function trailed({ points }, chosen) {
+  const ends = points.flatMap(({ name }, point) => (ENDS.test(name) ? [point] : []));
+  return (chosen.length > 0 ? chosen : ends).slice(0, MOST_TRAILS);
+}
+
 export class Trails {
   constructor() {
     this.mesh = solids(rodShape(), MOST);

@@ -28,7 +28,7 @@ export class Painter {
     if (compared?.body) {
       const isOver = store.get("layout") === "overlay";
       const colorOf = isOver ? alike(this.colors.ghost) : bySide(compared.clip.points, this.colors);
-      compared.body.paint(colorOf, this.theme, []);
+      compared.body.paint(colorOf, this.theme, this.#stage.chosenOther());
     }
     labels.setScale(null);
   }
@@ -45,7 +45,7 @@ export class Painter {
     const speeds = shown.speeds(frame, new Float32Array(shown.clip.points.length));
     const chosen = page.store.get("selection");
     shown.body.paint(byNumber(speeds, usualSpeed, this.colors.gone), this.theme, chosen);
-    compared?.body?.paint(alike(this.colors.ghost), this.theme, []);
+    compared?.body?.paint(alike(this.colors.ghost), this.theme, this.#stage.chosenOther());
     labels.setScale(["0", `${usualSpeed} ${shown.clip.unitCm === null ? "units/s" : "m/s"}`]);
   }
 
@@ -57,7 +57,8 @@ export class Painter {
     const { ofShown, ofCompared, unit } = pointErrors;
     const chosen = page.store.get("selection");
     shown.body.paint(byNumber(ofShown, most, this.colors.center), this.theme, chosen);
-    compared.body.paint(byNumber(ofCompared, most, this.colors.center), this.theme, []);
+    const others = this.#stage.chosenOther();
+    compared.body.paint(byNumber(ofCompared, most, this.colors.center), this.theme, others);
     labels.setScale(["0", figureText(most / 2), `${most} ${unit}`]);
   }
 }

@@ -43,6 +43,11 @@ export class PointErrors {
     this.most = 0;
   }
 
+  /** The points of the compared clip that are those of the shown one. */
+  others(points) {
+    return this.pairs.flatMap(([i, j]) => (points.includes(i) ? [j] : []));
+  }
+
   /** Measures where both are now. */
   measure() {
     const a = this.shown.places;

@@ -5,7 +5,7 @@ import { Labels, project } from "./labels.js";
 import { gridOf } from "./framing.js";
 import { FIGURE, upOf } from "./axes.js";
 import { themeOf, roundUp } from "./colors.js";
-import { Contacts, Trails } from "./marks.js";
+import { Contacts, Trails, trailed } from "./marks.js";
 import { Painter } from "./painter.js";
 import { PointErrors } from "./painting.js";
 import { listenToPointer } from "./pointer.js";
@@ -56,7 +56,9 @@ class Stage {
     this.painter = new Painter(this);
     this.trails = new Trails();
     this.contacts = new Contacts();
-    this.view.world.scene.add(this.trails.mesh, this.contacts.mesh);
+    this.contactsOfOther = new Contacts();
+    const marks = [this.trails, this.contacts, this.contactsOfOther].map(({ mesh }) => mesh);
+    this.view.world.scene.add(...marks);
     this.view.afterDrawing = () => this.#afterDrawing();
     this.#watchTheme();
     this.#watchStore();
@@ -107,6 +109,7 @@ class Stage {
       if (this.compared?.body) this.#look("fit");
     });
     store.watch(["colors", "errors", "selection"], () => this.painter.paint());
+    store.watch(["neighbors"], () => this.#guessLines([this.shown, this.compared]));
     store.watch(["view"], () => this.#look(store.get("view").name));
     const drawn = [
       "frame",
@@ -156,6 +159,7 @@ class Stage {
     if (actor.hasFigure) {
       this.#settle({ reframes: true, atOnce: true });
       if (actor.samples.length < actor.clip.nFrames) this.#refine(actor);
+      this.#guessLines([actor]);
     }
     const compared = this.page.store.get("compared");
     if (compared !== null) this.#compare(compared);
@@ -194,6 +198,25 @@ class Stage {
     }
     this.compared = actor;
     this.#relook();
+    this.#guessLines([actor]);
+  }
+
+  /** Lines of markers without known names, where they are wanted; they come when they are found. */
+  async #guessLines(actors) {
+    const isWanted = () => this.page.store.get("neighbors");
+    for (const actor of actors) {
+      if (!actor?.hasNoLines || !actor.hasFigure) continue;
+      const text = await actor.guessLines(isWanted()).catch(({ message }) => message);
+      if (actor !== this.shown && actor !== this.compared) continue;
+      if (!isWanted()) actor.neighbors = null;
+      else if (text) this.page.store.set({ message: { text: `No lines: ${text}`, isFault: false } });
+      this.#relook();
+    }
+  }
+
+  /** The points of the compared clip that are chosen: those that the chosen ones are compared with. */
+  chosenOther() {
+    return this.pointErrors?.others(this.page.store.get("selection")) ?? [];
   }
 
   #dropCompared() {
@@ -295,11 +318,21 @@ class Stage {
     const aside = this.#aside();
     const other = aside.map((x) => -x);
     shown.body.move(places, { chosen, gone: this.painter.colors.gone, offset: aside });
-    compared?.body?.move(compared.places, { gone: this.painter.colors.gone, offset: other });
-    this.trails.draw(shown, store.get("trails") ? trailed(store, shown) : [], frame, this.theme);
-    const feet = store.get("contacts") ? shown.standing.at(frame, store.get("up")) : [];
-    this.contacts.draw(shown, feet, { floor: shown.floor, theme: this.theme });
+    const ofOther = { chosen: this.chosenOther(), gone: this.painter.colors.gone, offset: other };
+    compared?.body?.move(compared.places, ofOther);
+    this.trails.draw(shown, store.get("trails") ? trailed(shown.clip, chosen) : [], frame, this.theme);
+    this.#drawContacts(this.contacts, shown, frame);
+    this.#drawContacts(this.contactsOfOther, compared, frame * (this.pointErrors?.step ?? 1));
     for (const { mesh } of [this.trails, this.contacts]) mesh.position.set(...aside);
+    this.contactsOfOther.mesh.position.set(...other);
+  }
+
+  /** Rings on the one floor where the feet of an actor stand; none of no actor. */
+  #drawContacts(rings, actor, frame) {
+    const { store } = this.page;
+    const isWanted = store.get("contacts") && actor?.body;
+    const feet = isWanted ? actor.standing.at(frame, store.get("up")) : [];
+    rings.draw(actor ?? this.shown, feet, { floor: this.shown.floor, theme: this.theme });
   }
 
   /** How far the figure that is shown stands aside; the other one stands as far on the other side. */
@@ -379,18 +412,6 @@ class Stage {
     const out = new Float32Array(places.length);
     return project(places, this.view.eye.camera, { width, height, offset: this.#aside() }, out);
   }
-}
-
-const MOST_TRAILS = 8;
-const ENDS = /hand|wrist|foot|toe|ankle|head/i;
-
-/** The points that leave a trail: the chosen ones, else hands and feet. */
-function trailed(store, { clip }) {
-  const chosen = store.get("selection");
-  if (chosen.length > 0) return chosen.slice(0, MOST_TRAILS);
-  return clip.points
-    .flatMap(({ name }, point) => (ENDS.test(name) ? [point] : []))
-    .slice(0, MOST_TRAILS);
 }
 
 function whyNoFigure({ nFrames, name }) {

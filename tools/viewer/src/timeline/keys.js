@@ -101,7 +101,7 @@ export function go(store, frame) {
   return true;
 }
 
-export function nextSpeed(speed, step) {
+function nextSpeed(speed, step) {
   const at = SPEEDS.findIndex((one) => one >= speed);
   return SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, at + step))];
 }

@@ -77,7 +77,7 @@ function showPlace(store, scrub, place) {
 }
 
 /** "12 / 343 · 0.10 s"; frames are numbered as the file does. */
-export function placeText({ nFrames, firstFrame = 1, rate }, frame) {
+function placeText({ nFrames, firstFrame = 1, rate }, frame) {
   const number = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
   const first = Number.isSafeInteger(firstFrame) ? firstFrame : 1;
   const seconds = frame / rateOf({ rate });

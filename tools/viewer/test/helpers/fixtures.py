@@ -62,6 +62,9 @@ def main(folder: Path, is_all: bool) -> None:
     for name, data in sample_files().items():
         (folder / name).write_bytes(data)
     mcz.encode(folder / "walk.c3d", folder / "markers.mcz")
+    markers = mcz.read(folder / "walk.c3d")
+    numbered = with_names(markers, [f"M{k:03}" for k in range(len(markers.skeleton.joints))])
+    mcz.write(replace(numbered, source=None), folder / "numbered.mcz")
     mcz.encode(folder / "walk.bvh", folder / "bvh.mcz")
     mcz.encode(folder / "walk.bvh", folder / "bvh-small.mcz", codec="mrdwt", params={"T_g": 2.0})
     mcz.write(replace(motion, frame_rate=Fraction(60)), folder / "steps.mcz")

@@ -1,6 +1,6 @@
 // What all strips have: a name with the value of a frame, a canvas, keys, and time below the pointer.
 
-import { inNextPicture, make, put } from "../../ui/dom.js";
+import { inNextPicture, make } from "../../ui/dom.js";
 import { sized } from "../../ui/canvas.js";
 import { count, frameNumber } from "../../ui/text.js";
 import { moved, zoomed } from "./window.js";
@@ -67,16 +67,31 @@ export class Row {
     canvas.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     canvas.addEventListener("keydown", (event) => this.#key(event));
     canvas.addEventListener("pointermove", (event) => {
-      if (!this.pressed) shared.hover(this.frameAt(event.offsetX));
+      if (this.#pinch(event)) this.pressed = null;
+      else if (!this.pressed) shared.hover(this.frameAt(event.offsetX));
       else this.#drag(event);
     });
     canvas.addEventListener("pointerleave", () => shared.hover(null));
     canvas.addEventListener("pointerdown", (event) => {
+      if (event.pointerType === "touch") {
+        shared.pinch.press(event.pointerId, event.offsetX, (x) => this.frameAt(x));
+      }
       this.pressed = { x: event.offsetX, window: shared.window(), isPan: event.shiftKey || event.button === 1, isClick: true };
       canvas.setPointerCapture(event.pointerId);
     });
     canvas.addEventListener("pointerup", (event) => this.#release(event));
-    canvas.addEventListener("pointercancel", () => (this.pressed = null));
+    canvas.addEventListener("pointercancel", ({ pointerId }) => {
+      shared.pinch.release(pointerId);
+      this.pressed = null;
+    });
+  }
+
+  /** Zooms by two fingers; whether the pointer is one of two. */
+  #pinch({ pointerId, offsetX }) {
+    const { pinch } = this.shared;
+    const window = pinch.move(pointerId, offsetX, this.canvas.clientWidth, this.shared.nFrames());
+    if (window !== null) this.shared.setWindow(window);
+    return pinch.has(pointerId);
   }
 
   #drag({ offsetX }) {
@@ -89,8 +104,10 @@ export class Row {
     } else this.shared.goTo(this.frameAt(offsetX));
   }
 
-  #release({ offsetX }) {
-    const wasClick = this.pressed?.isClick;
+  #release({ pointerId, offsetX }) {
+    const { pinch } = this.shared;
+    const wasClick = this.pressed?.isClick && !pinch.has(pointerId);
+    pinch.release(pointerId);
     this.pressed = null;
     if (!wasClick) return;
     const frame = this.frameAt(offsetX);

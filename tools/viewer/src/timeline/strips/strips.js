@@ -8,6 +8,7 @@ import { CurveStrip } from "./curve-strip.js";
 import { ErrorStrip } from "./error-strip.js";
 import { MarksStrip } from "./marks-strip.js";
 import { paintRuler } from "./paint.js";
+import { Pinch } from "./pinch.js";
 import { Row } from "./row.js";
 import { sourcesOf } from "./sources.js";
 import { clamped, moved } from "./window.js";
@@ -28,6 +29,7 @@ class Strips {
 
   constructor(element, page) {
     this.page = page;
+    this.pinch = new Pinch();
     this.list = make("div", { class: "strip-list" });
     this.playhead = make("div", { class: "playhead", "aria-hidden": "true" });
     this.menu = popover({ label: "Curves to show", shown: "Curves", icon: "curves", id: "curves-menu" });

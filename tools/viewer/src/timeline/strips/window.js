@@ -1,6 +1,7 @@
 // The part of the clip's time that strips show: frames from <= f < to, of one clip.
 
 const LEAST = 4; // frames
+const NEAR = 24; // pixels: fingers do not come nearer to each other
 
 /** The window of `nFrames` frames that is nearest to the wished one. */
 export function clamped(from, to, nFrames) {
@@ -15,6 +16,19 @@ export function zoomed({ from, to }, factor, about, nFrames) {
   const share = (about - from) / (to - from);
   const start = about - share * length;
   return clamped(start, start + length, nFrames);
+}
+
+/**
+ * The window in which two frames are below two fingers.
+ *
+ * @param {number[]} frames @param {number[]} xs of the fingers, in pixels of `width`
+ */
+export function pinched([a, b], [x, y], width, nFrames) {
+  const between = Math.max(NEAR, Math.abs(y - x)); // fingers that cross go on as they were
+  const each = Math.abs(b - a) / between; // frames a pixel
+  const middle = (a + b) / 2;
+  const from = middle - ((x + y) / 2) * each;
+  return clamped(from, from + width * each, nFrames);
 }
 
 export const moved = ({ from, to }, by, nFrames) => clamped(from + by, to + by, nFrames);

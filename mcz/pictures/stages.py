@@ -10,8 +10,8 @@ from mcz.kinematics.chain import Floats
 from mcz.pictures.bodies import LEFT, RIGHT, known_places
 from mcz.pictures.cameras import Camera, Viewport, axes_of, framed
 from mcz.pictures.canvases import Drawing, Word
+from mcz.pictures.capsules import Shapes, add_figure, add_shadow, pieces_of
 from mcz.pictures.floors import floor_lines, length_text, square_of
-from mcz.pictures.solids import Shapes, add_figure, add_shadow, pieces_of
 from mcz.pictures.themes import Theme
 from mcz.pictures.tracks import Track
 
@@ -22,7 +22,7 @@ ROOM = 0.10  # of its size, left free around the figure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class Stage:
     """How the frames of a track are looked at; ``targets`` (n_frames, 3), where, or None: one."""
 
     track: Track
@@ -52,7 +52,7 @@ class Scene:
         return f"grid {length_text(self.square, self.track.unit)}"
 
 
-def scene_of(
+def stage_of(
     track: Track,
     theme: Theme,
     view: str,
@@ -60,7 +60,7 @@ def scene_of(
     follow: bool | None,
     rate: float,
     around: float = AROUND,
-) -> Scene:
+) -> Stage:
     """How to look at a track, so that all of it is seen; ``rate`` its frames a second,
     ``around`` how far the floor reaches, of the figure's size.
 
@@ -82,7 +82,7 @@ def scene_of(
     else:
         camera_targets, reach = None, travel / 2 + around * track.size
     square = square_of(track.size, float(reach.max()))
-    return Scene(track, theme, camera, camera_targets, reach, square)
+    return Stage(track, theme, camera, camera_targets, reach, square)
 
 
 def steadied(centers: Floats, rate: float) -> Floats:
@@ -121,25 +121,25 @@ def _box(track: Track, axes: Floats, targets: Floats | None) -> tuple[Floats, Fl
     return low, high
 
 
-def words_around(scene: Scene, width: int, height: int, title: str, when: str) -> list[Word]:
+def words_around(stage: Stage, width: int, height: int, title: str, when: str) -> list[Word]:
     """What is written around a picture."""
-    theme, letter = scene.theme, max(9.0, min(15.0, height / 42))
+    theme, letter = stage.theme, max(9.0, min(15.0, height / 42))
     edge = 0.9 * letter
     top, bottom = height - edge - letter, edge
     fits = max(4, int((width - 2 * edge) / (0.66 * letter)) - len(when) - 2)
     words = [
         Word(edge, top, shortened(title, fits), theme.ink, letter, bold=True),
         Word(width - edge, top, when, theme.quiet, letter, "right"),
-        Word(width - edge, bottom, scene.grid_text, theme.quiet, letter, "right"),
+        Word(width - edge, bottom, stage.grid_text, theme.quiet, letter, "right"),
     ]
     x = edge
-    sides = scene.track.body.sides[scene.track.body.shown]
+    sides = stage.track.body.sides[stage.track.body.shown]
     if (sides == LEFT).any() and (sides == RIGHT).any():
         for text, color in (("left", theme.left), ("right", theme.right)):
             words.append(Word(x, bottom, f"\u25cf {text}", color, letter))
             x += (len(text) + 2.4) * 0.66 * letter
-    if scene.track.up_assumed:
-        words.append(Word(x, bottom, f"{scene.track.up} up assumed", theme.quiet, letter))
+    if stage.track.up_assumed:
+        words.append(Word(x, bottom, f"{stage.track.up} up assumed", theme.quiet, letter))
     return words
 
 
@@ -151,9 +151,9 @@ def shortened(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
-def drawing_of(scene: Scene, number: int, nodes: Floats, words: list[Word]) -> Drawing:
+def drawing_of(stage: Stage, number: int, nodes: Floats, words: list[Word]) -> Drawing:
     """The picture of one frame."""
-    camera = scene.camera_of(number)
+    camera = stage.camera_of(number)
     shadows, figures = Shapes(), Shapes()
-    scene.add(shadows, figures, camera, nodes)
-    return Drawing(scene.floor(camera), shadows.arrays(), figures.arrays(), words)
+    stage.add(shadows, figures, camera, nodes)
+    return Drawing(stage.floor(camera), shadows.arrays(), figures.arrays(), words)

@@ -23,7 +23,6 @@ h2 { font-size: 1.1rem; margin: 2.5rem 0 .5rem; overflow-wrap: anywhere; }
 p, li, figcaption { color: var(--quiet); max-width: 60rem; overflow-wrap: anywhere; }
 figure { margin: 1rem 0; }
 img { max-width: 100%; height: auto; display: block; border-radius: .4rem; }
-img.card { background: #fff; padding: .5rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .85rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .2rem .7rem; border-bottom: 1px solid var(--line); text-align: left;
@@ -49,7 +48,7 @@ class Sheet:
 
 
 @dataclass(frozen=True, slots=True)
-class Page:
+class ChartPage:
     """Pictures and tables, one below the other."""
 
     title: str
@@ -57,13 +56,10 @@ class Page:
     parts: list[str] = field(default_factory=list)
     headings: list[str] = field(default_factory=list)
 
-    def add_picture(self, name: str, light: str, dark: str | None = None) -> None:
-        """A picture as a data: URI, and how it looks on dark ground."""
-        source, kind = "", ' class="card"'
-        if dark is not None:
-            source = f'<source media="(prefers-color-scheme: dark)" srcset="{_text(dark)}">'
-            kind = ""
-        image = f'<img{kind} src="{_text(light)}" alt="{_text(name)}">'
+    def add_picture(self, name: str, light: str, dark: str) -> None:
+        """A picture on light and on dark ground, each as a data: URI."""
+        source = f'<source media="(prefers-color-scheme: dark)" srcset="{_text(dark)}">'
+        image = f'<img src="{_text(light)}" alt="{_text(name)}">'
         self.parts.append(f"<figure><picture>{source}{image}</picture></figure>")
 
     def add_table(self, table: Sheet) -> None:
@@ -85,33 +81,32 @@ class Page:
         self.headings.append(text)
         self.parts.append(f'<h2 id="part{len(self.headings)}">{_text(text)}</h2>')
 
+    def html(self) -> bytes:
+        """The page as UTF-8."""
+        style = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode("ascii")
+        policy = POLICY.format(style=f"sha256-{style}")
+        notes = "".join(f"<li>{_text(note)}</li>" for note in self.notes)
+        listed = f"<ul>{notes}</ul>" if notes else ""
+        contents = ""
+        if len(self.headings) > 3:
+            links = (
+                f'<li><a href="#part{number}">{_text(text)}</a></li>'
+                for number, text in enumerate(self.headings, 1)
+            )
+            contents = f'<nav aria-label="Contents"><ul>{"".join(links)}</ul></nav>'
+        body = "\n".join(self.parts)
+        return (
+            '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+            '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+            f"<title>{_text(self.title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
+            f"<h1>{_text(self.title)}</h1>\n{listed}{contents}\n{body}\n</main>\n</body>\n</html>\n"
+        ).encode("utf-8", "backslashreplace")
+
 
 def data_uri(data: bytes, kind: str) -> str:
     """A picture, "png" or "svg+xml", as the page holds it."""
     return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
-
-
-def page(content: Page) -> bytes:
-    """The page as UTF-8."""
-    style = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode("ascii")
-    policy = POLICY.format(style=f"sha256-{style}")
-    notes = "".join(f"<li>{_text(note)}</li>" for note in content.notes)
-    listed = f"<ul>{notes}</ul>" if notes else ""
-    contents = ""
-    if len(content.headings) > 3:
-        links = (
-            f'<li><a href="#part{number}">{_text(text)}</a></li>'
-            for number, text in enumerate(content.headings, 1)
-        )
-        contents = f'<nav aria-label="Contents"><ul>{"".join(links)}</ul></nav>'
-    body = "\n".join(content.parts)
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{_text(content.title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
-        f"<h1>{_text(content.title)}</h1>\n{listed}{contents}\n{body}\n</main>\n</body>\n</html>\n"
-    ).encode("utf-8", "backslashreplace")
 
 
 def _cells(row: Sequence[str], sides: str, tag: str) -> str:
