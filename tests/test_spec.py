@@ -167,7 +167,7 @@ def test_ids_end_their_sentences_and_lines_are_short() -> None:
     assert [end for end in ends if end[0] not in ".:;" and end != " |"] == []
     long = [line for line in TEXT.splitlines() if len(line) > 110]
     assert all(line.startswith("|") for line in long)
-    assert len(long) <= 26  # rows with hashes, and rows of the registry
+    assert len(long) <= 27  # rows with hashes, and rows of the registry
 
 
 def test_contents_lead_to_all_headings() -> None:
