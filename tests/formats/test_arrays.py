@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import pickle
 import struct
 import zipfile
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
 from mcz.errors import MotionError, OptionError, SourceError
 from mcz.formats import FORMATS, sniffed
 from mcz.formats.arrays.kinds import KINDS
@@ -389,3 +393,36 @@ def test_a_motion_of_another_source_is_no_array_file() -> None:
 def test_real_arrays() -> None:
     for path in sorted((Path(os.environ["MCZ_DATA"]) / "other" / "humanml3d").glob("*.npy")):
         back(path.read_bytes(), "npy")
+
+
+def test_commands_say_what_is_read_and_what_is_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, held, again = (str(tmp_path / name) for name in ("a.npz", "a.mcz", "b.npz"))
+    points = np.asfortranarray(floats(9, 4, 3))
+    deflated = Member("old.npy", zlib.compress(b"anything")[2:-4], method=8, size=8)
+    members = [
+        Member("points.npy", npy(points, by_columns=True)),
+        Member("betas.npy", npy(floats(10))),
+        Member("steps.npy", npy(np.arange(9).astype(">i4"))),
+    ]
+    Path(path).write_bytes(npz([*members, deflated]))
+    assert run(cli, "mcz", ["encode", path, "--arrays", "positions", "--unit", "cm"]) == 0
+    assert "old is deflated, and stays so" in capsys.readouterr().err
+    assert run(cli, "mcz", ["decode", held, "-o", again]) == 0
+    assert Path(again).read_bytes() == Path(path).read_bytes()
+    capsys.readouterr()
+    for file in (held, path):
+        assert run(cli, "mcz", ["info", file]) == 0
+        said = capsys.readouterr().out
+        assert "  array      points: 12 columns of <f8, by columns, in motion\n" in said
+        assert "  array      steps: 1 column of >i4, in steps\n" in said
+        assert "  kept       as bytes: betas, old\n" in said
+    assert run(cli, "mcz", ["info", "--json", held]) == 0
+    (clip,) = json.loads(capsys.readouterr().out)["clips"]
+    assert clip["arrays"][3] == {
+        "name": "old", "type": None, "order": None, "columns": None, "signal": None
+    }  # fmt: skip
+    assert [array["name"] for array in clip["arrays"]] == ["points", "betas", "steps", "old"]
+    assert run(cli, "mcz", ["encode", path, "--arrays", "quaternions-wxyz", "--force"]) == 1
+    assert "4 numbers a joint, but there are 3" in capsys.readouterr().err
