@@ -152,6 +152,11 @@ def test_every_bit_flip_and_prefix(data: bytes) -> None:
 def test_blanks_of_a_head_end_where_the_numbers_begin() -> None:
     head = b"\x93NUMPY\1\0\x40\0{'descr': '|u1', 'fortran_order': False, 'shape': (2, 2)}"
     back(head.ljust(74) + b"    ", "npy")
+    for shape in (b"02, 2)}", b"2" * 19 + b", 2)}", b"1," * 65 + b")}"):
+        odd = (head[: head.index(b"2, 2)")] + shape).ljust(74 + len(shape))
+        size = (len(odd) - 10).to_bytes(2, "little")
+        with pytest.raises(SourceError, match="a shape of"):
+            FORMATS["npy"].read(odd[:8] + size + odd[10:] + b"    ")
 
 
 def test_a_zip_that_was_written_forward() -> None:

@@ -11,6 +11,8 @@ from mcz.formats.arrays.layout import TYPES
 
 MAGIC = b"\x93NUMPY"
 MAX_HEAD = 2**16  # bytes; NumPy itself takes no more than 10,000 that nobody vouches for
+MAX_AXES = 64  # those of NumPy
+_PLAIN = re.compile(rb"0|[1-9]\d{0,17}")
 _DESCR = re.compile(rb"""["']descr["']\s*:\s*["']([<>|=]?)([A-Za-z])(\d*)["']""")
 _ORDER = re.compile(rb"""["']fortran_order["']\s*:\s*(True|False)\b""")
 _SHAPE = re.compile(rb"""["']shape["']\s*:\s*\(\s*((?:\d+\s*,\s*)*(?:\d+\s*)?)\)""")
@@ -66,7 +68,10 @@ def _parsed(text: bytes, at: int, stop: int) -> Head:
     descr, order, shape = found
     if descr is None or order is None or shape is None:
         return Head(odd=f"offset {at}: a head without a plain descr, fortran_order and shape")
-    lengths = tuple(int(n) for n in re.findall(rb"\d{1,18}", shape[1]))
+    numbers = re.findall(rb"\d+", shape[1])
+    if len(numbers) > MAX_AXES or not all(map(_PLAIN.fullmatch, numbers)):
+        return Head(odd=f"offset {at + shape.start(1)}: a shape of {shape[1][:60]!r}")
+    lengths = tuple(map(int, numbers))
     code = (descr[2] + descr[3]).decode()
     first = re.match(rb"\d+", shape[1])
     rows_at = (0, 0)
