@@ -315,6 +315,14 @@ def test_a_body_is_a_tree_of_joints(n_joints: int, name: str) -> None:
     )
 
 
+def test_bones_without_a_length_have_no_errors_in_cm() -> None:
+    motion = FORMATS["npz"].read(saved(poses=BODY[:, :72], trans=BODY[:, :3]), "body")
+    for codec, params in (("mrdwt", {"mean_error_cm": 1.0}), ("lsdt-clip", {}), ("posewave", {})):
+        with pytest.raises(OptionError, match="no bone has a length"):
+            mcz.write(motion, io.BytesIO(), codec, **params)
+    mcz.write(motion, io.BytesIO(), "mrdwt")
+
+
 def test_parts_of_a_body() -> None:
     trans = floats(5, 3, seed=2)
     parts = {"root_orient": BODY[:, :3], "pose_body": BODY[:, 3:66]}
