@@ -95,6 +95,11 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "AMC-05": ("invalid/sources/notes-text-*",),
     "AMC-06": ("valid/sources/bvh-*", "valid/sources/amc*"),
     "C3D-05": ("invalid/sources/c3d-template-*-many",),
+    "ARRAY-01": ("invalid/sources/arrays-kind",),  # without it our decoder ends with a bug
+    "ARRAY-02": ("invalid/sources/arrays-type",),
+    "ARRAY-09": ("invalid/sources/arrays-signal*",),
+    "ARRAY-10": ("invalid/sources/arrays-channel",),
+    "ARRAY-11": ("invalid/sources/arrays-count",),
     "C3D-12": ("invalid/sources/c3d-detail-values-*",),
     "C3D-14": ("invalid/sources/c3d-signals-*", "invalid/sources/c3d-outputs-*"),
     "C3D-17": ("invalid/sources/c3d-outputs-run-of-none-last",),

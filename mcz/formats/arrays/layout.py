@@ -125,24 +125,24 @@ def parse_arrays(template: bytes, detail: bytes) -> tuple[Piece, ...]:
     limits = {"runs": MAX_RUNS}  # ARRAY-17
     fields = parse(ARRAY_TEMPLATE, template, "source template", limits).pieces
     parts = list(parse(ARRAY_DETAIL, detail, "source detail").parts)
-    wanted = sum(entry.kind == Kind.OWN for entry in fields)
+    wanted = sum(row.kind == Kind.OWN for row in fields)
     if wanted != len(parts):  # ARRAY-05
         raise FormatError(f"source detail: {len(parts)} parts, but {wanted} pieces are its own")
     own = iter(parts)
     return tuple(
         Piece(
-            Kind(entry.kind),
-            next(own) if entry.kind == Kind.OWN else entry.text or b"",
-            entry.signal or 0,
-            entry.after or b"",
-            entry.size or 0,
-            entry.type or 0,
-            entry.flags or 0,
-            tuple((run.channel, run.n_channels) for run in entry.runs or ()),
-            entry.start or 0,
-            entry.stop or 0,
+            Kind(row.kind),
+            next(own) if row.kind == Kind.OWN else row.text or b"",
+            row.signal or 0,
+            row.after or b"",
+            row.size or 0,
+            row.type or 0,
+            row.flags or 0,
+            tuple((run.channel, run.n_channels) for run in row.runs or ()),
+            row.start or 0,
+            row.stop or 0,
         )
-        for entry in fields
+        for row in fields
     )
 
 

@@ -39,7 +39,7 @@ def restore_arrays(motion: Motion) -> bytes:
     sizes = [_size(piece, signals) for piece in pieces]
     starts = [0, *accumulate(sizes)]
     most = max(SIZE_LIMIT, SIZE_PER_VALUE * sum(signal.values.size for signal in signals))
-    if starts[-1] > most:  # LIMIT-12
+    if starts[-1] > most:
         raise LimitError(f"source template: a file of {starts[-1]} bytes, limit {most}")
     n_columns = sum(piece.n_columns for piece in pieces)
     if n_columns > MAX_COLUMNS:
