@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING, Any
 from mcz import version as _version
 
 if TYPE_CHECKING:
+    from mcz.adapters.c3d import from_c3d, to_c3d
+    from mcz.adapters.ezc3d import from_ezc3d, to_ezc3d
+    from mcz.adapters.movement import from_movement, to_movement
+    from mcz.adapters.pybvh import from_pybvh, to_pybvh
+    from mcz.adapters.rerun import to_rerun
     from mcz.bags import BagCheck, bag, check_bag
-    from mcz.conversion import Fit, convert, from_positions
+    from mcz.conversion import Fit, convert, from_positions, left_out
     from mcz.conversion.scenes import SceneFile, to_glb, to_usda
     from mcz.datasets import Dataset, Window, dataset
     from mcz.editing.archive import append, pack
@@ -46,6 +51,8 @@ if TYPE_CHECKING:
         UnsupportedError,
         WorkerError,
     )
+    from mcz.formats.body_models import offsets_from_positions, offsets_of_model
+    from mcz.formats.body_trees import body_skeleton
     from mcz.kinematics.contacts import Contact, Contacts, contacts
     from mcz.kinematics.marker_motion import in_positions
     from mcz.kinematics.rest import rest_positions
@@ -77,6 +84,7 @@ if TYPE_CHECKING:
     from mcz.reading.source_files import read_skeleton
     from mcz.retargeting.joint_maps import joint_map
     from mcz.retargeting.mirroring import mirror
+    from mcz.retargeting.offsets import with_offsets
     from mcz.retargeting.renaming import rename
     from mcz.retargeting.retargeting import retarget
     from mcz.retargeting.selection import select
@@ -88,6 +96,11 @@ if TYPE_CHECKING:
 __version__ = _version.VERSION
 
 _HOMES = {
+    "mcz.adapters.c3d": ("from_c3d", "to_c3d"),
+    "mcz.adapters.ezc3d": ("from_ezc3d", "to_ezc3d"),
+    "mcz.adapters.movement": ("from_movement", "to_movement"),
+    "mcz.adapters.pybvh": ("from_pybvh", "to_pybvh"),
+    "mcz.adapters.rerun": ("to_rerun",),
     "mcz.bags": ("BagCheck", "bag", "check_bag"),
     "mcz.editing.describing": ("set_metadata", "set_rate"),
     "mcz.editing.exporting": ("export",),
@@ -101,7 +114,7 @@ _HOMES = {
     "mcz.editing.outcomes": ("Outcome", "Report"),
     "mcz.reading.clip": ("Clip",),
     "mcz.live.concealment": ("LiveFrame",),
-    "mcz.conversion": ("Fit", "convert", "from_positions"),
+    "mcz.conversion": ("Fit", "convert", "from_positions", "left_out"),
     "mcz.conversion.scenes": ("SceneFile", "to_glb", "to_usda"),
     "mcz.editing.protected": ("protect",),
     "mcz.editing.protecting": ("Protection",),
@@ -152,8 +165,11 @@ _HOMES = {
     "mcz.motion": ("Channel", "Exceptions", "Joint", "Motion", "Signal", "Skeleton", "Source"),
     "mcz.reading.source_files": ("read_skeleton",),
     "mcz.kinematics.rest": ("rest_positions",),
+    "mcz.formats.body_models": ("offsets_from_positions", "offsets_of_model"),
+    "mcz.formats.body_trees": ("body_skeleton",),
     "mcz.retargeting.joint_maps": ("joint_map",),
     "mcz.retargeting.mirroring": ("mirror",),
+    "mcz.retargeting.offsets": ("with_offsets",),
     "mcz.retargeting.renaming": ("rename",),
     "mcz.retargeting.retargeting": ("retarget",),
     "mcz.retargeting.selection": ("select",),
@@ -220,6 +236,7 @@ __all__ = [
     "accelerations",
     "append",
     "bag",
+    "body_skeleton",
     "check_bag",
     "compare",
     "contacts",
@@ -229,12 +246,19 @@ __all__ = [
     "encode",
     "export",
     "extract",
+    "from_c3d",
+    "from_ezc3d",
+    "from_movement",
     "from_positions",
+    "from_pybvh",
     "in_positions",
     "joint_map",
+    "left_out",
     "live_frames",
     "merge",
     "mirror",
+    "offsets_from_positions",
+    "offsets_of_model",
     "open",
     "pack",
     "plot",
@@ -262,15 +286,21 @@ __all__ = [
     "split",
     "stream_decode",
     "stream_encode",
+    "to_c3d",
+    "to_ezc3d",
     "to_glb",
+    "to_movement",
     "to_npz",
     "to_pandas",
+    "to_pybvh",
+    "to_rerun",
     "to_usda",
     "to_xarray",
     "unpack",
     "velocities",
     "verify",
     "view",
+    "with_offsets",
     "write",
 ]
 

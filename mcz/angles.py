@@ -1,4 +1,4 @@
-"""Rotation channels along time: whole turns between neighboring rows taken out.
+"""What turns, along time: whole turns between neighboring rows taken out.
 
 SPEC.md, "Unwrapping", is normative. An ``Unwrapper`` goes through a signal block by block; the
 result does not depend on where the blocks end.
@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.motion import ROTATION_KINDS, Channel, Skeleton
+from mcz.whole_turns import Columns, SignKeeper, VectorFollower, quaternions_of, vectors_of
 
 FULL_TURN = {"deg": 360.0, "rad": 2 * math.pi}
 # A value of this magnitude or more takes no part. Below it every count of turns, and its product
@@ -39,7 +41,8 @@ def turns(steps: NDArray[np.float64], full: float) -> NDArray[np.float64]:
 class Unwrapper:
     """Takes whole turns out of the rotation channels of a signal, given block after block.
 
-    Where the skeleton's angle unit is unknown nothing is done: a turn has no known size.
+    Rotation vectors and quaternions follow each other, too, by what turns as they do. Where the
+    skeleton's angle unit is unknown nothing is done to angles: a turn has no known size.
     """
 
     def __init__(self, skeleton: Skeleton, channels: Sequence[Channel] | None = None) -> None:
@@ -49,10 +52,24 @@ class Unwrapper:
         self._last = np.zeros(len(self._columns))  # the last value that took part
         self._begun = np.zeros(len(self._columns), np.bool_)  # whether there was one
         self._turns = np.zeros(len(self._columns))
+        joints = skeleton if channels is None else Skeleton(())
+        self._followers: list[tuple[Columns, VectorFollower | SignKeeper]] = []
+        if self._full is not None:
+            self._followers += [(c, VectorFollower(self._full)) for c in vectors_of(joints)]
+        self._followers += [(c, SignKeeper()) for c in quaternions_of(joints)]
+
+    def __copy__(self) -> Unwrapper:
+        """One that goes on by itself from the same row."""
+        made = object.__new__(Unwrapper)
+        made.__dict__.update(self.__dict__)
+        made._followers = [(columns, copy(follow)) for columns, follow in self._followers]
+        return made
 
     def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The next rows, (n_rows, n_channels), as a new array; values that are NaN stay NaN."""
         out = np.array(values, dtype=np.float64)
+        for columns, follow in self._followers:
+            out[:, columns] = follow(out[:, columns])
         if self._full is None or not out.size or not len(self._columns):
             return out
         block = out[:, self._columns]

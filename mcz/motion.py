@@ -28,6 +28,7 @@ from mcz.skeleton import ORIGIN as ORIGIN
 from mcz.skeleton import POSITION_KINDS as POSITION_KINDS
 from mcz.skeleton import QUATERNION_KINDS as QUATERNION_KINDS
 from mcz.skeleton import ROTATION_KINDS as ROTATION_KINDS
+from mcz.skeleton import TURNING_KINDS as TURNING_KINDS
 from mcz.skeleton import VECTOR_KINDS as VECTOR_KINDS
 from mcz.skeleton import Channel as Channel
 from mcz.skeleton import Joint as Joint

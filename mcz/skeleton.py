@@ -24,6 +24,7 @@ ROTATION_KINDS = ("rx", "ry", "rz")
 QUATERNION_KINDS = ("qw", "qx", "qy", "qz")
 VECTOR_KINDS = ("vx", "vy", "vz")  # of a rotation vector: an axis times an angle
 ANGLE_KINDS = (*ROTATION_KINDS, *VECTOR_KINDS)  # whose numbers are angles
+TURNING_KINDS = (*ROTATION_KINDS, *QUATERNION_KINDS, *VECTOR_KINDS)
 CHANNEL_KINDS = (
     *POSITION_KINDS,
     *ROTATION_KINDS,
@@ -196,6 +197,19 @@ class Skeleton:
         if isinstance(joint, (int, np.integer)) and 0 <= joint < self.n_joints:
             return int(joint)
         raise MotionError(f"no joint {joint!r} among {brief.among(self.addresses(), joint)}")
+
+
+def first_columns(
+    channels: Sequence[Channel], kinds: tuple[str, ...], start: int = 0
+) -> tuple[int, ...]:
+    """The columns of kinds that turn a joint together, () where one of them is missing.
+
+    Of each kind it is the first channel; ``start`` is the column of the joint's first.
+    """
+    own = [channel.kind for channel in channels]
+    if not set(kinds) <= set(own):
+        return ()
+    return tuple(start + own.index(kind) for kind in kinds)
 
 
 Chosen = Sequence[int | str] | int | str

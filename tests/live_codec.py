@@ -37,6 +37,7 @@ def _unpacked(stream, n_frames, n_channels):
 
 class Encoder:
     models = ()
+    version: int | None = None
     header = HEADER
 
     def __init__(self, layout, options):

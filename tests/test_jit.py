@@ -306,12 +306,16 @@ def test_without_a_compiler_loops_are_interpreted(
 ) -> None:
     module = load("@kernel\ndef double(a: int) -> int:\n    return 2 * a\n")
     monkeypatch.setitem(sys.modules, "llvmlite.binding", None)
-    calling._has_compiler.cache_clear()
+    calling.missing_compiler.cache_clear()
+    calling._warn.cache_clear()
     try:
-        with pytest.warns(RuntimeWarning, match="plain Python"):
-            assert module.double(21) == 42
+        with pytest.warns(RuntimeWarning, match="plain Python") as said:
+            assert (module.double(21), module.double(22)) == (42, 44)
+        assert len(said) == 1
+        assert jit.lacks_compiler()
     finally:
-        calling._has_compiler.cache_clear()
+        calling.missing_compiler.cache_clear()
+        calling._warn.cache_clear()
 
 
 # What is kept.

@@ -213,8 +213,9 @@ def test_resampled_turns_are_slerps(skeleton: Skeleton, rate: Fraction | int) ->
         kinds = [channel.kind for channel in joint.channels]
         axes = [kind for kind in kinds if kind in ("rx", "ry", "rz")]
         alone = len(axes) == 3 == len(set(axes)) or len(axes) == 1
-        if set("qw qx qy qz".split()) <= set(kinds):
-            alone = not axes
+        whole = [part for part in ("qw qx qy qz", "vx vy vz") if set(part.split()) <= set(kinds)]
+        if whole:
+            alone = not axes and len(whole) == 1
         if alone and "length" not in kinds:
             slerp = Slerp(np.arange(6) / 100, Rotation.from_matrix(before[:, number]))
             wanted = slerp(np.minimum(times, 0.05)).as_matrix()

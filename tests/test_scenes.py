@@ -257,7 +257,7 @@ def test_decode_says_what_it_reached(call: Call) -> None:
     code, out, _ = call("decode", "bvh.mcz", "--to", "glb", "--frames", "9:19", "--json")
     scene = json.loads(out)["scene"]
     assert code == 0 and scene["max_error"] <= scene["key_error"]
-    assert scene["n_values"] == 10 * 32 and len(scene["notes"]) == 2
+    assert scene["n_values"] == 10 * 32 and len(scene["notes"]) == 3  # units, axis, numbers
     assert "max_error_mm" not in scene  # its unit is unknown
 
 

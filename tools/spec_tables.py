@@ -2,7 +2,7 @@
 
     python tools/spec_tables.py [--check]
 
-A table follows a line ``<!-- table: NAME -->``; NAME is that of a construct Struct, or of a tuple
+A table follows a line ``<!-- table: NAME -->``; NAME is that of a Struct, or of a tuple
 of (name, type, meaning) rows that a loop reads by, in one of ``MODULES``. Structures that are read
 by hand have tables without such a line. The contents list the headings behind them.
 The lines of the traced stream are those of ``tools/spec_trace.py``.
@@ -17,12 +17,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import construct
-
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # so that it runs as a script
 
 from mcz import numbers, schema
 from mcz.container import payloads
+from mcz.schema import fields
 from tools import spec_trace
 
 MODULES = (
@@ -70,7 +69,7 @@ def structures() -> dict[str, Any]:
     for module_name in MODULES:
         module = import_module(module_name)
         for name, thing in vars(module).items():
-            if isinstance(thing, construct.Struct) or (name.endswith("FIELDS") and _is_rows(thing)):
+            if isinstance(thing, schema.Struct) or (name.endswith("FIELDS") and _is_rows(thing)):
                 found.setdefault(name, thing)
                 found[f"{module_name.removeprefix('mcz.')}.{name}"] = thing
     return found
@@ -85,38 +84,31 @@ def rows(structure: Any) -> Iterator[tuple[str, str, str]]:
     if isinstance(structure, tuple):
         yield from structure
         return
-    for field in structure.subcons:
-        yield field.name, type_name(field.subcon), field.docs
+    for field in structure.fields:
+        yield field.name, type_name(field.item), field.docs
 
 
-def type_name(subcon: Any) -> str:
+def type_name(field: Any) -> str:
     """How SPEC.md calls a type."""
-    if id(subcon) in NAMED:
-        return NAMED[id(subcon)]
-    match subcon:
-        case construct.Struct():
+    if id(field) in NAMED:
+        return NAMED[id(field)]
+    match field:
+        case fields.Struct():
             names = {id(thing): name for name, thing in structures().items() if "." not in name}
-            return names[id(subcon)]
-        case construct.FocusedSeq():
-            return _counted(subcon)
-        case construct.Array():
-            return f"{subcon.count} {type_name(subcon.subcon)}"
-        case construct.Bytes():
-            return f"{subcon.length} bytes"
-        case construct.IfThenElse():
-            return type_name(subcon.thensubcon) + ", or absent"
-        case construct.FormatField():
-            return {"B": "u8", "f": "binary32", "d": "binary64"}[subcon.fmtstr[-1]]
-    if subcon is construct.GreedyBytes:
-        return "bytes to the end"
-    return type_name(subcon.subcon)
-
-
-def _counted(subcon: Any) -> str:
-    """construct's PrefixedArray: a Rebuild of the count, then an Array."""
-    count, items = (renamed.subcon for renamed in subcon.subcons)
-    word = "optional" if count.subcon is schema.AT_MOST_ONE else "counted"
-    return f"{word} {type_name(items.subcon)}"
+            return names[id(field)]
+        case fields.Counted():
+            return f"{field.word} {type_name(field.item)}"
+        case fields.Array():
+            return f"{field.count} {type_name(field.item)}"
+        case fields.Bytes():
+            return f"{field.size} bytes"
+        case fields.IfThenElse():
+            return type_name(field.item) + ", or absent"
+        case fields.Number():
+            return {"B": "u8", "f": "binary32", "d": "binary64"}[field.format.format[-1]]
+        case fields.Rest():
+            return "bytes to the end"
+    return type_name(field.item)
 
 
 def table(structure: Any) -> str:

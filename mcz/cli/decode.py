@@ -211,6 +211,7 @@ def _check_plain(file: str, wanted: Wanted) -> None:
 
 def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made]:
     """The outputs of a clip as it is wanted, and what is to be said of how they were made."""
+    from mcz.conversion import left_out
     from mcz.reading.source_files import with_facts
 
     target, made = wanted.target, Made()
@@ -231,8 +232,10 @@ def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made
             outputs = [(target, f"{_stem(motion)}.{target}", made.scene.data)]
         else:
             outputs = _converted(motion, target, rate, wanted.with_skeleton)
+            made.left_out = left_out(motion, target)
     else:
         outputs = [_export(clip, target, part, wanted)]
+        made.left_out = _beside(clip, wanted)
     if wanted.with_skeleton and target != "amc":
         outputs.append(_skeleton(held, _sourced(held, clip)))
     return outputs, made
@@ -312,6 +315,17 @@ def _export(clip: Clip, target: str, part: Part, wanted: Wanted) -> Output:
     if target == "npz" and chosen is None and channels is None and not wanted.preview:
         table = replace(table, motion=part.motion())
     return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
+
+
+def _beside(clip: Clip, wanted: Wanted) -> tuple[str, ...]:
+    """The signals that a table does not have, and --signal would write."""
+    from mcz.conversion.losses import of_recording
+
+    if wanted.signal is not None or wanted.joints is not None:
+        return ()
+    others = [signal.name for signal in clip.signals[1:]]
+    signals = [f"left out: signal {', '.join(others)} (--signal)"] if others else []
+    return (*signals, *of_recording(clip.recording))
 
 
 def _stem(clip: Clip | Motion) -> str:

@@ -17,10 +17,14 @@ class Made:
 
     fit: Fit | None = None
     scene: SceneFile | None = None
+    left_out: tuple[str, ...] = ()
 
 
 def facts_of(clips: Mapping[str, Made]) -> dict[str, Any]:
-    """What ``--json`` says: of one clip "fit" and "scene", of more "fits" and "scenes" by name."""
+    """What ``--json`` says: of one clip "fit" and "scene", of more "fits" and "scenes" by name.
+
+    "left_out" has by the names of clips what their formats have no place for.
+    """
     fits = {name: _fit(made.fit) for name, made in clips.items() if made.fit is not None}
     scenes = {name: _scene(made.scene) for name, made in clips.items() if made.scene is not None}
     facts: dict[str, Any] = {}
@@ -29,7 +33,8 @@ def facts_of(clips: Mapping[str, Made]) -> dict[str, Any]:
             facts[key] = next(iter(found.values()))
         elif found:
             facts[f"{key}s"] = found
-    return facts
+    left = {name: list(made.left_out) for name, made in clips.items() if made.left_out}
+    return facts | ({"left_out": left} if left else {})
 
 
 def told(clips: Mapping[str, Made]) -> Iterator[str]:
@@ -39,6 +44,7 @@ def told(clips: Mapping[str, Made]) -> Iterator[str]:
             yield _fit_told(made.fit)
         if made.scene is not None:
             yield from _scene_told(made.scene)
+        yield from made.left_out
 
 
 def _scene(scene: SceneFile) -> dict[str, Any]:

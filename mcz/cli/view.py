@@ -34,6 +34,7 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.terminal import say_json
+from mcz.cli.view_rerun import is_rerun, show_in_rerun
 
 if TYPE_CHECKING:
     from mcz.viewing.embedding import PageWritten
@@ -51,8 +52,12 @@ LOOPBACK = "127.0.0.1"
     "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(readable=False)
 )
 @click.option(
-    "-o", "--output", metavar="OUT.html", help="Write one page that holds the files and the player."
+    "-o",
+    "--output",
+    metavar="OUT.html",
+    help="Write one page that holds the files and the player; OUT.rrd: a file for rerun.",
 )
+@click.option("--rerun", is_flag=True, help="In the viewer of rerun, which is started.")
 @click.option("--no-browser", is_flag=True, help="Print the address, and open nothing.")
 @click.option("--keep", is_flag=True, help="Stay when the last page is closed, until Ctrl-C.")
 @click.option(
@@ -104,8 +109,12 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
     With -o one page is written, which needs neither a server nor a network: of an archive the clips
     that --clip and --where take, coded anew with --codec. Several files are compared, the first
     being the original.
+
+    With --rerun, or -o OUT.rrd, every clip is logged for rerun: its points and bones, other signals
+    as time series.
     """
-    _check_use(output, options)
+    in_rerun = is_rerun(options.pop("rerun"), output)
+    _check_use(output, options, in_rerun)
     from mcz.viewing.shelf import Shelf, put
 
     def told(line: str) -> None:
@@ -120,6 +129,8 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
         for path in files:
             with about(path):
                 put(shelf, path)
+        if in_rerun:
+            return show_in_rerun(shelf, output, as_json, options)
         if output is not None:
             return _write(shelf, output, as_json, {key: options[key] for key in OF_PAGE})
         return _serve(shelf, as_json, **{key: options[key] for key in OF_SERVER})
@@ -127,15 +138,20 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
         shelf.close()
 
 
-def _check_use(output: str | None, options: dict[str, Any]) -> None:
+def _check_use(output: str | None, options: dict[str, Any], in_rerun: bool) -> None:
     """Raise Failure for options of a page without -o, and of a server with it."""
     if output is not None and output != "-" and not output.lower().endswith(PAGES):
         raise Failure(f"{output}: a page is a .html; mcz render draws films", Exit.USAGE)
     if output == "-":
         raise Failure("a page is written to a file, not to standard output", Exit.USAGE)
-    if output is not None:
-        usual = {"no_browser": False, "keep": False, "host": LOOPBACK, "port": 0}
-        other, why = [key for key in OF_SERVER if options[key] != usual[key]], "without -o"
+    usual = {"no_browser": False, "keep": False, "host": LOOPBACK, "port": 0}
+    of_server = [key for key in OF_SERVER if options[key] != usual[key]]
+    if in_rerun:
+        wrong = ("codec", "effort", "params", "most", *(() if output else ("force",)))
+        other, why = [*of_server, *(k for k in wrong if options[k])], "without rerun"
+        why = "with -o" if other == ["force"] else why
+    elif output is not None:
+        other, why = of_server, "without -o"
     else:
         other, why = [key for key in OF_PAGE if options[key]], "with -o OUT.html"
     if other:

@@ -185,12 +185,13 @@ Recode = Callable[
 class LiveEncoder(Protocol):
     """Codes frames as they come, each into the one stream of a segment of one frame.
 
-    ``header`` and ``models`` are known before the first frame. ``n_resolutions`` is 1, and there is
-    one group.
+    ``header``, ``models`` and ``version``, as those of ``Encoded``, are known before the first
+    frame. ``n_resolutions`` is 1, and there is one group.
     """
 
     header: bytes
     models: tuple[Model, ...]
+    version: int | None
 
     def push(
         self, values: NDArray[np.float64], valid: NDArray[np.bool_] | None = None

@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from construct import Bytes, ExprValidator, Float64l, If, Int8ul, OneOf, Struct
 from numpy.typing import NDArray
 
 from mcz.codecs.basis_models import MAX_POINTS, Basis, Head, find_bases
@@ -19,7 +18,7 @@ from mcz.codecs.contract import ID_SIZE, Layout, Span
 from mcz.codecs.steps import ratio_of
 from mcz.coding.space_kernels import Transform
 from mcz.errors import FormatError
-from mcz.schema import counted
+from mcz.schema import Bytes, ExprValidator, Float64l, If, Int8ul, OneOf, Struct, counted
 from mcz.transforms.dct import dct_matrix
 
 Floats = NDArray[np.float64]

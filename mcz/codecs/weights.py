@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mcz.errors import MczError
 from mcz.kinematics import depths, reach
 from mcz.kinematics.sensitivity import sensitivities
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
+from mcz.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, Skeleton
 
 Floats = NDArray[np.float64]
 
@@ -30,16 +30,18 @@ def weights_of(skeleton: Skeleton, sample: Floats, rule: str, *, unit_aware: boo
     """
     kinds = [channel.kind for channel in skeleton.channels]
     degree = math.pi / 180 if skeleton.angle_unit == "rad" else 1.0
-    is_rotation = np.array([kind in ROTATION_KINDS for kind in kinds], np.bool_)
+    is_rotation = np.array([kind in ANGLE_KINDS for kind in kinds], np.bool_)
+    is_part = np.array([kind in QUATERNION_KINDS for kind in kinds], np.bool_)
+    degrees = np.where(is_rotation, degree, np.where(is_part, math.pi / 360, 1.0))
     if rule == "sensitivity":
-        return _by_sensitivity(skeleton, sample, is_rotation, degree)
+        return _by_sensitivity(skeleton, sample, is_rotation | is_part, degrees)
     weights = np.ones(len(kinds))
     if rule == "depth":
         counts = [len(joint.channels) for joint in skeleton.joints]
         weights = np.sqrt(np.log2(np.repeat(depths(skeleton), counts) + 2))
     if not unit_aware:
         return weights
-    weights = np.where(is_rotation, weights * degree, weights)
+    weights = weights * degrees
     is_position = np.array([kind in POSITION_KINDS for kind in kinds], np.bool_)
     with np.errstate(over="ignore"):
         lever = reach(skeleton) * math.pi / 180
@@ -47,17 +49,19 @@ def weights_of(skeleton: Skeleton, sample: Floats, rule: str, *, unit_aware: boo
 
 
 def _by_sensitivity(
-    skeleton: Skeleton, sample: Floats, is_rotation: NDArray[np.bool_], degree: float
+    skeleton: Skeleton, sample: Floats, turns: NDArray[np.bool_], degrees: Floats
 ) -> Floats:
-    """Thresholds that move the points alike: T_g is that of a rotation of average effect."""
-    plain = np.where(is_rotation, degree, 1.0)
+    """Thresholds that move the points alike: T_g is that of a rotation of average effect.
+
+    ``degrees`` (n_channels,) is what a degree is in the unit of a channel that ``turns``.
+    """
     try:
         effects = sensitivities(skeleton, sample, SAMPLED_FRAMES)
     except MczError:  # an unknown angle unit: there is no kinematics
-        return plain
-    turning = effects[is_rotation & (effects > 0)]
-    average = float(np.sqrt(np.mean(turning**2))) * degree if len(turning) else 1.0
+        return degrees
+    turning = (effects * degrees)[turns & (effects > 0)]
+    average = float(np.sqrt(np.mean(turning**2))) if len(turning) else 1.0
     if not np.isfinite(average) or average <= 0:
-        return plain
-    floor = average / degree * LEAST_SHARE
-    return np.where(effects > 0, average / np.maximum(effects, floor), plain)
+        return degrees
+    floor = average / degrees * LEAST_SHARE
+    return np.where(effects > 0, average / np.maximum(effects, floor), degrees)

@@ -1,6 +1,6 @@
 """Reading a structure by hand, field by field, where there are tens of thousands of them.
 
-Everything else is read by its schema, ``mcz/schema.py``. SPEC.md, "Conventions", is normative.
+Everything else is read by its schema, ``mcz/schema``. SPEC.md, "Conventions", is normative.
 """
 
 from __future__ import annotations

@@ -7,7 +7,13 @@ Open structures end in ``extension``, which readers ignore and rewriting keeps.
 
 from __future__ import annotations
 
-from construct import (
+from mcz.numbers import GRID
+from mcz.schema import (
+    EXTENSION,
+    FINITE,
+    SIZED,
+    TEXT,
+    UVARINT,
     Bytes,
     ExprValidator,
     GreedyBytes,
@@ -16,11 +22,10 @@ from construct import (
     OneOf,
     Pass,
     Struct,
+    counted,
+    optional,
     this,
 )
-
-from mcz.numbers import GRID
-from mcz.schema import EXTENSION, FINITE, SIZED, TEXT, UVARINT, counted, optional
 
 FORMAT_MAJOR, FORMAT_MINOR = 0, 9
 LEAST_NEEDED = 0, 2  # 0.1 had another CLIP and INDX

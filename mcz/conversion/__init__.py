@@ -7,6 +7,7 @@ from fractions import Fraction
 
 from mcz.conversion.acclaim import to_amc
 from mcz.conversion.hierarchy import to_bvh
+from mcz.conversion.losses import left_out
 from mcz.conversion.markers import to_c3d
 from mcz.conversion.solved import Fit, from_positions
 from mcz.conversion.tables import needs_rate, to_storage, to_trc
@@ -16,7 +17,7 @@ from mcz.kinematics import point_set
 from mcz.motion import Motion
 from mcz.reading.source_files import with_facts
 
-__all__ = ["TARGETS", "Fit", "convert", "converted_files", "from_positions"]
+__all__ = ["TARGETS", "Fit", "convert", "converted_files", "from_positions", "left_out"]
 
 TARGETS = {
     "bvh": to_bvh,

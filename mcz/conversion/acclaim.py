@@ -11,12 +11,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.conversion.hierarchy import to_bvh
 from mcz.errors import MotionError
 from mcz.kinematics import point_set
 from mcz.motion import (
     ORIGIN,
     POSITION_KINDS,
+    QUATERNION_KINDS,
     ROTATION_KINDS,
+    VECTOR_KINDS,
     Channel,
     Joint,
     Motion,
@@ -27,7 +30,12 @@ Ints = NDArray[np.int64]
 
 
 def to_amc(motion: Motion) -> Motion:
-    """``motion`` on Acclaim bones, its angles as they are; unchanged where its own are such."""
+    """``motion`` on Acclaim bones, its angles as they are; unchanged where its own are such.
+
+    Quaternions and rotation vectors become angles, as in BVH.
+    """
+    if any(c.kind in (*QUATERNION_KINDS, *VECTOR_KINDS) for c in motion.skeleton.channels):
+        motion = to_bvh(motion)
     skeleton = motion.skeleton
     if not skeleton.intrinsic:
         return motion

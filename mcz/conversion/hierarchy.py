@@ -15,6 +15,7 @@ from mcz.motion import (
     ORIGIN,
     POSITION_KINDS,
     ROTATION_KINDS,
+    TURNING_KINDS,
     Channel,
     Joint,
     Motion,
@@ -26,7 +27,6 @@ from mcz.numbers import Grid, GridKind
 
 PRINTED = Grid(GridKind.FIXED, 6)  # degrees and units: a millionth of either is far below noise
 TINY = 1e-13  # radians; what rounding makes of an angle of zero
-TURNING = (*ROTATION_KINDS, "qw", "qx", "qy", "qz")
 STRETCHING = ("sx", "sy", "sz", "length")
 BVH_KINDS = {"", *POSITION_KINDS, *ROTATION_KINDS, "sx", "sy", "sz"}
 
@@ -163,7 +163,7 @@ def loose_tails(skeleton: Skeleton, index: int) -> tuple[Vector, ...]:
 
 def _angles(skeleton: Skeleton, index: int, values: Floats) -> tuple[str, Floats]:
     """An order and the angles, (n_frames, 3) in degrees, of the joint's own rotation C M C^-1."""
-    part, columns = _part(skeleton, values, (index, TURNING))
+    part, columns = _part(skeleton, values, (index, TURNING_KINDS))
     if not len(columns):
         return "zyx", np.zeros((len(values), 3))
     turns = part.pose(columns).axes[0]

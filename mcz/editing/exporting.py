@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from mcz.conversion import TARGETS, converted_files
+from mcz.conversion import TARGETS, converted_files, left_out
 from mcz.conversion.scenes import WRITERS, to_scene
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder
@@ -103,7 +103,7 @@ def _converted(
 def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iterator[Made]:
     """The files that a clip becomes: an ASF before the AMC that needs it."""
     if to in EXPORTS:
-        yield _named(clip, to), EXPORTS[to](table_of(motion)), ()
+        yield _named(clip, to), EXPORTS[to](table_of(motion)), left_out(motion, to)
         return
     if to in WRITERS:
         scene = to_scene(motion, to, key_error_mm=key_error)
@@ -111,7 +111,8 @@ def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iter
         return
     files = converted_files(motion, to, None, True)
     for suffix in sorted(files, reverse=True):
-        yield _named(clip, suffix), files[suffix], ()
+        notes = left_out(motion, to) if suffix == to else ()
+        yield _named(clip, suffix), files[suffix], notes
 
 
 def _named(clip: Clip, suffix: str) -> str:

@@ -59,6 +59,11 @@ def tree(which: str | int) -> BodyTree:
     raise OptionError(f"no body tree {which!r}: there are {known}")
 
 
+def has_tree(which: str | int) -> bool:
+    """Whether there is a tree of that name, or of so many joints."""
+    return any(which in (each.name, each.n_joints) for each in _trees().values())
+
+
 @cache
 def _trees() -> dict[str, BodyTree]:
     rows = json.loads(annex_bytes(ANNEX))
@@ -74,8 +79,8 @@ def _trees() -> dict[str, BodyTree]:
     return {each.name: each for each in trees}
 
 
-def skeleton_of(
-    body: BodyTree,
+def body_skeleton(
+    body: BodyTree | str | int,
     offsets: NDArray[Any] | None = None,
     *,
     turns: str = "rotvec",
@@ -84,13 +89,14 @@ def skeleton_of(
     angle_unit: str = "rad",
     up_axis: str = "",
 ) -> Skeleton:
-    """A skeleton of the joints of ``body``, each turned by channels of its own.
+    """A skeleton of the joints of ``body``, a tree or what ``tree`` takes, each with its turns.
 
     ``offsets`` (n_joints, 3), in length units, lead from each parent to its joint; that of the
     root is where the root is while its positions are 0. Without them all bones have no length.
     ``turns`` is "rotvec", "quat", "euler" (rx ry rz) or "" for none; with ``moves`` the root has
     tx ty tz before these. Raises OptionError where ``offsets`` do not match.
     """
+    body = body if isinstance(body, BodyTree) else tree(body)
     if turns not in TURNS:
         raise OptionError(f"joints turned by {turns!r}: one of {', '.join(filter(None, TURNS))}")
     if offsets is not None:
@@ -108,3 +114,6 @@ def skeleton_of(
     return Skeleton(
         tuple(joints), body.title, unit_cm=unit_cm, angle_unit=angle_unit, up_axis=up_axis
     )
+
+
+skeleton_of = body_skeleton

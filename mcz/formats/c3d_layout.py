@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
-from construct import ExprValidator, Int8ul, OneOf, Struct
-
 from mcz.errors import FormatError, LimitError
 from mcz.formats.c3d_outputs import Split, split_of
 from mcz.formats.c3d_parameters import DEC, INTEL, SGI, Order
 from mcz.formats.c3d_shape import COUNTED, ROTATION_WORDS
-from mcz.schema import SIZED, UVARINT, build, counted, parse
+from mcz.schema import SIZED, UVARINT, ExprValidator, Int8ul, OneOf, Struct, build, counted, parse
 
 FORMAT, OUTPUTS_FORMAT = "c3d", "c3d-outputs"  # names in the registry of source formats
 MAX_ZEROS = 2**20  # that a detail counts instead of holding them

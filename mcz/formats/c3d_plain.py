@@ -54,6 +54,11 @@ def plain(motion: Motion) -> Motion:
     if residuals is not None and residuals.n_channels != n_points:
         raise MotionError(f"{residuals.n_channels} residuals for {n_points} points")
     names = [joint.name for joint in motion.skeleton.joints]
+    for name in names:
+        if not name or name != name.strip():
+            raise MotionError(
+                f"C3D cannot hold the name {name!r}: its labels are filled with blanks"
+            )
     listed = described(outputs)
     both = {*names} & {*listed.labels}
     if both or not all(listed.labels):

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from construct import ExprValidator, Struct
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError, LimitError
-from mcz.schema import SIZED, SVARINT, UVARINT, build, counted, parse
+from mcz.schema import SIZED, SVARINT, UVARINT, ExprValidator, Struct, build, counted, parse
 
 FRAME_NUMBER = -1  # the column of the frame number
 MAX_PATTERNS = 1024

@@ -13,12 +13,11 @@ from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
-from construct import Struct
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError
 from mcz.formats.layout import MAX_PATTERNS
-from mcz.schema import SIZED, UVARINT, build, counted, parse
+from mcz.schema import SIZED, UVARINT, Struct, build, counted, parse
 
 Ints = NDArray[np.int64]
 

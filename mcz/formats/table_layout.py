@@ -9,8 +9,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from construct import ExprValidator, Struct
-
 from mcz.errors import FormatError, LimitError
 from mcz.formats.layout import (
     BIT,
@@ -24,7 +22,17 @@ from mcz.formats.layout import (
     parsed_patterns,
 )
 from mcz.numbers import GRID, Grid, GridKind
-from mcz.schema import SIZED, SVARINT, UVARINT, build, counted, optional, parse
+from mcz.schema import (
+    SIZED,
+    SVARINT,
+    UVARINT,
+    ExprValidator,
+    Struct,
+    build,
+    counted,
+    optional,
+    parse,
+)
 
 NAME, NEXT, SAME, COUNT = b"\0", b"\1", b"\2", b"\3"  # marks of a header
 PHRASES = {  # and others: what stands in many headers

@@ -15,6 +15,7 @@ from mcz.numbers import Grid, GridKind
 
 UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m"}
 DECIMALS = 6  # of times
+MISSING = b"NaN"  # as OpenSim writes it, to which blank cells at the end of a row are none
 TIMES = Grid(GridKind.FIXED, DECIMALS)
 
 
@@ -42,7 +43,7 @@ def plain_trc(motion: Motion) -> Motion:
     )
     items = [(b"", FRAME_NUMBER, 0), (b"\t", 3 * len(names), 0)]
     items += [(b"\t", column, 0) for column in range(3 * len(names))]
-    return _with_source(motion, "trc", header, b"", items)
+    return _with_source(motion, "trc", header, MISSING, items)
 
 
 def plain_storage(motion: Motion, format_name: str = "sto") -> Motion:
@@ -108,9 +109,9 @@ def _rate(motion: Motion) -> Fraction:
 
 
 def _names(names: Sequence[str], n_frames: int) -> list[str]:
-    """The names, checked: a cell holds no control code."""
+    """The names, checked: a cell holds no control code, and no blanks around what it says."""
     for name in names:
-        if any(ord(character) < 32 for character in name):
+        if not name or name != name.strip() or any(ord(character) < 32 for character in name):
             raise MotionError(f"a table cannot hold the name {name!r}")
     if not n_frames:
         raise MotionError("a table without rows of numbers is none")

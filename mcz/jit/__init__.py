@@ -6,6 +6,9 @@ compiled by LLVM on its first call, and its machine code is kept in a folder (``
 the next process takes it while no source has changed. The same source runs, slowly, as plain
 Python.
 
+Without llvmlite loops run as plain Python, too, and say so once. What is read most has a way of its
+own for that, see ``lacks_compiler``.
+
 The environment says how loops run: ``MCZ_LOOPS=interpreted`` as plain Python; ``checked`` compiled,
 with an IndexError for an index out of range; otherwise compiled.
 
@@ -38,6 +41,18 @@ def kernel(function: Loop) -> Loop:
     from mcz.jit.calling import Kernel
 
     return cast(Loop, Kernel(cast(Any, function), checked=MODE == CHECKED))
+
+
+def lacks_compiler() -> bool:
+    """Whether loops that are to be compiled cannot be: then some work has a quicker way in Python.
+
+    Not where loops are said to be interpreted, which is how their source is tested.
+    """
+    if MODE == INTERPRETED:
+        return False
+    from mcz.jit.calling import missing_compiler
+
+    return bool(missing_compiler())
 
 
 def inner(function: Loop) -> Loop:

@@ -44,7 +44,8 @@ class Kernel:
         compiled = self._compiled.get(tuple(kinds))
         if compiled is None:
             if not _has_compiler():
-                return self.loop(*arguments)
+                with np.errstate(all="ignore"):  # compiled, numbers wrap and overflow silently
+                    return self.loop(*arguments)
             compiled = self._compile(tuple(kinds), arguments)
         return compiled(flat)
 
@@ -58,18 +59,29 @@ class Kernel:
             return self._compiled[kinds]
 
 
-@cache
 def _has_compiler() -> bool:
+    """Whether there is one; says once where there is none."""
+    fault = missing_compiler()
+    if fault:
+        _warn(fault)
+    return not fault
+
+
+@cache
+def missing_compiler() -> str:
+    """Why there is no compiler, or nothing where there is one."""
     try:
         import llvmlite.binding  # noqa: F401
     except (ImportError, OSError) as error:
         if lacks_memory_for_compiler():
             raise MemoryError("the compiler of loops cannot be loaded") from None
-        warnings.warn(
-            f"loops run as plain Python, very slowly: {error}", RuntimeWarning, stacklevel=3
-        )
-        return False
-    return True
+        return str(error)
+    return ""
+
+
+@cache
+def _warn(fault: str) -> None:
+    warnings.warn(f"loops run as plain Python, very slowly: {fault}", RuntimeWarning, stacklevel=4)
 
 
 def lacks_memory_for_compiler() -> bool:

@@ -27,6 +27,7 @@ from mcz.motion import (
     Joint,
     Skeleton,
 )
+from mcz.skeleton import first_columns
 
 Floats = NDArray[np.float64]
 
@@ -71,6 +72,11 @@ class Link:
     def turning(self) -> list[int]:
         """The columns of all that turns, in the order of ``turns``."""
         return [each for turn in self.turns for each in self.parts(*turn)]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether one of its turns can be any turn by itself."""
+        return bool(self.quaternion or self.vector)
 
     @property
     def freedoms(self) -> str:
@@ -137,7 +143,8 @@ class Chain:
             change = above.T if matrix is None else above.T @ matrix
         kinds = [channel.kind for channel in joint.channels]
         first = {kind: start + kinds.index(kind) for kind in kinds}
-        quaternion, vector = _whole(QUATERNION_KINDS, first), _whole(VECTOR_KINDS, first)
+        quaternion = first_columns(joint.channels, QUATERNION_KINDS, start)
+        vector = first_columns(joint.channels, VECTOR_KINDS, start)
         turns = [
             (ROTATION_KINDS.index(kind), start + k)
             for k, kind in enumerate(kinds)
@@ -311,11 +318,6 @@ def _components(
     kinds: list[str], names: tuple[str, ...], start: int
 ) -> tuple[tuple[int, int], ...]:
     return tuple((names.index(kind), start + k) for k, kind in enumerate(kinds) if kind in names)
-
-
-def _whole(kinds: tuple[str, ...], first: dict[str, int]) -> tuple[int, ...]:
-    """The columns of kinds that turn together, () where one of them is missing."""
-    return tuple(first[kind] for kind in kinds) if first.keys() >= set(kinds) else ()
 
 
 def _back(back: Floats | None, vector: Floats) -> Floats:

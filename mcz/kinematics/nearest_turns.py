@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.kinematics.chain import QUATERNION, Floats, Link, turned
+from mcz.kinematics.chain import Floats, Link, turned
 from mcz.kinematics.euler import ORDERS, euler_angles
 from mcz.kinematics.rotation_vectors import continuous, vectors_of_quaternions
 
@@ -13,26 +13,26 @@ SWEEPS = 12
 
 
 def set_turns(link: Link, moment: Floats, columns: Floats, radians: float) -> None:
-    """Set the rotation channels of a joint so that their R has the greatest trace of R' ``moment``.
+    """Set what turns a joint so that its R has the greatest trace of R' ``moment``.
 
     ``moment`` has shape (3, 3, F) and is along the joint's own axes; ``columns``, (n_channels, F)
-    in source units, are written. Where ``moment`` is a rotation, R is the nearest to it.
+    in source units, are written. Where ``moment`` is a rotation, R is the nearest to it. A
+    quaternion, or else a rotation vector, makes R alone, whatever else the joint has.
     """
-    order = link.freedoms
-    if order == "q":
-        columns[list(link.quaternion)] = quaternions_of(_kabsch(moment))
-    elif order == "v":
-        vectors = continuous(vectors_of_quaternions(quaternions_of(_kabsch(moment))))
-        columns[list(link.vector)] = vectors / radians
-    elif order in ORDERS:
-        angles = small(euler_angles(_kabsch(moment), order))
+    if link.is_whole:
+        columns[link.turning] = 0.0
+        quaternions = quaternions_of(_kabsch(moment))
+        if link.quaternion:
+            columns[list(link.quaternion)] = quaternions
+        else:
+            vectors = continuous(vectors_of_quaternions(quaternions))
+            columns[list(link.vector)] = vectors / radians
+    elif link.freedoms in ORDERS:
+        angles = small(euler_angles(_kabsch(moment), link.freedoms))
         for k, (_, column) in enumerate(link.turns):
             columns[column] = angles[:, k] / radians
     else:
-        turns = [(axis, column) for axis, column in link.turns if axis < QUATERNION]
-        angles = _angle_by_angle([axis for axis, _ in turns], moment)
-        for (_, column), angle in zip(turns, angles, strict=True):
-            columns[column] = angle / radians
+        columns[link.angles] = _angle_by_angle([axis for axis, _ in link.turns], moment) / radians
 
 
 def _kabsch(moment: Floats) -> Floats:

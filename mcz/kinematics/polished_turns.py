@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.kinematics.chain import IDENTITY, QUATERNION, Floats, Link, times, turned
+from mcz.kinematics.chain import IDENTITY, Floats, Link, times, turned
 
 STEPS = 40
 FLAT = 1e-14  # of the gradient, whose greatest is about 1: no way up any more
@@ -19,10 +19,10 @@ START_DAMPING, EASIER, HARDER = 1e-3, 0.1, 10.0
 def polish_turns(link: Link, wanted: Floats, columns: Floats, radians: float) -> None:
     """Improve the angles of a joint in ``columns``, (n_channels, F) in source units.
 
-    ``wanted`` are rotation matrices (3, 3, F) along the joint's own axes.
+    It turns by angles about axes alone. ``wanted`` are rotation matrices (3, 3, F) along
+    the joint's own axes.
     """
-    turns = [(axis, column) for axis, column in link.turns if axis < QUATERNION]
-    axes, own = [axis for axis, _ in turns], [column for _, column in turns]
+    axes, own = [axis for axis, _ in link.turns], link.angles
     angles = columns[own] * radians
     damping = np.full(angles.shape[1], START_DAMPING)
     made, spins = _turn(axes, angles)

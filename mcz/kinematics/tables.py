@@ -11,8 +11,7 @@ from mcz.kinematics.single_kernels import Joints, Points
 def is_elaborate(chain: Chain) -> bool:
     """Whether a joint has channels that do more than turn and move it, or one of them twice."""
     return any(
-        link.quaternion
-        or link.vector
+        link.is_whole
         or link.scales
         or link.lengths
         or len({component for component, _ in link.moves}) < len(link.moves)

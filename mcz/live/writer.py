@@ -98,7 +98,7 @@ class LiveWriter:
         motion = Motion(coded, (signal,), frame_rate, frame_rate_exact, name, metadata)
         self._encoder, self._decoder = _coders(self.codec, motion, self.options, self._writer)
         header, models = self._encoder.header, self._encoder.models
-        encoded = Encoded(header, iter(()), models=models)
+        encoded = Encoded(header, iter(()), models=models, version=self._encoder.version)
         open_clip(self._writer, motion, self.codec, encoded, first_number)
         self._is_open = True
         self._digest = ValueDigest()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mcz.angles import without_turns
 from mcz.motion import Signal, Skeleton
+from mcz.whole_turns import without_whole_turns
 
 Values = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -39,6 +40,8 @@ class ChannelErrors:
         valid = np.isfinite(left) & np.isfinite(right)
         raw = np.where(valid, left - right, 0.0)
         difference = without_turns(raw, self._skeleton, self._channels)
+        if self._channels is None:
+            difference = -without_whole_turns(left, right, -difference, self._skeleton)
         self._n += int(valid.sum())
         self.mismatched += int((np.isfinite(left) ^ np.isfinite(right)).sum())
         self._squares += float(np.sum(difference**2))

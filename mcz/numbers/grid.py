@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from construct import Adapter, Container, If, Int8ul, Struct
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError, OptionError
@@ -24,7 +23,7 @@ from mcz.numbers.magnitudes import (
 )
 from mcz.numbers.rules import CHECKED_KINDS, TEXT_KINDS, GridKind
 from mcz.numbers.tokens import NAN, TENS, Bools, Floats, Ints, Texts, Tokens, nearest
-from mcz.schema import FINITE
+from mcz.schema import FINITE, Adapter, Fields, If, Int8ul, Struct
 
 MAX = np.finfo(np.float64).max
 _IEEE = (GridKind.BINARY32, GridKind.BINARY64)
@@ -240,18 +239,18 @@ def printed_base(grid: Grid) -> Grid:
     return Grid(GridKind.FIXED, digits)
 
 
-class _GridAdapter(Adapter):
-    def _decode(self, obj: Container, context: Any, path: str) -> Grid:
-        try:
-            # GRID-01
-            scale = 1.0 if obj.scale is None else obj.scale
-            return Grid(obj.kind, obj.digits, obj.flags, scale, obj.style or 0)
-        except (ValueError, OptionError) as error:
-            raise FormatError(f"{path}: {error}") from None
+def _grid_of(fields: Fields) -> Grid:
+    try:
+        # GRID-01
+        scale = 1.0 if fields.scale is None else fields.scale
+        return Grid(fields.kind, fields.digits, fields.flags, scale, fields.style or 0)
+    except (ValueError, OptionError) as error:
+        raise FormatError(f"{error}") from None
 
-    def _encode(self, obj: Grid, context: Any, path: str) -> dict[str, Any]:
-        names = ("kind", "digits", "flags", "scale", "style")
-        return {name: getattr(obj, name) for name in names}
+
+def _fields_of(grid: Grid) -> dict[str, Any]:
+    names = ("kind", "digits", "flags", "scale", "style")
+    return {name: getattr(grid, name) for name in names}
 
 
 GRID_FIELDS = Struct(
@@ -263,4 +262,4 @@ GRID_FIELDS = Struct(
     / If(lambda fields: fields.kind == GridKind.PRINTED, Int8ul)
     * "PRINTED only: print rule",
 )
-GRID = _GridAdapter(GRID_FIELDS)
+GRID = Adapter(GRID_FIELDS, _grid_of, _fields_of)

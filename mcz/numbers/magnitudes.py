@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.numbers.rules import MAX_POWER, MIN_POWER
-from mcz.numbers.tokens import EXACT_POWER, NAN, TENS, Floats, Ints, scan_texts
+from mcz.numbers.tokens import EXACT_POWER, NAN, TENS, Floats, Ints
 
 FIRST_NAN32 = 0x7F800001
 FIRST_NAN64 = 0x7FF0000000000001
@@ -43,8 +43,9 @@ def general_magnitudes(values: Floats, digits: int) -> Ints:
     odd |= (mantissa < block) | (mantissa >= 10 * block)
     mantissa = np.where(odd, 0, mantissa).astype(np.int64)
     if odd.any():
-        fields = scan_texts([f"{value:.{digits - 1}e}" for value in values[odd].tolist()]).fields
-        mantissa[odd], power[odd] = fields[:, 0], fields[:, 1]
+        texts = [f"{value:.{digits - 1}e}".split("e") for value in values[odd].tolist()]
+        mantissa[odd] = [int(digits.replace(".", "")) for digits, _ in texts]
+        power[odd] = [int(power) for _, power in texts]
     zero |= power < MIN_POWER
     power = np.clip(power, MIN_POWER, MAX_POWER + 1)  # beyond the end is past the limit
     magnitudes = (power - MIN_POWER) * 9 * block + 1 + mantissa - block

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mcz import jit
 from mcz.numbers.blocks import grid_blocks
 from mcz.numbers.grid import Grid
 from mcz.numbers.magnitudes import POWERS
@@ -28,8 +29,10 @@ def values_of(
     """
     values = np.empty(ordinals.shape) if out is None else out
     if not changes and ordinals.flags.c_contiguous:
-        left = np.zeros(len(grids), np.int64)
-        _kernels("value").fill(ordinals, _rules(tuple(grids)), TENS, values, left)
+        left = np.ones(len(grids), np.int64)
+        if not jit.lacks_compiler():
+            left[:] = 0
+            _kernels("value").fill(ordinals, _rules(tuple(grids)), TENS, values, left)
         for grid, columns in _left(left, grids):
             values[:, columns] = grid.values(ordinals[:, columns])
         return values

@@ -13,7 +13,7 @@ from mcz.angles import Unwrapper
 from mcz.brief import printable
 from mcz.errors import MczError, MotionError
 from mcz.kinematics.chain import Floats
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Channel, Motion
+from mcz.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion
 from mcz.pictures.chart_pages import Sheet
 from mcz.pictures.charts import Chart, legend, line, rows_of, styled
 from mcz.pictures.themes import Theme
@@ -28,7 +28,7 @@ LEAST_POWER = 1e-290
 
 def unit_name(motion: Motion, kind: str) -> str:
     """What the numbers of a channel of that kind are in."""
-    if kind in ROTATION_KINDS:
+    if kind in ANGLE_KINDS:
         return {"deg": "degrees", "rad": "radians"}.get(motion.skeleton.angle_unit, "angle unit")
     if kind in POSITION_KINDS or kind == "length":
         return length_unit(motion)

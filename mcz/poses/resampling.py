@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import IDENTITY, Chain, Floats, Link, chain_of
 from mcz.kinematics.euler import ORDERS, euler_angles
-from mcz.kinematics.rotation_vectors import nearest_vector
+from mcz.kinematics.rotation_vectors import matrices_of_vectors, nearest_vector
 from mcz.motion import Motion, Signal, Skeleton, frame_rate_of
 from mcz.poses.conversions import from_matrices, slerp
 
@@ -153,15 +153,10 @@ def _turn(chain: Chain, link: Link, old: Floats, new: Floats, times: Times) -> N
         new[np.ix_(between, columns)] = np.where(near < 0, -1.0, 1.0)[:, None] * quaternions
         return
     full = 2 * np.pi / chain.radians
-    if link.freedoms == "v":
+    if link.vector:
         columns = np.array(link.vector, np.int64)
-        turns = _matrices(chain, link, old)
-        middle = slerp(turns[before], turns[after], share)
-        vectors = from_matrices(middle[:, None], "rotvec")[:, 0]
-        start = old[np.ix_(before, columns)] * chain.radians
-        near = [nearest_vector(*pair) for pair in zip(vectors, start, strict=True)]
-        new[np.ix_(between, columns)] = np.reshape(near, (-1, 3)) / chain.radians
-        return
+        first, last = (old[np.ix_(rows, columns)] * chain.radians for rows in (before, after))
+        new[np.ix_(between, columns)] = _vectors(first, last, share) / chain.radians
     angles = np.array(link.angles, np.int64)
     first, last = old[np.ix_(before, angles)], old[np.ix_(after, angles)]
     way = last - first
@@ -175,6 +170,13 @@ def _turn(chain: Chain, link: Link, old: Floats, new: Floats, times: Times) -> N
         known = np.isfinite(middle).all(axis=(1, 2))
         rows = np.ix_(between[known], angles)
         new[rows] = _angles(middle[known], order, guess[known], full)
+
+
+def _vectors(first: Floats, last: Floats, share: Floats) -> Floats:
+    """Rotation vectors (n, 3), in radians, a ``share`` of the shortest way to the last, (n,)."""
+    start, end = (np.moveaxis(matrices_of_vectors(ends.T), 2, 0) for ends in (first, last))
+    middle = from_matrices(slerp(start, end, share)[:, None], "rotvec")[:, 0]
+    return np.array([nearest_vector(*pair) for pair in zip(middle, first, strict=True)])
 
 
 def _matrices(chain: Chain, link: Link, old: Floats) -> Floats:

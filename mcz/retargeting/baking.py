@@ -14,13 +14,14 @@ from mcz.motion import (
     ORIGIN,
     POSITION_KINDS,
     ROTATION_KINDS,
+    TURNING_KINDS,
     Channel,
     Joint,
     Motion,
     Signal,
     Skeleton,
 )
-from mcz.retargeting.edited import TURNING, computed
+from mcz.retargeting.edited import computed
 from mcz.retargeting.turns import back, finite, held, local_turns, relative, set_local_turns
 
 STRETCHING = ("sx", "sy", "sz", "length")
@@ -79,12 +80,12 @@ def _places(chain: Chain, values: Floats, above: Mapping[int, int]) -> dict[int,
 
 def _held_joint(skeleton: Skeleton, joint: Joint, turn: Floats) -> Joint:
     """The joint with three position channels, three rotation channels, and others of its own."""
-    kinds = [c.kind for c in joint.channels if c.kind in TURNING]
+    kinds = [c.kind for c in joint.channels if c.kind in TURNING_KINDS]
     order = "".join(kind[1] for kind in kinds)
     if order not in ORDERS or kinds[0] not in ROTATION_KINDS:
         order = euler_order(held(turn, finite(turn)))
         order = order if skeleton.intrinsic else order[::-1]
-    others = tuple(c for c in joint.channels if c.kind not in (*TURNING, *POSITION_KINDS))
+    others = tuple(c for c in joint.channels if c.kind not in (*TURNING_KINDS, *POSITION_KINDS))
     own = tuple(Channel(kind) for kind in (*POSITION_KINDS, *(f"r{letter}" for letter in order)))
     return replace(joint, offset=ORIGIN, channels=own + others, adds_to_offset=True)
 
@@ -110,7 +111,7 @@ def _joined(
         if number in columns:
             order += range(first, first + 6)
             first += 6
-            kinds = (*TURNING, *POSITION_KINDS)
+            kinds = (*TURNING_KINDS, *POSITION_KINDS)
             own = [k for k, c in zip(own, joint.channels, strict=True) if c.kind not in kinds]
         order += own
     assert len(order) == after.n_channels

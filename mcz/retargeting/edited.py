@@ -8,18 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Channel, Motion, Signal, Skeleton
+from mcz.motion import POSITION_KINDS, TURNING_KINDS, Channel, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
 
 Floats = NDArray[np.float64]
 
 COMPUTED = Grid(GridKind.FIXED, 6)  # as of conversions: a millionth is far below noise
-TURNING = (*ROTATION_KINDS, "qw", "qx", "qy", "qz")
 
 
 def turns(channels: tuple[Channel, ...]) -> bool:
     """Whether one of the channels turns its joint."""
-    return any(channel.kind in TURNING for channel in channels)
+    return any(channel.kind in TURNING_KINDS for channel in channels)
 
 
 def moves(channels: tuple[Channel, ...]) -> bool:

@@ -14,7 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError, OptionError
-from mcz.motion import Exceptions, Joint, Motion, Signal, Skeleton, Vector, joint_columns
+from mcz.motion import (
+    POSITION_KINDS,
+    TURNING_KINDS,
+    Exceptions,
+    Joint,
+    Motion,
+    Signal,
+    Skeleton,
+    Vector,
+    joint_columns,
+)
 from mcz.retargeting.edited import check_channels, edited
 from mcz.retargeting.sides import counterparts
 
@@ -118,8 +128,9 @@ def _turned_about(signal: Signal, skeleton: Skeleton, axis: str) -> Signal:
 
 def _flips(kind: str, axis: str) -> bool:
     """Whether a channel of this kind changes its sign."""
-    moves, turns = kind[:1] == "t", kind[:1] == "r" or kind in ("qx", "qy", "qz")
-    return (moves and kind[1] == axis) or (turns and kind[1] != axis)
+    if kind in POSITION_KINDS:
+        return kind[1] == axis
+    return kind in TURNING_KINDS and kind != "qw" and kind[1] != axis
 
 
 def _without(exceptions: Exceptions, flipped: NDArray[np.bool_]) -> Exceptions:

@@ -41,7 +41,7 @@ def set_local_turns(chain: Chain, joint: int, wanted: Floats, columns: Floats) -
     if own is not None:
         turn = times(times(own.T[:, :, None], turn), own[:, :, None])
     set_turns(link, turn, columns, chain.radians)
-    if len(link.turns) > 1 and link.freedoms not in ORDERS:
+    if len(link.turns) > 1 and not link.is_whole and link.freedoms not in ORDERS:
         polish_turns(link, turn, columns, chain.radians)
     made = local_turns(chain, joint, columns)
     for column in link.turning:

@@ -60,7 +60,7 @@ def unchecked(node: ast.AST) -> Changed:
         elif node.func.id[0].isupper() and len(node.args) > 1:
             yield node.args[-1]
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
-        yield _with(node, "right", _attribute(node.right, "subcon"))
+        yield _with(node, "right", _attribute(node.right, "item"))
 
 
 def drop(node: ast.AST) -> Changed:

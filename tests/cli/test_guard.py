@@ -306,6 +306,7 @@ TWICE = [
     ("plot", "a.mcz", "--what", "bytes", "--what", "error"),
     ("extract", "a.mcz", "b.mcz", "--resolution", "1", "--resolution", "2"),
     ("view", "a.mcz", "--port", "1", "--port", "2"),
+    ("view", "a.mcz", "--rerun", "--rerun"),
     ("stream", "encode", "--name", "a", "--name", "b"),
     ("stream", "decode", "a.mcz", "--lost", "hold", "--lost", "linear"),
     ("train", "a.bvh", "-o", "x", "-o", "y"),

@@ -88,6 +88,7 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
             [str(file), "-o", f"{out}3.html", "--max-size", "9"],
             [odd],
             [str(file.parent / f"note{STEERING}.bvh"), "-o", f"{out}4.html"],
+            [str(file), "-o", f"{out}5.rrd"],
         ],
         "render": [
             [str(file), "-o", f"{out}.png", "--size", "64"],

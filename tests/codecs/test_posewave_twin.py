@@ -77,16 +77,22 @@ def case(skeleton: Skeleton, values: np.ndarray, seed: int) -> Case:
         int(random.integers(0, 7)) if own_sequence(joint, skeleton) else 0
         for joint in skeleton.joints
     ]
-    plan = make_plan(
-        skeleton, kept, reg, radius=0.7, kappa=0.3, joint_weights=weights, orders=orders
-    )
+    whole = bool(seed % 2)
+    more = {"joint_weights": weights, "orders": orders, "whole": whole}
+    plan = make_plan(skeleton, kept, reg, radius=0.7, kappa=0.3, **more)  # type: ignore[arg-type]
     factors = factor(plan, values)
     back = out_of_metric(plan, factors, rows, np.arange(len(rows)))
     return [[row.tobytes().hex() for row in array] for array in (factors, back)], {
         "skeleton": as_javascript(skeleton),
         "kept": np.flatnonzero(kept).tolist(),
         "reg": reg.tolist(),
-        "shell": {"radius": 0.7, "kappa": 0.3, "weights": weights.tolist(), "orders": orders},
+        "shell": {
+            "radius": 0.7,
+            "kappa": 0.3,
+            "whole": whole,
+            "weights": weights.tolist(),
+            "orders": orders,
+        },
         "values": values.tolist(),
         "rows": rows.tolist(),
     }

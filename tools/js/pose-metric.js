@@ -7,6 +7,8 @@ const UNKNOWN_UNIT = 0;
 const TX = 1;
 const RX = 4;
 const SX = 7;
+const QW = 11;
+const VX = 15;
 const MAX_PATH = 96;
 const BEYOND = 2 ** 40;
 const [LEAST_REG, GREATEST_REG] = [2 ** -100, 2 ** 100];
@@ -28,6 +30,7 @@ export const RULES = [
 
 const isPosition = ({ kind }) => kind >= TX && kind < RX;
 const isRotation = ({ kind }) => kind >= RX && kind < SX;
+const isVector = ({ kind }) => kind >= VX && kind < VX + 3;
 const clamp = (v, least, greatest) => (v < least ? least : v > greatest ? greatest : v);
 
 /** v, or 0 where it is not below 2^40 in magnitude, or not a number. */
@@ -67,7 +70,60 @@ export function turn(angle, { quarters, high, low, radians }) {
   }
 }
 
+/** Factors of sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3. */
+const SERIES = [2, 3, 4].map((last) =>
+  factors(...[14, 12, 10, 8, 6, 4, 2, 0].map((more) => last + more)),
+);
+
+/** sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3 of s = t^2, below 256. */
+function exponential(s) {
+  let q = s * 2 ** -8;
+  let [a, b, c] = SERIES.map((series) => series.reduce((sum, factor) => 1 - q * sum * factor, 1));
+  b *= 0.5;
+  c *= 0.16666666666666666;
+  for (let i = 0; i < 4; i++) {
+    [a, b, c] = [a * (1 - q * b), a * a * 0.5, (c + a * b) * 0.25];
+    q *= 4;
+  }
+  return [a, b, c];
+}
+
 // Matrices are 9 numbers, row after row.
+
+/** What a change of each part of a rotation vector turns about, and the rotation. */
+function vectorTurn(parts, radians) {
+  let [x, y, z] = parts.map((part) => part * radians);
+  let s = x * x + y * y + z * z;
+  if (!(s < 256)) x = y = z = s = 0;
+  const [a, b, c] = exponential(s);
+  const spins = [
+    [a + c * (x * x), c * (x * y) + b * z, c * (x * z) - b * y],
+    [c * (x * y) - b * z, a + c * (y * y), c * (y * z) + b * x],
+    [c * (x * z) + b * y, c * (y * z) - b * x, a + c * (z * z)],
+  ].map((spin) => spin.map((part) => part * radians));
+  // prettier-ignore
+  const R = [
+    1 - b * (y * y + z * z), b * (x * y) - a * z, b * (x * z) + a * y,
+    b * (x * y) + a * z, 1 - b * (x * x + z * z), b * (y * z) - a * x,
+    b * (x * z) - a * y, b * (y * z) + a * x, 1 - b * (x * x + y * y),
+  ];
+  return { spins, R };
+}
+
+/** The same of a quaternion. */
+function quaternionTurn([p, q, r, t]) {
+  const s = p * p + q * q + r * r + t * t;
+  const [w, x, y, z] = s >= 2 ** -100 ? [p, q, r, t] : [1, 0, 0, 0];
+  const two = s >= 2 ** -100 ? 2 / s : 2;
+  const [a, i, j, k] = [w * two, x * two, y * two, z * two];
+  // prettier-ignore
+  const R = [
+    1 - (j * y + k * z), i * y - k * w, i * z + j * w,
+    i * y + k * w, 1 - (i * x + k * z), j * z - i * w,
+    i * z - j * w, j * z + i * w, 1 - (i * x + j * y),
+  ];
+  return { spins: [[-i, -j, -k], [a, k, -j], [-k, a, i], [j, -i, a]], R };
+}
 
 /** Turns the columns of M, which begins at `at`, about one of them, in place. */
 export function rotate(M, axis, [s, c], at = 0) {
@@ -118,16 +174,19 @@ export class PoseMetric {
    * @param {import("./skel.js").Skeleton} skeleton
    * @param {number[]} kept the columns of its kept channels, ascending
    * @param {ArrayLike<number>} reg of each kept channel what is added to the diagonal
-   * @param {{radius: number, kappa: number, weights?: number[], orders?: ArrayLike<number>}} shell
-   *   its radius, its share, and the weights and axis orders of joints
+   * @param {{radius: number, kappa: number, weights?: number[], orders?: ArrayLike<number>,
+   *   whole?: boolean}} shell its radius, its share, the weights and axis orders of joints, and
+   *   whether whole turns are in the metric
    */
-  constructor(skeleton, kept, reg, { radius, kappa, weights, orders = [] }) {
+  constructor(skeleton, kept, reg, { radius, kappa, weights, orders = [], whole = false }) {
     const { joints, channels, angleUnit, intrinsic } = skeleton;
     this.nKept = kept.length;
+    this.whole = whole;
     this.rule = RULES[angleUnit];
     const hasAxis = ({ axis }) => axis.some((angle) => angle !== 0);
     this.isPlain =
-      angleUnit === UNKNOWN_UNIT && (channels.some(isRotation) || joints.some(hasAxis));
+      angleUnit === UNKNOWN_UNIT &&
+      (channels.some(isRotation) || (whole && channels.some(isVector)) || joints.some(hasAxis));
     this.reg = Float64Array.from(reg, (r) => clamp(r, LEAST_REG, GREATEST_REG));
     this.numbers = new Map(kept.map((of, number) => [of, number]));
     const points = joints.map((joint) => pointsOf(joint, pointSet(skeleton)));
@@ -174,9 +233,12 @@ export class PoseMetric {
   /** The rotations of a joint from the outermost to the innermost. */
   turnsOf({ channels, firstColumn }, intrinsic, order) {
     if (this.isPlain) return [];
+    const wholes = this.whole ? wholesOf(channels, firstColumn) : [];
     const turns = channels.flatMap((channel, i) => {
-      if (!isRotation(channel)) return [];
       const from = firstColumn + i;
+      const found = wholes.find(({ parts }) => Math.min(...parts) === from);
+      if (found) return [{ ...found, numbers: found.parts.map((part) => this.numbers.get(part)) }];
+      if (!isRotation(channel)) return [];
       return [{ axis: channel.kind - RX, column: from, number: this.numbers.get(from) }];
     });
     if (order) return AXIS_ORDERS[order - 1].map((axis) => turns.find((one) => one.axis === axis));
@@ -190,9 +252,11 @@ export class PoseMetric {
     const ends = [];
     joints.forEach(({ parent, channels, firstColumn }, j) => {
       let path = parent < 0 ? [] : ends[parent];
+      const found = this.whole ? wholesOf(channels, firstColumn) : [];
+      const wholes = new Set(found.flatMap(({ parts }) => parts));
       const own = channels.flatMap((channel, i) => {
         const number = this.numbers.get(firstColumn + i);
-        const counts = isPosition(channel) || isRotation(channel);
+        const counts = isPosition(channel) || isRotation(channel) || wholes.has(firstColumn + i);
         return counts && !this.isPlain && number !== undefined ? [number] : [];
       });
       if (path.length + own.length > MAX_PATH) path = [];
@@ -273,7 +337,11 @@ export class PoseMetric {
       timesAt(above, at, change[k], v);
       for (let i = 0; i < 3; i++) axes[B + 3 * i + k] = v[i];
     }
-    for (const { axis, column: from, number } of turns) {
+    for (const { axis, column: from, number, kind, parts, numbers } of turns) {
+      if (parts) {
+        this.turnWhole(j, kind, parts.map((part) => limited(values[part])), numbers);
+        continue;
+      }
       if (number !== undefined) {
         const x = axes[B + axis] * rule.radians;
         const y = axes[B + axis + 3] * rule.radians;
@@ -288,6 +356,27 @@ export class PoseMetric {
       }
       rotate(axes, axis, turn(values[from], rule), B);
     }
+  }
+
+  /** Turns joint j by a quaternion or a rotation vector, and notes what its kept parts do. */
+  turnWhole(j, kind, parts, numbers) {
+    const { origins, axes, motions, rule } = this;
+    const [o, B] = [3 * j, 9 * j];
+    const { spins, R } = kind === QW ? quaternionTurn(parts) : vectorTurn(parts, rule.radians);
+    const v = [0, 0, 0];
+    numbers.forEach((number, part) => {
+      if (number === undefined) return;
+      timesAt(axes, B, spins[part], v);
+      const [x, y, z] = v;
+      const m = 6 * number;
+      motions[m] = x;
+      motions[m + 1] = y;
+      motions[m + 2] = z;
+      motions[m + 3] = origins[o + 1] * z - origins[o + 2] * y;
+      motions[m + 4] = origins[o + 2] * x - origins[o] * z;
+      motions[m + 5] = origins[o] * y - origins[o + 1] * x;
+    });
+    for (let row = B; row < B + 9; row += 3) axes.set(back(R, axes.slice(row, row + 3)), row);
   }
 
   /** What is fastened to joint j, about the origin of its root: N, S, K. */
@@ -367,6 +456,20 @@ export class PoseMetric {
     }
     return x;
   }
+}
+
+/** The columns of a joint's quaternion and of its rotation vector, where it has all of one. */
+function wholesOf(channels, firstColumn) {
+  return [
+    [QW, 4],
+    [VX, 3],
+  ].flatMap(([kind, nParts]) => {
+    const found = Array.from({ length: nParts }, (_, part) =>
+      channels.findIndex((channel) => channel.kind === kind + part),
+    );
+    if (found.includes(-1)) return [];
+    return [{ kind, parts: found.map((i) => firstColumn + i) }];
+  });
 }
 
 /** The points of a joint, as seen from its origin. */

@@ -18,7 +18,7 @@ from mcz.codecs.parameters import SCALED, chosen_of
 from mcz.codecs.segments import segment_frames_of
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import reach
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
+from mcz.motion import ANGLE_KINDS, POSITION_KINDS, Skeleton
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -80,7 +80,7 @@ def position_channels(layout: Layout) -> NDArray[np.bool_]:
 
 def _lever(skeleton: Skeleton | None) -> float:
     """How far the farthest point moves when a root turns by one angle unit; 1 without rotations."""
-    if skeleton is None or not any(c.kind in ROTATION_KINDS for c in skeleton.channels):
+    if skeleton is None or not any(c.kind in ANGLE_KINDS for c in skeleton.channels):
         return 1.0
     lever = reach(skeleton) * (math.pi / 180 if skeleton.angle_unit != "rad" else 1.0)
     return lever if LEAST_LEVER <= lever <= 1 / LEAST_LEVER else 1.0

@@ -17,7 +17,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from construct import ExprValidator, Float64l, IfThenElse, Int8ul, Pass, Struct, this
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
@@ -55,7 +54,18 @@ from mcz.codecs.parameters import (
 )
 from mcz.codecs.segments import SEGMENT_FRAMES, SEGMENT_FRAMES_PARAMETER, Lengths, halving
 from mcz.errors import FormatError, OptionError
-from mcz.schema import UVARINT, build, parse
+from mcz.schema import (
+    UVARINT,
+    ExprValidator,
+    Float64l,
+    IfThenElse,
+    Int8ul,
+    Pass,
+    Struct,
+    build,
+    parse,
+    this,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

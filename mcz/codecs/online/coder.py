@@ -10,7 +10,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from construct import Int8ul, OneOf, Struct
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
@@ -18,7 +17,7 @@ from mcz.codecs.online.units import GOLOMB, INTRA, LTR, MIXED, STR, Unit
 from mcz.codecs.space import APART, COURSES, MEAN, N_COORDINATES, SPACE, Space, space_of
 from mcz.coding.start import start_states
 from mcz.errors import FormatError, LostFrameError, MotionError
-from mcz.schema import parse
+from mcz.schema import Int8ul, OneOf, Struct, parse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -200,6 +200,8 @@ def uses(header: bytes) -> tuple[bytes, ...]:
 class _LiveEncoder:
     """One frame a push, each a unit and a segment; fresh ones are intra coded."""
 
+    version: int | None = None
+
     def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
         chosen = settled(options)
         choice, order = choose_live(layout, chosen)

@@ -15,7 +15,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from construct import ExprValidator, Int8ul, Struct
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
@@ -41,7 +40,7 @@ from mcz.codecs.segments import (
 )
 from mcz.codecs.steps import ratio_of
 from mcz.errors import FormatError
-from mcz.schema import build, parse
+from mcz.schema import ExprValidator, Int8ul, Struct, build, parse
 
 Floats = NDArray[np.float64]
 

@@ -26,7 +26,8 @@ class Chain:
 
     def __init__(self, header: Header, skeleton: Skeleton) -> None:
         self.header, self.skeleton = header, skeleton
-        self._classes, self._kinds = classes_of(skeleton), kinds_of(skeleton)
+        self._classes = classes_of(skeleton, header.whole)
+        self._kinds = kinds_of(skeleton, header.whole)
         self._walk: Walk | None = None  # None: nothing can go on
         self._rows: RowCoder | None = None
 

@@ -18,7 +18,16 @@ from mcz.codecs.gaps import FrameReader
 from mcz.codecs.posewave.contact_choice import choose_contacts, runs_of
 from mcz.codecs.posewave.contact_keeper import Keeper
 from mcz.codecs.posewave.exact import partition
-from mcz.codecs.posewave.header import MAX_FINE, NAME, Header, build_header, parse_header
+from mcz.codecs.posewave.header import (
+    MAX_FINE,
+    NAME,
+    REFINING,
+    WHOLE_TURNS,
+    Header,
+    build_header,
+    has_whole_turns,
+    parse_header,
+)
 from mcz.codecs.posewave.order_choices import choose_orders
 from mcz.codecs.posewave.orders import N_NOTES, Orders
 from mcz.codecs.posewave.segment import Weights, encode_coded
@@ -28,7 +37,7 @@ from mcz.codecs.steps import code_of
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import reach
 from mcz.kinematics.chain import chain_of
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
+from mcz.motion import ANGLE_KINDS, POSITION_KINDS, QUATERNION_KINDS, ROTATION_KINDS, Skeleton
 
 Floats = NDArray[np.float64]
 
@@ -43,6 +52,7 @@ SHARE_OF_CONSTANT = 0.25  # of a step: how far a constant channel may move point
 SPREAD_CM = 2.0  # a step of so much would be as large as a plain channel spreads
 SAMPLED_FRAMES = 128  # where it is measured
 FINE_CM = 0.08  # a step below which first poses are told more exactly
+SPATIAL = (*ROTATION_KINDS, *POSITION_KINDS)
 LEVELS = (2, 3, 4, 5)  # that are tried
 TRIAL_FRAMES = 2048
 SAMPLED = 8  # every so many frames an error is measured in a trial
@@ -75,7 +85,8 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
     fields = _fields(skeleton, step, step_cm)
     fields |= _plain_steps(skeleton, _spreads(sample(source, SAMPLED_FRAMES)), step_cm)
     octaves = params.get("refinement")
-    fields["refining"] = int(octaves is not None and bool(np.any(octaves)))
+    if octaves is not None and np.any(octaves):
+        fields["flags"] |= REFINING
     groups = partition(skeleton, params)
     fields["exact"] = groups[1] if groups else ()
     exact = {channel for group in fields["exact"] for channel in source.layout.groups[group]}
@@ -117,14 +128,16 @@ def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) 
     """
     unit = skeleton.unit_cm
     if step is None:
-        if bound_cm is None or not unit or not has_kinematics(skeleton):
+        if bound_cm is None or not unit or not has_kinematics(skeleton, whole=True):
             raise OptionError(f"{NAME}: step has to be given, for lengths in cm are not known")
         step = STEP_OF_BOUND * bound_cm
     own = step / (unit or 1.0)
     step_cm = own * (unit or RADIUS_CM / PROPORTION / (reach(skeleton) or 1.0))
     fields = _fields(skeleton, own, step_cm)
     fields |= _plain_steps(skeleton, np.ones(skeleton.n_channels), step_cm)
-    fields |= {"start": 1, "refining": int(bound_cm is not None), "levels": 0, "borrowing": 0}
+    fields |= {"start": 1, "levels": 0, "borrowing": 0}
+    if bound_cm is not None:
+        fields["flags"] |= REFINING
     return Choice(build_header(**fields), weights_of(step_cm))
 
 
@@ -158,7 +171,7 @@ def _fields(skeleton: Skeleton, step: float, step_cm: float) -> dict[str, Any]:
     first = 2 if step_cm <= FINE_CM else 0
     return {
         "start": 0 if step_cm < COARSE_CM else 1,
-        "refining": 0,
+        "flags": WHOLE_TURNS if has_whole_turns(skeleton) else 0,
         "step": step,
         "radius": RADIUS_CM * in_cm,
         "shell": SHELL,
@@ -198,17 +211,23 @@ def _plain_steps(skeleton: Skeleton, spreads: Floats, step_cm: float) -> dict[st
         own = [s for kind, s in zip(kinds, spreads, strict=True) if kind in some and s > 0]
         return code_of(float(np.median(own)) * share) if own else code_of(1.0)
 
-    spatial = (*ROTATION_KINDS, *POSITION_KINDS)
+    moving = has_kinematics(skeleton, whole=True)
+    spatial = (*ANGLE_KINDS, *POSITION_KINDS) if has_whole_turns(skeleton) else SPATIAL
+    turning = code_of(math.radians(GREATEST_DEGREES) / 2)  # of a part of a quaternion
     plain = [
-        code_of(float(spread) * share) if spread > 0 else code_of(1.0)
+        turning
+        if moving and kind in QUATERNION_KINDS
+        else code_of(float(spread) * share)
+        if spread > 0
+        else code_of(1.0)
         for kind, spread in zip(kinds, spreads, strict=True)
         if kind not in spatial
     ]
-    if has_kinematics(skeleton):
+    if moving:
         return {"plain": plain}
     return {
         "plain": plain,
-        "rotation": code(ROTATION_KINDS),
+        "rotation": code(ANGLE_KINDS),
         "position": code(POSITION_KINDS),
     }
 

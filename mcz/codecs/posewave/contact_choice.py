@@ -98,7 +98,7 @@ def runs_of(source: SignalSource, wanted: Runs) -> tuple[Run, ...]:
     """
     layout = source.layout
     skeleton, n_frames = skeleton_of(NAME, layout), layout.n_frames
-    if not has_kinematics(skeleton):
+    if not has_kinematics(skeleton, whole=True):
         raise OptionError(f"contacts: skeleton {skeleton.name!r} has angles of an unknown unit")
     if isinstance(wanted, str):
         if not feet_of(skeleton):

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from construct import ExprValidator, Float32l, Int8ul, Struct
 
 from mcz.codecs.posewave.skeleton_plan import PLAIN, Floats, Ints, Plan, limited, orientation
 from mcz.codecs.posewave.turns import RULES
 from mcz.errors import FormatError
 from mcz.motion import Skeleton
-from mcz.schema import UVARINT, counted
+from mcz.schema import UVARINT, ExprValidator, Float32l, Int8ul, Struct, counted
 
 MAX_POINTS = 8
 MAX_ROUNDS = 6

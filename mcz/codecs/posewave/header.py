@@ -11,7 +11,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from construct import ExprValidator, Float32l, Int8ul, Struct
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Layout
@@ -20,8 +19,16 @@ from mcz.codecs.posewave.model import Start, start_tables
 from mcz.codecs.posewave.orders import N_ORDERS, check_orders
 from mcz.codecs.steps import code_of, ratio_of
 from mcz.errors import FormatError
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS
-from mcz.schema import UVARINT, build, counted, parse
+from mcz.motion import (
+    ANGLE_KINDS,
+    POSITION_KINDS,
+    QUATERNION_KINDS,
+    ROTATION_KINDS,
+    VECTOR_KINDS,
+    Skeleton,
+)
+from mcz.schema import UVARINT, ExprValidator, Float32l, Int8ul, Struct, build, counted, parse
+from mcz.skeleton import first_columns
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +36,7 @@ NAME = "posewave"
 MAX_LEVELS = 8
 MAX_FINE = 24
 WHOLE_SHARE = 16
+REFINING, WHOLE_TURNS = 1, 2  # of ``flags``
 
 POSEWAVE_HEADER = Struct(
     "levels"
@@ -38,9 +46,9 @@ POSEWAVE_HEADER = Struct(
     / ExprValidator(Int8ul, lambda n, ctx: n <= ctx.levels)  # PWAVE-06
     * "finest levels of details that take the metric of the next coarser one",
     "start" / Int8ul * "start table of the model, 0 or 1",
-    "refining"
-    / ExprValidator(Int8ul, lambda n, ctx: n <= 1)  # PWAVE-08
-    * "1: rows may have finer steps of their own; 0: none has",
+    "flags"
+    / ExprValidator(Int8ul, lambda n, ctx: n <= 3)  # PWAVE-08
+    * "bit 0: rows may have finer steps of their own; 1: whole turns are in the metric",
     "step"
     / ExprValidator(Float32l, lambda x, ctx: 2.0**-60 <= x <= 2.0**60)  # PWAVE-09
     * "quantizer step of a row in the metric, in length units, 2^-60 to 2^60",
@@ -75,15 +83,17 @@ class Header:
     """The fields of POSEWAVE_HEADER, checked against a layout.
 
     Arrays are by channel, but for ``weights`` (n_joints,): ``greatest`` steps and the step of the
-    ``first`` value of a segment and of a ``constant``, in source units. ``orders``: a code of each
-    joint, or none. ``exact`` (n_channels,): whether a channel is; ``exact_groups`` are their
-    groups.
+    ``first`` value of a segment and of a ``constant``, in source units. ``whole``: quaternions and
+    rotation vectors turn in the metric, and the latter's channels are rotations. ``orders``: a code
+    of each joint, or none. ``exact`` (n_channels,): whether a channel is; ``exact_groups`` are
+    their groups.
     """
 
     levels: int
     borrowing: int
     start: Start
     refining: bool
+    whole: bool
     step: float
     radius: float
     shell: float
@@ -97,10 +107,24 @@ class Header:
     contacts: Contacts | None = None
 
     @property
+    def version(self) -> int:
+        """The least version of the codec that has this."""
+        return int(self.whole)
+
+    @property
     def may_go_on(self) -> bool:
         """Whether a segment may go on where the one before it ended."""
         rest = any(self.orders) or self.exact_groups or self.contacts
         return self.levels == 0 and not rest  # PWAVE-28
+
+
+def has_whole_turns(skeleton: Skeleton) -> bool:
+    """Whether a joint turns by a quaternion or a rotation vector."""
+    return any(
+        first_columns(joint.channels, kinds)
+        for joint in skeleton.joints
+        for kinds in (QUATERNION_KINDS, VECTOR_KINDS)
+    )
 
 
 def build_header(**fields: Any) -> bytes:
@@ -123,8 +147,10 @@ def parse_header(header: bytes, layout: Layout) -> Header:
     start, last = fields.start, len(start_tables()) - 1
     if start > last:  # PWAVE-07
         raise FormatError(f"{NAME}: start table {start}, the last is {last}")
+    whole = bool(fields.flags & WHOLE_TURNS)
+    turning = ANGLE_KINDS if whole else ROTATION_KINDS
     kinds = [channel.kind for channel in skeleton.channels]
-    n_plain = sum(kind not in (*ROTATION_KINDS, *POSITION_KINDS) for kind in kinds)
+    n_plain = sum(kind not in (*turning, *POSITION_KINDS) for kind in kinds)
     for name, due in (
         ("plain", n_plain),
         ("weights", skeleton.n_joints),
@@ -141,7 +167,7 @@ def parse_header(header: bytes, layout: Layout) -> Header:
     greatest = np.array(
         [
             rotation
-            if kind in ROTATION_KINDS
+            if kind in turning
             else position
             if kind in POSITION_KINDS
             else ratio_of(next(plain))
@@ -154,7 +180,8 @@ def parse_header(header: bytes, layout: Layout) -> Header:
         levels=fields.levels,
         borrowing=fields.borrowing,
         start=start_tables()[start],
-        refining=fields.refining == 1,
+        refining=bool(fields.flags & REFINING),
+        whole=whole,
         step=fields.step,
         radius=fields.radius,
         shell=fields.shell / WHOLE_SHARE,

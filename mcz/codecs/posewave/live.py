@@ -38,6 +38,7 @@ class LiveEncoder:
     """
 
     models: tuple[Model, ...] = ()
+    version: int | None
 
     def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
         self.skeleton = skeleton_of(NAME, layout)
@@ -49,7 +50,9 @@ class LiveEncoder:
         bound = PRESETS[options["preset"]] if options["step"] is None else None
         choice = live_choice(self.skeleton, options["step"], bound)
         self.header, self._weight = choice.header, choice.weights.approximations
-        self._chain = Chain(parse_header(self.header, layout), self.skeleton)
+        fields = parse_header(self.header, layout)
+        self.version = fields.version
+        self._chain = Chain(fields, self.skeleton)
         self._bound = math.inf if bound is None else bound / (self.skeleton.unit_cm or 1.0)
         self._places = None if bound is None else FramePositions(self.skeleton)
         self._every = options["segment_frames"] or JOINING

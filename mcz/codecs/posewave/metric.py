@@ -55,6 +55,7 @@ class Metric:
             kappa=header.shell,
             joint_weights=header.weights,
             orders=header.orders,
+            whole=header.whole,
         )
 
     def factors(self, poses: Floats) -> Floats:

@@ -8,8 +8,9 @@ knows how far apart rows are. For one frame alone both are known.
 
 from __future__ import annotations
 
-from mcz.codecs.posewave.skeleton_plan import Floats, Plan
+from mcz.codecs.posewave.skeleton_plan import QUATERNION, VECTOR, Floats, Plan
 from mcz.codecs.posewave.turns import BEYOND, sine_cosine
+from mcz.codecs.posewave.whole_turn_kernels import turn_by_quaternion, turn_by_vector
 from mcz.jit import inner
 
 # Angles, then sines, (n_turns, width); cosines, likewise; scratch (9, width); ``axes``
@@ -50,8 +51,9 @@ def _take_turns(
 ) -> None:
     for turn in range(len(plan.turns)):
         take_values(columns, plan.turns[turn, 1], first, angles[turn], lanes)
-        for p in range(lanes):
-            angles[turn, p], cosines[turn, p] = sine_cosine(angles[turn, p], plan.rule)
+        if plan.turns[turn, 0] < QUATERNION:
+            for p in range(lanes):
+                angles[turn, p], cosines[turn, p] = sine_cosine(angles[turn, p], plan.rule)
 
 
 @inner
@@ -90,23 +92,40 @@ def _move(plan: Plan, joint: int, columns: Floats, first: int, batch: Lanes, lan
 
 @inner
 def _turn(plan: Plan, joint: int, batch: Lanes, lanes: int) -> None:
-    """Turn a joint by its rotation channels, from the outermost to the innermost."""
-    sines, cosines, own, axes, origins, motions = batch
+    """Turn a joint by its channels, from the outermost to the innermost."""
+    sines, _, own, axes, origins, motions = batch
+    origin = origins[joint + 1]
     _change(axes[plan.parents[joint] + 1], plan.changes[joint], own, lanes)
-    for turn in range(plan.turn_starts[joint], plan.turn_starts[joint + 1]):
-        axis, number = plan.turns[turn, 0], plan.turns[turn, 2]
-        if number >= 0:
-            radians = plan.rule.radians
-            _note_turn(own, axis, radians, origins[joint + 1], motions[number], lanes)
-        if axis == 0:  # LLVM makes vectors only where it knows which columns these are
-            _mix(own, 1, 2, sines[turn], cosines[turn], lanes)
-        elif axis == 1:
-            _mix(own, 2, 0, sines[turn], cosines[turn], lanes)
+    turn, stop = plan.turn_starts[joint], plan.turn_starts[joint + 1]
+    while turn < stop:
+        axis = plan.turns[turn, 0]
+        if axis == QUATERNION:
+            turn_by_quaternion(plan, turn, sines, own, origin, motions, lanes)
+            turn += 4
+        elif axis == VECTOR:
+            turn_by_vector(plan, turn, sines, own, origin, motions, lanes)
+            turn += 3
         else:
-            _mix(own, 0, 1, sines[turn], cosines[turn], lanes)
+            _turn_about(plan, turn, batch, origin, lanes)
+            turn += 1
     for i in range(9):
         for p in range(lanes):
             axes[joint + 1, i, p] = own[i, p]
+
+
+@inner
+def _turn_about(plan: Plan, turn: int, batch: Lanes, origin: Floats, lanes: int) -> None:
+    """Turn a joint's axes about one of them, and note what the channel does."""
+    sines, cosines, own, _, _, motions = batch
+    axis, number = plan.turns[turn, 0], plan.turns[turn, 2]
+    if number >= 0:
+        _note_turn(own, axis, plan.rule.radians, origin, motions[number], lanes)
+    if axis == 0:  # LLVM makes vectors only where it knows which columns these are
+        _mix(own, 1, 2, sines[turn], cosines[turn], lanes)
+    elif axis == 1:
+        _mix(own, 2, 0, sines[turn], cosines[turn], lanes)
+    else:
+        _mix(own, 0, 1, sines[turn], cosines[turn], lanes)
 
 
 @inner

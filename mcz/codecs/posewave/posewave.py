@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,7 @@ def encode(source: SignalSource, params: Mapping[str, Any]) -> Encoded:
     choice = choose(source, params)
     header = parse_header(choice.header, layout)
     segments = _segments(source, header, choice, params)
-    return Encoded(choice.header, segments, header.levels + 1)
+    return Encoded(choice.header, segments, header.levels + 1, version=header.version)
 
 
 def _segments(
@@ -125,13 +126,20 @@ def exact_groups(header: bytes, layout: Layout) -> tuple[int, ...]:
 
 
 def decode(
-    header: bytes, layout: Layout, spans: Sequence[Span], request: Request, fetch: Fetch
+    header: bytes,
+    layout: Layout,
+    spans: Sequence[Span],
+    request: Request,
+    fetch: Fetch,
+    version: int = 1,
 ) -> NDArray[Any]:
     """The values, (frames, channels of the groups), ordinals of exact groups.
 
     Raises FormatError on bad bytes.
     """
     fields = parse_header(header, layout)
+    if fields.version > version:  # PWAVE-40
+        raise FormatError(f"{NAME}: whole turns in a signal of version {version}")
     for span in spans:
         if span.lead or span.tail:  # PWAVE-03
             raise FormatError(f"{NAME}: the segment at {span.first} bears upon others")
@@ -186,7 +194,8 @@ def _decoder(header: Header, skeleton: Skeleton) -> Callable[[Sequence[bytes], S
 CODEC = Codec(
     id=13,
     name=NAME,
-    version=0,
+    version=1,
+    earlier={0: partial(decode, version=0)},
     domain="values",
     lossless=False,
     encode=encode,

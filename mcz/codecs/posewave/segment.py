@@ -20,7 +20,7 @@ from mcz.codecs.posewave.pyramid import Pyramid
 from mcz.codecs.posewave.rows import RowCoder, Stream, code_head, fresh_coder
 from mcz.codecs.posewave.walk import Walk
 from mcz.errors import FormatError, MotionError
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Skeleton
+from mcz.motion import ANGLE_KINDS, POSITION_KINDS, ROTATION_KINDS, Skeleton
 from mcz.transforms import lifting
 
 Floats = NDArray[np.float64]
@@ -98,7 +98,7 @@ def encode_coded(
         details.append(detail)
     bands = [approx, *reversed(details)]
     head = choose_head(header, values, kept, approx)
-    classes, coder = classes_of(skeleton), fresh_coder(header.start)
+    classes, coder = classes_of(skeleton, header.whole), fresh_coder(header.start)
     rows = RowCoder(classes[kept], header.start, coder, NAME, refining=header.refining)
     walk = Walk(header, skeleton, pyramid, kept, head.values(header))
     streams = []
@@ -107,7 +107,7 @@ def encode_coded(
         stream = Stream(coder, room, None)
         if level == 0:
             moving = head.moving.astype(np.int64)
-            code_head(stream, kinds_of(skeleton), moving, head.numbers.copy(), NAME)
+            code_head(stream, kinds_of(skeleton, header.whole), moving, head.numbers.copy(), NAME)
         rows.begin(level, pyramid.kind(level), len(band), stream)
         rows.exponents[:] = pyramid.exponents(level, refinement)
         code = partial(rows.encode, weights.of(level))
@@ -144,11 +144,11 @@ def decode_segment(
     orders = Orders(header.orders, skeleton)
     notes, coarsest = orders.take_notes(streams[0], n_frames, where)
     streams = [coarsest, *streams[1 + n_empty :]]
-    classes = classes_of(skeleton)
+    classes = classes_of(skeleton, header.whole)
     coder = fresh_coder(header.start)
     stream = Stream(coder, 0, streams[0])
     moving, numbers = np.zeros((2, len(classes)), np.int64)
-    code_head(stream, kinds_of(skeleton), moving, numbers, where)
+    code_head(stream, kinds_of(skeleton, header.whole), moving, numbers, where)
     head = Head(moving == 1, numbers)
     kept = head.kept(header)
     walk = Walk(header, skeleton, pyramid, kept, head.values(header))
@@ -170,15 +170,17 @@ def decode_segment(
     return orders.values(values, notes)
 
 
-def kinds_of(skeleton: Skeleton) -> Ints:
+def kinds_of(skeleton: Skeleton, whole: bool = False) -> Ints:
     """0 for rotation channels, 1 for positions, 2 for others."""
     kinds = [channel.kind for channel in skeleton.channels]
-    found = [0 if k in ROTATION_KINDS else 1 if k in POSITION_KINDS else 2 for k in kinds]
+    turning = ANGLE_KINDS if whole else ROTATION_KINDS
+    found = [0 if k in turning else 1 if k in POSITION_KINDS else 2 for k in kinds]
     return np.array(found, np.int64)
 
 
-def classes_of(skeleton: Skeleton) -> Ints:
+def classes_of(skeleton: Skeleton, whole: bool = False) -> Ints:
     """What channels are to the model of their rows: by how many joints a rotation moves."""
+    turning = ANGLE_KINDS if whole else ROTATION_KINDS
     n_below = [1] * skeleton.n_joints
     for index in range(skeleton.n_joints - 1, -1, -1):
         parent = skeleton.joints[index].parent
@@ -187,7 +189,7 @@ def classes_of(skeleton: Skeleton) -> Ints:
     found = []
     for joint, n in zip(skeleton.joints, n_below, strict=True):
         own = 1 if joint.parent < 0 else 2 + (n >= 2) + (n >= 4) + (n >= 8)
-        found += [own if channel.kind in ROTATION_KINDS else 0 for channel in joint.channels]
+        found += [own if channel.kind in turning else 0 for channel in joint.channels]
     return np.array(found, np.int64)
 
 

@@ -18,16 +18,27 @@ from numpy.typing import NDArray
 from mcz.codecs.posewave.orders import KEPT, SEQUENCES
 from mcz.codecs.posewave.turns import BEYOND, RULES, Rule, sine_cosine
 from mcz.kinematics.points import points_of
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Joint, Skeleton
+from mcz.motion import (
+    ANGLE_KINDS,
+    POSITION_KINDS,
+    QUATERNION_KINDS,
+    ROTATION_KINDS,
+    VECTOR_KINDS,
+    Joint,
+    Skeleton,
+)
+from mcz.skeleton import first_columns
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]  # rows
+Turn = tuple[int, int, int]  # axis, column, number among the kept
 
 MAX_PATH = 96  # channels from the first of a block down to a channel, itself included
 LEAST_REGULARIZATION, GREATEST_REGULARIZATION = 2.0**-100, 2.0**100
 PLAIN = -1
+QUATERNION, VECTOR = 3, 4  # as axes of turns
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 N_INERTIA = 10  # mass, first moment x y z, inertia xx yy zz xy xz yz
 
@@ -42,7 +53,8 @@ class Plan(NamedTuple):
     Of position channels, in joint order: ``moves`` (n_moves, 2), column and number among the kept
     or -1; ``directions`` (n_moves, 3) along the parent's B; ``move_starts`` (n_joints + 1,).
     Of rotation channels, in joint order and within a joint as they are multiplied from the left:
-    ``turns`` (n_turns, 3), axis, column and number among the kept or -1; ``turn_starts``.
+    ``turns`` (n_turns, 3), axis, column and number among the kept or -1; ``turn_starts``. A
+    quaternion has four of them, of the axis QUATERNION, a rotation vector three, of VECTOR.
     Of kept channels: ``joints`` (n_kept,), -1 for a plain one; ``starts`` (n_kept + 1,), its row in
     ``path`` (n_entries,): the channels from the first of its block down to itself, as numbers among
     the kept; ``regularization`` (n_kept,).
@@ -84,18 +96,19 @@ def make_plan(
     kappa: float = 0.5,
     joint_weights: Floats | None = None,
     orders: Sequence[int] = (),
+    whole: bool = False,
 ) -> Plan:
     """The plan of ``skeleton`` for the channels where ``kept``, bool (n_channels,), is true.
 
     ``regularization`` (n_kept,) is added to the diagonal; of a plain channel it is the diagonal.
     ``radius`` of the shell is in length units, ``kappa`` the shell's part of the whole,
     ``joint_weights`` (n_joints,) multiply what a joint has of both. ``orders`` (n_joints,), or
-    none, are codes of axis orders.
+    none, are codes of axis orders. ``whole``: quaternions and rotation vectors turn.
 
-    All but positions and rotations are plain. The pose takes scales as 1, lengths as 0, and a joint
-    with a quaternion as unturned. All channels are plain where angles have no known unit. What is
-    2^40 or more, or not finite, among offsets, tails, axes and weights counts as 0, and so do the
-    values of a pose: the metric then is that of another pose, but there always is one.
+    All but positions and what turns are plain. The pose takes scales as 1 and lengths as 0. All
+    channels are plain where angles have no known unit. What is 2^40 or more, or not finite, among
+    offsets, tails, axes and weights counts as 0, and so do the values of a pose: the metric then is
+    that of another pose, but there always is one.
     """
     if len(kept) != skeleton.n_channels or len(regularization) != np.count_nonzero(kept):
         raise ValueError(f"{len(regularization)} of {len(kept)} channels are kept")
@@ -107,8 +120,11 @@ def make_plan(
     rule = RULES[skeleton.angle_unit]
     frames = [orientation(joint, rule) for joint in skeleton.joints]
     moves, move_starts, directions = _moves(skeleton, frames, numbers)
-    turns, turn_starts = _turns(skeleton, numbers, orders)
-    joints, starts, path = _rows(skeleton, numbers, int(np.count_nonzero(kept)))
+    turns, turn_starts = _turns(skeleton, numbers, orders, whole)
+    moving = {column for _, column, _ in turns}
+    if has_kinematics(skeleton, whole):
+        moving |= {column for column, _ in moves}
+    joints, starts, path = _rows(skeleton, numbers, int(np.count_nonzero(kept)), moving)
     least, greatest = LEAST_REGULARIZATION, GREATEST_REGULARIZATION
     return Plan(
         parents=skeleton.parents,
@@ -136,9 +152,10 @@ def limited(value: float) -> float:
     return value if abs(value) < BEYOND else 0.0
 
 
-def has_kinematics(skeleton: Skeleton) -> bool:
+def has_kinematics(skeleton: Skeleton, whole: bool = False) -> bool:
     """Whether angles mean something; without, all channels are plain."""
-    turning = any(c.kind in ROTATION_KINDS for c in skeleton.channels)
+    kinds = ANGLE_KINDS if whole else ROTATION_KINDS
+    turning = any(c.kind in kinds for c in skeleton.channels)
     return bool(skeleton.angle_unit) or not (turning or any(any(j.axis) for j in skeleton.joints))
 
 
@@ -211,11 +228,11 @@ def _moves(
 
 
 def _turns(
-    skeleton: Skeleton, numbers: list[int], orders: Sequence[int]
-) -> tuple[list[tuple[int, int, int]], list[int]]:
-    if not has_kinematics(skeleton):
+    skeleton: Skeleton, numbers: list[int], orders: Sequence[int], whole: bool
+) -> tuple[list[Turn], list[int]]:
+    if not has_kinematics(skeleton, whole):
         return [], [0] * (skeleton.n_joints + 1)
-    turns: list[tuple[int, int, int]] = []
+    turns: list[Turn] = []
     starts, column = [0], 0
     for index, joint in enumerate(skeleton.joints):
         own = [
@@ -223,27 +240,39 @@ def _turns(
             for k, channel in enumerate(joint.channels)
             if channel.kind in ROTATION_KINDS
         ]
-        own = own if skeleton.intrinsic else own[::-1]
         code = orders[index] if orders else KEPT
-        turns += own if code == KEPT else sorted(own, key=lambda t: SEQUENCES[code - 1].index(t[0]))
+        if code != KEPT:
+            turns += sorted(own, key=lambda turn: SEQUENCES[code - 1].index(turn[0]))
+        else:
+            parts = [[turn] for turn in own] + (_whole(joint, column, numbers) if whole else [])
+            parts.sort(key=lambda part: min(column for _, column, _ in part))
+            turns += [turn for part in parts[:: 1 if skeleton.intrinsic else -1] for turn in part]
         column += len(joint.channels)
         starts.append(len(turns))
     return turns, starts
 
 
+def _whole(joint: Joint, start: int, numbers: list[int]) -> list[list[Turn]]:
+    """The quaternion and the rotation vector of a joint, where it has them."""
+    found = (
+        [(axis, column, numbers[column]) for column in first_columns(joint.channels, kinds, start)]
+        for axis, kinds in ((QUATERNION, QUATERNION_KINDS), (VECTOR, VECTOR_KINDS))
+    )
+    return [part for part in found if part]
+
+
 def _rows(
-    skeleton: Skeleton, numbers: list[int], n_kept: int
+    skeleton: Skeleton, numbers: list[int], n_kept: int, moving: set[int]
 ) -> tuple[list[int], list[int], list[int]]:
     """The joint of each kept channel, where its row starts, and the rows."""
     joints = [PLAIN] * n_kept
     rows: list[list[int]] = [[kept] for kept in range(n_kept)]
     paths: list[list[int]] = []
-    kinds = (*POSITION_KINDS, *ROTATION_KINDS) if has_kinematics(skeleton) else ()
     column = 0
     for index, joint in enumerate(skeleton.joints):
         path = paths[joint.parent] if joint.parent >= 0 else []
-        pairs = zip(joint.channels, numbers[column:], strict=False)
-        own = [n for channel, n in pairs if n >= 0 and channel.kind in kinds]
+        columns = range(column, column + len(joint.channels))
+        own = [numbers[c] for c in columns if numbers[c] >= 0 and c in moving]
         if len(path) + len(own) > MAX_PATH:  # POSE-02
             path = []
         for number in own:

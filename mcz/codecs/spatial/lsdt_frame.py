@@ -16,7 +16,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from construct import Struct
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import (
@@ -59,7 +58,7 @@ from mcz.codecs.spatial.prefix_streams import (
 from mcz.coding.start import start_states
 from mcz.coding.streams import code, uncode
 from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
-from mcz.schema import build, parse
+from mcz.schema import Struct, build, parse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -267,6 +266,8 @@ class _Coder:
 
 class _LiveEncoder:
     """One frame a push, each a segment that needs the one before, from time to time a fresh one."""
+
+    version: int | None = None
 
     def __init__(self, layout: Layout, options: Mapping[str, Any]) -> None:
         chosen = chosen_of(PRESETS, options)

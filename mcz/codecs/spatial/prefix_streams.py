@@ -11,12 +11,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from construct import ExprValidator, If, Int8ul, OneOf, Struct
 from numpy.typing import NDArray
 
 from mcz.coding.huffman import DIRECT, MAX_LENGTH, N_CLASSES, code_lengths, codes_of
 from mcz.errors import FormatError
-from mcz.schema import counted
+from mcz.schema import ExprValidator, If, Int8ul, OneOf, Struct, counted
 
 Ints = NDArray[np.int64]
 

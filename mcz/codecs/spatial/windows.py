@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from construct import ExprValidator, Struct
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import (
@@ -30,7 +29,7 @@ from mcz.codecs.space import APART, SPACE, WEIGHTED, Space, check, space_of, use
 from mcz.codecs.spatial.prefix_streams import CODE, NO_CODES, Codes, codes_from, fields_of
 from mcz.codecs.spatial.window_streams import MAX_INDEX, build_window, parse_window, windows_of
 from mcz.errors import FormatError, MotionError
-from mcz.schema import UVARINT, build, parse
+from mcz.schema import UVARINT, ExprValidator, Struct, build, parse
 from mcz.transforms.dct import dct_matrix
 
 Floats = NDArray[np.float64]

@@ -12,7 +12,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from construct import ExprValidator, Float64l, IfThenElse, Int8ul, Pass, Struct, this
 from numpy.typing import NDArray
 
 from mcz.codecs.contract import Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
@@ -23,7 +22,19 @@ from mcz.codecs.wavelet.quantizer import Quantizer
 from mcz.codecs.wavelet.streams import Coding, build_streams, parse_streams
 from mcz.codecs.wavelet.windows import Frames
 from mcz.errors import FormatError
-from mcz.schema import UVARINT, build, counted, parse
+from mcz.schema import (
+    UVARINT,
+    ExprValidator,
+    Float64l,
+    IfThenElse,
+    Int8ul,
+    Pass,
+    Struct,
+    build,
+    counted,
+    parse,
+    this,
+)
 from mcz.transforms import dwt
 from mcz.transforms.wavelets import INLINE, MAX_LEVELS, MAX_TAPS, Wavelet, by_id, by_name
 

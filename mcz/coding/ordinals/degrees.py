@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz import jit
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.magnitudes import POWERS
 from mcz.numbers.tokens import TENS
@@ -20,6 +21,7 @@ Floats = NDArray[np.float64]
 DEGREE = 180 / np.pi  # in a radian
 LARGEST = 1e-12  # degrees: numbers near 1e-9 are products by chance
 MOST = 2**24  # units in a value
+EXACT = 2**52  # codes below are exact as floats, as are their multiples
 _UNITS = DEGREE * 2.0 ** -np.arange(44, 77)
 _SAMPLE = 8
 
@@ -32,8 +34,9 @@ def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
     from mcz.coding.ordinals import product_kernels as own  # on first use
 
     codes = np.ascontiguousarray(codes)
-    out = np.empty(len(codes), np.int64)
-    if own.fill(codes, unit, shifts, TENS, POWERS, grid.digits, out):
+    out = np.full(len(codes), own.PRINTED)
+    all_printed = jit.lacks_compiler() and bool((np.abs(codes) < EXACT).all())
+    if all_printed or own.fill(codes, unit, shifts, TENS, POWERS, grid.digits, out):
         printed = out == own.PRINTED
         few, places = np.unique(codes[printed], return_inverse=True)  # often small ones
         out[printed] = grid.ordinals(multiples_of(few, shifts) * np.float64(unit))[0][

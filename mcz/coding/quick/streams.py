@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz import jit
 from mcz.coding.ordinals.choices import Lattice, base_and_digits, max_top
 from mcz.coding.ordinals.counts import parse_law
 from mcz.coding.ordinals.degrees import of_products
@@ -230,10 +231,10 @@ def parse_streams(
     given = read.Streams(data, bounds, firsts, channels.forms)
     plans = np.zeros((len(channels.forms), own.PLAN_SIZE), np.int64)
     rests = np.zeros((len(out), 0), np.int64)
-    channel, fault = read.read_streams(given, plans, read.Rows(out, rests), tables())
+    channel, fault = _read(given, plans, read.Rows(out, rests))
     if channel == read.NO_ROOM:
         rests = np.zeros(out.shape, np.int64)
-        channel, fault = read.read_streams(given, plans, read.Rows(out, rests), tables())
+        channel, fault = _read(given, plans, read.Rows(out, rests))
     if fault >= 0:
         raise FormatError(f"fast: channel {channel} of those read: {FAULTS[fault]}")
     for n in np.flatnonzero((plans[:, own.KIND] == CODED) & (plans[:, own.UNIT] > 0)):
@@ -254,6 +255,16 @@ def parse_streams(
         int(n): (int(plans[n, own.GROUP]), int(plans[n, own.COLUMN]))
         for n in np.flatnonzero(plans[:, own.KIND] == COPY)
     }
+
+
+def _read(streams: Any, plans: Ints, rows: Any) -> tuple[int, int]:
+    """The streams decoded, compiled or in the quickest plain Python: see ``read_streams``."""
+    if jit.lacks_compiler():
+        from mcz.coding.quick import plain
+
+        return plain.read_streams(streams, plans, rows)
+    found: tuple[int, int] = loops()[1].read_streams(streams, plans, rows, tables())
+    return found
 
 
 def renumbered(stream: bytes, channels: Channels, number_of: Callable[[int, int], int]) -> bytes:

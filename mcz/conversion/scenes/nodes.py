@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.conversion.hierarchy import loose_tails, moves, stretches
+from mcz.conversion.losses import left_out
 from mcz.errors import MotionError
 from mcz.kinematics import point_set
 from mcz.kinematics.chain import Chain, Floats, times
 from mcz.kinematics.frames import frame_poses_of
-from mcz.motion import ROTATION_KINDS, Motion
+from mcz.motion import TURNING_KINDS, Motion
 from mcz.poses.conversions import from_matrices
 from mcz.retargeting.sides import sides_of
 
 CM_PER_M = 100.0
-TURNING = (*ROTATION_KINDS, "qw")
 SAMPLED_FRAMES = 500  # by which the size of a set of markers is judged
 UNSIZED = 1.0  # m, the size of a scene that has none
 
@@ -138,13 +138,7 @@ def _notes(motion: Motion) -> Iterator[str]:
         yield "its length unit is unknown: a unit became a meter"
     if not skeleton.up_axis:
         yield "the axis that points up is unknown: taken for y"
-    plain = [channel.label for channel in skeleton.channels if not channel.kind]
-    if plain:
-        more = " ..." if len(plain) > 8 else ""
-        yield f"left out: {', '.join(plain[:8])}{more}, which move nothing"
-    others = [signal.name for signal in motion.signals[1:]]
-    if others:
-        yield f"left out: signal {', '.join(others)}"
+    yield from left_out(motion, "glb")
 
 
 def _markers(motion: Motion, scale: float) -> Iterator[Node]:
@@ -245,7 +239,7 @@ class _Placed:
 
 def _turns(motion: Motion, values: Floats, index: int) -> Floats | None:
     """How a joint is turned from its parent, x y z w; None where nothing turns it."""
-    if not any(channel.kind in TURNING for channel in motion.skeleton.joints[index].channels):
+    if not any(channel.kind in TURNING_KINDS for channel in motion.skeleton.joints[index].channels):
         return None
     matrices = frame_poses_of(motion.skeleton).local(values, [index])
     if not np.isfinite(matrices).all():

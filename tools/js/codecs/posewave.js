@@ -15,7 +15,11 @@ import { decodeGroups } from "./lossless.js";
 
 export const id = 13;
 export const name = "posewave";
-export const version = 0;
+export const version = 1;
+
+/** Bits of the flags. */
+const REFINING = 1;
+const WHOLE_TURNS = 2;
 
 const MAX_LEVELS = 8;
 const MAX_SHELL = 16;
@@ -28,6 +32,7 @@ const GREATEST_LENGTH = 2 ** 60;
 const TX = 1;
 const RX = 4;
 const SX = 7;
+const VX = 15;
 
 /** From so many joints on that a rotation moves its class is another. */
 const MANY = [2, 4, 8];
@@ -42,14 +47,16 @@ const PLAIN = 2;
  *
  * @param {Uint8Array} header POSEWAVE_HEADER
  * @param {object} layout the signal, as CLIP has it
+ * @param {number} codecVersion 0 or 1
  * @returns {PoseDecoder}
  * @throws {Refused} for a header, or a signal, that the codec does not have
  */
-export function open(header, layout) {
+export function open(header, layout, codecVersion) {
   const { skeleton, groups, nResolutions, samplesPerFrame } = layout;
   if (samplesPerFrame !== 1) throw new Refused(`${name}: ${samplesPerFrame} rows a frame`);
   if (skeleton === null) throw new Refused(`${name}: channels that are not those of the skeleton`);
   const fields = readHeader(header, skeleton, groups);
+  if (fields.whole && codecVersion < 1) throw new Refused(`${name}: whole turns in version 0`);
   if (groups.length > 1 && fields.exactGroups.length === 0) {
     throw new Refused(`${name}: ${groups.length} groups`);
   }
@@ -65,7 +72,9 @@ function readHeader(bytes, skeleton, groups) {
   const levels = upTo(reader, MAX_LEVELS, "levels");
   const borrowing = upTo(reader, levels, "borrowed levels");
   const start = upTo(reader, MAX_START, "is a start table");
-  const refining = upTo(reader, 1, "for refining") === 1;
+  const flags = upTo(reader, REFINING | WHOLE_TURNS, "as flags");
+  const refining = (flags & REFINING) !== 0;
+  const whole = (flags & WHOLE_TURNS) !== 0;
   const step = reader.f32();
   if (!(step >= 1 / GREATEST_LENGTH && step <= GREATEST_LENGTH)) reader.refuse(`a step of ${step}`);
   const radius = reader.f32();
@@ -74,7 +83,7 @@ function readHeader(bytes, skeleton, groups) {
   const steps = [stepOf(reader.u8()), stepOf(reader.u8())];
   const first = upTo(reader, MAX_FINE, "halvings");
   const constant = upTo(reader, MAX_FINE, "halvings");
-  const kinds = Uint8Array.from(channels, kindOf);
+  const kinds = Uint8Array.from(channels, (channel) => kindOf(channel, whole));
   const plain = readSteps(reader, kinds.filter((kind) => kind === PLAIN).length);
   const weights = readSteps(reader, joints.length);
   const orders = reader.counted(() => upTo(reader, MAX_ORDER, "is an axis order"));
@@ -91,12 +100,12 @@ function readHeader(bytes, skeleton, groups) {
   const firstStep = greatest.map((x) => x * 2 ** -first);
   const constantStep = firstStep.map((x) => x * 2 ** -constant);
   return {
-    ...{ levels, borrowing, start, refining, step, radius, kappa, weights, orders },
+    ...{ levels, borrowing, start, refining, whole, step, radius, kappa, weights, orders },
     axisOrders: new AxisOrders(skeleton, orders),
     ...{ kinds, greatest, firstStep, constantStep, exactGroups },
     exactColumns: new Set(exactGroups.flatMap((g) => groups[g])),
     contacts: contacts[0] ?? null,
-    classes: classesOf(joints),
+    classes: classesOf(joints, whole),
   };
 }
 
@@ -123,8 +132,9 @@ function readExact(reader, nGroups) {
   return numbers;
 }
 
-function kindOf({ kind }) {
+function kindOf({ kind }, whole) {
   if (kind >= TX && kind < RX) return POSITION;
+  if (whole && kind >= VX && kind < VX + 3) return ROTATION;
   return kind >= RX && kind < SX ? ROTATION : PLAIN;
 }
 
@@ -133,9 +143,10 @@ function kindOf({ kind }) {
  * many joints it moves; any other channel 0.
  *
  * @param {import("../skel.js").Joint[]} joints
+ * @param {boolean} whole whether rotation vectors are rotations
  * @returns {Uint8Array}
  */
-function classesOf(joints) {
+function classesOf(joints, whole) {
   const moved = new Array(joints.length).fill(1);
   for (let j = joints.length - 1; j >= 0; j--) {
     const { parent } = joints[j];
@@ -144,7 +155,7 @@ function classesOf(joints) {
   return Uint8Array.from(
     joints.flatMap(({ parent, channels }, j) => {
       const own = parent < 0 ? 1 : 2 + MANY.filter((many) => moved[j] >= many).length;
-      return channels.map((channel) => (kindOf(channel) === ROTATION ? own : 0));
+      return channels.map((channel) => (kindOf(channel, whole) === ROTATION ? own : 0));
     }),
   );
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 import struct
 import zlib
@@ -10,12 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-import construct
-
 from mcz.container import payloads
 from mcz.container.segments import SegmentHeader, StreamCounts, parse_table
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build, varint
+from mcz.schema import Field, Fields, Struct, build, varint
+from mcz.schema.fields import Counted
+from mcz.schema.source import Source
 
 BAD_STEPS = {  # that no codec takes, by what their vectors are called
     "0": 0.0,
@@ -50,38 +49,36 @@ def put(schema: Any, path: str, new: bytes) -> Edit:
     return edit
 
 
-def span(schema: Any, payload: bytes, path: str) -> tuple[int, int]:
+def span(schema: Field, payload: bytes, path: str) -> tuple[int, int]:
     """Where the field at ``path`` begins and ends in ``payload``."""
-    stream = io.BytesIO(payload)
     start, stop = 0, len(payload)
     for name in path.split("."):
-        while not isinstance(schema, (construct.Struct, construct.FocusedSeq)):
-            schema = schema.subcon
-        stream.seek(start)
-        if isinstance(schema, construct.Struct):
-            schema, start, stop = _field(schema, stream, name)
-        else:
-            schema, start, stop = _item(schema, stream, int(name))
+        while not isinstance(schema, Struct | Counted):
+            schema = schema.item
+        source = Source(payload, {})
+        source.at = start
+        find = _field if isinstance(schema, Struct) else _item
+        schema, start, stop = find(schema, source, name)
     return start, stop
 
 
-def _field(schema: construct.Struct, stream: io.BytesIO, name: str) -> tuple[Any, int, int]:
-    parts = []
-    for part in schema.subcons:
-        parts += [f"{part.name}_at" / construct.Tell, part, f"{part.name}_end" / construct.Tell]
-    places = construct.Struct(*parts).parse_stream(stream)
-    part = next(part for part in schema.subcons if part.name == name)
-    return part.subcon, places[f"{name}_at"], places[f"{name}_end"]
+def _field(schema: Struct, source: Source, name: str) -> tuple[Field, int, int]:
+    found = Fields()
+    for field in schema.fields:
+        start = source.at
+        found[field.name] = field.item.read(source, found)
+        if field.name == name:
+            return field.item, start, source.at
+    raise KeyError(name)
 
 
-def _item(schema: construct.FocusedSeq, stream: io.BytesIO, index: int) -> tuple[Any, int, int]:
-    count, items = (renamed.subcon for renamed in schema.subcons)
-    count.subcon.parse_stream(stream)
-    for _ in range(index):
-        items.subcon.parse_stream(stream)
-    start = stream.tell()
-    items.subcon.parse_stream(stream)
-    return items.subcon, start, stream.tell()
+def _item(schema: Counted, source: Source, index: str) -> tuple[Field, int, int]:
+    source.varint()
+    start = source.at
+    for _ in range(int(index) + 1):
+        start = source.at
+        schema.item.read(source, Fields())
+    return schema.item, start, source.at
 
 
 def says(data: bytes) -> Edit:

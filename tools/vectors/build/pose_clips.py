@@ -35,7 +35,7 @@ PLAIN_FIELDS: dict[str, Any] = {
     "levels": 2,
     "borrowing": 1,
     "start": 0,
-    "refining": 0,
+    "flags": 0,
     "step": 0.03125,
     "radius": 3.0,
     "shell": 8,
@@ -168,7 +168,8 @@ def codec_of(plan: Plan) -> Codec:
 
     def encode(source: Any, params: Any) -> Encoded:
         made = with_exact(plan, source) if plan.exact else iter(segments_of(plan))
-        return Encoded(header_of(plan), made, plan.n_resolutions)
+        version = parsed(plan).version
+        return Encoded(header_of(plan), made, plan.n_resolutions, version=version)
 
     return replace(
         posewave.CODEC,

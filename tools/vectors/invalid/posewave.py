@@ -85,7 +85,7 @@ def _headers(shelf: Broken) -> None:
         "borrowing-255": ("Borrowing of 255 levels", "borrowing", b"\xff"),
         "start-2": ("Start table 2", "start", b"\2"),
         "start-255": ("Start table 255", "start", b"\xff"),
-        "refining-2": ("2 for refining", "refining", b"\2"),
+        "refining-2": ("Whole turns in a signal of version 0", "flags", b"\2"),
         "step-0": ("A step of 0", "step", _binary32(0.0)),
         "step-minus": ("A negative step", "step", _binary32(-1.0)),
         "step-NaN": ("A step that is no number", "step", _binary32(math.nan)),
@@ -105,6 +105,9 @@ def _headers(shelf: Broken) -> None:
         header = put(POSEWAVE_HEADER, path, new)(header_of(plan))
         data = file_with(plan, CLIP=says(header))
         shelf.add(name, HEADING, f"{purpose}, over nothing but zeros.", data)
+    whole = _still(flags=3)
+    header = put(POSEWAVE_HEADER, "flags", b"\4")(header_of(whole))
+    shelf.add("flags-4", HEADING, "Flags of 4.", file_with(whole, CLIP=says(header)))
     many = _still(levels=8)
     header = put(POSEWAVE_HEADER, "levels", b"\x09")(header_of(many))
     shelf.add("levels-9", HEADING, "9 levels.", file_with(many, CLIP=says(header)))

@@ -106,7 +106,7 @@ def _both(first: Edit, then: Edit) -> Edit:
 
 
 def build_grid(grid: Grid) -> bytes:
-    return bytes(GRID.build(grid))
+    return build(GRID, grid, "grid")
 
 
 def _headers(shelf: Unrestorable, plain: Motion) -> None:

@@ -41,7 +41,7 @@ def _segments(shelf: Poses) -> None:
     purpose = "Segments of 1 to 16 frames, of which two start fresh."
     shelf.plan("on", purpose, plan, CHAINS, requests)
     octaves = [0] * 8 + [2] * 5 + [7] + [0] * 16 + [1] * 10
-    refined = replace(plan, fields={"levels": 0, "refining": 1, "step": 0.25}, refinement=octaves)
+    refined = replace(plan, fields={"levels": 0, "flags": 1, "step": 0.25}, refinement=octaves)
     purpose = "Exponents, which those of the segment before tell; rows of zeros among them."
     shelf.plan("on-refining", purpose, refined, CHAINS, requests)
     coarse = replace(plan, fields={"levels": 0, "step": 2.0, "start": 1}, price=0.5)
@@ -71,7 +71,7 @@ def _live(shelf: Poses) -> None:
     plan = Plan(
         skeleton,
         waves(11, skeleton),
-        {"levels": 0, "refining": 1},
+        {"levels": 0, "flags": 1},
         tuple(range(1, 11)),
         refinement=[0, 1, 0, 0, 3, 0, 0, 0, 0, 0, 1],
         on=set(range(11)) - {0, 4, 8},

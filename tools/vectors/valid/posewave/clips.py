@@ -284,7 +284,7 @@ def _rows(shelf: Poses) -> None:
     shelf.plan("pauses", "Poses that stay, and leaps: rows of zeros among others.", plan, ROWS)
     octaves = [[0, 0, 1, 7, 2, 0, 3][f // 10] for f in range(70)]
     for name, refinement in (("some", octaves), ("all", [7] * 70), ("none", [0] * 70)):
-        fields = {"levels": 3, "refining": 1, "step": 0.5}
+        fields = {"levels": 3, "flags": 1, "step": 0.5}
         plan = Plan(skeleton, source, fields, refinement=refinement)
         purpose = f"Rows with finer steps of their own: {name}."
         shelf.plan(f"refining-{name}", purpose, plan, ROWS, [(1, (5, 60), None)])

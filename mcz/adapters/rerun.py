@@ -1,0 +1,239 @@
+"""``rerun.RecordingStream``: motions as entities over time, logged chunk by chunk."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError
+from mcz.kinematics.chain import Floats
+from mcz.kinematics.points import listed_points, point_set
+from mcz.motion import Motion, Skeleton
+from mcz.pictures.bodies import LEFT, MIDDLE, RIGHT, body_of
+from mcz.poses import point_names
+from mcz.poses.moving import Moving, scale_to, values_of
+from mcz.reading.clip import Clip
+from mcz.reading.recording import recording as recording_of
+from mcz.tables.files import channel_names, channel_units
+from mcz.tables.labelled import imported
+
+APPLICATION = "mcz"
+BLOCK = 2**19  # numbers that are worked on at a time: what bounds the memory
+SIDES = {
+    MIDDLE: ("middle", (190, 190, 190)),
+    LEFT: ("left", (86, 156, 214)),
+    RIGHT: ("right", (214, 96, 77)),
+}
+
+
+def to_rerun(moving: Moving, recording: Any = None, *, entity: str | None = None) -> Any:
+    """Log a Motion or Clip to a ``rerun.RecordingStream``; needs rerun-sdk (``mcz[rerun]``).
+
+    Below ``entity``, by default the clip's name: ``points/NAME`` for every point of
+    ``mcz.point_names``, ``bones/left``, ``right`` and ``middle`` as lines, and every plain scalar
+    and every channel of another signal as a time series ``SIGNAL/NAME``; events as texts. Lengths
+    are in meters where the unit is known. The timeline ``frame`` has the source's frame numbers,
+    ``time`` the seconds since frame number 1, where the rate is known. What is missing is absent.
+    Positions are binary32, scalars binary64.
+
+    Without ``recording`` a new one is made, which holds all until it has a sink; with one that has
+    (``save``, ``spawn``) memory is bounded. Returns the recording. Raises MotionError where there
+    is nothing to log.
+    """
+    rerun = imported("rerun", "rerun")
+    if recording is None:
+        recording = rerun.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
+    _Log(rerun, recording, moving, moving.name if entity is None else entity).all()
+    return recording
+
+
+def view_of(moving: Moving, entity: str) -> Any:
+    """How the viewer of rerun is to show what ``to_rerun`` logs: a figure, and curves beside it.
+
+    Residuals are there, and not shown: there are as many as points.
+    """
+    blueprint = imported("rerun.blueprint", "rerun")
+    log = _Log(imported("rerun", "rerun"), None, moving, entity)
+    origin = str(log.path())
+    figure = [blueprint.Spatial3DView(origin=origin, name=entity)] if log.figure else []
+    curves = [
+        blueprint.TimeSeriesView(origin=str(log.path(signal)), name=f"{entity} {signal}")
+        for signal, _, _, _ in log.series
+        if signal != "residuals"
+    ]
+    beside = [blueprint.Vertical(*curves)] if curves else []
+    return blueprint.Horizontal(*figure, *beside, name=entity)
+
+
+class _Log:
+    """One motion on its way into a recording."""
+
+    def __init__(self, rerun: Any, recording: Any, moving: Moving, entity: str) -> None:
+        self.rerun, self.recording, self.moving = rerun, recording, moving
+        self.parts = [part for part in entity.split("/") if part] or ["motion"]
+        self.rate = moving.frame_rate
+        self.figure = _figure_of(moving)
+        self.series = list(_series_of(moving))
+        self.numbers = _numbers(moving)
+        if self.figure is None and not self.series:
+            raise MotionError(f"{moving.name!r}: neither positions nor scalars, nothing to log")
+
+    def all(self) -> None:
+        self._still()
+        per_frame = sum(len(columns) * rate for _, _, columns, rate in self.series)
+        per_frame += 0 if self.figure is None else 3 * self.figure.n_nodes
+        step = max(1, BLOCK // max(1, per_frame))
+        for start in range(0, self.moving.n_frames, step):
+            self._frames(start, min(start + step, self.moving.n_frames))
+
+    def path(self, *parts: str) -> Any:
+        return self.rerun.new_entity_path([*self.parts, *parts])
+
+    def _send(self, path: Any, numbers: Floats, columns: Any) -> None:
+        """Columns at frames of these numbers, fractions of which are samples within a frame."""
+        times = [self.rerun.TimeColumn("frame", sequence=np.floor(numbers).astype(np.int64))]
+        if self.rate is not None:
+            seconds = (numbers - 1) / float(self.rate)
+            times.append(self.rerun.TimeColumn("time", duration=seconds))
+        self.rerun.send_columns(str(path), times, columns, recording=self.recording)
+
+    def _still(self) -> None:
+        """What does not change: axes, names, colors, events."""
+        rerun, log = self.rerun, self.recording.log
+        up = self.moving.skeleton.up_axis
+        if up:
+            axes = getattr(rerun.ViewCoordinates, f"RIGHT_HAND_{up.upper()}_UP")
+            log(str(self.path()), axes, static=True)
+        if self.figure is not None:
+            for name, side in zip(self.figure.names, self.figure.sides, strict=True):
+                about = rerun.Points3D.from_fields(
+                    labels=[name], show_labels=self.figure.is_markers, colors=[SIDES[side][1]]
+                )
+                log(str(self.path("points", name)), about, static=True)
+            for side in self.figure.bones:
+                name, color = SIDES[side]
+                about = rerun.LineStrips3D.from_fields(colors=[color])
+                log(str(self.path("bones", name)), about, static=True)
+        for signal, _, columns, _ in self.series:
+            for name, unit, _ in columns:
+                shown = f"{name} [{unit}]" if unit else name
+                log(str(self.path(signal, name)), rerun.SeriesLines(names=[shown]), static=True)
+        self._events()
+
+    def _events(self) -> None:
+        moving = self.moving
+        told = moving.recording if isinstance(moving, Clip) else recording_of(_motion(moving))
+        if told is None or not told.events:
+            return
+        texts = [" ".join(filter(None, (e.context, e.label))) for e in told.events]
+        times = [self.rerun.TimeColumn("time", duration=[event.time for event in told.events])]
+        columns = self.rerun.TextLog.columns(text=texts)
+        self.rerun.send_columns(str(self.path("events")), times, columns, recording=self.recording)
+
+    def _frames(self, start: int, stop: int) -> None:
+        numbers = self.numbers[start:stop]
+        if self.figure is not None:
+            self._places(numbers, self.figure.places(self.moving, start, stop))
+        for signal, index, columns, per_frame in self.series:
+            values = _samples(self.moving, index, start, stop)
+            at = (numbers[:, None] + np.arange(per_frame) / per_frame).ravel()
+            for name, _, column in columns:
+                known = np.isfinite(values[:, column])
+                scalars = self.rerun.Scalars.columns(scalars=values[known, column])
+                self._send(self.path(signal, name), at, scalars.partition(known.astype(np.int64)))
+
+    def _places(self, numbers: Floats, nodes: Floats) -> None:
+        """Points and bones of some frames; ``nodes`` (n_frames, n_nodes, 3), NaN where unknown."""
+        figure, rerun = self.figure, self.rerun
+        assert figure is not None
+        for name, node in zip(figure.names, figure.points, strict=True):
+            known = np.isfinite(nodes[:, node]).all(axis=1)
+            points = rerun.Points3D.columns(positions=nodes[known, node].astype(np.float32))
+            self._send(self.path("points", name), numbers, points.partition(known.astype(np.int64)))
+        for side, bones in figure.bones.items():
+            ends = nodes[:, bones]  # (n_frames, n_bones, 2, 3)
+            known = np.isfinite(ends).all(axis=(2, 3))
+            strips = rerun.LineStrips3D.columns(strips=ends[known].astype(np.float32))
+            self._send(
+                self.path("bones", SIDES[side][0]), numbers, strips.partition(known.sum(axis=1))
+            )
+
+
+class _Figure:
+    """Nodes of a skeleton, which of them are its points, and the bones of each side."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.body = body_of(skeleton)
+        self.scale = scale_to(skeleton, None if skeleton.unit_cm is None else "m")
+        self.n_nodes = len(self.body.joints)
+        self.names = point_names(skeleton)
+        self.is_markers = point_set(skeleton) == "markers"
+        of_point = {point: node for node, point in enumerate(self.body.points, skeleton.n_joints)}
+        self.points = [
+            joint if tail < 0 else of_point[number]
+            for number, (joint, tail) in enumerate(listed_points(skeleton))
+        ]
+        self.sides = self.body.sides[self.points].tolist()
+        of_bones = self.body.sides[self.body.bones[:, 1]]
+        self.bones = {s: self.body.bones[of_bones == s] for s in SIDES if (of_bones == s).any()}
+
+    def places(self, moving: Moving, start: int, stop: int) -> Floats:
+        """Where the nodes are, (n_frames, n_nodes, 3), NaN where unknown."""
+        values = values_of(moving, (start, stop), range(moving.skeleton.n_joints))
+        return self.body.places(values) * self.scale
+
+
+def _figure_of(moving: Moving) -> _Figure | None:
+    """None where the skeleton has no kinematics."""
+    if moving.signals[0].channels is not None or not moving.skeleton.joints:
+        return None
+    try:
+        figure = _Figure(moving.skeleton)
+        figure.places(moving, 0, min(1, moving.n_frames))
+    except MotionError:
+        return None
+    return figure
+
+
+Columns = list[tuple[str, str, int]]  # names, units, columns
+
+
+def _series_of(moving: Moving) -> Iterator[tuple[str, int, Columns, int]]:
+    """Of every signal with scalars its name, its index, these, and how many samples a frame has."""
+    for index, signal in enumerate(moving.signals):
+        channels = signal.channels
+        kinds = moving.skeleton.channels if channels is None else channels
+        names = channel_names(moving.skeleton, channels)
+        units = channel_units(moving.skeleton, channels)
+        plain = [k for k, channel in enumerate(kinds) if index or not channel.kind]
+        per_frame = (
+            signal.layout.samples_per_frame
+            if isinstance(moving, Clip)
+            else (signal.samples_per_frame)
+        )
+        if plain:
+            name = signal.name if index else "channels"
+            yield name, index, [(names[k], units[k], k) for k in plain], per_frame
+
+
+def _samples(moving: Moving, index: int, start: int, stop: int) -> NDArray[np.float64]:
+    """The samples of a signal in some frames, in units, NaN where invalid."""
+    if isinstance(moving, Clip):
+        return np.asarray(moving.read((start, stop), signal=index), np.float64)
+    return np.asarray(_motion(moving).signals[index].cut(start, stop).masked(), np.float64)
+
+
+def _numbers(moving: Moving) -> NDArray[np.float64]:
+    """The source's numbers of all frames."""
+    numbers = moving.frame_numbers if isinstance(moving, Clip) else _motion(moving).frame_numbers
+    found = np.arange(1, moving.n_frames + 1) if numbers is None else numbers
+    return np.asarray(found, np.float64)
+
+
+def _motion(moving: Moving) -> Motion:
+    assert isinstance(moving, Motion)
+    return moving

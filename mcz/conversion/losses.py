@@ -1,0 +1,72 @@
+"""What a format has no place for: said in words, so that nothing is lost unnoticed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mcz.kinematics import point_set
+from mcz.motion import Motion
+from mcz.reading.recording import Recording, recording
+
+MOST_NAMES = 8
+POINTS = ("c3d", "trc")  # what becomes of joints are points
+SCENES = ("glb", "usda")
+UNNUMBERED = ("bvh", "sto", "mot", *SCENES)
+ANY_SIGNAL = ("bvh", "amc", "c3d")  # they refuse, or hold, what is beside the motion
+ROOT = "root"  # the only name that ASF has for it
+
+
+def left_out(motion: Motion, to: str) -> tuple[str, ...]:
+    """What ``motion`` says and a file of the format ``to`` will not, a text a thing.
+
+    ``to`` is "csv", "npz", "glb", "usda" or a format of ``mcz.convert``. Metadata are left out of
+    every format, and are not named. What makes a format impossible is an error of the conversion.
+    """
+    return tuple(_left_out(motion, to))
+
+
+def _left_out(motion: Motion, to: str) -> Iterator[str]:
+    others = [signal.name for signal in motion.signals[1:]]
+    if others and to not in ANY_SIGNAL:
+        yield f"left out: signal {', '.join(others)}"
+    names = [channel.label for channel in motion.skeleton.channels if not channel.kind]
+    if names and to in (*POINTS, *SCENES) and point_set(motion.skeleton) != "markers":
+        more = " ..." if len(names) > MOST_NAMES else ""
+        yield f"left out: {', '.join(names[:MOST_NAMES])}{more}, which move nothing"
+    yield from of_recording(recording(motion))
+    yield from _numbers(motion, to)
+    if to == "amc":
+        yield from _acclaim_names(motion)
+
+
+def _acclaim_names(motion: Motion) -> Iterator[str]:
+    roots = [joint.name for joint in motion.skeleton.joints if joint.parent < 0]
+    if roots and roots[0] != ROOT:
+        yield f"joint {roots[0]!r} is called {ROOT}"
+    bones = [joint.name for joint in motion.skeleton.joints if joint.parent >= 0]
+    odd = [name for name in bones if not name or any(c <= " " or c in "()" for c in name)]
+    if odd:
+        shown = ", ".join(map(repr, odd[:MOST_NAMES])) + (" ..." if len(odd) > MOST_NAMES else "")
+        yield f"ASF cannot hold the joint names {shown}: they have _ instead"
+
+
+def of_recording(told: Recording | None) -> Iterator[str]:
+    """Of a C3D what it says beside its numbers: no other file has it, nor does a plain C3D."""
+    if told is None:
+        return
+    counts = ((len(told.events), "event"), (len(told.platforms), "force platform"))
+    found = [f"{count} {what}{'s' if count > 1 else ''}" for count, what in counts if count]
+    if found:
+        yield f"left out: {', '.join(found)}"
+
+
+def _numbers(motion: Motion, to: str) -> Iterator[str]:
+    numbers = motion.frame_numbers
+    if numbers is None or not len(numbers):
+        return
+    if to in UNNUMBERED and (numbers != np.arange(1, len(numbers) + 1)).any():
+        yield f"left out: frame numbers, which begin with {numbers[0]}"
+    elif to == "c3d" and (np.diff(numbers) != 1).any():
+        yield f"left out: frame numbers but the first, {numbers[0]}: C3D counts on"

@@ -1,0 +1,39 @@
+"""Reading takes nothing but Python and NumPy; that loops are slow then is said once."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import mcz
+from mcz.codecs import CODECS
+from mcz.sample import write_samples
+from tests import bare
+
+
+def test_nothing_else_is_needed(tmp_path: Path) -> None:
+    """Vectors of every codec, and a file that is read in every way: see ``bare``."""
+    write_samples(tmp_path)
+    mcz.encode(tmp_path / "walk.amc", tmp_path / "walk.mcz", codec="fast", rate=120)
+    (tmp_path / "walk.source").write_bytes((tmp_path / "walk.amc").read_bytes())
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.bare", "2", str(tmp_path / "walk.mcz")],
+        cwd=Path(__file__).parents[1],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["vectors"] == len(bare.chosen(2)) > 100
+    assert found["loaded"] == ["conformance", "mcz", "numpy", "tests"]
+    assert len(found["slow"]) == 1
+
+
+def test_every_codec_is_among_the_vectors() -> None:
+    from tests.broken import answers
+
+    codecs = {name for v in bare.chosen(2) for name in answers.vectors()[v].get("codecs", [])}
+    assert {codec.name for codec in CODECS.values()} <= codecs

@@ -1,0 +1,126 @@
+"""File > Export > MCZ: selected armatures and empties, as a new file or added to an archive."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy_extras.io_utils import ExportHelper
+
+import mcz
+
+from .importing import AXES, UNITS, mcz_line, tell_what_is_slow
+from .recording import KEEP, Terms, recorded, things_of
+
+CODECS = [
+    ("fast", "Fast", "Lossless on the grid of the decimals below; read fastest"),
+    ("best", "Best", "Lossless on the grid of the decimals below; fewest bytes, slow"),
+    ("lossy", "Lossy", "No joint farther off than the greatest error below"),
+]
+RANGES = [
+    ("scene", "Scene", "The scene's range of frames"),
+    ("action", "Action", "From the first to the last key of the action"),
+]
+
+
+class ExportMCZ(bpy.types.Operator, ExportHelper):
+    """Export the motion of selected armatures and empties, baked frame by frame"""
+
+    bl_idname = "export_anim.mcz"
+    bl_label = "Export MCZ"
+    bl_options = {"PRESET"}
+
+    filename_ext = ".mcz"
+    filter_glob: StringProperty(default="*.mcz", options={"HIDDEN"})
+    adds: BoolProperty(
+        name="Add to Archive", description="Add to the file, if it is there, in place of a new one"
+    )
+    clip_name: StringProperty(name="Clip Name", description="Of one clip; otherwise its own name")
+    codec: EnumProperty(name="Codec", items=CODECS, default="fast")
+    max_error_cm: FloatProperty(
+        name="Greatest Error", min=0.001, default=0.5, description="In cm, of a lossy file"
+    )
+    angle_decimals: IntProperty(name="Decimals of Degrees", min=0, max=9, default=4)
+    length_decimals: IntProperty(
+        name="Decimals of Lengths", min=-1, max=9, default=-1, description="-1: to a micrometer"
+    )
+    unit: EnumProperty(
+        name="Unit", items=[(KEEP, "Keep", "As imported, otherwise cm"), *UNITS], default=KEEP
+    )
+    up: EnumProperty(name="Up", items=[(KEEP, "Keep", "As imported, otherwise z"), *AXES])
+    frames: EnumProperty(name="Frames", items=RANGES, default="scene")
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        return any(thing.type in ("ARMATURE", "EMPTY") for thing in context.selected_objects)
+
+    def draw(self, context: Any) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        for name in ("adds", "clip_name", "codec"):
+            layout.prop(self, name)
+        shown = ("max_error_cm",) if self.codec == "lossy" else ()
+        for name in (*shown, "angle_decimals", "length_decimals", "unit", "up", "frames"):
+            layout.prop(self, name)
+        tell_what_is_slow(layout)
+
+    def execute(self, context: Any) -> set[str]:
+        manager = context.window_manager
+        things = things_of(context)
+        manager.progress_begin(0, 1000)
+        try:
+            if self.clip_name and len(things) > 1:
+                raise mcz.OptionError(f"{len(things)} clips cannot all be {self.clip_name!r}")
+            motions = []
+            for number, (thing, markers) in enumerate(things):
+
+                def step(share: float, number: int = number) -> None:
+                    manager.progress_update(round(1000 * (number + share) / len(things)))
+
+                terms = self._terms(context, thing, markers)
+                motions.append(recorded(context, thing, markers, terms, step))
+            self._write(motions, Path(bpy.path.abspath(self.filepath)))
+        except mcz.MczError as error:
+            self.report({"ERROR"}, mcz_line(str(error)))
+            return {"CANCELLED"}
+        finally:
+            manager.progress_end()
+        self.report({"INFO"}, f"{len(motions)} exported")
+        return {"FINISHED"}
+
+    def _terms(self, context: Any, thing: Any, markers: list[Any]) -> Terms:
+        first, last = context.scene.frame_start, context.scene.frame_end
+        data = (markers[0] if markers else thing).animation_data
+        if self.frames == "action" and data and data.action:
+            first, last = (round(frame) for frame in data.action.frame_range)
+        decimals = self.angle_decimals, self.length_decimals
+        return Terms(first, last, self.clip_name, self.unit, self.up, *decimals)
+
+    def _write(self, motions: list[mcz.Motion], target: Path) -> None:
+        """All of them, or none: several, and those that are added, are written aside first."""
+        codec = {"codec": "lossy", "max_error_cm": self.max_error_cm}
+        terms: dict[str, Any] = codec if self.codec == "lossy" else {"effort": self.codec}
+        adds = self.adds and target.exists()
+        if len(motions) == 1 and not adds:
+            mcz.write(motions[0], target, force=True, **terms)
+            return
+        with tempfile.TemporaryDirectory(prefix="mcz-") as folder:
+            parts = [str(Path(folder, f"{number}.mcz")) for number in range(len(motions))]
+            for motion, part in zip(motions, parts, strict=True):
+                mcz.write(motion, part, **terms)
+            if adds:
+                mcz.append(parts, target)
+            else:
+                mcz.merge(parts, target, force=True)
+
+
+def register() -> None:
+    bpy.utils.register_class(ExportMCZ)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_class(ExportMCZ)
