@@ -11,11 +11,22 @@ from enum import IntEnum
 from itertools import accumulate
 
 import numpy as np
-from construct import Construct, ExprValidator, If, Int8ul, OneOf, Struct
 from numpy.typing import NDArray
 
 from mcz.errors import FormatError
-from mcz.schema import SIZED, UVARINT, build, counted, parse
+from mcz.schema import (
+    SIZED,
+    UVARINT,
+    ExprValidator,
+    If,
+    Int8ul,
+    OneOf,
+    Struct,
+    build,
+    counted,
+    parse,
+)
+from mcz.schema.fields import Field, IfThenElse
 
 # Types of NumPy by their number in a template: |b1 to <f8, without byte order.
 TYPES = ("b1", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", "f2", "f4", "f8")
@@ -39,7 +50,7 @@ _OF_ROWS = (Kind.COUNT, Kind.DATA)
 _OF_PIECES = (Kind.CRC, Kind.SIZE4, Kind.SIZE8)
 
 
-def _if(kinds: Sequence[Kind], item: Construct) -> Construct:
+def _if(kinds: Sequence[Kind], item: Field) -> IfThenElse:
     return If(lambda fields: fields.kind in kinds, item)
 
 
