@@ -15,6 +15,7 @@ HERE = Path(__file__).parent
 VECTORS = HERE / "vectors"
 GROUPS = ("valid", "uncommon", "invalid")
 FORMATS = ("asf", "amc", "bvh", "c3d", "c3d-outputs", "trc", "mot", "sto", "motive", "vicon", "csv")
+FORMATS += ("npy", "npz")
 MAX_LINE = 2**20  # bytes of the JSON line
 SPARE_OUTPUT = 2**25  # bytes that an answer may have beyond what is expected
 SIZES = {"<f8": 8, "<i8": 8, "u1": 1}  # bytes of a value

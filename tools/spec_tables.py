@@ -41,6 +41,7 @@ MODULES = (
     "mcz.codecs.posewave.contact_plan",
     "mcz.formats.layout",
     "mcz.formats.table_layout",
+    "mcz.formats.arrays.layout",
     "mcz.formats.notes",
     "mcz.formats.table_notes",
     "mcz.formats.c3d_layout",

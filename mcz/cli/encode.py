@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from mcz.writing.written import Written
 
 
-@click.command(short_help="A .bvh, .amc, .c3d, .asf, .trc, .mot, .sto or .csv file to .mcz.")
+@click.command(short_help="A .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv or .npz file to .mcz.")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
 @click.option(
     "-o",
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "format_name",
-    type=click.Choice(("bvh", "amc", "c3d", "asf", "trc", "mot", "sto")),
+    type=click.Choice(("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "npy", "npz")),
     help="What standard input is. Default: what it looks like; live BVH, or AMC with --skeleton.",
 )
 @copies_option("no")
@@ -70,7 +70,7 @@ def command(
     format_name: str | None,
     **options: Any,
 ) -> Exit:
-    """Encode SRC (.bvh, .amc, .c3d, .asf, .trc, .mot, .sto or .csv) into OUT.mcz.
+    """Encode SRC (.bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv, .npy or .npz) into OUT.mcz.
 
     An ASF alone makes one of a skeleton.
 

@@ -34,7 +34,7 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.previews import preview_lines
-from mcz.cli.recording import recording_lines
+from mcz.cli.recording import array_lines, recording_lines
 from mcz.cli.repeats import Once
 from mcz.cli.terminal import is_terminal
 from mcz.cli.verify import is_unsound
@@ -93,8 +93,8 @@ def command(
 ) -> Exit:
     """Show versions, skeletons, clips, codecs, bytes by part, ratios and hashes of FILE.mcz.
 
-    Of a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .csv) it shows the skeleton and the
-    clip.
+    Of a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .csv, .npy, .npz) it shows the
+    skeleton and the clip.
     """
     from mcz.reading import report, source_report
 
@@ -277,6 +277,7 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
         yield f"  model      {model['id'][:8]} ({known})"
     yield from _source(clip)
     yield from recording_lines(clip["recording"])
+    yield from array_lines(clip["arrays"])
     for key, value in clip["metadata"].items():
         yield f"  {key}  {value[:WIDEST]}"
     if clip["quality"]:

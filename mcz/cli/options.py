@@ -170,6 +170,18 @@ def up_option(what: str) -> Callable[[Function], Function]:
     return click.option("--up", type=click.Choice(("x", "y", "z")), help=what)
 
 
+ARRAYS = ("positions", "rotation-vectors", "quaternions-wxyz", "quaternions-xyzw")
+
+
+def arrays_option(function: Function) -> Function:
+    """``--arrays``, as the argument ``arrays`` of ``mcz.read`` and ``mcz.encode``."""
+    return click.option(
+        "--arrays",
+        type=click.Choice(ARRAYS),
+        help="What the numbers of a plain .npy or .npz are, which does not say it.",
+    )(function)
+
+
 def key_error_option(function: Function) -> Function:
     """``--key-error``, as the argument ``key_error``."""
     return click.option(
@@ -199,6 +211,7 @@ def encoding_options(function: Function) -> Function:
         ),
         click.option("--unit", type=click.Choice(UNITS), help="Length unit of the source."),
         up_option("Axis of the source that points up. BVH and AMC do not say theirs."),
+        arrays_option,
         click.option("--verbatim", is_flag=True, help="Keep what cannot be parsed as attachment."),
         click.option("--archive", is_flag=True, help="Use the profile of large limits."),
     )

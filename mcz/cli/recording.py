@@ -45,6 +45,21 @@ def recording_lines(recording: dict[str, Any] | None) -> Iterator[str]:
     yield from _rows(["output", "unit", "of", "description"], outputs, "llll")
 
 
+def array_lines(arrays: list[dict[str, Any]] | None) -> Iterator[str]:
+    """The lines for a part ``arrays`` of the document: each that is read, then what is kept."""
+    if arrays is None:
+        return
+    for array in arrays:
+        if array["signal"] is not None:
+            name = array["name"] or "numbers"
+            order = ", by columns" if array["order"] == "F" else ""
+            columns = plural(array["columns"], "column")
+            yield f"  array      {name}: {columns} of {array['type']}{order}, in {array['signal']}"
+    kept = [array["name"] for array in arrays if array["signal"] is None]
+    if kept:
+        yield f"  kept       as bytes: {', '.join(kept)}"
+
+
 def _facts(recording: dict[str, Any]) -> Iterator[str]:
     yield f"first frame {recording['first_frame']}"
     yield f"points in {recording['unit'] or 'an unknown unit'}"

@@ -7,7 +7,7 @@ from typing import Any
 
 from mcz.cli.common import plural
 from mcz.cli.previews import preview_lines
-from mcz.cli.recording import recording_lines
+from mcz.cli.recording import array_lines, recording_lines
 
 
 def source_lines(
@@ -39,6 +39,7 @@ def source_lines(
         share = 100 * clip["exceptions_share"]
         yield f"  exceptions {clip['n_exceptions']:,} numbers off their grid ({share:.3g} %)"
         yield from recording_lines(clip["recording"])
+        yield from array_lines(clip["arrays"])
         for key, value in clip["metadata"].items():
             yield f"  {key}  {value[:80]}"
         if "preview" in clip:

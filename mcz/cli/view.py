@@ -100,8 +100,8 @@ LOOPBACK = "127.0.0.1"
 def command(files: tuple[str, ...], output: str | None, as_json: bool, **options: Any) -> Exit:
     """Show motions in the browser: files, folders of them, URLs of an .mcz.
 
-    Files are .mcz, .bvh, .amc, .c3d, .trc, .csv, .mot and .sto. What has no points is shown as
-    curves.
+    Files are .mcz, .bvh, .amc, .c3d, .trc, .csv, .mot, .sto, .npy and .npz. What has no points is
+    shown as curves.
 
     A server on this machine serves the page and the files to this machine alone, at an address
     that nobody can guess. It ends some seconds after its last page was closed, and at Ctrl-C.

@@ -45,6 +45,7 @@ def pack(
     rate: float | None = None,
     unit: str | None = None,
     up: str | None = None,
+    arrays: str | None = None,
     verbatim: bool = False,
     keep_all: bool = False,
     force: bool = False,
@@ -59,7 +60,8 @@ def pack(
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
-    relative to ``directory``. ``effort``, ``copies`` and ``threads`` are those of ``mcz.write``;
+    relative to ``directory``. ``arrays`` is that of ``mcz.read``; ``effort``, ``copies`` and
+    ``threads`` are those of ``mcz.write``;
     ``jobs`` processes may work at once, by default one: the bytes are the same. ``mtimes`` keeps
     when each file was last changed as metadata of its clip, so that the same files give other
     bytes later. An earlier MCZ file of the target's name is no part of the new one; any other file
@@ -74,7 +76,7 @@ def pack(
         others += [left_out(path, root) for path in left]
     verbatim = verbatim or keep_all
     coded = chosen(codec, effort)
-    terms = Terms(coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up)
+    terms = Terms(coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up, arrays=arrays)
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
     inputs = (*paths, *(params or {}).values())
     with (
@@ -121,6 +123,7 @@ def append(
     rate: float | None = None,
     unit: str | None = None,
     up: str | None = None,
+    arrays: str | None = None,
     verbatim: bool = False,
     root: str | os.PathLike[str] | None = None,
     salvage: bool = False,
@@ -144,7 +147,8 @@ def append(
 
     A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
     lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
-    them. Where its end is damaged, one of the two has to be given. ``threads`` is that of
+    them. Where its end is damaged, one of the two has to be given. ``arrays`` is that of
+    ``mcz.read``. ``threads`` is that of
     ``mcz.write``, and so is ``copies``, of all that has none yet; None: where the file has some.
     ``jobs`` is that of ``mcz.pack``.
     Raises AccessError while another process is appending, OptionError where the target is a source
@@ -152,7 +156,7 @@ def append(
     """
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
     coded = chosen(codec, effort)
-    terms = Terms(coded, params, skeleton, rate, unit, verbatim, up=up)
+    terms = Terms(coded, params, skeleton, rate, unit, verbatim, up=up, arrays=arrays)
     held = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
     files = [source for source in sources if source not in held]
     named, others = sources_named(files, root, target)

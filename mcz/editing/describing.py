@@ -25,7 +25,7 @@ from mcz.reading.file import File, open
 from mcz.writing.clip_writer import Progress
 
 Said = Mapping[str, str | None]  # a key and its value; None: it is not there any more
-WITHOUT_RATE = ("amc",)  # formats of sources that do not state a frame rate
+WITHOUT_RATE = ("amc", "npy")  # formats of sources that do not state a frame rate
 
 
 def set_metadata(

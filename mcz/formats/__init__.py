@@ -18,7 +18,16 @@ from mcz.formats.notes import join_notes
 from mcz.formats.table_notes import join_table_notes
 from mcz.motion import FrameNotes, Source
 
-__all__ = ["FORMATS", "Format", "format_by_id", "format_of", "is_table", "recording_of", "sniffed"]
+__all__ = [
+    "FORMATS",
+    "Format",
+    "arrays_of",
+    "format_by_id",
+    "format_of",
+    "is_table",
+    "recording_of",
+    "sniffed",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,6 +148,23 @@ FORMATS: dict[str, Format] = {
             )
             for format_id, name in ((11, "csv"), (9, "motive"), (10, "vicon"))
         ),
+        Format(
+            "npy",
+            12,
+            (".npy",),
+            _of("arrays.read", "read_npy"),
+            _of("arrays.read", "write_arrays"),
+            is_motion=_of("arrays.sniffing", "is_motion"),
+        ),
+        Format(
+            "npz",
+            13,
+            (".npz",),
+            _of("arrays.read", "read_npz"),
+            _of("arrays.read", "write_arrays"),
+            states_rate=True,
+            is_motion=_of("arrays.sniffing", "is_motion"),
+        ),
     )
 }
 
@@ -161,6 +187,10 @@ def is_table(path: str | Path) -> bool:
 
 def sniffed(data: bytes) -> str | None:
     """The name of the format that ``data`` seems to be of, None where it seems to be of none."""
+    if data.startswith(b"\x93NUMPY"):
+        return "npy"
+    if data.startswith(b"PK\3\4"):
+        return "npz"
     start = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:16].upper()
     if start.startswith(b"HIERARCHY"):
         return "bvh"
@@ -187,6 +217,17 @@ def recording_of(source: Source | None) -> Any:
     if source is None or read is None:
         return None
     return read(source.format, source.template, source.detail)
+
+
+def arrays_of(source: Source | None, signals: Sequence[str]) -> list[dict[str, Any]] | None:
+    """What became of the arrays of a source, see ``arrays.listing``; None where it has none.
+
+    ``signals`` are the names of the clip's signals. Raises FormatError on bad bytes.
+    """
+    if source is None or source.format not in ("npy", "npz"):
+        return None
+    found: list[dict[str, Any]] = _of("arrays.listing", "arrays_listed")(source, signals)
+    return found
 
 
 def format_by_id(format_id: int, *, of_skeleton: bool = False) -> Format:

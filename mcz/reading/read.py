@@ -22,17 +22,20 @@ def read(
     rate: Fraction | float | None = None,
     unit: str | None = None,
     up: str | None = None,
+    arrays: str | None = None,
     clip: str | None = None,
     max_decoded: int | None = None,
     threads: int | None = None,
 ) -> Motion:
-    """The motion in a BVH, AMC, C3D or MCZ file.
+    """The motion in a file of any source format, or in an MCZ file.
 
     An AMC finds its ASF beside it, or takes ``skeleton``, a path, a Skeleton or "none"; how it was
     found stands in the metadata, and a SkeletonWarning tells of one whose name or dofs do not fit.
     ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
-    ("x", "y", "z"), say what the file does not. Of an MCZ file ``clip`` is read, with
-    ``max_decoded`` and ``threads`` as in ``open``. Raises SourceError, FormatError or OptionError.
+    ("x", "y", "z"), say what the file does not. ``arrays`` says what the numbers of a plain NPY or
+    NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". Of an MCZ
+    file ``clip`` is read, with ``max_decoded`` and ``threads`` as in ``open``. Raises SourceError,
+    FormatError or OptionError.
     """
     path = Path(path)
     if path.suffix.lower() == ".mcz":
@@ -46,4 +49,4 @@ def read(
         if taken.remark:
             warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
         motion = taken.motion
-    return with_facts(motion, rate, unit, up)
+    return with_facts(motion, rate, unit, up, arrays)

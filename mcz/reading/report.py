@@ -15,6 +15,7 @@ from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import GROUP_NOTES
 from mcz.errors import ChecksumError, FormatError, MczError, OptionError, UnsupportedError
+from mcz.formats import arrays_of
 from mcz.jobs import limited
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
@@ -148,6 +149,7 @@ def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
         ],
         **_source_info(clip),
         "recording": _recording(clip, unread),
+        "arrays": _arrays(clip, unread),
         **exceptions_info(file.container, clip),
         "quality": clip.quality,
         "damage": [*clip.damage, *unread],
@@ -172,6 +174,18 @@ def _recording(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
         return document_of(clip.recording)
     except FormatError as error:
         unread.append(f"recording: {error}")
+        return None
+
+
+def _arrays(clip: Clip, unread: list[str]) -> list[dict[str, Any]] | None:
+    """What became of the arrays of the source, None where it has none; ``unread`` as above."""
+    if clip.source is None or clip.source.format not in ("npy", "npz"):
+        return None
+    try:
+        source = clip.motion((0, 0)).source
+        return arrays_of(source, [signal.name for signal in clip.signals])
+    except FormatError as error:
+        unread.append(f"arrays: {error}")
         return None
 
 

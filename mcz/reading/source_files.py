@@ -10,6 +10,7 @@ from typing import Any
 
 from mcz.errors import MczError, OptionError, SourceError
 from mcz.formats import Format, format_of
+from mcz.formats.arrays.kinds import with_kinds
 from mcz.motion import Motion, Skeleton
 from mcz.units import facing, in_unit
 
@@ -55,12 +56,19 @@ def read_bytes(path: Path) -> bytes:
 
 
 def with_facts(
-    motion: Motion, rate: Fraction | float | None, unit: str | None, up: str | None = None
+    motion: Motion,
+    rate: Fraction | float | None,
+    unit: str | None,
+    up: str | None = None,
+    arrays: str | None = None,
 ) -> Motion:
     """``motion`` with a frame rate, a length unit and an axis that points up, None: as they are.
 
-    Raises OptionError.
+    ``arrays`` says what plain arrays are, see ``mcz.read``. Raises OptionError, and MotionError for
+    arrays of another shape.
     """
+    if arrays is not None:
+        motion = with_kinds(motion, arrays)
     if rate is not None:
         try:
             exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))

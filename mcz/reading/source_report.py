@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mcz.errors import SkeletonWarning
-from mcz.formats import FORMATS, Format, format_of
+from mcz.formats import FORMATS, Format, arrays_of, format_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.recording import recording
 from mcz.reading.recording_report import document_of
@@ -78,6 +78,7 @@ def _clip_facts(motion: Motion, source_format: Format, name: str, data: bytes) -
         ],
         "n_invalid": n_invalid,
         "recording": document_of(recording(motion)),
+        "arrays": arrays_of(motion.source, [s.name for s in motion.signals]),
         "source_format": source_format.name,
         "source_path": name,
         "source_bytes": len(data),

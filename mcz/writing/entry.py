@@ -15,6 +15,7 @@ from mcz.container.limits import BASE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError
 from mcz.formats import Format, format_of
+from mcz.formats.arrays.kinds import kinds_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.skeletons import NONE, NOTE, Given, Taken, take
 from mcz.reading.source_files import read_bytes, read_skeleton, with_facts
@@ -34,7 +35,8 @@ class Terms:
     ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit`` and
     ``up``, the axis that points up, say what the file does not. ``verbatim``: one that cannot be
     parsed is kept as an attachment. ``keep_skeleton``: an ASF is restored as well, under its own
-    name. Raises OptionError for an unknown codec, unit or axis.
+    name. ``arrays`` says what plain arrays are. Raises OptionError for an unknown codec, unit, axis
+    or kind of arrays.
     """
 
     codec: str = DEFAULT
@@ -45,12 +47,15 @@ class Terms:
     verbatim: bool = False
     keep_skeleton: bool = False
     up: str | None = None
+    arrays: str | None = None
 
     def __post_init__(self) -> None:
         by_name(self.codec)
         if self.unit is not None:
             unit_cm_of(self.unit)
         facing(Skeleton(()), self.up)
+        if self.arrays is not None:
+            kinds_of(self.arrays)
 
 
 class Entry:
@@ -106,7 +111,8 @@ class Entry:
         _refuse_early(source_format, data, writer.profile)
         taken = take(self.path, given, self.terms.unit, data)
         self._note(taken)
-        motion = with_facts(taken.motion, self.terms.rate, self.terms.unit, self.terms.up)
+        terms = self.terms
+        motion = with_facts(taken.motion, terms.rate, terms.unit, terms.up, terms.arrays)
         self.notes += tuple(_contradictions(taken.motion, motion))
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))

@@ -82,6 +82,7 @@ def encode(
     rate: Fraction | float | None = None,
     unit: str | None = None,
     up: str | None = None,
+    arrays: str | None = None,
     verbatim: bool = False,
     force: bool = False,
     archive: bool = False,
@@ -89,20 +90,22 @@ def encode(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Written:
-    """Turn one ASF, AMC, BVH or C3D file into an MCZ file.
+    """Turn one source file into an MCZ file.
 
     ``skeleton`` is the ASF of an AMC, as ``mcz.read`` takes it, with the same SkeletonWarning.
     ``verbatim`` keeps a file that cannot be parsed as an attachment. ``up`` is the axis that points
-    up ("x", "y", "z"). ``effort``, ``copies`` and ``threads`` are those of
-    ``mcz.write``. Raises SourceError, OptionError, MotionError or LimitError; nothing is left
-    under the final name then. A target that is the source or its skeleton is refused, even with
-    ``force``.
+    up ("x", "y", "z"). ``arrays`` is that of ``mcz.read``; ``effort``, ``copies`` and ``threads``
+    are those of ``mcz.write``. Raises SourceError, OptionError, MotionError or LimitError; nothing
+    is left under the final name then. A target that is the source or its skeleton is refused, even
+    with ``force``.
     """
     path = Path(source)
     if up is not None and path.suffix.lower() == ".asf":
         raise OptionError(f"{path}: a skeleton alone is kept as it is; say the up axis of its AMC")
     coded = chosen(codec, effort)
-    terms = Terms(coded, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up)
+    terms = Terms(
+        coded, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up, arrays=arrays
+    )
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with limited(threads), replacing(target, force=force, inputs=inputs) as stream:

@@ -8,9 +8,10 @@ from typing import Any
 
 from mcz.codecs.contract import Codec
 from mcz.container.writer import Writer
+from mcz.errors import OptionError
 from mcz.kinematics import point_set
 from mcz.kinematics.marker_motion import in_positions
-from mcz.motion import Motion, Skeleton
+from mcz.motion import POSITION_KINDS, Motion, Skeleton
 from mcz.writing.clip_writer import write_skeleton
 
 
@@ -21,12 +22,29 @@ def wants_positions(codec: Codec, options: Mapping[str, Any], skeleton: Skeleton
     return point_set(skeleton) != "markers"
 
 
+def check_bones(skeleton: Skeleton, what: str) -> None:
+    """Raise OptionError where rotations move no point, since no bone has a length.
+
+    Arrays of body models are such: ``what`` would then be about the root alone.
+    """
+    below = [joint for joint in skeleton.joints if joint.parent >= 0]
+    moved = any(any(joint.offset) or joint.tails for joint in below)
+    placed = any(channel.kind in POSITION_KINDS for joint in below for channel in joint.channels)
+    turned = any(channel.kind for joint in below for channel in joint.channels)
+    if turned and not moved and not placed:
+        raise OptionError(
+            f"{what} has no meaning: no bone has a length, so that rotations move no point; "
+            "rest offsets give them one"
+        )
+
+
 def as_codec_wants(
     writer: Writer, motion: Motion, codec: Codec, options: Mapping[str, Any]
 ) -> Motion:
     """``motion``, or the positions of its points where that is what the codec codes."""
     if not wants_positions(codec, options, motion.skeleton):
         return motion
+    check_bones(motion.skeleton, f"codec {codec.name}, of positions,")
     return as_domain(writer, motion, bool(options.get("virtual_markers")))
 
 

@@ -21,7 +21,7 @@ from mcz.kinematics import positions_of
 from mcz.motion import Motion
 from mcz.writing.bounding import REFINEMENT, bounded
 from mcz.writing.clip_writer import Amend, Progress, asked, write_clip
-from mcz.writing.positions import as_codec_wants
+from mcz.writing.positions import as_codec_wants, check_bones
 from mcz.writing.trials import Target, Trials
 from mcz.writing.weighing import QUALITY, Limits, weighted
 
@@ -63,6 +63,7 @@ def write_tuned(
                 f"{codec.name}: a preset promises an error in cm, and the length unit is unknown; "
                 f"--unit says it, or give {codec.dial.parameter}"
             )
+        check_bones(motion.skeleton, f"{codec.name}: a preset that promises an error in cm")
     limits = options.get(QUALITY)
     if codec.dial is None or not (targets or limits):
         return write_clip(writer, motion, codec, params, progress, amend=amend)
@@ -122,6 +123,7 @@ def _meet(codec: Codec, target: Target | None, trial: Trials) -> Found:
 def _check_unit(motion: Motion, name: str) -> None:
     if motion.skeleton.unit_cm is None:
         raise OptionError(f"{name} has no meaning: the length unit is unknown; --unit says it")
+    check_bones(motion.skeleton, name)
 
 
 def _check_places(motion: Motion, dial: Dial, target: Target) -> None:

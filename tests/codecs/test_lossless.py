@@ -264,6 +264,14 @@ def test_multiples_of_a_unit(unit: float, counts: list[int]) -> None:
     np.testing.assert_array_equal(out[:, 0], ordinals)
 
 
+def test_a_unit_beyond_all_that_a_head_may_have_is_none() -> None:
+    ordinals = of_multiples(np.array([0, 1, 3, 5, 2]), 2.0**81)
+    assert find_unit(ordinals) is None
+    stream = coded(ordinals[:, None], Grid(GridKind.BINARY32))
+    out = decoded(stream, 5, 1, Grid(GridKind.BINARY32))
+    np.testing.assert_array_equal(out[:, 0], ordinals)
+
+
 def test_scaled_integers_are_found_among_floats() -> None:
     counts = np.random.default_rng(5).integers(-2000, 2000, 800)
     ordinals = of_multiples(counts, 0.0833333358168602)

@@ -40,6 +40,15 @@ WORDS = {
         ":FULLY-SPECIFIED :DEGREES :RADIANS #!OML:ASF root lowerback lfemur 1 2 3 -0 1e-014 "
         "nan 1e300 0.30000000000000004 \\x0d\\x0a \\x09"
     ),
+    "npy": (
+        "\\x93NUMPY descr fortran_order shape True False '<f8' '>f4' '|O' '<i8' '|b1' (3,2) (6,) "
+        "() \\x00\\x00\\x00\\x00\\x00\\x00\\xf8\\x7f"
+    ),
+    "npz": (
+        "PK\\x03\\x04 PK\\x01\\x02 PK\\x05\\x06 PK\\x06\\x06 PK\\x06\\x07 PK\\x07\\x08 "
+        "poses.npy trans.npy root_orient.npy times.npy mocap_framerate.npy "
+        "\\xff\\xff\\xff\\xff \\x01\\x00\\x10\\x00"
+    ),
     "c3d": (
         "POINT ANALOG USED SCALE RATE DATA_START FRAMES LABELS LABELS2 DESCRIPTIONS UNITS OFFSET "
         "GEN_SCALE FORMAT UNSIGNED SIGNED TRIAL ACTUAL_START_FIELD ACTUAL_END_FIELD EVENT "
@@ -77,6 +86,8 @@ def seeds(name: str) -> dict[str, bytes]:
 
 
 def _sample(name: str) -> bytes:
+    if name in ("npy", "npz"):
+        return _array_sample(name)
     if name == "asf":
         return asf.write(acclaim_walk().skeleton)
     if name == "csv":
@@ -86,6 +97,24 @@ def _sample(name: str) -> bytes:
     mask = None if signal.mask is None else signal.mask[:FRAMES]
     cut = replace(signal, values=signal.values[:FRAMES], mask=mask)
     return FORMATS[name].write(replace(walk, signals=(cut,), source=None))
+
+
+def _array_sample(name: str) -> bytes:
+    numbers = np.arange(12.0).reshape(FRAMES, 4) / 7
+    buffer = io.BytesIO()
+    if name == "npy":
+        np.save(buffer, numbers)
+    else:
+        np.savez(buffer, poses=numbers, fps=30, times=np.arange(FRAMES) / 30)
+    return buffer.getvalue()
+
+
+def check_npy(data: bytes) -> bool:
+    return _check("npy", data)
+
+
+def check_npz(data: bytes) -> bool:
+    return _check("npz", data)
 
 
 def check_bvh(data: bytes) -> bool:

@@ -81,6 +81,8 @@ TARGETS: dict[str, Target] = {
         _reader("mot", readers.check_mot),
         _reader("sto", readers.check_sto),
         _reader("csv", readers.check_csv),
+        _reader("npy", readers.check_npy),
+        _reader("npz", readers.check_npz),
         Target(
             "mcz",
             "whole files: strict, in parts, salvaged, live, verified",

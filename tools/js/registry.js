@@ -15,6 +15,8 @@ const SOURCE_FORMATS = new Map([
   [9, { name: "motive", of: "clip" }],
   [10, { name: "vicon", of: "clip" }],
   [11, { name: "csv", of: "clip" }],
+  [12, { name: "npy", of: "clip" }],
+  [13, { name: "npz", of: "clip" }],
 ]);
 
 /** Names of the source formats that this decoder restores. */

@@ -5,6 +5,7 @@ import { Refused } from "./errors.js";
 import { within } from "./limits.js";
 import { sourceFormatName } from "./registry.js";
 import { sha256 } from "./sha256.js";
+import { restoreArrays } from "./source-arrays.js";
 import { checkAsf } from "./source-asf.js";
 import { restoreC3d } from "./source-c3d.js";
 import { restoreTable } from "./source-table.js";
@@ -12,6 +13,7 @@ import { restoreText } from "./source-text.js";
 
 const C3D_FORMATS = ["c3d", "c3d-outputs"];
 const TABLES = ["trc", "mot", "sto", "motive", "vicon", "csv"];
+const ARRAYS = ["npy", "npz"];
 
 /**
  * The source file of a clip. Of a clip whose codecs are lossless it is told by size and hash.
@@ -42,6 +44,7 @@ function restored(format, { clip, signals, numbers, maxBytes }) {
   if (C3D_FORMATS.includes(format)) {
     return restoreC3d(source, signals, clip.nFrames, numbers[0].number, maxBytes);
   }
+  if (ARRAYS.includes(format)) return restoreArrays(source, signals, maxBytes);
   if (TABLES.includes(format)) {
     const names = clip.skeleton.joints.map(({ name }) => name);
     return restoreTable(source, signals, numbers, names, maxBytes);

@@ -15,6 +15,7 @@ Floats = NDArray[np.float64]
 
 BINARY32 = Grid(GridKind.BINARY32)
 MOST = 2**20  # units in a value: beyond, the multiples take as many bits as the mantissas
+GREATEST = 2.0**80  # unit that a head may have
 _STEPS = 24  # of Euclid's algorithm
 
 
@@ -39,6 +40,8 @@ def find_unit(ordinals: Ints) -> tuple[float, Ints] | None:
     if guess * MOST < sizes[-1]:
         return None
     unit = _within_rounding(sizes, guess)
+    if unit > GREATEST:  # LOSS-12
+        return None
     multiples = np.rint(values / unit).astype(np.int64)
     return (unit, multiples) if (of_multiples(multiples, unit) == ordinals).all() else None
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from tools.vectors.build.files import Unrestorable, Vector
-from tools.vectors.invalid.sources import c3d, c3d_outputs, files, notes, tables, templates
+from tools.vectors.invalid.sources import arrays, c3d, c3d_outputs, files, notes, tables, templates
 
 
 def vectors() -> Iterable[Vector]:
@@ -20,4 +20,5 @@ def vectors() -> Iterable[Vector]:
     c3d.add(shelf)
     c3d_outputs.add(shelf)
     tables.add(shelf)
+    arrays.add(shelf)
     return shelf.vectors

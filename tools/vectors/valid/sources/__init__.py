@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from tools.vectors.build.files import Vector, Whole
 from tools.vectors.valid.sources import (
+    arrays,
     c3d,
     c3d_outputs,
     c3d_parts,
@@ -29,4 +30,5 @@ def vectors() -> Iterable[Vector]:
     c3d_parts.add(shelf)
     c3d_outputs.add(shelf)
     tables.add(shelf)
+    arrays.add(shelf)
     return shelf.vectors

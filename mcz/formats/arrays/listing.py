@@ -1,0 +1,50 @@
+"""What became of each array of a file, as its template tells it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from mcz.formats.arrays.layout import BIG_ENDIAN, BY_COLUMNS, TYPES, Kind, Piece, parse_arrays
+from mcz.motion import Source
+
+LOCAL, HEADER = b"PK\3\4", 30  # how a member of a ZIP begins; bytes before its name
+
+
+def arrays_listed(source: Source, signals: Sequence[str]) -> list[dict[str, Any]]:
+    """The arrays of a file in order: ``name type order columns signal``, ``name`` alone where kept.
+
+    ``columns`` are the numbers of a row, ``order`` is "C" or "F"; ``signals`` are the names of the
+    clip's. The name is "" in an NPY file. Raises FormatError on bad bytes.
+    """
+    pieces = parse_arrays(source.template, source.detail)
+    found: list[dict[str, Any]] = [] if source.format == "npz" else [_kept("")]
+    for index, piece in enumerate(pieces):
+        if piece.kind == Kind.TEXT and piece.text.startswith(LOCAL) and source.format == "npz":
+            found.append(_kept(_name(pieces[index:])))
+        elif piece.kind == Kind.DATA and found:
+            found[-1] |= {
+                "type": (">" if piece.flags & BIG_ENDIAN else "<") + TYPES[piece.type],
+                "order": "F" if piece.flags & BY_COLUMNS else "C",
+                "columns": piece.n_columns,
+                "signal": signals[piece.signal] if piece.signal < len(signals) else "",
+            }
+    return found
+
+
+def _kept(name: str) -> dict[str, Any]:
+    return {"name": name, "type": None, "order": None, "columns": None, "signal": None}
+
+
+def _name(pieces: Sequence[Piece]) -> str:
+    """The name in a local header, which begins with the first of ``pieces``."""
+    header = b""
+    for piece in pieces:
+        if piece.kind == Kind.TEXT:
+            header += piece.text
+        elif piece.kind in (Kind.CRC, Kind.SIZE4, Kind.SIZE8):
+            header += bytes(8 if piece.kind == Kind.SIZE8 else 4)
+        else:
+            break
+    size = int.from_bytes(header[26:28], "little")
+    return header[HEADER : HEADER + size].decode("utf-8", "replace").removesuffix(".npy")

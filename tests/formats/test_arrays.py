@@ -1,0 +1,455 @@
+"""NPY and NPZ: whatever NumPy and zipfile write is given back, and nothing else is believed."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pickle
+import struct
+import zipfile
+import zlib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
+from mcz.editing.folders import motion_files
+from mcz.errors import MotionError, OptionError, SourceError
+from mcz.formats import FORMATS, sniffed
+from mcz.formats.arrays.kinds import KINDS
+from mcz.numbers import GridKind
+from tools.vectors.build.array_files import Member, floats, npy, npz, plain_npz
+
+CODES = ("?", "<i2", ">i4", "<i8", "|u1", "<u8", "<f2", ">f4", "<f4", "<f8", ">f8")
+
+
+def saved(**arrays: Any) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def back(data: bytes, suffix: str = "npz") -> mcz.Motion:
+    """The motion in a file that is given back, also by way of an MCZ file."""
+    motion: mcz.Motion = FORMATS[suffix].read(data, "take")
+    assert FORMATS[suffix].write(motion) == data
+    out = io.BytesIO()
+    mcz.write(motion, out)
+    with mcz.open(out.getvalue()) as file:
+        assert file.only_clip().source_bytes() == data
+    return motion
+
+
+@st.composite
+def arrays(draw: st.DrawFn) -> Any:
+    """An array of any type and order; any bits are numbers."""
+    code = draw(st.sampled_from(CODES))
+    shape = draw(hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=4))
+    dtype = np.dtype(code)
+    count = int(np.prod(shape))
+    if draw(st.booleans()):
+        words = draw(st.lists(st.integers(-99, 99), min_size=count, max_size=count))
+        array = (np.array(words, np.float64) / 4).astype(dtype).reshape(shape)
+    else:
+        size = count * dtype.itemsize
+        array = np.frombuffer(draw(st.binary(min_size=size, max_size=size)), dtype).reshape(shape)
+    return np.asfortranarray(array) if draw(st.booleans()) else array
+
+
+@st.composite
+def archives(draw: st.DrawFn) -> bytes:
+    """An NPZ by zipfile, with options of its own for each member."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.comment = draw(st.sampled_from([b"", b"PK\5\6 is no end", b"x" * 300]))
+        names = draw(st.lists(st.text("abc/é", min_size=1, max_size=4), unique=True, max_size=4))
+        for name in (*names, "motion"):
+            array = floats(3, 2) if name == "motion" else draw(arrays())
+            part = io.BytesIO()
+            np.save(part, array)
+            info = zipfile.ZipInfo(f"{name}.npy", (draw(st.integers(1980, 2100)), 2, 3, 4, 5, 6))
+            info.comment = draw(st.binary(max_size=3))
+            info.extra = draw(st.sampled_from([b"", b"\xfe\xca\4\0abcd", b"ab"]))
+            info.external_attr = draw(st.integers(0, 2**32 - 1))
+            method = zipfile.ZIP_DEFLATED if draw(st.booleans()) else zipfile.ZIP_STORED
+            info.compress_type = zipfile.ZIP_STORED if name == "motion" else method
+            wide = draw(st.booleans())
+            with archive.open(info, "w", force_zip64=wide) as file:
+                file.write(part.getvalue())
+    return buffer.getvalue()
+
+
+class Forward(io.BytesIO):
+    """A stream that cannot seek: zipfile writes sizes behind the members."""
+
+    def seek(self, *args: Any) -> int:
+        raise OSError("no")
+
+    def tell(self) -> int:
+        raise OSError("no")
+
+
+@given(arrays())
+def test_any_array_comes_back_or_is_refused(array: Any) -> None:
+    buffer = io.BytesIO()
+    np.save(buffer, array)
+    try:
+        motion = back(buffer.getvalue(), "npy")
+    except SourceError:
+        plain = array.ndim > 1 and array.size
+        odd = array.dtype.kind in "iu" and array.dtype.itemsize == 8
+        assert not plain or odd or array.dtype in (np.float16, np.bool_)
+        return
+    with np.errstate(invalid="ignore"):  # of NaNs that signal
+        shown = array.reshape(len(array), -1).astype(np.float64)
+    np.testing.assert_array_equal(motion.values, shown)
+
+
+@given(archives())
+def test_any_archive_comes_back(data: bytes) -> None:
+    motion = back(data)
+    assert motion.signals[0].name == "motion"
+
+
+@given(archives(), st.data())
+def test_damaged_archives_are_refused_or_come_back(data: bytes, pick: st.DataObject) -> None:
+    with pytest.raises(SourceError):
+        FORMATS["npz"].read(data[: pick.draw(st.integers(0, len(data) - 1))])
+    changed = bytearray(data)
+    for _ in range(pick.draw(st.integers(1, 3))):
+        changed[pick.draw(st.integers(0, len(data) - 1))] ^= 1 << pick.draw(st.integers(0, 7))
+    try:
+        motion = FORMATS["npz"].read(bytes(changed))
+    except SourceError:
+        return
+    assert FORMATS["npz"].write(motion) == changed
+
+
+@pytest.mark.parametrize("data", [npy(floats(4, 3)), plain_npz({"a": floats(3, 2)})])
+def test_every_bit_flip_and_prefix(data: bytes) -> None:
+    suffix = "npy" if data[:1] == b"\x93" else "npz"
+    for size in range(len(data)):
+        with pytest.raises(SourceError):
+            FORMATS[suffix].read(data[:size])
+    for bit in range(0, 8 * len(data), 11):
+        changed = bytearray(data)
+        changed[bit // 8] ^= 1 << bit % 8
+        try:
+            motion = FORMATS[suffix].read(bytes(changed))
+        except SourceError:
+            continue
+        assert FORMATS[suffix].write(motion) == changed
+
+
+def test_blanks_of_a_head_end_where_the_numbers_begin() -> None:
+    head = b"\x93NUMPY\1\0\x40\0{'descr': '|u1', 'fortran_order': False, 'shape': (2, 2)}"
+    back(head.ljust(74) + b"    ", "npy")
+    for shape in (b"02, 2)}", b"2" * 19 + b", 2)}", b"1," * 65 + b")}"):
+        odd = (head[: head.index(b"2, 2)")] + shape).ljust(74 + len(shape))
+        size = (len(odd) - 10).to_bytes(2, "little")
+        with pytest.raises(SourceError, match="a shape of"):
+            FORMATS["npy"].read(odd[:8] + size + odd[10:] + b"    ")
+
+
+def test_a_zip_that_was_written_forward() -> None:
+    stream = Forward()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name in "ab":
+            archive.writestr(f"{name}.npy", npy(floats(4, 3)))
+    data = stream.getvalue()
+    assert b"PK\7\x08" in data
+    motion = back(data)
+    cut = replace(motion, signals=tuple(signal.cut(1, 3) for signal in motion.signals))
+    part = FORMATS["npz"].write(cut)
+    with np.load(io.BytesIO(part)) as arrays:  # which checks sizes and CRC-32
+        np.testing.assert_array_equal(arrays["b"], floats(4, 3)[1:3])
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_frames_of_a_file_are_a_file_that_numpy_loads(order: Any) -> None:
+    poses = np.array(floats(50, 4, 3), order=order)
+    given = {"poses": poses, "force": floats(100, 2).astype(">f4"), "who": np.array("A")}
+    out = io.BytesIO()
+    mcz.write(back(saved(**given)), out)
+    with mcz.open(out.getvalue()) as file:
+        part = file.only_clip().source_bytes((3, 12))
+    with np.load(io.BytesIO(part)) as arrays:
+        np.testing.assert_array_equal(arrays["poses"], given["poses"][3:12])
+        np.testing.assert_array_equal(arrays["force"], given["force"][6:24])
+        assert arrays["who"] == "A"
+
+
+def test_nothing_is_unpickled_nor_inflated(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Bomb:
+        def __reduce__(self) -> Any:
+            return pytest.fail, ("unpickled",)
+
+    pickled = np.array([None], object)
+    buffer = io.BytesIO()
+    np.save(buffer, pickled, allow_pickle=True)
+    head = buffer.getvalue()[: -len(pickle.dumps(pickled, protocol=3))] or buffer.getvalue()[:128]
+    evil = head[:128] + pickle.dumps(Bomb())
+    members = (Member("evil.npy", evil), Member("a.npy", npy(floats(3, 2))))
+    motion = back(npz(members))
+    assert motion.metadata["source-note"] == "evil is pickled, and not unpickled"
+    with pytest.raises(SourceError, match="pickled"):
+        FORMATS["npy"].read(evil)
+    monkeypatch.setattr("zlib.decompressobj", lambda *given: pytest.fail("inflated"))
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, a=floats(3, 2))
+    with pytest.raises(SourceError, match="'a' is deflated.*numpy.savez stores"):
+        FORMATS["npz"].read(buffer.getvalue())
+
+
+def _changed(data: bytes, at: int, format_: str, number: int) -> bytes:
+    return data[:at] + struct.pack(format_, number) + data[at + struct.calcsize(format_) :]
+
+
+def test_archives_that_lie_are_refused_by_place() -> None:
+    plain = Member("a.npy", npy(floats(3, 2)), wide=False)
+    data = npz([plain, replace(plain, name="b.npy")])
+    entry, end = data.index(b"PK\1\2"), data.index(b"PK\5\6")
+    second = data.index(b"PK\1\2", entry + 1)
+    cases = (
+        (_changed(data, entry + 24, "<I", 999), rf"offset {entry}: .*stored, but \d+ bytes.*999"),
+        (_changed(data, entry + 42, "<I", 7), rf"offset {entry}: member 'a.npy' has no local"),
+        (_changed(data, second + 42, "<I", 0), r"offset 0: member 'b.npy' has another name"),
+        (_changed(data, 18, "<I", 5), "offset 18: member 'a.npy' has 5 bytes"),
+        (_changed(data, 8, "<H", 8), "offset 8: member 'a.npy' has two methods"),
+        (_changed(data, end + 10, "<H", 999), f"offset {end}: 999 members"),
+        (_changed(data, end + 16, "<I", 1), f"offset {end}: a directory from 1"),
+        (data[:entry] + b"XX" + data[entry + 2 :], f"offset {entry}: no entry"),
+        (b"PK", "no end of a ZIP directory"),
+    )
+    for changed, message in cases:
+        with pytest.raises(SourceError, match=message):
+            FORMATS["npz"].read(changed)
+    size = len(plain.data)
+    big = _changed(_changed(data, entry + 20, "<I", size + 9), entry + 24, "<I", size + 9)
+    big = _changed(_changed(big, 18, "<I", size + 9), 22, "<I", size + 9)
+    with pytest.raises(SourceError, match="overlap"):
+        FORMATS["npz"].read(big)
+
+
+def test_a_wrong_checksum_is_kept_and_said() -> None:
+    members = (Member("a.npy", npy(floats(3, 2)), checksum=5),)
+    motion = back(npz(members))
+    assert motion.metadata["source-note"] == "the CRC-32 of a.npy is not that of its bytes"
+
+
+def test_which_arrays_are_signals() -> None:
+    times = np.arange(40) / 120
+    motion = back(
+        saved(
+            times=times,
+            joints=floats(40, 3, 3),
+            angles=floats(40, 2).astype(np.float32),
+            forces=floats(400, 6),
+            mesh=floats(900, 3),
+            steps=np.arange(40),
+            model=np.array(["a", "b"]),
+            bones=floats(16),
+        )
+    )
+    found = {s.name: (s.n_channels, s.samples_per_frame) for s in motion.signals}
+    wanted = {"times": (1, 1), "angles": (2, 1), "forces": (6, 10), "steps": (1, 1)}
+    assert found == {"motion": (9, 1), **wanted}
+    assert motion.frame_rate == 120
+    assert motion.skeleton.joint_names == ("0", "1", "2")
+    assert motion.metadata == {"source-note": "mesh has 900x3 numbers, and is kept as its bytes"}
+    assert motion.signals[1].channels == (mcz.Channel("", "times", "s"),)
+    uneven = back(saved(times=times**2, joints=floats(40, 3), fps=np.array(30)))
+    assert uneven.frame_rate is None
+    assert uneven.metadata["source-note"] == "the times are not uniform"
+    rates = {np.float32(59.94): 59.94, 29.97: 29.97, 30000 / 1001: 30000 / 1001, 100: 100.0}
+    for stated, rate in rates.items():
+        found_rate = back(saved(a=floats(3, 2), framerate=stated)).frame_rate
+        assert found_rate is not None and float(found_rate) == rate
+
+
+def test_columns_get_the_grid_that_is_shortest() -> None:
+    columns = [
+        np.round(floats(30), 2),
+        floats(30).astype(np.float32).astype(np.float64),
+        floats(30),
+        np.where(np.arange(30) == 7, 0.123456, 1.0),
+        np.where(np.arange(30) == 8, -0.0, 0.0),
+    ]
+    kinds = [grid.kind for grid in back(npy(np.array(columns).T), "npy").signals[0].grids]
+    fixed = GridKind.FIXED
+    assert kinds == [fixed, GridKind.BINARY32, GridKind.BINARY64, fixed, fixed]
+
+
+BODY = floats(5, 165)
+
+
+@pytest.mark.parametrize(("n_joints", "name"), [(24, "SMPL"), (52, "SMPL-H"), (55, "SMPL-X")])
+def test_a_body_is_a_tree_of_joints(n_joints: int, name: str) -> None:
+    poses = BODY[:, : 3 * n_joints].copy()
+    given = {
+        "poses": poses,
+        "trans": floats(5, 3, seed=2),
+        "gender": np.array("male"),
+        "mocap_framerate": np.array(120.0),
+        "betas": floats(10),
+        "dmpls": floats(5, 8, seed=3),
+    }
+    motion = back(saved(**given))
+    assert motion.skeleton.name == name and motion.skeleton.n_joints == n_joints
+    assert motion.skeleton.joints[0].name == "pelvis"
+    assert [s.name for s in motion.signals] == ["motion", "dmpls"]
+    np.testing.assert_array_equal(motion.values, np.hstack([given["trans"], poses]))
+    assert motion.metadata == {"x-gender": "male", "x-num-betas": "10"}
+    assert (motion.frame_rate, motion.skeleton.unit_cm, motion.skeleton.angle_unit) == (
+        120,
+        100.0,
+        "rad",
+    )
+
+
+def test_bones_without_a_length_have_no_errors_in_cm() -> None:
+    motion = FORMATS["npz"].read(saved(poses=BODY[:, :72], trans=BODY[:, :3]), "body")
+    for codec, params in (("mrdwt", {"mean_error_cm": 1.0}), ("lsdt-clip", {}), ("posewave", {})):
+        with pytest.raises(OptionError, match="no bone has a length"):
+            mcz.write(motion, io.BytesIO(), codec, **params)
+    mcz.write(motion, io.BytesIO(), "mrdwt")
+
+
+def test_parts_of_a_body() -> None:
+    trans = floats(5, 3, seed=2)
+    parts = {"root_orient": BODY[:, :3], "pose_body": BODY[:, 3:66]}
+    assert back(saved(**parts)).skeleton.n_joints == 22
+    hands = {"left_hand_pose": BODY[:, 75:120], "right_hand_pose": BODY[:, 120:]}
+    assert back(saved(**parts, **hands, transl=trans)).skeleton.n_joints == 52
+    face = {"pose_jaw": BODY[:, 66:69], "pose_eye": BODY[:, 69:75]}
+    motion = back(saved(**face, **hands, **parts, trans=trans))
+    assert motion.skeleton.n_joints == 55
+    np.testing.assert_array_equal(motion.values[:, 3:], BODY)
+    twice = back(saved(**face, **hands, poses=BODY, **parts))
+    assert len(twice.signals) == 1
+    parts["pose_body"] = parts["pose_body"] + 1e-9
+    other = back(saved(poses=BODY, **parts))
+    assert [s.name for s in other.signals] == ["motion", "pose_body"]
+
+
+def test_somebody_says_what_plain_arrays_are(tmp_path: Path) -> None:
+    path = tmp_path / "joints.npy"
+    for name, kinds in KINDS.items():
+        for shape in ((6, 5, len(kinds)), (6, 5 * len(kinds))):
+            path.write_bytes(npy(floats(*shape)))
+            motion = mcz.read(path, arrays=name, unit="m", up="y", rate=20)
+            assert [c.kind for c in motion.skeleton.channels] == [*kinds] * 5
+            mcz.encode(path, tmp_path / "a.mcz", arrays=name, rate=20, force=True)
+            with mcz.open(tmp_path / "a.mcz") as file:
+                clip = file.only_clip()
+                assert clip.source_bytes() == path.read_bytes()
+                assert clip.skeleton.channels == motion.skeleton.channels
+    with pytest.raises(MotionError, match="3 numbers a joint, but there are 4"):
+        path.write_bytes(npy(floats(6, 5, 4)))
+        mcz.read(path, arrays="positions")
+    with pytest.raises(OptionError, match="one of positions"):
+        mcz.read(path, arrays="markers")
+    points = tmp_path / "points.npy"
+    points.write_bytes(npy(floats(6, 5, 3)))
+    positions = mcz.positions(mcz.read(points, arrays="positions", unit="m"))
+    np.testing.assert_allclose(positions, floats(6, 5, 3))
+
+
+def test_gaps_are_invalid_and_lossy_codecs_leave_them_open(tmp_path: Path) -> None:
+    values = np.cumsum(floats(64, 2, 3), axis=0).astype(np.float32)
+    values[5:9, 1] = np.nan
+    path = tmp_path / "gaps.npy"
+    path.write_bytes(npy(values))
+    target = tmp_path / "gaps.mcz"
+    mcz.encode(path, target, codec="mrdwt", arrays="positions", unit="cm", rate=30)
+    with mcz.open(target) as file:
+        found = np.load(io.BytesIO(file.only_clip().source_bytes()))
+    assert found.dtype == np.float32
+    np.testing.assert_array_equal(np.isnan(found), np.isnan(values))
+
+
+def test_files_without_a_motion_are_refused_with_the_reason() -> None:
+    cases = {
+        npy(np.array(3.0)): "a single number",
+        npy(floats(16)): "no array has a row for each frame; 'array' is of shape",
+        npy(floats(3, 0)): r"of shape \(3, 0\)",
+        npy(np.zeros((3, 2), complex)): "of type c16",
+        npy(floats(3, 2))[:-1]: "offset 128: 47 bytes of numbers",
+        npy(np.full((2, 2), 2**60)): "an integer beyond 2\\^53",
+        b"\x93NUMPY\4\0\0\0": "no NPY file|version 4",
+    }
+    for data, message in cases.items():
+        with pytest.raises(SourceError, match=message):
+            FORMATS["npy"].read(data)
+    with pytest.raises(SourceError, match="no array has a row for each frame; 'betas' is of shape"):
+        FORMATS["npz"].read(saved(betas=floats(16)))
+    with pytest.raises(SourceError, match="no array"):
+        FORMATS["npz"].read(npz(()))
+    assert sniffed(npy(floats(2, 2))) == "npy" and sniffed(saved(a=floats(2, 2))) == "npz"
+
+
+def test_what_a_folder_has_of_motions(tmp_path: Path) -> None:
+    """Means and names beside a data set are no motions, and pack leaves them out."""
+    np.save(tmp_path / "mean.npy", np.zeros(22))
+    np.save(tmp_path / "motion.npy", np.zeros((9, 22)))
+    np.savez(tmp_path / "names.npz", names=np.array([["a", "b"]]), count=3)
+    np.savez(tmp_path / "poses.npz", gender="neutral", poses=np.zeros((9, 72)))
+    np.savez_compressed(tmp_path / "deflated.npz", poses=np.zeros((9, 72)))
+    (tmp_path / "no.npy").write_bytes(b"no array")  # its reader says so
+    motions, others = motion_files(sorted(tmp_path.iterdir()))
+    assert [path.name for path in others] == ["mean.npy", "names.npz"]
+    assert len(motions) == 4
+
+
+def test_a_motion_of_another_source_is_no_array_file() -> None:
+    motion = mcz.Motion(mcz.Skeleton(()), (mcz.Signal(np.zeros((2, 0))),))
+    with pytest.raises(MotionError, match="to_npz"):
+        FORMATS["npz"].write(motion)
+
+
+@pytest.mark.real
+def test_real_arrays() -> None:
+    for path in sorted((Path(os.environ["MCZ_DATA"]) / "other" / "humanml3d").glob("*.npy")):
+        back(path.read_bytes(), "npy")
+
+
+def test_commands_say_what_is_read_and_what_is_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, held, again = (str(tmp_path / name) for name in ("a.npz", "a.mcz", "b.npz"))
+    points = np.asfortranarray(floats(9, 4, 3))
+    deflated = Member("old.npy", zlib.compress(b"anything")[2:-4], method=8, size=8)
+    members = [
+        Member("points.npy", npy(points, by_columns=True)),
+        Member("betas.npy", npy(floats(10))),
+        Member("steps.npy", npy(np.arange(9).astype(">i4"))),
+    ]
+    Path(path).write_bytes(npz([*members, deflated]))
+    assert run(cli, "mcz", ["encode", path, "--arrays", "positions", "--unit", "cm"]) == 0
+    assert "old is deflated, and stays so" in capsys.readouterr().err
+    assert run(cli, "mcz", ["decode", held, "-o", again]) == 0
+    assert Path(again).read_bytes() == Path(path).read_bytes()
+    capsys.readouterr()
+    for file in (held, path):
+        assert run(cli, "mcz", ["info", file]) == 0
+        said = capsys.readouterr().out
+        assert "  array      points: 12 columns of <f8, by columns, in motion\n" in said
+        assert "  array      steps: 1 column of >i4, in steps\n" in said
+        assert "  kept       as bytes: betas, old\n" in said
+    assert run(cli, "mcz", ["info", "--json", held]) == 0
+    (clip,) = json.loads(capsys.readouterr().out)["clips"]
+    assert clip["arrays"][3] == {
+        "name": "old", "type": None, "order": None, "columns": None, "signal": None
+    }  # fmt: skip
+    assert [array["name"] for array in clip["arrays"]] == ["points", "betas", "steps", "old"]
+    assert run(cli, "mcz", ["encode", path, "--arrays", "quaternions-wxyz", "--force"]) == 1
+    assert "4 numbers a joint, but there are 3" in capsys.readouterr().err
