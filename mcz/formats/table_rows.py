@@ -160,8 +160,8 @@ def read_table(
     if n_missing <= np.count_nonzero(blank):
         missing = b""
     elif blank.any():  # both: what is blank is left out of the layout
-        rows = attempt(False)
-        blank[:] = False
+        rows = attempt(False)  # which may have others, where a row had blanks alone
+        blank = np.zeros(rows.start.shape, np.bool_)
     gone = blank
     if missing:
         gone = blank | _are(data, rows, missing)

@@ -320,3 +320,9 @@ def test_memory_is_bounded_by_the_bytes_of_a_ragged_table() -> None:
             FORMATS["csv"].read(long, "table")
     wide = b",".join(b"c%d" % k for k in range(2000)) + b"\n" + (b"," * 1999 + b"1\n") * 40
     assert back(wide).values.shape == (40, 2000)
+
+
+def test_rows_that_are_no_rows_without_blanks() -> None:
+    """An empty line is a row of blanks at first, and none where another word is what is missing."""
+    with pytest.raises(SourceError, match="line 3: b'l' is not a number"):
+        FORMATS["csv"].read(b"5;NA\n5\nl\n\n5;NA\n")
