@@ -7,12 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from mcz.kinematics import point_set
+from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion
 from mcz.reading.recording import Recording, recording
 
 MOST_NAMES = 8
 POINTS = ("c3d", "trc")  # what becomes of joints are points
 SCENES = ("glb", "usda")
+SHAPED = ("bvh", "amc", *POINTS, *SCENES)  # a skeleton or its points
 UNNUMBERED = ("bvh", "sto", "mot", *SCENES)
 ANY_SIGNAL = ("bvh", "amc", "c3d")  # they refuse, or hold, what is beside the motion
 ROOT = "root"  # the only name that ASF has for it
@@ -28,6 +30,8 @@ def left_out(motion: Motion, to: str) -> tuple[str, ...]:
 
 
 def _left_out(motion: Motion, to: str) -> Iterator[str]:
+    if to in SHAPED and has_no_lengths(motion.skeleton):
+        yield f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
     others = [signal.name for signal in motion.signals[1:]]
     if others and to not in ANY_SIGNAL:
         yield f"left out: signal {', '.join(others)}"

@@ -328,6 +328,19 @@ def model_file(path: Path, n_shapes: int) -> np.ndarray:
     return np.einsum("jv,vks->jks", regressor, np.dstack([shapes, vertices]))
 
 
+def test_joints_that_all_lie_at_the_root_are_not_shown_without_a_word(tmp_path: Path) -> None:
+    """Pictures and files of other formats would look fine and mean nothing."""
+    said = "no bone has a length: all joints lie where the root is, until rest offsets are given"
+    body = back(saved(poses=floats(5, 72), trans=floats(5, 3)))
+    for to in ("bvh", "c3d", "glb", "trc"):
+        assert mcz.left_out(body, to)[0] == said
+    assert said not in mcz.left_out(body, "csv")
+    assert mcz.render(body, tmp_path / "still.svg").notes[0] == said
+    offsets = np.vstack([np.zeros((1, 3)), np.full((23, 3), 0.1)])
+    shaped = mcz.with_offsets(body, offsets)
+    assert said not in (*mcz.left_out(shaped, "bvh"), *mcz.render(shaped, tmp_path / "b.svg").notes)
+
+
 def test_a_model_file_says_how_long_bones_are(tmp_path: Path) -> None:
     moves = model_file(tmp_path / "model_female.npz", 4)
     betas, poses, take = np.array([0.5, -1, 2, 0, 0]), floats(9, 72), tmp_path / "take.npz"
