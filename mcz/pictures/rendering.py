@@ -102,7 +102,9 @@ def render(
     look = Look(view, theme_of(theme), checked_size(size), follow)
     notes: list[str] = []
     if has_no_lengths(moving.skeleton):
-        notes.append(f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given")
+        notes.append(
+            f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
+        )
     known_rate = _rate(moving, rate)
     first, stop = frame_range(moving, frames)
     if first == stop:

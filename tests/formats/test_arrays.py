@@ -156,7 +156,7 @@ def test_blanks_of_a_head_end_where_the_numbers_begin() -> None:
     for shape in (b"02, 2)}", b"2" * 19 + b", 2)}", b"1," * 65 + b")}"):
         odd = (head[: head.index(b"2, 2)")] + shape).ljust(74 + len(shape))
         size = (len(odd) - 10).to_bytes(2, "little")
-        with pytest.raises(SourceError, match="a shape of"):
+        with pytest.raises(SourceError, match="the shape .* is no plain one"):
             FORMATS["npy"].read(odd[:8] + size + odd[10:] + b"    ")
 
 
@@ -457,6 +457,11 @@ def test_files_without_a_motion_are_refused_with_the_reason() -> None:
         FORMATS["npz"].read(saved(betas=floats(16)))
     with pytest.raises(SourceError, match="no array"):
         FORMATS["npz"].read(npz(()))
+    deflated = io.BytesIO()
+    np.savez_compressed(deflated, poses=floats(9, 72), trans=floats(9, 3))
+    again = r"all of its 2 members are deflated, .*: numpy.savez\(path, "
+    with pytest.raises(SourceError, match=again):
+        FORMATS["npz"].read(deflated.getvalue())
     assert sniffed(npy(floats(2, 2))) == "npy" and sniffed(saved(a=floats(2, 2))) == "npz"
 
 
