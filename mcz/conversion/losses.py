@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -43,6 +43,18 @@ def _left_out(motion: Motion, to: str) -> Iterator[str]:
     yield from _numbers(motion, to)
     if to == "amc":
         yield from _acclaim_names(motion)
+
+
+def first_gap(motion: Motion, columns: Sequence[int] | None = None) -> str | None:
+    """Which joint has no value in which frame, in words: the first such of ``columns``, or None."""
+    chosen = range(motion.skeleton.n_channels) if columns is None else columns
+    bad = ~np.isfinite(np.asarray(motion.signals[0].masked(), np.float64)[:, chosen])
+    if not bad.any():
+        return None
+    frame, place = np.argwhere(bad)[0]
+    owners = [j for j, joint in enumerate(motion.skeleton.joints) for _ in joint.channels]
+    joint = motion.skeleton.addresses()[owners[chosen[place]]]
+    return f"joint {joint!r} has no value in frame {frame}, of {bad.sum()} missing or not finite"
 
 
 def _acclaim_names(motion: Motion) -> Iterator[str]:
