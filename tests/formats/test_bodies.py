@@ -125,9 +125,7 @@ def test_what_is_pickled_is_never_opened(tmp_path: Path) -> None:
     assert offsets_of_model(model(tmp_path / "j.npz", J_regressor=pickled), 24).shape == (24, 3)
     other = tmp_path / "SMPL_NEUTRAL.pkl"
     other.write_bytes(b"\x80\x04.")
-    with pytest.raises(
-        SourceError, match="never opened here; where you trust it.*shapedirs=.*kintree_table="
-    ):
+    with pytest.raises(SourceError, match="never opened here; where you trust it.*shapedirs="):
         offsets_of_model(other, 24)
 
 
