@@ -144,7 +144,7 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
 
 def _check_use(output: str | None, options: dict[str, Any], in_rerun: bool) -> None:
     """Raise Failure for options of a page without -o, and of a server with it."""
-    if output is not None and output != "-" and not output.lower().endswith(PAGES):
+    if output not in (None, "-") and not in_rerun and not output.lower().endswith(PAGES):
         raise Failure(f"{output}: a page is a .html; mcz render draws films", Exit.USAGE)
     if output == "-":
         raise Failure("a page is written to a file, not to standard output", Exit.USAGE)
