@@ -338,6 +338,9 @@ def test_joints_that_all_lie_at_the_root_are_not_shown_without_a_word(tmp_path: 
     assert mcz.render(body, tmp_path / "still.svg").notes[0] == said
     offsets = np.vstack([np.zeros((1, 3)), np.full((23, 3), 0.1)])
     shaped = mcz.with_offsets(body, offsets)
+    found = mcz.compare(body, shaped)
+    assert found.mse == 0 and found.max_position_error is None
+    assert "no bone has a length, but on the other side: no positions" in found.notes[-1]
     assert said not in (*mcz.left_out(shaped, "bvh"), *mcz.render(shaped, tmp_path / "b.svg").notes)
 
 
