@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mcz.brief import brief
 from mcz.errors import MotionError
 from mcz.kinematics import origins_of
+from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion, Skeleton
 
 BLOCK = 2**20  # coordinates that are looked at in one go
@@ -55,7 +56,7 @@ class JointErrors:
 def joint_errors(original: Motion, other: Motion) -> JointErrors:
     """Compare the joints that both have, frame by frame; names are equal in any case of letters.
 
-    Raises MotionError where the two differ in frames, or one has no kinematics.
+    Raises MotionError where the two differ in frames, or one has no kinematics or no lengths.
     """
     a, b = original.skeleton, other.skeleton
     for motion in (original, other):
@@ -63,6 +64,9 @@ def joint_errors(original: Motion, other: Motion) -> JointErrors:
             raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
     if original.signals[0].n_rows != other.signals[0].n_rows:
         raise MotionError(f"{original.n_frames} and {other.n_frames} frames")
+    if has_no_lengths(a) != has_no_lengths(b):
+        name = (original if has_no_lengths(a) else other).name
+        raise MotionError(f"motion {name!r}: {NO_LENGTHS}, but on the other side")
     names_a, names_b = a.addresses(), b.addresses()
     pairs = pairs_of(a, b)
     both = {names_a[i].lower() for i, _ in pairs}

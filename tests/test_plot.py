@@ -70,6 +70,12 @@ class Tags(HTMLParser):
         return [attributes for name, attributes in self.tags if name == tag]
 
 
+def test_a_table_is_drawn_from_its_first_column_behind_the_times(tmp_path: Path) -> None:
+    path = tmp_path / "forces.sto"
+    path.write_text("f\nnRows=3\nnColumns=3\nendheader\ntime\tfx\tfy\n0\t1\t2\n1\t3\t4\n2\t5\t6\n")
+    assert mcz.plot(mcz.read(path), tmp_path / "a.png", size=SIZE).title == "forces: fx, channels"
+
+
 def test_errors_are_those_of_diff(walk: Motion, lossy: Path, tmp_path: Path) -> None:
     with mcz.open(lossy) as file:
         clip = file.only_clip()

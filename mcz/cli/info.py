@@ -243,8 +243,20 @@ def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:
     yield from _tree(skeleton["joints"])
 
 
+def _is_plain(joints: list[dict[str, Any]]) -> bool:
+    """Whether the joints are numbers in order, all alike, as those of an array are."""
+    alike = -1, joints[0]["channels"]
+    return all(
+        joint["name"] == str(index) and (joint["parent"], joint["channels"]) == alike
+        for index, joint in enumerate(joints)
+    )
+
+
 def _tree(joints: list[dict[str, Any]]) -> Iterator[str]:
     """The joints as a tree; a stack instead of recursion, since files choose the depth."""
+    if len(joints) > 2 and _is_plain(joints):
+        yield f"  0 to {len(joints) - 1}  {' '.join(joints[0]['channels'])}".rstrip()
+        return
     children: dict[int, list[int]] = {}
     for index, joint in enumerate(joints):
         children.setdefault(joint["parent"], []).append(index)

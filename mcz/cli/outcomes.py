@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mcz.editing.outcomes import Outcome, Report
 
 
-HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "restored")
+HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "restored", "written")
 MANY = 50  # files of one kind that are named for one reason; --json names all
 
 
@@ -63,18 +63,25 @@ def _say_left_out(report: Report, target: str) -> None:
 def _say_notes(report: Report) -> None:
     """Say on standard error what was left out and why, and what was noticed about the rest."""
     said: Counter[tuple[str, str, str]] = Counter()
+    noted: Counter[tuple[str, str]] = Counter()
     for outcome in report.outcomes:
+        kind = PurePosixPath(outcome.path).suffix.lower()
         if outcome.message and outcome not in report.failures:
-            kind = PurePosixPath(outcome.path).suffix.lower()
             said[outcome.result, kind, outcome.message] += 1
             if said[outcome.result, kind, outcome.message] <= MANY:
                 say(f"{outcome.path}: {outcome.result}: {outcome.message}")
         for note in outcome.notes:
-            say(f"{outcome.path}: {note}")
+            noted[kind, note] += 1
+            if noted[kind, note] <= MANY:
+                say(f"{outcome.path}: {note}")
     for (result, kind, message), count in said.items():
         if count > MANY:
             files = plural(count - MANY, f"more {kind} file".replace("  ", " "))
             say(f"{files} {result}: {message} (--json names them)")
+    for (kind, note), count in noted.items():
+        if count > MANY:
+            files = plural(count - MANY, f"more {kind} file".replace("  ", " "))
+            say(f"{files}: {note} (--json names them)")
 
 
 def conclude(report: Report, target: str, as_json: bool) -> Exit:

@@ -46,7 +46,7 @@ MOST_ROWS = 24  # of a table that is printed
     type=click.Choice(WHAT),
     help="Default: channels, of two files the error of FILE2 against FILE.",
 )
-@click.option("--joint", metavar="NAME", help="Whose channels or spectrum. Default: the root.")
+@click.option("--joint", metavar="NAME", help="Whose channels or spectrum. Default: the first.")
 @click.option(
     "--codecs", metavar="A,B", help="Lossy codecs of rate-distortion. Default: posewave,mrdwt."
 )

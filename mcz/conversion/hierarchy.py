@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mcz.conversion.losses import first_gap
 from mcz.errors import MotionError
 from mcz.formats.bvh import with_positions
 from mcz.kinematics import point_set
@@ -125,9 +126,8 @@ def _check(motion: Motion) -> None:
     if len(motion.signals) > 1 or motion.signals[0].channels is not None:
         names = ", ".join(signal.name for signal in motion.signals)
         raise MotionError(f"BVH holds the channels of a skeleton alone, not the signals {names}")
-    bad = ~np.isfinite(motion.values)
-    if bad.any() or (motion.signals[0].mask is not None and not motion.signals[0].mask.all()):
-        raise MotionError("BVH cannot leave out values, and some are invalid or not finite")
+    if gap := first_gap(motion):
+        raise MotionError(f"motion {motion.name!r}: BVH cannot leave out values, but {gap}")
     if is_bvh(motion.skeleton):
         return
     for joint in motion.skeleton.joints:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from mcz.kinematics import point_set
+from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion
 from mcz.reading.recording import Recording, recording
 
 MOST_NAMES = 8
 POINTS = ("c3d", "trc")  # what becomes of joints are points
 SCENES = ("glb", "usda")
+SHAPED = ("bvh", "amc", *POINTS, *SCENES)  # a skeleton or its points
 UNNUMBERED = ("bvh", "sto", "mot", *SCENES)
 ANY_SIGNAL = ("bvh", "amc", "c3d")  # they refuse, or hold, what is beside the motion
 ROOT = "root"  # the only name that ASF has for it
@@ -28,6 +30,8 @@ def left_out(motion: Motion, to: str) -> tuple[str, ...]:
 
 
 def _left_out(motion: Motion, to: str) -> Iterator[str]:
+    if to in SHAPED and has_no_lengths(motion.skeleton):
+        yield f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
     others = [signal.name for signal in motion.signals[1:]]
     if others and to not in ANY_SIGNAL:
         yield f"left out: signal {', '.join(others)}"
@@ -39,6 +43,18 @@ def _left_out(motion: Motion, to: str) -> Iterator[str]:
     yield from _numbers(motion, to)
     if to == "amc":
         yield from _acclaim_names(motion)
+
+
+def first_gap(motion: Motion, columns: Sequence[int] | None = None) -> str | None:
+    """Which joint has no value in which frame, in words: the first such of ``columns``, or None."""
+    chosen = range(motion.skeleton.n_channels) if columns is None else columns
+    bad = ~np.isfinite(np.asarray(motion.signals[0].masked(), np.float64)[:, chosen])
+    if not bad.any():
+        return None
+    frame, place = np.argwhere(bad)[0]
+    owners = [j for j, joint in enumerate(motion.skeleton.joints) for _ in joint.channels]
+    joint = motion.skeleton.addresses()[owners[chosen[place]]]
+    return f"joint {joint!r} has no value in frame {frame}, of {bad.sum()} missing or not finite"
 
 
 def _acclaim_names(motion: Motion) -> Iterator[str]:

@@ -27,7 +27,13 @@ UNREADABLE = (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, z
 UNPICKLED = (
     "a pickle can run any program, so it is never opened here; where you trust it, write it anew "
     "in Python: m = pickle.load(open('model.pkl', 'rb'), encoding='latin1'); numpy.savez("
-    "'model.npz', J=m['J'], kintree_table=m['kintree_table'])"
+    "'model.npz', J_regressor=m['J_regressor'].toarray(), v_template=numpy.array(m['v_template']), "
+    "shapedirs=numpy.array(m['shapedirs']), kintree_table=m['kintree_table']), without .toarray() "
+    "where it is dense"
+)
+UNSHAPED = (
+    "J is where joints are without betas; to shape it by these, J_regressor, v_template and "
+    "shapedirs of the model are needed as well"
 )
 NOT_DENSE = (
     "a pickled object, as of a sparse matrix, is never opened here; where you trust the file, "
@@ -205,6 +211,10 @@ class _Model:
     def joints(self, betas: ArrayLike | None) -> Floats:
         """Where joints are at rest, (n_joints, 3)."""
         if betas is None and self.has("J"):
+            return np.asarray(self.array("J"), np.float64)
+        if self.has("J") and not self.has("J_regressor"):
+            if np.any(betas):
+                raise SourceError(f"{self.file}: {UNSHAPED}")
             return np.asarray(self.array("J"), np.float64)
         regressor, vertices = self.array("J_regressor"), self.array("v_template")
         if regressor.ndim != 2 or vertices.shape != (regressor.shape[1], 3):

@@ -119,10 +119,13 @@ def _head(data: bytes, encoding: str) -> _Head:
     lines = lines_from(data, 0)
     found = first_row(lines)
     if found is None:
-        hint = "no row of numbers"
         if has_decimal_commas(lines):
-            hint = "numbers with decimal commas, which no grid prints; save it with points"
-        raise SourceError(f"line {min(len(lines), 1)}: {hint} in the first lines; no table")
+            raise SourceError(
+                "line 1: the first numbers have decimal commas, which no grid prints; "
+                "save the table with points"
+            )
+        hint = "no row of numbers in the first lines; no table" if lines else "an empty file"
+        raise SourceError(f"line 1: {hint}")
     number, separator, n_cells = found
     above = [(at, line) for at, line in lines[:number] if line.strip()]
     texts = [texts_of(line, separator, encoding) for _, line in above]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Sequence
 
 from mcz.errors import FormatError, LimitError
@@ -22,20 +21,31 @@ from mcz.formats.table_layout import (
 from mcz.formats.table_notes import table_notes
 from mcz.motion import Source
 
+BEFORE = {b"", *(bytes([c]) for c in b'\t ,;"')}  # of a label in a line, b"" at the line's end
+AFTER = {*BEFORE, b"\r", b"\n"}
+
 
 def names_in(line: bytes, names: Sequence[str]) -> bytes:
     """A line of labels with a mark for each name, as far as the names come in order."""
     out, at = [], 0
     for name in names:
         label = name.encode()
-        found = re.compile(rb"(?<![^\t ,;\"])" + re.escape(label) + rb"(?![^\t ,;\"\r\n])").search(
-            line, at
-        )
-        if found is None:
+        start = _label_at(line, label, at)
+        if start < 0:
             break
-        out += [line[at : found.start()], NAME]
-        at = found.end()
+        out += [line[at:start], NAME]
+        at = start + len(label)
     return b"".join((*out, line[at:]))
+
+
+def _label_at(line: bytes, label: bytes, at: int) -> int:
+    """Where ``label`` stands between separators in ``line``, from ``at`` on; else -1."""
+    while (at := line.find(label, at)) >= 0:
+        stop = at + len(label)
+        if line[max(at - 1, 0) : at] in BEFORE and line[stop : stop + 1] in AFTER:
+            return at
+        at += 1
+    return -1
 
 
 def named_count(data: bytes, at: int, stop: int, count: tuple[int, int], n_rows: int) -> bytes:

@@ -6,6 +6,7 @@ import numpy as np
 
 from mcz.errors import MczError, MotionError
 from mcz.kinematics import point_names, point_set, positions_of
+from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.metrics.sums import Number, Values
 from mcz.motion import POSITION_KINDS, Motion, Signal, Skeleton
 
@@ -73,6 +74,10 @@ def same_points(original: Motion, decoded: Motion, notes: list[str]) -> bool:
     if not (alike and counts[0]):
         sets = f"{point_set(original.skeleton)}, {point_set(decoded.skeleton)}"
         notes.append(f"{counts[0]} and {counts[1]} points ({sets}): no errors of positions")
+        return False
+    without = [m for m in (original, decoded) if has_no_lengths(m.skeleton)]
+    if len(without) == 1:
+        notes.append(f"{without[0].name!r}: {NO_LENGTHS}, but on the other side: no positions")
         return False
     pairs = zip(point_names(original.skeleton), point_names(decoded.skeleton), strict=False)
     apart = [pair for pair in pairs if pair[0] != pair[1]]

@@ -44,13 +44,18 @@ def length_unit(motion: Motion) -> str:
 
 
 def joint_of(motion: Motion, joint: int | str | None) -> tuple[int, str, tuple[Channel, ...]]:
-    """Index, name and channels of a joint, None: the first that has any; raises MotionError."""
+    """Index, name and channels of a joint, None: the first that has any; raises MotionError.
+
+    Tables begin with a column of times, which nobody wants to see: the next one is taken there.
+    """
     skeleton = motion.skeleton
     if motion.signals[0].channels is not None:
         raise MotionError(f"{motion.name!r}: its channels are not those of its skeleton")
     having = [index for index, each in enumerate(skeleton.joints) if each.channels]
     if not having:
         raise MotionError(f"{motion.name!r}: no joint has channels")
+    if len(having) > 1 and skeleton.joints[having[0]].name.lower() == "time":
+        having = having[1:]
     index = having[0] if joint is None else skeleton.find(joint)
     name, channels = skeleton.addresses()[index], skeleton.joints[index].channels
     if not channels:

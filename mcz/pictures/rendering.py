@@ -12,6 +12,7 @@ from typing import BinaryIO
 import numpy as np
 
 from mcz.errors import MotionError, OptionError
+from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.pictures.bodies import Ints
 from mcz.pictures.cameras import Viewport
 from mcz.pictures.canvases import Canvas
@@ -100,6 +101,10 @@ def render(
     suffix = _kind(path, sheet)
     look = Look(view, theme_of(theme), checked_size(size), follow)
     notes: list[str] = []
+    if has_no_lengths(moving.skeleton):
+        notes.append(
+            f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
+        )
     known_rate = _rate(moving, rate)
     first, stop = frame_range(moving, frames)
     if first == stop:

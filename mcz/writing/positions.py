@@ -11,7 +11,8 @@ from mcz.container.writer import Writer
 from mcz.errors import OptionError
 from mcz.kinematics import point_set
 from mcz.kinematics.marker_motion import in_positions
-from mcz.motion import POSITION_KINDS, Motion, Skeleton
+from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
+from mcz.motion import Motion, Skeleton
 from mcz.writing.clip_writer import write_skeleton
 
 
@@ -27,13 +28,9 @@ def check_bones(skeleton: Skeleton, what: str) -> None:
 
     Arrays of body models are such: ``what`` would then be about the root alone.
     """
-    below = [joint for joint in skeleton.joints if joint.parent >= 0]
-    moved = any(any(joint.offset) or joint.tails for joint in below)
-    placed = any(channel.kind in POSITION_KINDS for joint in below for channel in joint.channels)
-    turned = any(channel.kind for joint in below for channel in joint.channels)
-    if turned and not moved and not placed:
+    if has_no_lengths(skeleton):
         raise OptionError(
-            f"{what} has no meaning: no bone has a length, so that rotations move no point; "
+            f"{what} has no meaning: {NO_LENGTHS}, so that rotations move no point; "
             "rest offsets give them one"
         )
 

@@ -417,6 +417,14 @@ def test_many_of_a_kind_are_counted(tmp_path: Path, call: Call) -> None:
     errors = call("pack", tmp_path, tmp_path / "a.mcz")[2]
     assert errors.count(".png: skipped") == 50
     assert "mcz: 10 more .png files skipped: no motion file" in errors
+    for number in range(53):
+        (tmp_path / f"{number:02}.bvh").write_text(
+            (SLOPPY % 2).replace("ROOT a", f"ROOT a{number}")
+        )
+    errors = call("pack", tmp_path, tmp_path / "b.mcz")[2]
+    note = "2 frames are declared, 3 are there"
+    assert errors.count(f".bvh: {note}") == 50
+    assert f"mcz: 3 more .bvh files: {note}" in errors
 
 
 def test_encode_and_append_pass_on_what_was_noticed(folder: Path, call: Call) -> None:

@@ -156,7 +156,7 @@ def test_blanks_of_a_head_end_where_the_numbers_begin() -> None:
     for shape in (b"02, 2)}", b"2" * 19 + b", 2)}", b"1," * 65 + b")}"):
         odd = (head[: head.index(b"2, 2)")] + shape).ljust(74 + len(shape))
         size = (len(odd) - 10).to_bytes(2, "little")
-        with pytest.raises(SourceError, match="a shape of"):
+        with pytest.raises(SourceError, match="the shape .* is no plain one"):
             FORMATS["npy"].read(odd[:8] + size + odd[10:] + b"    ")
 
 
@@ -328,6 +328,22 @@ def model_file(path: Path, n_shapes: int) -> np.ndarray:
     return np.einsum("jv,vks->jks", regressor, np.dstack([shapes, vertices]))
 
 
+def test_joints_that_all_lie_at_the_root_are_not_shown_without_a_word(tmp_path: Path) -> None:
+    """Pictures and files of other formats would look fine and mean nothing."""
+    said = "no bone has a length: all joints lie where the root is, until rest offsets are given"
+    body = back(saved(poses=floats(5, 72), trans=floats(5, 3)))
+    for to in ("bvh", "c3d", "glb", "trc"):
+        assert mcz.left_out(body, to)[0] == said
+    assert said not in mcz.left_out(body, "csv")
+    assert mcz.render(body, tmp_path / "still.svg").notes[0] == said
+    offsets = np.vstack([np.zeros((1, 3)), np.full((23, 3), 0.1)])
+    shaped = mcz.with_offsets(body, offsets)
+    found = mcz.compare(body, shaped)
+    assert found.mse == 0 and found.max_position_error is None
+    assert "no bone has a length, but on the other side: no positions" in found.notes[-1]
+    assert said not in (*mcz.left_out(shaped, "bvh"), *mcz.render(shaped, tmp_path / "b.svg").notes)
+
+
 def test_a_model_file_says_how_long_bones_are(tmp_path: Path) -> None:
     moves = model_file(tmp_path / "model_female.npz", 4)
     betas, poses, take = np.array([0.5, -1, 2, 0, 0]), floats(9, 72), tmp_path / "take.npz"
@@ -444,6 +460,11 @@ def test_files_without_a_motion_are_refused_with_the_reason() -> None:
         FORMATS["npz"].read(saved(betas=floats(16)))
     with pytest.raises(SourceError, match="no array"):
         FORMATS["npz"].read(npz(()))
+    deflated = io.BytesIO()
+    np.savez_compressed(deflated, poses=floats(9, 72), trans=floats(9, 3))
+    again = r"all of its 2 members are deflated, .*: numpy.savez\(path, "
+    with pytest.raises(SourceError, match=again):
+        FORMATS["npz"].read(deflated.getvalue())
     assert sniffed(npy(floats(2, 2))) == "npy" and sniffed(saved(a=floats(2, 2))) == "npz"
 
 

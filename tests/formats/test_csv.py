@@ -212,9 +212,10 @@ def test_columns_of_many_programs(text: str, rate: int | None, numbers: list[int
 
 
 REFUSED = {
-    b"": "no row of numbers",
+    b"": "line 1: an empty file",
     b"a,b\nx,y\n": "no row of numbers",
-    b"a;b\n1,5;2,5\n": "decimal commas",
+    b"a;b\n1,5;2,5\n": "line 1: the first numbers have decimal commas, which no grid prints; "
+    "save the table with points",
     b"a,b\n1,2\n3,x\n": "line 3: b'x' is not a number",
     b"a,b\n1,2\n3,4,5\n": "line 3: more than 2 cells",
     b"Format Version,1.21\n": "no line Frame,Time",

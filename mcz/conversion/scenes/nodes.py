@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.conversion.hierarchy import loose_tails, moves, stretches
-from mcz.conversion.losses import left_out
+from mcz.conversion.losses import first_gap, left_out
 from mcz.errors import MotionError
 from mcz.kinematics import point_set
 from mcz.kinematics.chain import Chain, Floats, times
@@ -168,11 +168,8 @@ def _joints(motion: Motion, scale: float) -> Iterator[Node]:
     """The joints in their order, each followed by the ends of its bones."""
     skeleton, values = motion.skeleton, np.asarray(motion.values, np.float64)
     used = [column for column, channel in enumerate(skeleton.channels) if channel.kind]
-    if not np.isfinite(values[:, used]).all():
-        raise MotionError(
-            f"motion {motion.name!r}: joints cannot be left out of frames, and some values are "
-            "invalid or not finite"
-        )
+    if gap := first_gap(motion, used):
+        raise MotionError(f"motion {motion.name!r}: joints cannot be left out of frames, but {gap}")
     placed = _Placed(motion, values, scale)
     names = skeleton.addresses()
     starts = accumulate((1 + len(tails) for tails in placed.tails), initial=0)

@@ -54,11 +54,11 @@ def read_head(data: bytes, at: int, stop: int) -> Head:
     version = data[at + 6]
     wide = 2 if version == 1 else 4
     if version not in (1, 2, 3):
-        return Head(odd=f"offset {at + 6}: version {version} of NPY")
+        return Head(odd=f"offset {at + 6}: version {version} of NPY is not known")
     text_at = at + 8 + wide
     size = int.from_bytes(data[at + 8 : text_at], "little")
     if size > MAX_HEAD or text_at + size > stop:
-        return Head(odd=f"offset {at + 8}: a head of {size} bytes")
+        return Head(odd=f"offset {at + 8}: a head of {size} bytes is too long")
     return _parsed(data[text_at : text_at + size], text_at, stop)
 
 
@@ -70,7 +70,9 @@ def _parsed(text: bytes, at: int, stop: int) -> Head:
         return Head(odd=f"offset {at}: a head without a plain descr, fortran_order and shape")
     numbers = re.findall(rb"\d+", shape[1])
     if len(numbers) > MAX_AXES or not all(map(_PLAIN.fullmatch, numbers)):
-        return Head(odd=f"offset {at + shape.start(1)}: a shape of {shape[1][:60]!r}")
+        return Head(
+            odd=f"offset {at + shape.start(1)}: the shape {shape[1][:60]!r} is no plain one"
+        )
     lengths = tuple(map(int, numbers))
     code = (descr[2] + descr[3]).decode()
     first = re.match(rb"\d+", shape[1])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mcz.errors import SourceError
 from mcz.formats.arrays.body import Body, body_of
 from mcz.formats.arrays.facts import SHAPE, TIMES, facts_of, rate_of
-from mcz.formats.arrays.files import Array
+from mcz.formats.arrays.files import DEFLATED, STAYS, Array
 from mcz.motion import Channel, Joint, Skeleton
 
 MAX_PER_FRAME = 1000  # rows a frame of an array that is longer than the motion
@@ -92,6 +92,9 @@ def _frames_of(arrays: Sequence[Array]) -> int:
 
 def _reasons(arrays: Sequence[Array]) -> list[str]:
     """Of the first arrays why they are no motion."""
+    if len(arrays) > 1 and all(STAYS in array.kept for array in arrays):
+        again = "numpy.savez(path, **numpy.load(other)) stores it anew"
+        return [f"all of its {len(arrays)} members are {DEFLATED}: {again}"]
     shown = arrays[:4]
     found = [f"{a.name!r} is {a.kept or f'of shape {a.head.shape}'}" for a in shown]
     return [*found, "..."] if len(arrays) > len(shown) else found

@@ -47,7 +47,8 @@ def _motion(
     n_runs = sum(len(piece.runs) for piece in pieces)
     if len(pieces) > MAX_PIECES or n_runs > MAX_RUNS:
         raise SourceError(
-            f"{len(arrays)} arrays of {len(pieces)} pieces and {n_runs} runs are many"
+            f"{len(arrays)} arrays in {len(pieces)} pieces with {n_runs} runs of numbers are too "
+            f"many: {MAX_PIECES} pieces and {MAX_RUNS} runs at most"
         )
     template, detail = build_arrays(pieces)
     digest = hashlib.sha256(data).digest()
