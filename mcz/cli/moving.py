@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mcz.cli.common import about, existing, opened, to_frames, to_rate
-from mcz.cli.options import UNITS, decoded_option, up_option
+from mcz.cli.options import UNITS, arrays_option, decoded_option, model_option, up_option
 
 if TYPE_CHECKING:
     from mcz.motion import Motion
@@ -21,7 +21,7 @@ Function = Callable[..., Any]
 
 
 def moving_options(function: Function) -> Function:
-    """``--clip --frames --rate --unit --up --skeleton --max-decoded``."""
+    """``--clip --frames --rate --unit --up --skeleton --arrays --model --max-decoded``."""
     options = (
         click.option(
             "--clip", "name", metavar="NAME", help="Which clip of an .mcz. Default: the only one."
@@ -43,6 +43,8 @@ def moving_options(function: Function) -> Function:
             type=click.Path(readable=False),
             help="The ASF of an AMC, or none.",
         ),
+        arrays_option,
+        model_option,
         decoded_option,
     )
     for option in reversed(options):
@@ -59,6 +61,8 @@ def moving_of(
     unit: str | None,
     up: str | None,
     skeleton: str | None,
+    arrays: str | None,
+    model: str | None,
     max_decoded: int | None,
 ) -> Iterator[Motion | Clip]:
     """The motion of a source file, or a clip of an .mcz that stays open; errors name the file.
@@ -75,7 +79,8 @@ def moving_of(
     existing(path)
     with about(path):
         is_amc = PurePath(path).suffix.lower() == ".amc"
-        motion = mcz.read(path, skeleton=skeleton if is_amc else None)
+        asf = skeleton if is_amc else None
+        motion = mcz.read(path, skeleton=asf, arrays=arrays, model=model)
         yield told(motion, rate, unit, up)
 
 

@@ -182,6 +182,16 @@ def arrays_option(function: Function) -> Function:
     )(function)
 
 
+def model_option(function: Function) -> Function:
+    """``--model``, as the argument ``model`` of ``mcz.read`` and ``mcz.encode``."""
+    return click.option(
+        "--model",
+        metavar="NPZ",
+        help="Your own model file of SMPL and its kin: how long the bones of bodies in an .npz "
+        "are. {gender} in it stands for that of the take.",
+    )(function)
+
+
 def key_error_option(function: Function) -> Function:
     """``--key-error``, as the argument ``key_error``."""
     return click.option(
@@ -212,6 +222,7 @@ def encoding_options(function: Function) -> Function:
         click.option("--unit", type=click.Choice(UNITS), help="Length unit of the source."),
         up_option("Axis of the source that points up. BVH and AMC do not say theirs."),
         arrays_option,
+        model_option,
         click.option("--verbatim", is_flag=True, help="Keep what cannot be parsed as attachment."),
         click.option("--archive", is_flag=True, help="Use the profile of large limits."),
     )

@@ -69,7 +69,7 @@ def command(
     as_json: bool,
     **options: Any,
 ) -> Exit:
-    """Draw numbers of FILE (.mcz, .bvh, .amc, .c3d, .trc, .mot, .sto, .csv), and print them.
+    """Draw numbers of FILE (.mcz or of any source format), and print them.
 
     channels and spectrum of a --joint; error of FILE2 against FILE, the original, as mcz diff has
     it; bytes of a clip by joint and resolution, as mcz info --layout has them; rate-distortion at a
@@ -86,7 +86,8 @@ def command(
     refuse_inputs(target, (file, other, skeleton))
     check_new(Path(target), force)
     facts = {key: options[key] for key in ("rate", "up", "unit")}
-    wanted = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts}
+    own = {key: options.pop(key) for key in ("arrays", "model")}
+    wanted = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts, **own}
     if codecs is not None:
         options["codecs"] = [each for each in codecs.split(",") if each]
     with ExitStack() as stack:

@@ -82,8 +82,8 @@ def command(
 ) -> Exit:
     """Draw the motion in FILE: a film, a still or a sheet of poses.
 
-    FILE is an .mcz, .bvh, .amc, .c3d, .trc or .csv of Motive or Vicon; a .mot, a .sto and other
-    .csv have no points to draw.
+    FILE is an .mcz, .bvh, .amc, .c3d, .trc, .csv of Motive or Vicon, or .npz; a .mot, a .sto and
+    other .csv have no points to draw, nor has a plain .npy unless --arrays says what it is.
 
     A .png or .svg without --sheet shows the middle frame of --frames. A grid on the floor has its
     length, left and right have colors of their own. It needs pip install 'mcz[render]'.
@@ -98,7 +98,8 @@ def command(
     if "://" not in target:
         check_new(Path(target), force)
     facts = {key: options[key] for key in ("rate", "up", "unit")}
-    wanted = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts}
+    own = {key: options.pop(key) for key in ("arrays", "model")}
+    wanted = {"name": name, "skeleton": skeleton, "max_decoded": max_decoded, **facts, **own}
     with moving_of(file, **wanted) as moving, about(file, target), Progress() as progress:
         drawn = mcz.render(
             moving,

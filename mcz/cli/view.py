@@ -22,10 +22,12 @@ from mcz.cli.common import (
 from mcz.cli.options import (
     EFFORTS,
     UNITS,
+    arrays_option,
     clips_option,
     decoded_option,
     force_option,
     json_option,
+    model_option,
     param_option,
     salvage_option,
     threads_option,
@@ -40,7 +42,7 @@ if TYPE_CHECKING:
     from mcz.viewing.embedding import PageWritten
     from mcz.viewing.shelf import Shelf
 
-SAID = ("skeleton", "rate", "unit", "up")  # what a file may not say itself
+SAID = ("skeleton", "rate", "unit", "up", "arrays", "model")  # what a file may not say itself
 OF_PAGE = ("clips", "where", "codec", "effort", "params", "max_decoded", "most", "force")
 PAGES = (".html", ".htm")
 OF_SERVER = ("no_browser", "keep", "host", "port")
@@ -80,6 +82,8 @@ LOOPBACK = "127.0.0.1"
 )
 @click.option("--unit", type=click.Choice(UNITS), help="Length unit of a file that says none.")
 @up_option("Axis that points up, of a file that does not say.")
+@arrays_option
+@model_option
 @salvage_option
 @clips_option
 @where_option
@@ -140,7 +144,7 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
 
 def _check_use(output: str | None, options: dict[str, Any], in_rerun: bool) -> None:
     """Raise Failure for options of a page without -o, and of a server with it."""
-    if output is not None and output != "-" and not output.lower().endswith(PAGES):
+    if output not in (None, "-") and not in_rerun and not output.lower().endswith(PAGES):
         raise Failure(f"{output}: a page is a .html; mcz render draws films", Exit.USAGE)
     if output == "-":
         raise Failure("a page is written to a file, not to standard output", Exit.USAGE)

@@ -36,6 +36,7 @@ def pack(
     unit: str | None = None,
     up: str | None = None,
     arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
     verbatim: bool = False,
     keep_all: bool = False,
     force: bool = False,
@@ -57,7 +58,9 @@ def pack(
     coded = chosen(codec, effort)
     verbatim = verbatim or keep_all
     params = None if params is None else dict(params)
-    terms = Terms(coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up, arrays=arrays)
+    terms = Terms(
+        coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up, arrays=arrays, model=model
+    )
     paths = [os.path.join(root, one.name) for one in taken] if "://" not in root else []  # noqa: PTH118
     inputs = (*paths, *(params or {}).values())
     report, profile = Report(), profile_of(archive)

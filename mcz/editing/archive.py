@@ -46,6 +46,7 @@ def pack(
     unit: str | None = None,
     up: str | None = None,
     arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
     verbatim: bool = False,
     keep_all: bool = False,
     force: bool = False,
@@ -60,8 +61,8 @@ def pack(
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
-    relative to ``directory``. ``arrays`` is that of ``mcz.read``; ``effort``, ``copies`` and
-    ``threads`` are those of ``mcz.write``;
+    relative to ``directory``. ``arrays`` and ``model`` are those of ``mcz.read``; ``effort``,
+    ``copies`` and ``threads`` are those of ``mcz.write``;
     ``jobs`` processes may work at once, by default one: the bytes are the same. ``mtimes`` keeps
     when each file was last changed as metadata of its clip, so that the same files give other
     bytes later. An earlier MCZ file of the target's name is no part of the new one; any other file
@@ -76,7 +77,9 @@ def pack(
         others += [left_out(path, root) for path in left]
     verbatim = verbatim or keep_all
     coded = chosen(codec, effort)
-    terms = Terms(coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up, arrays=arrays)
+    terms = Terms(
+        coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up, arrays=arrays, model=model
+    )
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
     inputs = (*paths, *(params or {}).values())
     with (
@@ -124,6 +127,7 @@ def append(
     unit: str | None = None,
     up: str | None = None,
     arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
     verbatim: bool = False,
     root: str | os.PathLike[str] | None = None,
     salvage: bool = False,
@@ -156,7 +160,8 @@ def append(
     """
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
     coded = chosen(codec, effort)
-    terms = Terms(coded, params, skeleton, rate, unit, verbatim, up=up, arrays=arrays)
+    said: dict[str, Any] = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
+    terms = Terms(coded, params, skeleton, verbatim=verbatim, **said)
     held = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
     files = [source for source in sources if source not in held]
     named, others = sources_named(files, root, target)

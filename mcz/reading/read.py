@@ -23,6 +23,7 @@ def read(
     unit: str | None = None,
     up: str | None = None,
     arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
     clip: str | None = None,
     max_decoded: int | None = None,
     threads: int | None = None,
@@ -33,9 +34,10 @@ def read(
     found stands in the metadata, and a SkeletonWarning tells of one whose name or dofs do not fit.
     ``rate`` in frames a second, ``unit`` (a key of ``UNIT_CM``) and ``up``, the axis that points up
     ("x", "y", "z"), say what the file does not. ``arrays`` says what the numbers of a plain NPY or
-    NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". Of an MCZ
-    file ``clip`` is read, with ``max_decoded`` and ``threads`` as in ``open``. Raises SourceError,
-    FormatError or OptionError.
+    NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". ``model``
+    is a model file of SMPL and its kin, which says how long the bones of such a body in an NPZ are
+    ("{gender}" in it: that of the take). Of an MCZ file ``clip`` is read, with ``max_decoded`` and
+    ``threads`` as in ``open``. Raises SourceError, FormatError or OptionError.
     """
     path = Path(path)
     if path.suffix.lower() == ".mcz":
@@ -49,4 +51,4 @@ def read(
         if taken.remark:
             warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
         motion = taken.motion
-    return with_facts(motion, rate, unit, up, arrays)
+    return with_facts(motion, rate, unit, up, arrays, model)

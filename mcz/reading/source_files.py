@@ -11,6 +11,7 @@ from typing import Any
 from mcz.errors import MczError, OptionError, SourceError
 from mcz.formats import Format, format_of
 from mcz.formats.arrays.kinds import with_kinds
+from mcz.formats.arrays.shaped import with_model
 from mcz.motion import Motion, Skeleton
 from mcz.units import facing, in_unit
 
@@ -61,14 +62,17 @@ def with_facts(
     unit: str | None,
     up: str | None = None,
     arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
 ) -> Motion:
     """``motion`` with a frame rate, a length unit and an axis that points up, None: as they are.
 
-    ``arrays`` says what plain arrays are, see ``mcz.read``. Raises OptionError, and MotionError for
-    arrays of another shape.
+    ``arrays`` says what plain arrays are, ``model`` how long the bones of a body are, see
+    ``mcz.read``. Raises OptionError, and MotionError for arrays of another shape.
     """
     if arrays is not None:
         motion = with_kinds(motion, arrays)
+    if model is not None:
+        motion = with_model(motion, model)
     if rate is not None:
         try:
             exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))

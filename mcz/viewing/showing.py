@@ -66,6 +66,8 @@ def view(
     rate: Fraction | float | None = None,
     unit: str | None = None,
     up: str | None = None,
+    arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
     salvage: bool = False,
     browser: bool = True,
     port: int = 0,
@@ -74,13 +76,15 @@ def view(
 
     In a notebook the result displays as a small player of each. Elsewhere a server on this machine
     shows them on a page, which is opened in the browser unless ``browser`` is False, until the
-    result is closed. ``skeleton``, ``rate``, ``unit`` and ``up`` say what files do not;
-    ``salvage``: files may be damaged. Raises MczError for what cannot be read, and AccessError
-    where this installation has no page or the ``port`` cannot be had.
+    result is closed. ``skeleton``, ``rate``, ``unit``, ``up``, ``arrays`` and ``model`` say what
+    files do not, as to ``mcz.read``; ``salvage``: files may be damaged. Raises MczError for what
+    cannot be read, and AccessError where this installation has no page or the ``port`` cannot be
+    had.
     """
     if not things:
         raise OptionError("there is nothing to view: give a Motion, a Clip or a path")
-    said = {"skeleton": skeleton, "rate": rate, "unit": unit, "up": up}
+    facts = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
+    said = {"skeleton": skeleton, **facts}
     if in_notebook():
         return View(None, [_player_of(thing, said, salvage) for thing in things])
     shelf = Shelf(said, _tell, salvage=salvage)

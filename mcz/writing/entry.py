@@ -35,8 +35,8 @@ class Terms:
     ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit`` and
     ``up``, the axis that points up, say what the file does not. ``verbatim``: one that cannot be
     parsed is kept as an attachment. ``keep_skeleton``: an ASF is restored as well, under its own
-    name. ``arrays`` says what plain arrays are. Raises OptionError for an unknown codec, unit, axis
-    or kind of arrays.
+    name. ``arrays`` says what plain arrays are, ``model`` how long the bones of bodies are. Raises
+    OptionError for an unknown codec, unit, axis or kind of arrays.
     """
 
     codec: str = DEFAULT
@@ -48,6 +48,7 @@ class Terms:
     keep_skeleton: bool = False
     up: str | None = None
     arrays: str | None = None
+    model: str | os.PathLike[str] | None = None
 
     def __post_init__(self) -> None:
         by_name(self.codec)
@@ -112,7 +113,8 @@ class Entry:
         taken = take(self.path, given, self.terms.unit, data)
         self._note(taken)
         terms = self.terms
-        motion = with_facts(taken.motion, terms.rate, terms.unit, terms.up, terms.arrays)
+        facts = terms.rate, terms.unit, terms.up, terms.arrays, terms.model
+        motion = with_facts(taken.motion, *facts)
         self.notes += tuple(_contradictions(taken.motion, motion))
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))

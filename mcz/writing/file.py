@@ -83,6 +83,7 @@ def encode(
     unit: str | None = None,
     up: str | None = None,
     arrays: str | None = None,
+    model: str | os.PathLike[str] | None = None,
     verbatim: bool = False,
     force: bool = False,
     archive: bool = False,
@@ -94,18 +95,17 @@ def encode(
 
     ``skeleton`` is the ASF of an AMC, as ``mcz.read`` takes it, with the same SkeletonWarning.
     ``verbatim`` keeps a file that cannot be parsed as an attachment. ``up`` is the axis that points
-    up ("x", "y", "z"). ``arrays`` is that of ``mcz.read``; ``effort``, ``copies`` and ``threads``
-    are those of ``mcz.write``. Raises SourceError, OptionError, MotionError or LimitError; nothing
-    is left under the final name then. A target that is the source or its skeleton is refused, even
-    with ``force``.
+    up ("x", "y", "z"). ``arrays`` and ``model`` are those of ``mcz.read``; ``effort``, ``copies``
+    and ``threads`` are those of ``mcz.write``. Raises SourceError, OptionError, MotionError or
+    LimitError; nothing is left under the final name then. A target that is the source or its
+    skeleton is refused, even with ``force``.
     """
     path = Path(source)
     if up is not None and path.suffix.lower() == ".asf":
         raise OptionError(f"{path}: a skeleton alone is kept as it is; say the up axis of its AMC")
     coded = chosen(codec, effort)
-    terms = Terms(
-        coded, params, skeleton, rate, unit, verbatim, keep_skeleton=True, up=up, arrays=arrays
-    )
+    said: dict[str, Any] = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
+    terms = Terms(coded, params, skeleton, verbatim=verbatim, keep_skeleton=True, **said)
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with limited(threads), replacing(target, force=force, inputs=inputs) as stream:

@@ -103,13 +103,14 @@ def numeric(
 ) -> np.ndarray:
     """G of a pose by central differences, (n_channels, n_channels); 0 where it is plain."""
     weights = np.ones(skeleton.n_joints) if weights is None else weights
-    step = 2e-3 if skeleton.angle_unit == "deg" else 3e-5
     n = skeleton.n_channels
-    steps = step * np.eye(n)
+    degrees = [c.kind[:1] != "q" and skeleton.angle_unit == "deg" for c in skeleton.channels]
+    step = np.where(degrees, 2e-3, 3e-5)
+    steps = np.diag(step)
     ends, heavy = weighted_points(
         skeleton, np.concatenate([values + steps, values - steps]), weights, whole
     )
-    slopes = (ends[:n] - ends[n:]) / (2 * step)
+    slopes = (ends[:n] - ends[n:]) / (2 * step[:, None, None])
     own = (*METRIC_KINDS, *TURNING_KINDS) if whole else METRIC_KINDS
     kinds = np.array([channel.kind in own for channel in skeleton.channels], np.bool_)
     slopes[~kinds] = 0.0

@@ -23,7 +23,7 @@ import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
 from mcz.editing.folders import motion_files
-from mcz.errors import MotionError, OptionError, SourceError
+from mcz.errors import MczError, MotionError, OptionError, SourceError
 from mcz.formats import FORMATS, sniffed
 from mcz.formats.arrays.kinds import KINDS
 from mcz.numbers import GridKind
@@ -314,6 +314,56 @@ def test_a_body_is_a_tree_of_joints(n_joints: int, name: str) -> None:
         100.0,
         "rad",
     )
+
+
+def model_file(path: Path, n_shapes: int) -> np.ndarray:
+    """A made-up model of SMPL; returns how a beta moves joints, (n_joints, 3, n_shapes)."""
+    body, rng = mcz.body_skeleton("smpl"), np.random.default_rng(5)
+    vertices, regressor = rng.normal(size=(60, 3)), rng.normal(size=(24, 60))
+    shapes = rng.normal(size=(60, 3, n_shapes))
+    parents = [joint.parent % 2**32 for joint in body.joints]
+    table = np.array([parents, range(24)])
+    arrays = {"J_regressor": regressor, "v_template": vertices, "shapedirs": shapes}
+    np.savez(path, kintree_table=table, **arrays)
+    return np.einsum("jv,vks->jks", regressor, np.dstack([shapes, vertices]))
+
+
+def test_a_model_file_says_how_long_bones_are(tmp_path: Path) -> None:
+    moves = model_file(tmp_path / "model_female.npz", 4)
+    betas, poses, take = np.array([0.5, -1, 2, 0, 0]), floats(9, 72), tmp_path / "take.npz"
+    np.savez(take, poses=poses, trans=floats(9, 3), betas=betas, gender="female")
+    target = tmp_path / "take.mcz"
+    mcz.encode(take, target, model=tmp_path / "model_{gender}.npz")
+    with mcz.open(target) as file:
+        skeleton = file["take"].skeleton
+        assert file["take"].source_bytes() == take.read_bytes()
+    joints = moves @ [0.5, -1, 2, 0, 1]
+    for joint, own in zip(skeleton.joints, joints, strict=True):
+        above = joints[joint.parent] if joint.parent >= 0 else 0.0
+        np.testing.assert_allclose(joint.offset, own - above, atol=1e-12)
+    np.testing.assert_array_equal(mcz.read(take).skeleton.joints[1].offset, (0, 0, 0))
+    plain = tmp_path / "plain.npy"
+    np.save(plain, poses)
+    assert mcz.read(plain, model="there is none").n_frames == 9  # no body, no model
+
+
+@pytest.mark.parametrize(
+    ("arrays", "model", "message"),
+    [
+        ({}, "model_{gender}.npz", "states no gender"),
+        ({"gender": "../x"}, "model_{gender}.npz", "states no gender, but '../x'"),
+        ({"betas": np.arange(6.0)}, "model_female.npz", "6 betas, and the model has 4"),
+        ({"betas": np.eye(3)}, "model_female.npz", "more than one shape of a body"),
+        ({}, "missing.npz", "No such file"),
+    ],
+)
+def test_models_that_do_not_fit(
+    arrays: dict[str, Any], model: str, message: str, tmp_path: Path
+) -> None:
+    model_file(tmp_path / "model_female.npz", 4)
+    np.savez(tmp_path / "take.npz", poses=floats(9, 72), **arrays)
+    with pytest.raises(MczError, match=message):
+        mcz.read(tmp_path / "take.npz", model=tmp_path / model)
 
 
 def test_bones_without_a_length_have_no_errors_in_cm() -> None:

@@ -284,3 +284,13 @@ def test_the_browser_is_that_of_the_user(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setenv("DISPLAY", ":0")
     assert browser.show("http://x/")
     assert opened == ["http://x/"]
+
+
+def test_what_is_written_has_a_suffix_of_its_kind(call: Call, tmp_path: Path) -> None:
+    assert call("view", "walk.bvh", "-o", tmp_path / "film.mp4") == (
+        2,
+        "",
+        f"mcz: {tmp_path / 'film.mp4'}: a page is a .html; mcz render draws films\n",
+    )
+    code, _, said = call("view", tmp_path / "missing.mcz", "-o", tmp_path / "take.rrd")
+    assert code != 2 and "missing.mcz" in said  # an .rrd is for rerun

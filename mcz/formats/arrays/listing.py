@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 from mcz.formats.arrays.layout import BIG_ENDIAN, BY_COLUMNS, TYPES, Kind, Piece, parse_arrays
@@ -18,18 +19,34 @@ def arrays_listed(source: Source, signals: Sequence[str]) -> list[dict[str, Any]
     clip's. The name is "" in an NPY file. Raises FormatError on bad bytes.
     """
     pieces = parse_arrays(source.template, source.detail)
-    found: list[dict[str, Any]] = [] if source.format == "npz" else [_kept("")]
-    for index, piece in enumerate(pieces):
-        if piece.kind == Kind.TEXT and piece.text.startswith(LOCAL) and source.format == "npz":
-            found.append(_kept(_name(pieces[index:])))
-        elif piece.kind == Kind.DATA and found:
-            found[-1] |= {
+    members = members_of(pieces) if source.format == "npz" else [("", pieces)]
+    return [_listed(name, own, signals) for name, own in members]
+
+
+def members_of(pieces: Sequence[Piece]) -> list[tuple[str, Sequence[Piece]]]:
+    """The members of an NPZ: the name of each array, and its pieces from its header on."""
+    starts = [
+        index
+        for index, piece in enumerate(pieces)
+        if piece.kind == Kind.TEXT and piece.text.startswith(LOCAL)
+    ]
+    return [
+        (_name(pieces[start:]), pieces[start:stop])
+        for start, stop in pairwise((*starts, len(pieces)))
+    ]
+
+
+def _listed(name: str, pieces: Sequence[Piece], signals: Sequence[str]) -> dict[str, Any]:
+    listed = _kept(name)
+    for piece in pieces:
+        if piece.kind == Kind.DATA:
+            listed |= {
                 "type": (">" if piece.flags & BIG_ENDIAN else "<") + TYPES[piece.type],
                 "order": "F" if piece.flags & BY_COLUMNS else "C",
                 "columns": piece.n_columns,
                 "signal": signals[piece.signal] if piece.signal < len(signals) else "",
             }
-    return found
+    return listed
 
 
 def _kept(name: str) -> dict[str, Any]:

@@ -1,0 +1,79 @@
+"""How long the bones of a body are, by a model file of the user's own and the betas of the take."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from mcz.errors import AccessError, OptionError, SourceError
+from mcz.formats.arrays.facts import SHAPE
+from mcz.formats.arrays.header import MAGIC
+from mcz.formats.arrays.layout import parse_arrays
+from mcz.formats.arrays.listing import members_of
+from mcz.formats.body_models import offsets_of_model
+from mcz.formats.body_trees import has_tree, tree
+from mcz.motion import Motion, Source
+
+GENDER = "{gender}"
+
+
+def with_model(motion: Motion, model: str | os.PathLike[str]) -> Motion:
+    """``motion``, that of a body of an NPZ, with the offsets that a model has for its betas.
+
+    ``model`` is a file as of ``mcz.offsets_of_model``; "{gender}" in it stands for the gender that
+    the take states. Numbers and source stay as they are. A motion of anything else is returned as
+    it is. Raises what ``offsets_of_model`` does, and OptionError where no gender is stated.
+    """
+    skeleton, source = motion.skeleton, motion.source
+    if source is None or source.format != "npz" or not has_tree(skeleton.n_joints):
+        return motion
+    if skeleton.joint_names != tree(skeleton.n_joints).names:
+        return motion
+    path = os.fspath(model)
+    if GENDER in path:
+        gender = motion.metadata.get("x-gender", "")
+        if not gender.isalnum():
+            raise OptionError(f"{path}: the take states no gender, but {gender!r}")
+        path = path.replace(GENDER, gender)
+    offsets = _offsets(path, _changed(path), skeleton.n_joints, _betas(source))
+    joints = tuple(
+        replace(joint, offset=offset)
+        for joint, offset in zip(skeleton.joints, offsets, strict=True)
+    )
+    return replace(motion, skeleton=replace(skeleton, joints=joints))
+
+
+def _changed(path: str) -> int:
+    try:
+        return Path(path).stat().st_mtime_ns
+    except OSError as error:
+        raise AccessError(f"{path}: {error.strerror or error}") from None
+
+
+@lru_cache(maxsize=64)  # the takes of a subject have the same betas, and models are large
+def _offsets(
+    path: str, changed: int, n_joints: int, betas: tuple[float, ...] | None
+) -> tuple[tuple[float, float, float], ...]:
+    found = offsets_of_model(path, n_joints, None if betas is None else np.array(betas))
+    return tuple((x, y, z) for x, y, z in found.tolist())
+
+
+def _betas(source: Source) -> tuple[float, ...] | None:
+    """The numbers of ``betas``, which a file keeps beside its signals; None where it has none."""
+    members = dict(members_of(parse_arrays(source.template, source.detail)))
+    data = b"".join(piece.text for piece in members.get(SHAPE, ()))
+    if MAGIC not in data:
+        return None  # none, or deflated
+    try:
+        betas = np.lib.format.read_array(BytesIO(data[data.index(MAGIC) :]), allow_pickle=False)
+        rows = np.asarray(betas, np.float64).reshape(-1, betas.shape[-1] if betas.ndim else 1)
+    except (ValueError, TypeError, EOFError, SyntaxError) as error:
+        raise SourceError(f"{SHAPE}: {error}") from None
+    if not len(rows) or (rows != rows[0]).any():
+        raise SourceError(f"{SHAPE} of shape {betas.shape} say more than one shape of a body")
+    return tuple(rows[0].tolist())
