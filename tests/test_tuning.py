@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import mcz
@@ -122,6 +122,7 @@ def test_all_other_parameters_stay(name: str) -> None:
     assert float(found.quality["param.T_g"]) > 0
 
 
+@settings(max_examples=settings.default.max_examples // 3)  # a dozen encodings each
 @given(st.integers(150, 20_000))
 def test_any_size(limit: int) -> None:
     short = walk(300)  # every step of a few bytes, at its shortest

@@ -13,8 +13,9 @@ import hashlib
 import json
 import sys
 import zlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -32,20 +33,21 @@ GROUPS = (valid, uncommon, invalid)
 FORMAT_VERSION = f"{FORMAT_MAJOR}.{FORMAT_MINOR}"
 
 
-def vectors() -> list[Vector]:
-    """Every vector, by group and name."""
+def vectors(without: Collection[ModuleType] = ()) -> list[Vector]:
+    """Every vector, by group and name, but for those of the modules ``without``."""
     found = []
     for group in GROUPS:
-        made = [vector for module in group.MODULES for vector in module.vectors()]
+        modules = [module for module in group.MODULES if module not in without]
+        made = [vector for module in modules for vector in module.vectors()]
         found += sorted(made, key=lambda vector: vector.name)
     names = [vector.name for vector in found]
     assert len(names) == len(set(names)), sorted(n for n in names if names.count(n) > 1)
     return found
 
 
-def rows(made: Sequence[Vector]) -> list[dict[str, Any]]:
-    """The manifest's rows of all vectors."""
-    names = [vector.name for vector in made]
+def rows(made: Sequence[Vector], names: Sequence[str] = ()) -> list[dict[str, Any]]:
+    """The manifest's rows of vectors: of all, or of some among ``names``, those of all."""
+    names = names or [vector.name for vector in made]
     ids = requirements(names)
     wrong = faults([name for name in names if name.startswith("invalid/")])
     return [row(vector, ids[vector.name], wrong.get(vector.name)) for vector in made]

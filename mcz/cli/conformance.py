@@ -12,6 +12,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -65,6 +66,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> int:
     return 0
 
 
+@cache
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="mcz.cli.conformance", description=__doc__)
     parser.add_argument("--capabilities", action="store_true")

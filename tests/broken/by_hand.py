@@ -11,6 +11,9 @@ CRASH = frozenset(
     "SRC-11".split()
 )
 
+# Of these the vector is large, and what is broken is no loop: loops are compiled, with checks.
+LARGE = frozenset("LIMIT-05 LIMIT-10 WIND-17".split())
+
 
 @dataclass(frozen=True)
 class Break:

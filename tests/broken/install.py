@@ -42,12 +42,15 @@ class _Finder(MetaPathFinder):
         return spec
 
 
-def install(codes: Mapping[str, CodeType]) -> None:
-    """Have modules of mcz imported as ``codes``; those that are there are forgotten."""
+def install(codes: Mapping[str, CodeType], *, loops: str = "interpreted") -> None:
+    """Have modules of mcz imported as ``codes``; those that are there are forgotten.
+
+    What is compiled is looked up by the source of modules, which does not change: ``loops`` may be
+    "checked" only where none of ``codes`` has loops.
+    """
     for name in [name for name in sys.modules if name.partition(".")[0] == "mcz"]:
         del sys.modules[name]
-    # What is compiled is looked up by the source of modules, which does not change.
-    os.environ["MCZ_LOOPS"] = "interpreted"
+    os.environ["MCZ_LOOPS"] = loops
     sys.meta_path.insert(0, _Finder(codes))
 
 

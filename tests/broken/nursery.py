@@ -8,6 +8,7 @@ null where none was. Forking costs a hundredth of a process of its own.
 
 from __future__ import annotations
 
+import gc
 import importlib
 import json
 import os
@@ -16,7 +17,7 @@ import signal
 import sys
 from types import FrameType
 
-from tests.broken import answers, install, marks, variants
+from tests.broken import answers, by_hand, install, marks, variants
 
 MEMORY = 2**32  # of a child
 
@@ -34,6 +35,7 @@ def main() -> None:
     answers.vectors()
     functions = install.live()
     signal.signal(signal.SIGPROF, _hang)
+    gc.freeze()  # what a child collected of it, it would copy first
     for line in sys.stdin:
         sys.stdout.flush()
         pid = os.fork()
@@ -58,7 +60,7 @@ def _catch(
     try:
         codes = variants.codes(rule, name) if rule else {}
         if codes and not install.swap(codes, functions):
-            install.install(codes)
+            install.install(codes, loops="checked" if rule in by_hand.LARGE else "interpreted")
         crash = None
         for vector in vectors:
             fault = answers.fault(answers.vectors()[vector])

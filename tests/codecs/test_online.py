@@ -126,6 +126,7 @@ def test_a_rate_needs_a_frame_rate() -> None:
 # Parts
 
 
+@settings(max_examples=settings.default.max_examples // 2)  # two codings of 60 frames each
 @given(st.integers(1, 25), st.integers(0, 3), st.sampled_from([1, 30, 1200]), st.data())
 def test_a_part_is_what_it_is_in_the_whole(gof, period, segment_frames, data) -> None:
     motion = markers(60, 2)
@@ -258,6 +259,7 @@ def test_the_dial_finds_a_size_and_an_error() -> None:
 # Live
 
 
+@settings(max_examples=settings.default.max_examples // 2)
 @given(
     st.integers(1, 60),
     st.integers(1, 4),
@@ -303,11 +305,11 @@ def live_pair(motion, **params):
     return encoder, ONLINE.follow(encoder.header, known)
 
 
-@given(st.sets(st.integers(0, 79), max_size=12), st.integers(1, 9), st.integers(0, 3))
-@settings(max_examples=30)  # of 80 frames each; test_online_losses.py has damage, too
+@given(st.sets(st.integers(0, 39), max_size=6), st.integers(1, 9), st.integers(0, 3))
+@settings(max_examples=30)  # of 40 frames each; test_online_losses.py has damage, too
 def test_what_is_decoded_after_a_loss_is_right(lost, gof, period) -> None:
     """A lost STR spoils its group, a lost LTR all up to the next intra coded one."""
-    motion = markers(80, 2)
+    motion = markers(40, 2)
     encoder, decoder = live_pair(motion, step=0.5, gof=gof, intra_period=period)
     _, whole = live_pair(motion, step=0.5, gof=gof, intra_period=period)
     ltr = before = False

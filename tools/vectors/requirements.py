@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from fnmatch import fnmatchcase
+from fnmatch import filter as matching
 from pathlib import Path
 
 from tools.vectors import (
@@ -59,7 +59,7 @@ def requirements(names: Iterable[str]) -> dict[str, list[str]]:
         if not ID.fullmatch(id_) or (id_ in table and id_ in ARGUED):
             raise ValueError(f"requirements: {id_!r} is no id, or is both shown and argued")
     for id_, globs in sorted(table.items()):
-        shown = [[name for name in found if fnmatchcase(name, glob)] for glob in globs]
+        shown = [[glob] if glob in found else matching(found, glob) for glob in globs]
         if not globs or not all(shown):
             raise ValueError(f"requirements: a glob of {id_} matches no vector: {globs}")
         for name in sorted({name for part in shown for name in part}):
