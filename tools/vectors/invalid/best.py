@@ -153,7 +153,9 @@ def _echoes(shelf: Broken) -> None:
     ordinals[2, 1] = -1 - 2**53
     heads_ = [Coded(form=PLAIN, drop=19)] * 2
     data = build_stream(ordinals, (WHOLE,) * 2, heads_, [Link(4, 9, ())] * 2, echoes=mirrored)
-    shelf.add("echo-beyond-grid", HEADING, "An echo whose other sign no grid has.", _with(whole, data))
+    shelf.add(
+        "echo-beyond-grid", HEADING, "An echo whose other sign no grid has.", _with(whole, data)
+    )
 
 
 def _echoes_of_rests(shelf: Broken, good: Echo) -> None:

@@ -16,7 +16,9 @@ from mcz.numbers import Grid, GridKind
 from tools.vectors.build.best_clips import HEADING, Streams
 from tools.vectors.build.files import Vector, partial
 from tools.vectors.build.lossless_clips import (
+    BINARY64,
     COUNTS,
+    DOUBLE,
     MULTIPLES,
     PLAIN,
     PRODUCTS,
@@ -262,6 +264,12 @@ def _odd_echoes(shelf: Streams) -> None:
     purpose = "Echoes of 100 numbers in 40 rows of two channels and rests, which count, too."
     again = (Echo(20, 20, 1, 1, 20, 1, False),) * 5
     shelf.code("echo-beside-rests", purpose, motion, [first, Coded()], echoes=again)
+
+    values = [1.5, 2.5, 0.1, 0.2, 4.5], [0.1, 0.2, 0.3, 0.7, 1.1]
+    heads = [Coded(form=BINARY64, drop=40), Coded()]
+    purpose = "Echoes of magnitudes with low bits in a channel that drops them."
+    fine = (Echo(2, 2, 0, 1, 2, 1, False),)
+    shelf.code("echo-drop", purpose, panel(values, (DOUBLE,) * 2, (2,)), heads, echoes=fine)
 
 
 def _across() -> tuple[Motion, list[Coded]]:

@@ -192,25 +192,25 @@ def _noted(shelf: Unrestorable, plain: Motion, name: str, purpose: str, each: An
 def _details(shelf: Unrestorable, plain: Motion) -> None:
     """What is said of patterns and details holds for the second section, too."""
     assert plain.source is not None
-    template, detail = plain.source.template, plain.source.detail
-    patterns = parse(TABLE_TEMPLATE, template, "template").sections[1].patterns
+    patterns = parse(TABLE_TEMPLATE, plain.source.template, "template").sections[1].patterns
     pattern = build(PATTERN, patterns[0], "pattern")
+    own = "sections.1.patterns"
     template_cases: tuple[tuple[str, str, Edit], ...] = (
-        ("two-patterns", "two patterns", put(TABLE_TEMPLATE, "sections.1.patterns", b"\2" + pattern * 2)),
-        ("run-of-none", "a run of no columns", put(TABLE_TEMPLATE, "sections.1.patterns.0.runs.1.n_columns", b"\0")),
-        ("column-twice", "a column twice", put(TABLE_TEMPLATE, "sections.1.patterns.0.runs.1.column", b"\0")),
-    )  # fmt: skip
+        ("two-patterns", "two patterns", put(TABLE_TEMPLATE, own, b"\2" + pattern * 2)),
+        ("run-of-none", "no columns", put(TABLE_TEMPLATE, f"{own}.0.runs.1.n_columns", b"\0")),
+        ("column-twice", "a column twice", put(TABLE_TEMPLATE, f"{own}.0.runs.1.column", b"\0")),
+    )
     for name, purpose, edit in template_cases:
         data = file_of(with_source(plain, VICON), SRCE=with_template(edit))
         shelf.add(f"table-{name}", SPEC, f"The second section of a table: {purpose}.", data)
-    detail_cases: tuple[tuple[str, str, Edit], ...] = (
-        ("rows-of-nothing", "rows of a count that is not", put(TABLE_DETAIL, "details.1.rows", b"\3")),
-        ("ending", "an ending that is none", put(TABLE_DETAIL, "details.1.ending", b"\1x")),
-        ("gap-beyond", "a pattern with a gap that is not", put(TABLE_DETAIL, "details.1.patterns", b"\1\0\x7f")),
-    )  # fmt: skip
-    for name, purpose, edit in detail_cases:
-        own = replace(plain, source=replace(plain.source, template=template, detail=edit(detail)))
-        data = file_of(with_source(own, VICON))
+    detail_cases: tuple[tuple[str, str, str, bytes], ...] = (
+        ("rows-of-nothing", "rows of a count that is not", "rows", b"\3"),
+        ("ending", "an ending that is none", "ending", b"\1x"),
+        ("gap-beyond", "a pattern with a gap that is not", "patterns", b"\1\0\x7f"),
+    )
+    for name, purpose, field, new in detail_cases:
+        edit = put(TABLE_DETAIL, f"details.1.{field}", new)
+        data = file_of(with_source(plain, VICON, detail=edit))
         shelf.add(f"table-{name}", SPEC, f"The second section of a table: {purpose}.", data)
 
 
