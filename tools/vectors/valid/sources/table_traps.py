@@ -1,4 +1,4 @@
-"""Tables on which two readings of the text would differ: names, masks, notes, grids without text."""
+"""Tables that two readings of the text would restore differently: names, masks, notes, grids."""
 
 from __future__ import annotations
 
