@@ -150,7 +150,7 @@ function checkSpans(pieces) {
     }
     if (kind !== CRC) continue;
     if (sums[start] !== sums[stop]) throw new Refused("arrays: a CRC-32 of a CRC-32");
-    spans.push({ start, stop });
+    if (start < stop) spans.push({ start, stop }); // no pieces overlap none
   }
   spans.sort((a, b) => a.start - b.start || a.stop - b.stop);
   for (let k = 1; k < spans.length; k++) {

@@ -81,7 +81,7 @@ VECTORS: dict[str, tuple[str, ...]] = {
     "GRID-01": ("invalid/notes/change-kind",),
     "GRID-02": ("invalid/numbers/*-digits",),
     "GRID-04": ("invalid/numbers/scale-*",),
-    "GRID-05": ("invalid/numbers/ordinal-of-*",),
+    "GRID-05": ("invalid/numbers/ordinal-of-*", "invalid/best/echo-beyond-grid"),
     "GRID-09": ("valid/numbers/*",),
     "GRID-11": ("valid/sources/*-lossy-*",),
     "TEXT-01": (

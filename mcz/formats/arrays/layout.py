@@ -171,7 +171,8 @@ def check_spans(pieces: Sequence[Piece]) -> None:
         if piece.kind == Kind.CRC:
             if checks[piece.start] != checks[piece.stop]:  # ARRAY-07
                 raise FormatError("source template: a CRC-32 of a CRC-32")
-            spans.add((piece.start, piece.stop))
+            if piece.start < piece.stop:  # no pieces overlap none
+                spans.add((piece.start, piece.stop))
     end = 0
     for start, stop in sorted(spans):
         if start < end:  # ARRAY-08

@@ -12,6 +12,8 @@ from mcz.codecs.lossless import best_numbers as numbers
 from mcz.codecs.lossless import best_streams
 from mcz.codecs.lossless.best_streams import Link
 from mcz.codecs.lossless.echoes import Echo, build_echoes
+from mcz.coding.ordinals.counts import Law
+from mcz.coding.ordinals.degrees import of_products
 from mcz.coding.start import start_states
 from mcz.container import payloads
 from mcz.motion import Motion
@@ -19,7 +21,10 @@ from tools.vectors.build.best_clips import HEADING, build_stream, codec_of
 from tools.vectors.build.edits import Edit, at, flip, plus, put, stream
 from tools.vectors.build.files import Broken, Vector, file_of
 from tools.vectors.build.lossless_clips import (
+    COUNTS,
     MULTIPLES,
+    PLAIN,
+    PRODUCTS,
     SINGLE,
     SIX,
     UNEXAMINED,
@@ -29,6 +34,7 @@ from tools.vectors.build.lossless_clips import (
 )
 from tools.vectors.build.motions import HUNDREDTHS, column, dance, panel, wave
 from tools.vectors.invalid.common import every_codec
+from tools.vectors.valid.lossless.counts import values_of
 
 
 def vectors() -> Iterable[Vector]:
@@ -140,6 +146,41 @@ def _echoes(shelf: Broken) -> None:
         stream = b"\2" + heads + build_echoes([echo]) + rest
         purpose = f"An echo {name.replace('-', ' ')}, which are no ordinals."
         shelf.add(f"echo-{name}", HEADING, purpose, _with(motion, stream))
+    _echoes_of_rests(shelf, good)
+    whole = panel([[2.0**53] * 3, [2.0**53] * 2 + [0.0]], (WHOLE,) * 2, (2,))
+    mirrored = (Echo(2, 1, 1, 1, 1, 0, True),)
+    ordinals = _ordinals(whole)
+    ordinals[2, 1] = -1 - 2**53
+    heads_ = [Coded(form=PLAIN, drop=19)] * 2
+    data = build_stream(ordinals, (WHOLE,) * 2, heads_, [Link(4, 9, ())] * 2, echoes=mirrored)
+    shelf.add(
+        "echo-beyond-grid", HEADING, "An echo whose other sign no grid has.", _with(whole, data)
+    )
+
+
+def _echoes_of_rests(shelf: Broken, good: Echo) -> None:
+    """Counts, with what is left of them, and products: each beside a channel that may echo."""
+    counts = tuple(round(50 * v) for v in wave(10)) * 2
+    law = Coded(COUNTS, law=Law(0.25), multiples=counts, rests=(1,) * 20)
+    degrees = Coded(PRODUCTS, unit=0.25, shifts=3, multiples=counts)
+    products = SIX.values(of_products(np.array(counts), 0.25, 3, SIX)).tolist()
+    for name, head, column_, grid, place in (
+        ("counts", law, values_of(law, SINGLE), SINGLE, 0),
+        ("rests", law, values_of(law, SINGLE), SINGLE, 2),
+        ("products", degrees, products, SIX, 0),
+    ):
+        own = [head, Coded()]
+        motion = panel([column_, wave(20, 1)], (grid, HUNDREDTHS), (2,))
+        every = [Link(4, 9, ())] * (3 if head.rests else 2)
+        data = build_stream(_ordinals(motion), (grid, HUNDREDTHS), own, every)
+        end = data.index(b"".join(link.head() for link in every))
+        for way, echo in (
+            ("in", replace(good, channel=place, source=1)),
+            ("of", replace(good, channel=1, source=place)),
+        ):
+            stream = b"\2" + data[1:end] + build_echoes([echo]) + data[end:]
+            purpose = f"An echo {way} {name}, which are no ordinals."
+            shelf.add(f"echo-{way}-{name}", HEADING, purpose, _with(motion, stream))
 
 
 def _ordinals(motion: Motion) -> Any:

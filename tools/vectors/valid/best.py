@@ -16,7 +16,9 @@ from mcz.numbers import Grid, GridKind
 from tools.vectors.build.best_clips import HEADING, Streams
 from tools.vectors.build.files import Vector, partial
 from tools.vectors.build.lossless_clips import (
+    BINARY64,
     COUNTS,
+    DOUBLE,
     MULTIPLES,
     PLAIN,
     PRODUCTS,
@@ -50,6 +52,7 @@ def vectors() -> Iterable[Vector]:
     _methods(shelf)
     _links(shelf)
     _echoes(shelf)
+    _odd_echoes(shelf)
     _degenerate(shelf)
     _classes(shelf)
     _rows(shelf)
@@ -223,6 +226,66 @@ def _echoes(shelf: Streams) -> None:
     shelf.code(
         "echo-beside-multiples", purpose, motion, heads, echoes=(Echo(20, 20, 1, 1, 20, 1, False),)
     )
+
+
+def _odd_echoes(shelf: Streams) -> None:
+    """Echoes of other grids and forms, in several groups, beside rests, before and amid much."""
+    shelf.code(
+        "echo-other-grids",
+        "Echoes of another channel's ordinals, whatever the two grids and forms are.",
+        *_across(),
+        echoes=(
+            Echo(2, 4, 1, 1, 2, 0, False),
+            Echo(7, 2, 0, 1, 3, 1, True),
+            Echo(3, 3, 2, 1, 2, 1, True),
+        ),
+    )
+    n, column = 100, wave(100)
+    bent = wave(n, 1)
+    columns = [
+        [*column[:3], *column[:3], *column[6:]],
+        [*bent[:30], *[-v for v in column[26:56]], *bent[60:]],
+        wave(n, 2),
+    ]
+    heads = [Coded(taps=(41, -13, 5)), Coded(from_last=0, taps=(64, -32)), Coded()]
+    echoes = (Echo(3, 3, 0, 1, 3, 0, False), Echo(30, 30, 1, 1, 4, 0, True))
+    purpose = "Echoes among the first rows and amid many: rows are counted with them."
+    motion = panel(columns, (HUNDREDTHS,) * 3, (3,))
+    shelf.code("echo-long", purpose, motion, heads, echoes=echoes)
+    loops = [wave(9, seed) * 2 for seed in range(2)]
+    motion = panel(loops, (HUNDREDTHS,) * 2, (1, 1))
+    purpose = "Echoes in both of two groups, whose channels count from 0 each."
+    every = (Echo(9, 9, 0, 1, 9, 0, False),)
+    shelf.code("echo-groups", purpose, motion, [Coded()] * 2, grouping="joint", echoes=every)
+    counts = tuple(round(50 * v) for v in wave(40))
+    rests = tuple(row % 3 - 1 for row in range(40))
+    first = Coded(COUNTS, law=Law(0.1), multiples=counts, rests=rests)
+    motion = panel([values_of(first, SINGLE), wave(20, 3) * 2], (SINGLE, HUNDREDTHS), (2,))
+    purpose = "Echoes of 100 numbers in 40 rows of two channels and rests, which count, too."
+    again = (Echo(20, 20, 1, 1, 20, 1, False),) * 5
+    shelf.code("echo-beside-rests", purpose, motion, [first, Coded()], echoes=again)
+
+    values = [1.5, 2.5, 0.1, 0.2, 4.5], [0.1, 0.2, 0.3, 0.7, 1.1]
+    heads = [Coded(form=BINARY64, drop=40), Coded()]
+    purpose = "Echoes of magnitudes with low bits in a channel that drops them."
+    fine = (Echo(2, 2, 0, 1, 2, 1, False),)
+    shelf.code("echo-drop", purpose, panel(values, (DOUBLE,) * 2, (2,)), heads, echoes=fine)
+
+
+def _across() -> tuple[Motion, list[Coded]]:
+    """GENERAL 6, FIXED 2 with a drop and INTEGER; each repeats ordinals of the others."""
+    ordinals = np.zeros((9, 3), np.int64)
+    ordinals[:, 0] = SIX.ordinals(np.array([1.5, 2.25, -1.125, 3, 4.5, 7, 8, 9, 10.5]))[0]
+    ordinals[:, 1] = np.arange(9) * 8
+    ordinals[:, 2] = np.arange(9) ** 2
+    ordinals[2:6, 1] = ordinals[0:4, 0]
+    ordinals[7:9, 0] = -1 - ordinals[4:6, 1]
+    ordinals[3:6, 2] = -1 - ordinals[1:4, 1]
+    grids = (SIX, HUNDREDTHS, WHOLE)
+    columns = [
+        grid.values(ordinals[:, place]).astype(float).tolist() for place, grid in enumerate(grids)
+    ]
+    return panel(columns, grids, (3,)), [Coded(), Coded(form=PLAIN, drop=3), Coded()]
 
 
 def _degenerate(shelf: Streams) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mcz.formats.layout import DETAIL
+from mcz.formats.layout import DETAIL, PATTERN
 from mcz.formats.table_layout import CLOCK, SECTION, TABLE_DETAIL, TABLE_TEMPLATE
 from mcz.formats.table_notes import TABLE_NOTES
 from mcz.motion import Motion
@@ -154,6 +154,7 @@ def _sections(shelf: Unrestorable) -> None:
     add("signals-twice", "a signal that another has", again, VICON + parts[-1])
     add("rows", "signals that differ in their rows a frame", *_mixed(plain))
     _notes(shelf, plain)
+    _details(shelf, plain)
 
 
 def _notes(shelf: Unrestorable, plain: Motion) -> None:
@@ -161,13 +162,56 @@ def _notes(shelf: Unrestorable, plain: Motion) -> None:
         ("rows", "of other rows a frame", [1]),
         ("more", "of 4", [2, 1, 1, 1]),
     ):
-        texts = [{"row": 0, "text": b"+7"}]
-        each = [{"rows_per_frame": n, "patterns": [], "texts": texts} for n in rows]
-        notes = _Notes(build(TABLE_NOTES, {"sections": each}, "notes"))
-        assert plain.source is not None
-        noted = replace(plain, source=replace(plain.source, notes=notes))
-        data = file_of(with_source(noted, VICON))
-        shelf.add(f"table-notes-{name}", SPEC, f"Sections of a table: notes {purpose}.", data)
+        each = [{"rows_per_frame": n, "patterns": [], "texts": []} for n in rows]
+        _noted(shelf, plain, name, f"notes {purpose}", each)
+    cases: tuple[tuple[str, str, Any, Any], ...] = (
+        ("no-rows", "a run of no rows", [(0, 0)], []),
+        ("rows-beyond", "runs of more rows than there are", [(7, 0)], []),
+        ("pattern", "a pattern that there is not", [(1, 9)], []),
+        ("row-beyond", "the text of a row that there is not", [], [(6, b"9")]),
+        ("row-twice", "two texts of a row", [], [(2, b"8"), (0, b"8")]),
+        ("text", "a frame number that is none", [], [(2, b"8.")]),
+    )
+    for name, purpose, patterns, texts in cases:
+        first = {
+            "rows_per_frame": 2,
+            "patterns": [{"n_rows": n, "pattern": pattern} for n, pattern in patterns],
+            "texts": [{"row": row, "text": text} for row, text in texts],
+        }
+        _noted(shelf, plain, name, f"notes with {purpose}", [first])
+
+
+def _noted(shelf: Unrestorable, plain: Motion, name: str, purpose: str, each: Any) -> None:
+    notes = _Notes(build(TABLE_NOTES, {"sections": each}, "notes"))
+    assert plain.source is not None
+    noted = replace(plain, source=replace(plain.source, notes=notes))
+    data = file_of(with_source(noted, VICON))
+    shelf.add(f"table-notes-{name}", SPEC, f"Sections of a table: {purpose}.", data)
+
+
+def _details(shelf: Unrestorable, plain: Motion) -> None:
+    """What is said of patterns and details holds for the second section, too."""
+    assert plain.source is not None
+    patterns = parse(TABLE_TEMPLATE, plain.source.template, "template").sections[1].patterns
+    pattern = build(PATTERN, patterns[0], "pattern")
+    own = "sections.1.patterns"
+    template_cases: tuple[tuple[str, str, Edit], ...] = (
+        ("two-patterns", "two patterns", put(TABLE_TEMPLATE, own, b"\2" + pattern * 2)),
+        ("run-of-none", "no columns", put(TABLE_TEMPLATE, f"{own}.0.runs.1.n_columns", b"\0")),
+        ("column-twice", "a column twice", put(TABLE_TEMPLATE, f"{own}.0.runs.1.column", b"\0")),
+    )
+    for name, purpose, edit in template_cases:
+        data = file_of(with_source(plain, VICON), SRCE=with_template(edit))
+        shelf.add(f"table-{name}", SPEC, f"The second section of a table: {purpose}.", data)
+    detail_cases: tuple[tuple[str, str, str, bytes], ...] = (
+        ("rows-of-nothing", "rows of a count that is not", "rows", b"\3"),
+        ("ending", "an ending that is none", "ending", b"\1x"),
+        ("gap-beyond", "a pattern with a gap that is not", "patterns", b"\1\0\x7f"),
+    )
+    for name, purpose, field, new in detail_cases:
+        edit = put(TABLE_DETAIL, f"details.1.{field}", new)
+        data = file_of(with_source(plain, VICON, detail=edit))
+        shelf.add(f"table-{name}", SPEC, f"The second section of a table: {purpose}.", data)
 
 
 @dataclass(frozen=True)

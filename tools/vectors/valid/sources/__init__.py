@@ -14,6 +14,7 @@ from tools.vectors.valid.sources import (
     lossy,
     lossy_steps,
     numbers,
+    table_traps,
     tables,
     text,
 )
@@ -30,5 +31,6 @@ def vectors() -> Iterable[Vector]:
     c3d_parts.add(shelf)
     c3d_outputs.add(shelf)
     tables.add(shelf)
+    table_traps.add(shelf)
     arrays.add(shelf)
     return shelf.vectors

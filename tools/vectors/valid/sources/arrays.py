@@ -35,6 +35,7 @@ def add(shelf: Whole) -> None:
     _npz(shelf)
     _bodies(shelf)
     _words(shelf)
+    _rounded(shelf)
     _pieces(shelf)
     _lossy(shelf)
 
@@ -142,6 +143,21 @@ def _words(shelf: Whole) -> None:
         _hold(shelf, name, purpose, with_pieces(motion, pieces))
 
 
+def _rounded(shelf: Whole) -> None:
+    """Halves of steps of binary16, by less than a binary32 says; NaN with other bits."""
+    model = take_arrays(npy(floats(4, 1)), "rounded.npy")
+    values = np.array([[1 + 2.0**-11 + 2.0**-40], [2 + 2.0**-10 - 2.0**-40], [1 + 2.0**-24], [0.1]])
+    pieces = [number_piece(0, type_, (0, 1)) for type_ in (9, 10)]
+    signal = Signal(values, (Grid(GridKind.BINARY64),))
+    purpose = "A number is rounded once, from binary64 to its type."
+    _hold(shelf, "rounded", purpose, with_pieces(replace(model, signals=(signal,)), pieces))
+    single = np.array([NAN32, 0xFFC00000, 0x3FC00000, 0xFF800001], np.uint32).view(np.float32)
+    motion = take_arrays(npy(single[:, None]), "nan.npy")
+    pieces = [number_piece(0, type_, (0, 1)) for type_ in (9, 10, 11)]
+    purpose = "NaN of a binary32 as numbers of other types: their bits and sign are not kept."
+    _hold(shelf, "nan", purpose, with_pieces(motion, pieces))
+
+
 def _pieces(shelf: Whole) -> None:
     """A template that is no file that anybody knows."""
     motion = take_arrays(npy(floats(3, 2)), "pieces.npy")
@@ -158,6 +174,15 @@ def _pieces(shelf: Whole) -> None:
         Piece(Kind.CRC, start=1, stop=4),
     ]
     _hold(shelf, "pieces", "Pieces of every kind.", with_pieces(motion, pieces))
+    sizes = [
+        Piece(Kind.COUNT, after=b"|", size=2),
+        Piece(Kind.SIZE4, start=0, stop=3),
+        Piece(Kind.SIZE8, start=1, stop=1),
+        Piece(Kind.CRC, start=0, stop=3),
+        Piece(Kind.CRC, start=2, stop=2),
+    ]
+    purpose = "A count without blanks, a CRC-32 of sizes, another of nothing."
+    _hold(shelf, "sizes", purpose, with_pieces(motion, sizes))
     other = take_arrays(npy(np.round(floats(4, 3), 1)), "other.npy")
     changed = np.round(other.signals[0].values + 1, 1)
     signal = replace(other.signals[0], values=changed)
