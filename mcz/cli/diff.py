@@ -25,7 +25,15 @@ from mcz.cli.common import (
     to_rate,
 )
 from mcz.cli.diff_lines import lines_of
-from mcz.cli.options import UNITS, decoded_option, json_option, up_option, where_option
+from mcz.cli.options import (
+    UNITS,
+    arrays_option,
+    decoded_option,
+    json_option,
+    model_option,
+    up_option,
+    where_option,
+)
 
 if TYPE_CHECKING:
     from mcz.motion import Motion
@@ -72,6 +80,8 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     "--rate", metavar="R", callback=to_rate, help="Frames a second of a file that does not say."
 )
 @up_option("Axis that points up, of a file that does not say.")
+@arrays_option
+@model_option
 @click.option(
     "--shell",
     "shell_cm",
@@ -101,7 +111,7 @@ def command(
     as_json: bool,
     **options: Any,
 ) -> Exit:
-    """Compare B with A, the original: any two of .amc, .bvh, .c3d, .trc and .mcz.
+    """Compare B with A, the original: any two of .mcz and of source formats.
 
     Errors of channels, and of positions in length units and cm, SPEC.md's "Metrics"; how far feet
     slide that stand in A; compression ratios of an .mcz. The exit code is 0 whenever the two could
@@ -142,6 +152,8 @@ class _Wanted:
     rate: Fraction | None
     up: str | None
     skeleton: str | None
+    arrays: str | None
+    model: str | None
     shell_cm: float
     by_joint: bool
     contacts: bool
@@ -193,7 +205,9 @@ class _Side:
         with about(self.path):
             if self.file is None:
                 is_amc = PurePath(self.path).suffix.lower() == ".amc"
-                motion = mcz.read(self.path, skeleton=self._wanted.skeleton if is_amc else None)
+                wanted = self._wanted
+                asf = wanted.skeleton if is_amc else None
+                motion = mcz.read(self.path, skeleton=asf, arrays=wanted.arrays, model=wanted.model)
                 start, stop = _range(frames, motion.n_frames, self.path)
                 signals = tuple(signal.cut(start, stop) for signal in motion.signals)
                 motion = replace(motion, signals=signals, source=None, frame_numbers=None)

@@ -188,7 +188,7 @@ def model_option(function: Function) -> Function:
         "--model",
         metavar="NPZ",
         help="Your own model file of SMPL and its kin: how long the bones of bodies in an .npz "
-        "are. {gender} in it stands for that of the take.",
+        "are. {gender} in it stands for that of the take, {body} for smpl, smplh or smplx.",
     )(function)
 
 

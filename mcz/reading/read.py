@@ -36,8 +36,8 @@ def read(
     ("x", "y", "z"), say what the file does not. ``arrays`` says what the numbers of a plain NPY or
     NPZ are: "positions", "rotation-vectors", "quaternions-wxyz" or "quaternions-xyzw". ``model``
     is a model file of SMPL and its kin, which says how long the bones of such a body in an NPZ are
-    ("{gender}" in it: that of the take). Of an MCZ file ``clip`` is read, with ``max_decoded`` and
-    ``threads`` as in ``open``. Raises SourceError, FormatError or OptionError.
+    ("{gender}" and "{body}" in it: those of the take). Of an MCZ file ``clip`` is read, with
+    ``max_decoded`` and ``threads`` as in ``open``. Raises SourceError, FormatError or OptionError.
     """
     path = Path(path)
     if path.suffix.lower() == ".mcz":

@@ -345,11 +345,11 @@ def test_joints_that_all_lie_at_the_root_are_not_shown_without_a_word(tmp_path: 
 
 
 def test_a_model_file_says_how_long_bones_are(tmp_path: Path) -> None:
-    moves = model_file(tmp_path / "model_female.npz", 4)
+    moves = model_file(tmp_path / "smpl_female.npz", 4)
     betas, poses, take = np.array([0.5, -1, 2, 0, 0]), floats(9, 72), tmp_path / "take.npz"
     np.savez(take, poses=poses, trans=floats(9, 3), betas=betas, gender="female")
     target = tmp_path / "take.mcz"
-    mcz.encode(take, target, model=tmp_path / "model_{gender}.npz")
+    mcz.encode(take, target, model=tmp_path / "{body}_{gender}.npz")
     with mcz.open(target) as file:
         skeleton = file["take"].skeleton
         assert file["take"].source_bytes() == take.read_bytes()

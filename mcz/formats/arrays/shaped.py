@@ -19,22 +19,24 @@ from mcz.formats.body_models import offsets_of_model
 from mcz.formats.body_trees import has_tree, tree
 from mcz.motion import Motion, Source
 
-GENDER = "{gender}"
+BODY, GENDER = "{body}", "{gender}"  # in the name of a model file
 
 
 def with_model(motion: Motion, model: str | os.PathLike[str]) -> Motion:
     """``motion``, that of a body of an NPZ, with the offsets that a model has for its betas.
 
     ``model`` is a file as of ``mcz.offsets_of_model``; "{gender}" in it stands for the gender that
-    the take states. Numbers and source stay as they are. A motion of anything else is returned as
-    it is. Raises what ``offsets_of_model`` does, and OptionError where no gender is stated.
+    the take states, "{body}" for smpl, smplh or smplx. Numbers and source stay as they are. A
+    motion of anything else is returned as it is. Raises what ``offsets_of_model`` does, and
+    OptionError where no gender is stated.
     """
     skeleton, source = motion.skeleton, motion.source
     if source is None or source.format != "npz" or not has_tree(skeleton.n_joints):
         return motion
-    if skeleton.joint_names != tree(skeleton.n_joints).names:
+    body = tree(skeleton.n_joints)
+    if skeleton.joint_names != body.names:
         return motion
-    path = os.fspath(model)
+    path = os.fspath(model).replace(BODY, body.name)
     if GENDER in path:
         gender = motion.metadata.get("x-gender", "")
         if not gender.isalnum():
