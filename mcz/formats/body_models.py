@@ -102,7 +102,7 @@ def offsets_of_joints(joints: ArrayLike, parents: Sequence[int]) -> Floats:
 def offsets_from_positions(
     positions: ArrayLike,
     rotations: ArrayLike,
-    parents: Sequence[int],
+    parents: Sequence[int] | NDArray[np.integer[Any]],
     translations: ArrayLike | None = None,
 ) -> FoundOffsets:
     """The offsets that fit positions of joints best, in the sense of least squares.
