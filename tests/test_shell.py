@@ -117,7 +117,8 @@ def test_where_shells_cannot_be_compared() -> None:
     assert found.shell_mean_cm is None
     assert any("virtual markers and shells" in note for note in found.notes)
     one = hinge([0.0])
-    two = Skeleton((Joint("a"), Joint("b", 0, channels=(Channel("rz"),))), unit_cm=100.0)
+    other = Joint("b", 0, (2.0, 0.0, 0.0), channels=(Channel("rz"),))
+    two = Skeleton((Joint("a"), other), unit_cm=100.0)
     found = mcz.compare(one, Motion(two, one.signals))
     assert found.points == 2
     assert found.shell_mean_cm is found.virtual_marker_mean_cm is None

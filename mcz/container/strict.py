@@ -21,7 +21,7 @@ from mcz.schema import inflate, parse
 
 Templates = Mapping[bytes, int]  # id of a SRCE -> its source format
 # The source formats of the registry, by what they are sources of.
-OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset(range(2, 12))
+OF_SKELETONS, OF_CLIPS = frozenset({1}), frozenset(range(2, 14))
 
 
 def decoded(data: bytes, encoding: int, size: int, where: str) -> bytes:
