@@ -622,3 +622,15 @@ def test_values_of_a_matrix_refuse_what_is_no_ordinal() -> None:
         if grid.limit < 2**63 - 1:
             with pytest.raises(FormatError, match="not an ordinal"):
                 values_of(np.array([[0], [grid.limit + 1]], np.int64), [grid])
+
+
+@pytest.mark.parametrize(
+    ("token", "grid"),
+    [
+        (b"-1.797693134862316e+308", Grid(GridKind.TEXT64, 16)),
+        (b"-2e+308", Grid(GridKind.PRINTED, 64, style=129)),
+    ],
+)
+def test_text_of_the_greatest_number_that_reads_as_infinity(token: bytes, grid: Grid) -> None:
+    """A grid would print it so, but its number is another: an exception."""
+    assert not grid.ordinals_of_tokens(scan(token, [0], [len(token)]))[1].any()

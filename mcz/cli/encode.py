@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "format_name",
-    type=click.Choice(("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "npy", "npz")),
+    type=click.Choice(("bvh", "amc", "c3d", "asf", "trc", "mot", "sto", "csv", "npy", "npz")),
     help="What standard input is. Default: what it looks like; live BVH, or AMC with --skeleton.",
 )
 @copies_option("no")

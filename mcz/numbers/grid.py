@@ -192,7 +192,10 @@ class Grid:
         if self.kind == GridKind.TEXT32:
             ordinals[known] = textgrids.token_ordinals32(chosen)
         else:
-            ordinals[known] = self.ordinals(chosen.values())[0]
+            values = chosen.values()
+            ordinals[known] = self.ordinals(values)[0]
+            unsure &= ~_beyond(known, values)
+            known &= ~_beyond(known, values)
         known[unsure] = self.texts(ordinals[unsure]).equal(tokens[unsure].texts())
         ordinals[~known] = 0
         return ordinals, known
@@ -205,7 +208,8 @@ class Grid:
         values = chosen.values()
         indices = np.minimum(self._indices(np.minimum(np.abs(values), MAX)), self.limit)
         ordinals[known] = indices ^ -np.signbit(values).astype(np.int64)
-        known[known] = self.texts(ordinals[known]).equal(chosen.texts())
+        same = self.texts(ordinals[known]).equal(chosen.texts())
+        known[known] = same & np.isfinite(values)
         ordinals[~known] = 0
         return ordinals, known
 
@@ -263,3 +267,13 @@ GRID_FIELDS = Struct(
     * "PRINTED only: print rule",
 )
 GRID = Adapter(GRID_FIELDS, _grid_of, _fields_of)
+
+
+def _beyond(chosen: Bools, values: Floats) -> Bools:
+    """Which of all tokens are too large for a binary64, ``values`` being those of ``chosen``.
+
+    The greatest number, printed with fewer digits, reads as infinity: its text is an exception.
+    """
+    beyond = np.zeros(len(chosen), np.bool_)
+    beyond[chosen] = ~np.isfinite(values)
+    return beyond
