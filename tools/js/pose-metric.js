@@ -346,35 +346,34 @@ export class PoseMetric {
         const x = axes[B + axis] * rule.radians;
         const y = axes[B + axis + 3] * rule.radians;
         const z = axes[B + axis + 6] * rule.radians;
-        const m = 6 * number;
-        motions[m] = x;
-        motions[m + 1] = y;
-        motions[m + 2] = z;
-        motions[m + 3] = origins[o + 1] * z - origins[o + 2] * y;
-        motions[m + 4] = origins[o + 2] * x - origins[o] * z;
-        motions[m + 5] = origins[o] * y - origins[o + 1] * x;
+        this.noteTurn(number, j, x, y, z);
       }
       rotate(axes, axis, turn(values[from], rule), B);
     }
   }
 
+  /** Notes what a kept channel does that turns joint j about the axis (x, y, z). */
+  noteTurn(number, j, x, y, z) {
+    const { motions, origins } = this;
+    const [m, o] = [6 * number, 3 * j];
+    motions[m] = x;
+    motions[m + 1] = y;
+    motions[m + 2] = z;
+    motions[m + 3] = origins[o + 1] * z - origins[o + 2] * y;
+    motions[m + 4] = origins[o + 2] * x - origins[o] * z;
+    motions[m + 5] = origins[o] * y - origins[o + 1] * x;
+  }
+
   /** Turns joint j by a quaternion or a rotation vector, and notes what its kept parts do. */
   turnWhole(j, kind, parts, numbers) {
-    const { origins, axes, motions, rule } = this;
-    const [o, B] = [3 * j, 9 * j];
+    const { axes, rule } = this;
+    const B = 9 * j;
     const { spins, R } = kind === QW ? quaternionTurn(parts) : vectorTurn(parts, rule.radians);
     const v = [0, 0, 0];
     numbers.forEach((number, part) => {
       if (number === undefined) return;
       timesAt(axes, B, spins[part], v);
-      const [x, y, z] = v;
-      const m = 6 * number;
-      motions[m] = x;
-      motions[m + 1] = y;
-      motions[m + 2] = z;
-      motions[m + 3] = origins[o + 1] * z - origins[o + 2] * y;
-      motions[m + 4] = origins[o + 2] * x - origins[o] * z;
-      motions[m + 5] = origins[o] * y - origins[o + 1] * x;
+      this.noteTurn(number, j, ...v);
     });
     for (let row = B; row < B + 9; row += 3) axes.set(back(R, axes.slice(row, row + 3)), row);
   }
