@@ -38,8 +38,8 @@ PROGRAMS = {"mcz": cli, "mcz-info": info_command}
 # What is not run here, and what runs it.
 ELSEWHERE = {
     "python3 -m venv": ".ci/run: a clean environment",
-    ".venv/bin/pip": ".ci/run: a clean environment",
-    ".venv/bin/python -m pytest": ".ci/run: the tests themselves",
+    ". .venv/bin/activate": ".ci/run: a clean environment",
+    "pip install": ".ci/run: a clean environment",
     "python -m pytest": ".ci/run: the tests themselves",
     "tools/check": "what .ci/run does, step by step",
 }
@@ -200,6 +200,16 @@ def test_links_and_paths_lead_somewhere(page: str) -> None:
 @pytest.mark.parametrize(("page", "most"), [("README.md", 120), *((p, 160) for p in MANUAL)])
 def test_pages_stay_short(page: str, most: int) -> None:
     assert len(text_of(page).splitlines()) <= most
+
+
+def test_readme_installs_without_extras_and_runs_the_main_job() -> None:
+    """.ci/environment runs the first block in an environment that has nothing else."""
+    first, second = [block.text.splitlines() for block in blocks("README.md")][:2]
+    assert first[0].endswith("pip install .") and len(first) <= 6
+    assert [line.split()[:2] for line in first[1:3]] == [["mcz", "sample"], ["mcz", "encode"]]
+    assert first[-1].endswith("cmp samples/walk.bvh restored.bvh && echo identical")
+    assert second == ["pip install -e '.[test]' && python -m pytest -n auto"]
+    assert "readme_block 1 | sed 1d | bash" in text_of(".ci/environment")
 
 
 def test_the_way_through_the_code_is_there() -> None:
