@@ -165,10 +165,10 @@ def _check_use(output: str | None, options: dict[str, Any], in_rerun: bool) -> N
 
 def _serve(shelf: Shelf, as_json: bool, no_browser: bool, keep: bool, host: str, port: int) -> Exit:
     from mcz.viewing.browser import show
-    from mcz.viewing.page import page
     from mcz.viewing.server import Server
+    from mcz.viewing.small_page import viewer_page
 
-    with Server(page(shelf.say), shelf, host=host, port=port) as server:
+    with Server(viewer_page(shelf), shelf, host=host, port=port) as server:
         if as_json:
             print_json({"url": server.url, "files": server.site.work.files()})
         else:

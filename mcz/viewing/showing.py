@@ -14,10 +14,10 @@ from mcz.errors import OptionError
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.viewing.browser import show
-from mcz.viewing.page import page
 from mcz.viewing.player import player
 from mcz.viewing.server import Server
 from mcz.viewing.shelf import Shelf, Stored, put
+from mcz.viewing.small_page import viewer_page
 
 _OPEN: set[View] = set()  # those that are served, whether anybody keeps them or not
 
@@ -91,7 +91,7 @@ def view(
     try:
         for thing in things:
             _give(shelf, thing)
-        server = Server(page(_tell), shelf, port=port)
+        server = Server(viewer_page(shelf), shelf, port=port)
     except BaseException:
         shelf.close()
         raise

@@ -114,8 +114,11 @@ def test_a_build_that_fails_says_why(checkout: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("has_page", [True, False])
-def test_a_wheel_has_the_page_if_it_was_built(tmp_path: Path, has_page: bool) -> None:
+def test_a_wheel_has_the_page_unless_told(
+    tmp_path: Path, has_page: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With a package of a few modules in place of ours, and the real hook and settings."""
+    monkeypatch.delenv("MCZ_BUILD_WITHOUT_VIEWER", raising=False)
     wheel = pytest.importorskip("hatchling.builders.wheel")
     sdist = pytest.importorskip("hatchling.builders.sdist")
     for name in ("pyproject.toml", "README.md", "LICENSE", "tools/viewer/hatch_hook.py"):
@@ -127,6 +130,11 @@ def test_a_wheel_has_the_page_if_it_was_built(tmp_path: Path, has_page: bool) ->
     if has_page:
         (tmp_path / "tools/viewer/dist").mkdir()
         shutil.copy(PAGE, tmp_path / "tools/viewer/dist/viewer.html")
+    else:
+        for builder in (wheel.WheelBuilder, sdist.SdistBuilder):
+            with pytest.raises(SystemExit, match="npm run build"):
+                list(builder(str(tmp_path)).build(directory=str(tmp_path / "out")))
+        monkeypatch.setenv("MCZ_BUILD_WITHOUT_VIEWER", "1")
     (whl,) = wheel.WheelBuilder(str(tmp_path)).build(directory=str(tmp_path / "out"))
     with zipfile.ZipFile(whl) as archive:
         names = archive.namelist()
