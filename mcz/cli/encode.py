@@ -145,18 +145,18 @@ def _encode_file(
     if sink is not None:
         sink.write(piped.getvalue())
     if not unread:
-        _tell(target, written, Path(source).stat().st_size, as_json)
+        _tell(target, written, as_json)
     return Exit.FINE
 
 
-def _tell(target: str, written: Written, source_size: int, as_json: bool) -> None:
+def _tell(target: str, written: Written, as_json: bool) -> None:
     from mcz.container.limits import output_limit
 
-    needed, allowed = max(written.decoded_bytes, source_size), output_limit(written.size)
+    needed, allowed = max(written.decoded_bytes, written.source_bytes), output_limit(written.size)
     if needed > allowed:
         say(f"{target}: reading it takes --max-decoded {needed}, the default is {allowed}")
     if not as_json:
-        echo(summary(target, written, source_size))
+        echo(summary(target, written))
         for clip in written.clips:
             if clip.quality is not None:
                 echo(f"  {reached(clip.quality)}")
@@ -173,8 +173,9 @@ def _is_special(target: str) -> bool:
     return "://" not in target and path.exists() and not (path.is_file() or path.is_dir())
 
 
-def summary(target: str, written: Written, source_size: int) -> str:
+def summary(target: str, written: Written) -> str:
     """One line about a file just written."""
+    source_size = written.source_bytes
     held = [
         f"{plural(clip.n_frames, 'frame')} of {plural(clip.n_channels, 'channel')}"
         for clip in written.clips

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -48,11 +48,9 @@ FEW = 4  # clips that are shown in full; more are shown as a table
 WIDEST = 200  # characters that are shown of a value of metadata
 NOTES = ("source-note", "skeleton-note")
 PARTS = ("payload", "overhead", "model", "source_chunk", "hash", "quality")
-RATIOS = (
-    ("cr_source", "source file"),
-    ("cr_float32", "float32 a channel"),
-    ("cr_40B", "40 bytes a joint-frame"),
-    ("cr_file", "source file / whole file"),
+RATIOS = (  # of the bytes that a codec wrote, which restore no source alone
+    ("cr_float32", "float32 a channel / payload and overhead"),
+    ("cr_40B", "40 bytes a joint and frame / payload and overhead"),
 )
 
 
@@ -207,8 +205,7 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
         f"{file}: MCZ {document['format_version']} (readers of {document['needs_version']} on), "
         f"{document['profile']} profile, {document['file_bytes']:,} bytes"
     )
-    copies = f", copies {document['copy_bytes']:,}" if document["copy_bytes"] else ""
-    yield f"  {', '.join(held)}; index {document['index_bytes']:,}{copies} bytes"
+    yield f"  {', '.join(held)}"
     for skeleton in document["skeletons"][:FEW]:
         yield from _skeleton(skeleton)
     if len(document["skeletons"]) > FEW:
@@ -216,13 +213,30 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
         yield f"{len(document['skeletons']) - FEW:,} more skeletons; --json lists them"
     if len(document["clips"]) <= FEW:
         for clip in document["clips"]:
-            yield from _clip(clip)
+            yield from _clip(clip, alone=bool(document["parts"]) and len(document["clips"]) == 1)
     else:
         yield from ("", *_clips(document["clips"]).split("\n"))
         yield from _notes(document["clips"])
     for attachment in document["attachments"]:
         yield ""
         yield f"attachment {attachment['name']}: {attachment['bytes']:,} bytes, verbatim"
+    if document["parts"]:
+        yield from _file_parts(document)
+
+
+def _file_parts(document: dict[str, Any]) -> Iterator[str]:
+    """Each part of the file, their sum, and what the stored files are against it."""
+    yield ""
+    size = document["file_bytes"]
+    yield from _part_table({**document["parts"], "file": size}, size)
+    if document["cr_file"] is not None:
+        yield f"  {document['cr_file']:7.2f} : 1, the files stored / this file"
+
+
+def _part_table(parts: Mapping[str, int], whole: int) -> Iterator[str]:
+    rows = [[name, f"{n:,}", _percent(n, whole)] for name, n in parts.items() if n]
+    for line in table([["part", "bytes", "share"], *rows], "lrr").split("\n"):
+        yield f"  {line}"
 
 
 def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:
@@ -273,7 +287,8 @@ def _tree(joints: list[dict[str, Any]]) -> Iterator[str]:
             )
 
 
-def _clip(clip: dict[str, Any]) -> Iterator[str]:
+def _clip(clip: dict[str, Any], alone: bool) -> Iterator[str]:
+    """Lines about a clip; where it is ``alone`` the parts of the file stand for its own."""
     yield ""
     yield (
         f"clip {clip['name']}: {plural(clip['n_frames'], 'frame')} {_rate(clip)}, "
@@ -295,19 +310,9 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
     if clip["quality"]:
         yield "  quality"
         yield from (f"    {line}" for line in figure_lines(clip["quality"]))
-    total = sum(clip[f"{part}_bytes"] for part in PARTS)
-    rows = [
-        [
-            part.replace("_", " "),
-            f"{clip[f'{part}_bytes']:,}",
-            _percent(clip[f"{part}_bytes"], total),
-        ]
-        for part in PARTS
-        if part != "model" or clip["models"]
-    ]
-    yield from (
-        "  " + line for line in table([["part", "bytes", "share"], *rows], "lrr").split("\n")
-    )
+    if not alone:
+        own = {part.replace("_", " "): clip[f"{part}_bytes"] for part in PARTS}
+        yield from _part_table(own, sum(own.values()))
     if clip["packets"]:
         framing = f"{clip['packet_bytes']:,} bytes of the overhead"
         yield f"  {plural(clip['packets'], 'packet')}, their framing {framing}"
@@ -315,7 +320,7 @@ def _clip(clip: dict[str, Any]) -> Iterator[str]:
         yield f"  {clip['between_bytes']:,} bytes of ancillary chunks (REPT) amid the frames"
     for key, against in RATIOS:
         if clip[key] is not None:
-            yield f"  {clip[key]:7.2f} : 1 against {against}"
+            yield f"  {clip[key]:7.2f} : 1, {against}"
     yield from (f"  damage: {line}" for line in clip["damage"])
     if "preview" in clip:
         yield from preview_lines(clip["preview"])
@@ -354,11 +359,17 @@ def _clips(clips: list[dict[str, Any]]) -> str:
             f"{clip['source_bytes'] or 0:,}",
             f"{clip['payload_bytes']:,}",
             f"{sum(clip[f'{part}_bytes'] for part in PARTS[1:]):,}",
-            "" if clip["cr_source"] is None else f"{clip['cr_source']:.2f}",
+            _clip_ratio(clip),
         ]
         for clip in clips
     ]
     return table([heading, *rows], "llrrrrrrr")
+
+
+def _clip_ratio(clip: dict[str, Any]) -> str:
+    """The source against the payload and the other parts that are shown beside it."""
+    own = sum(clip[f"{part}_bytes"] for part in PARTS)
+    return f"{clip['source_bytes'] / own:.2f}" if clip["source_bytes"] else ""
 
 
 def _rate(clip: dict[str, Any]) -> str:

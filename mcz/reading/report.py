@@ -28,7 +28,7 @@ from mcz.reading.recording_report import document_of
 from mcz.reading.recovery_check import recovery_problems
 from mcz.reading.sharing import shared_out
 from mcz.reading.signal_info import SignalInfo, read_segments
-from mcz.reading.sizes import Sizes, clip_sizes, models_used
+from mcz.reading.sizes import Sizes, clip_sizes, file_parts, models_used
 from mcz.schema import parse
 
 Row = tuple[str, str, list[Problem]]  # kind, name and faults of a part of a file
@@ -43,12 +43,12 @@ def info(
     """
     container, whole = file.container, names is None and where is None
     chosen = file.chosen(names, where)
-    clips = [_clip_info(file, clip) for clip in chosen]
+    sizes = [clip_sizes(container, clip) for clip in chosen]
+    clips = [_clip_info(file, clip, own) for clip, own in zip(chosen, sizes, strict=True)]
     shared = container.directory.shared
     ids = {id_ for _, id_ in shared} if whole else file.skeleton_ids(chosen)
     used = {model["id"] for clip in clips for model in clip["models"]}
     models = [id_ for kind, id_ in shared if kind == b"MODL" and (whole or id_.hex() in used)]
-    sources = [c["source_bytes"] for c in clips if c["source_bytes"]]
     attachments = [{"name": a.name, "bytes": a.size} for a in file.attachments.values()]
     return {
         "format_version": file.header["format_version"],
@@ -57,14 +57,42 @@ def info(
         "file_bytes": file.size,
         "index_bytes": container.index.index_length if container.index else 0,
         "copy_bytes": sum(chunk.size for chunk in container.copies()),
+        "parts": file_parts(container, sizes) if whole else None,
         "skeletons": [_skeleton_info(container, i, s) for i, s in file.skeletons if i in ids],
         "models": [_model_info(container, id_) for id_ in models],
         "clips": clips,
         "attachments": attachments if whole else [],
         "aliases": sorted(file.aliases) if whole else [],
-        "cr_file": sum(sources) / file.size if sources and whole else None,
+        "cr_file": _file_ratio(file) if whole else None,
         "damage": list(file.damage),
     }
+
+
+def stored_bytes(file: File) -> int:
+    """The bytes of all files that ``file`` gives back: sources, skeletons and attachments."""
+    own = [clip.source.size for clip in file.clips.values() if clip.source is not None]
+    own += [attachment.size for attachment in file.attachments.values()]
+    return sum(own) + sum(_alias_bytes(file, name) for name in file.aliases)
+
+
+def _alias_bytes(file: File, name: str) -> int:
+    of, target = file.aliases[name]
+    if of == payloads.OF_SKELETON:
+        source = file.skeleton(target, with_source=True).source
+        return source.size if source is not None else 0
+    called = target.decode("utf-8", "replace")
+    if of == payloads.OF_ATTACHMENT:
+        return file.attachments[called].size
+    clip_source = file.clips[called].source
+    return clip_source.size if clip_source is not None else 0
+
+
+def _file_ratio(file: File) -> float | None:
+    """Bytes of the stored files for a byte of the file, None where nothing says them."""
+    try:
+        return stored_bytes(file) / file.size or None
+    except (FormatError, KeyError):  # salvaged: what they name is lost
+        return None
 
 
 def _skeleton_info(container: Container, id_: bytes, skeleton: Skeleton) -> dict[str, Any]:
@@ -103,9 +131,8 @@ def _model_info(container: Container, id_: bytes) -> dict[str, Any]:
     return {"id": id_.hex(), "kind": fields.kind, "chunk_bytes": size}
 
 
-def _clip_info(file: File, clip: Clip) -> dict[str, Any]:
+def _clip_info(file: File, clip: Clip, sizes: Sizes) -> dict[str, Any]:
     rate = clip.frame_rate
-    sizes = clip_sizes(file.container, clip)
     unread: list[str] = []
     document = {
         "name": clip.name,
@@ -229,7 +256,7 @@ def _ratios(file: File, clip: Clip, sizes: Sizes) -> dict[str, float | None]:
         "cr_source": source / restored if source else None,
         "cr_float32": 4 * rows / coded if rows else None,
         "cr_40B": 40 * clip.n_frames * clip.skeleton.n_joints / coded if rows else None,
-        "cr_file": source / file.size if source and len(file.clips) == 1 else None,
+        "cr_file": _file_ratio(file) if source and len(file.clips) == 1 else None,
     }
 
 

@@ -5,13 +5,13 @@ SPEC.md, "Sizes and ratios", is normative.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 from mcz.container import payloads
-from mcz.container.chunks import FRAMING, HEADER
+from mcz.container.chunks import FOOT, FRAMING, HEADER
 from mcz.container.directory import SegmentRow
 from mcz.container.packets import CHECK_SIZE, head_size
 from mcz.container.reader import Container
@@ -26,7 +26,8 @@ class Sizes:
     """The bytes of one clip by part; ``models`` are those that its codecs need, in the file.
 
     ``packets`` is the part of ``overhead`` that goes to framing open DATA and their packets,
-    ``between`` are the whole ancillary chunks between CLIP and CEND.
+    ``between`` are the whole ancillary chunks between CLIP and CEND, ``template`` is the part of
+    ``source`` that other clips may share.
     """
 
     payload: int = 0
@@ -37,6 +38,7 @@ class Sizes:
     models: int = 0
     packets: int = 0
     between: int = 0
+    template: int = 0
 
 
 def clip_sizes(container: Container, clip: Clip) -> Sizes:
@@ -70,7 +72,35 @@ def clip_sizes(container: Container, clip: Clip) -> Sizes:
         coded = sum(segment.size for segment in row.segments) + packets + closed
         between = row.cend.offset - (row.clip.offset + row.clip.size) - coded
     own_parts = payload - tables, overhead, template + source, hashes, quality
-    return Sizes(*own_parts, models, packets, between)
+    return Sizes(*own_parts, models, packets, between, template)
+
+
+def file_parts(container: Container, sizes: Iterable[Sizes]) -> dict[str, int]:
+    """The bytes of a file by part, which sum to its size; ``sizes`` are those of all its clips.
+
+    What several clips share counts once. "other" is the rest: the signature, HEAD, metadata,
+    aliases, recovery data, and what a later end of the file has replaced.
+    """
+    directory, sizes = container.directory, list(sizes)
+    shared = {b"SKEL": 0, b"SRCE": 0, b"MODL": 0}
+    for (kind, _), chunk in directory.shared.items():
+        shared[kind] += (
+            chunk.size if chunk.offset < container.source.size else 0
+        )  # salvage adds some
+    attachments = [part for row in directory.attachments.values() for part in row.parts]
+    parts = {
+        "payload": sum(one.payload for one in sizes),
+        "overhead": sum(one.overhead for one in sizes),
+        "skeletons": shared[b"SKEL"],
+        "models": shared[b"MODL"],
+        "source": shared[b"SRCE"] + sum(one.source - one.template for one in sizes),
+        "hashes": sum(one.hashes for one in sizes),
+        "quality": sum(one.quality for one in sizes),
+        "attachments": sum(part.size for part in attachments),
+        "copies": sum(chunk.size for chunk in container.copies()),
+        "index": container.index.index_length + FOOT.size if container.index else 0,
+    }
+    return parts | {"other": container.source.size - sum(parts.values())}
 
 
 def models_used(signal: SignalInfo) -> tuple[bytes, ...]:

@@ -74,6 +74,12 @@ class Entry:
         """The SHA-256 of the file."""
         return hashlib.sha256(read_bytes(self.path)).digest()
 
+    @property
+    def source_bytes(self) -> int:
+        """The size of the file, and of the ASF that is kept with it."""
+        kept = self.inputs[:1] if self.reason else dict.fromkeys(self.inputs)
+        return sum(path.stat().st_size for path in kept)
+
     def write(self, draft: Draft, progress: Progress | None = None) -> str:
         """Write the file; return how: "skeleton", "parsed", "present" or "verbatim"."""
         check_name(self.name)

@@ -116,4 +116,5 @@ def encode(
         draft.finish()
     if entry.remark:
         warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=2)
-    return written(draft.writer.directory, draft.writer.offset, entry.quality, entry.notes)
+    directory, size = draft.writer.directory, draft.writer.offset
+    return written(directory, size, entry.quality, entry.notes, entry.source_bytes)

@@ -26,7 +26,8 @@ class Written:
     """What ``write`` and ``encode`` have written.
 
     ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal. ``notes``: what
-    is odd about the source file.
+    is odd about the source file. ``source_bytes``: what the file gives back, of ``encode`` the
+    source and the ASF that it was read with; 0 where there is no source.
     """
 
     size: int
@@ -35,6 +36,7 @@ class Written:
     n_attachments: int
     decoded_bytes: int
     notes: tuple[str, ...] = ()
+    source_bytes: int = 0
 
     __repr__ = brief
 
@@ -44,6 +46,7 @@ def written(
     size: int,
     quality: Mapping[str, str] | None = None,
     notes: tuple[str, ...] = (),
+    source_bytes: int = 0,
 ) -> Written:
     """What a file of one clip or none holds, with its size and the quality record of that clip."""
     return Written(
@@ -56,6 +59,7 @@ def written(
         n_attachments=len(directory.attachments),
         decoded_bytes=max(map(_decoded_bytes, directory.clips.values()), default=0),
         notes=notes,
+        source_bytes=source_bytes,
     )
 
 
