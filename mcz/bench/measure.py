@@ -20,7 +20,7 @@ from mcz.formats import format_of
 from mcz.kinematics import SHELL_CM
 from mcz.metrics.comparison import NO_CONTACTS
 from mcz.motion import Motion
-from mcz.reading.report import clip_ratios
+from mcz.reading.ratios import clip_ratios
 from mcz.reading.sizes import clip_sizes
 from mcz.reading.source_files import read_source
 from mcz.writing.clip_writer import write_clip

@@ -199,7 +199,7 @@ class _Side:
     def load(self, name: str | None) -> _Loaded:
         """The motion called ``name``, or the only one, cut to the frames that are wanted."""
         import mcz
-        from mcz.reading.report import clip_ratios
+        from mcz.reading.ratios import clip_ratios
 
         frames = self._wanted.frames
         with about(self.path):

@@ -36,6 +36,7 @@ from mcz.cli.options import (
 from mcz.cli.previews import preview_lines
 from mcz.cli.recording import array_lines, recording_lines
 from mcz.cli.repeats import Once
+from mcz.cli.skeleton_lines import rate_text, skeleton_lines
 from mcz.cli.terminal import is_terminal
 from mcz.cli.verify import is_unsound
 from mcz.errors import MczError
@@ -43,7 +44,6 @@ from mcz.errors import MczError
 if TYPE_CHECKING:
     from mcz.reading.file import File
 
-DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
 FEW = 4  # clips that are shown in full; more are shown as a table
 WIDEST = 200  # characters that are shown of a value of metadata
 NOTES = ("source-note", "skeleton-note")
@@ -156,7 +156,7 @@ def _of_source(file: str, skeleton: str | None, as_json: bool, preview: bool) ->
     if as_json:
         print_json(document)
     else:
-        echo(*source_lines(file, document, _skeleton, _rate))
+        echo(*source_lines(file, document))
     return Exit.FINE
 
 
@@ -207,7 +207,7 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
     )
     yield f"  {', '.join(held)}"
     for skeleton in document["skeletons"][:FEW]:
-        yield from _skeleton(skeleton)
+        yield from skeleton_lines(skeleton)
     if len(document["skeletons"]) > FEW:
         yield ""
         yield f"{len(document['skeletons']) - FEW:,} more skeletons; --json lists them"
@@ -239,59 +239,11 @@ def _part_table(parts: Mapping[str, int], whole: int) -> Iterator[str]:
         yield f"  {line}"
 
 
-def _skeleton(skeleton: dict[str, Any]) -> Iterator[str]:
-    yield ""
-    unit = skeleton["unit_cm"]
-    facts = [
-        plural(skeleton["n_joints"], "joint"),
-        plural(skeleton["n_channels"], "channel"),
-        "unit unknown" if unit is None else f"1 unit = {unit:.6g} cm",
-        f"angles in {skeleton['angle_unit'] or 'an unknown unit'}",
-        f"{skeleton['up_axis']} up" if skeleton["up_axis"] else "up axis unknown",
-    ]
-    name = f" {skeleton['name']}" if skeleton["name"] else ""
-    id_ = f" ({skeleton['id'][:8]})" if "id" in skeleton else ""
-    yield f"skeleton{name}{id_}: {', '.join(facts)}"
-    if skeleton.get("base"):
-        yield f"  derived from {skeleton['base'][:8]}"
-    yield from _tree(skeleton["joints"])
-
-
-def _is_plain(joints: list[dict[str, Any]]) -> bool:
-    """Whether the joints are numbers in order, all alike, as those of an array are."""
-    alike = -1, joints[0]["channels"]
-    return all(
-        joint["name"] == str(index) and (joint["parent"], joint["channels"]) == alike
-        for index, joint in enumerate(joints)
-    )
-
-
-def _tree(joints: list[dict[str, Any]]) -> Iterator[str]:
-    """The joints as a tree; a stack instead of recursion, since files choose the depth."""
-    if len(joints) > 2 and _is_plain(joints):
-        yield f"  0 to {len(joints) - 1}  {' '.join(joints[0]['channels'])}".rstrip()
-        return
-    children: dict[int, list[int]] = {}
-    for index, joint in enumerate(joints):
-        children.setdefault(joint["parent"], []).append(index)
-    stack = [(root, "  ", "  ") for root in reversed(children.get(-1, []))]
-    while stack:
-        index, own, below = stack.pop()
-        if len(below) > DEEPEST:
-            own, below = f"{below} ... ", below[:DEEPEST]
-        yield f"{own}{joints[index]['name']}  {' '.join(joints[index]['channels'])}".rstrip()
-        for number, child in enumerate(reversed(children.get(index, []))):
-            last = number == 0
-            stack.append(
-                (child, below + ("└─ " if last else "├─ "), below + ("   " if last else "│  "))
-            )
-
-
 def _clip(clip: dict[str, Any], alone: bool) -> Iterator[str]:
     """Lines about a clip; where it is ``alone`` the parts of the file stand for its own."""
     yield ""
     yield (
-        f"clip {clip['name']}: {plural(clip['n_frames'], 'frame')} {_rate(clip)}, "
+        f"clip {clip['name']}: {plural(clip['n_frames'], 'frame')} {rate_text(clip)}, "
         f"{plural(clip['n_channels'], 'channel')}, {plural(clip['n_joints'], 'joint')}"
     )
     yield f"  skeleton   {clip['skeleton'][:8]}"
@@ -370,14 +322,6 @@ def _clip_ratio(clip: dict[str, Any]) -> str:
     """The source against the payload and the other parts that are shown beside it."""
     own = sum(clip[f"{part}_bytes"] for part in PARTS)
     return f"{clip['source_bytes'] / own:.2f}" if clip["source_bytes"] else ""
-
-
-def _rate(clip: dict[str, Any]) -> str:
-    rate = clip["frame_rate"]
-    if rate is None:
-        return "at an unknown rate"
-    about = "" if clip["frame_rate_exact"] else "about "
-    return f"at {about}{rate:g} Hz ({clip['n_frames'] / rate:.2f} s)"
 
 
 def _notes(clips: list[dict[str, Any]]) -> Iterator[str]:

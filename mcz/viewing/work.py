@@ -145,7 +145,7 @@ class Work:
     def diff(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """How far one clip is from another, as ``mcz diff --by-joint --json`` says it."""
         from mcz.metrics.document import difference
-        from mcz.reading.report import clip_ratios
+        from mcz.reading.ratios import clip_ratios
 
         sides = [object_of(asked, key) for key in "ab"]
         ratios = []

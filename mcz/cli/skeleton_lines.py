@@ -1,0 +1,66 @@
+"""Skeletons and frame rates as the lines that ``mcz info`` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from mcz.cli.common import plural
+
+DEEPEST = 90  # characters before a joint's name; what lies deeper is not indented further
+
+
+def skeleton_lines(skeleton: dict[str, Any]) -> Iterator[str]:
+    yield ""
+    unit = skeleton["unit_cm"]
+    facts = [
+        plural(skeleton["n_joints"], "joint"),
+        plural(skeleton["n_channels"], "channel"),
+        "unit unknown" if unit is None else f"1 unit = {unit:.6g} cm",
+        f"angles in {skeleton['angle_unit'] or 'an unknown unit'}",
+        f"{skeleton['up_axis']} up" if skeleton["up_axis"] else "up axis unknown",
+    ]
+    name = f" {skeleton['name']}" if skeleton["name"] else ""
+    id_ = f" ({skeleton['id'][:8]})" if "id" in skeleton else ""
+    yield f"skeleton{name}{id_}: {', '.join(facts)}"
+    if skeleton.get("base"):
+        yield f"  derived from {skeleton['base'][:8]}"
+    yield from _tree(skeleton["joints"])
+
+
+def _is_plain(joints: list[dict[str, Any]]) -> bool:
+    """Whether the joints are numbers in order, all alike, as those of an array are."""
+    alike = -1, joints[0]["channels"]
+    return all(
+        joint["name"] == str(index) and (joint["parent"], joint["channels"]) == alike
+        for index, joint in enumerate(joints)
+    )
+
+
+def _tree(joints: list[dict[str, Any]]) -> Iterator[str]:
+    """The joints as a tree; a stack instead of recursion, since files choose the depth."""
+    if len(joints) > 2 and _is_plain(joints):
+        yield f"  0 to {len(joints) - 1}  {' '.join(joints[0]['channels'])}".rstrip()
+        return
+    children: dict[int, list[int]] = {}
+    for index, joint in enumerate(joints):
+        children.setdefault(joint["parent"], []).append(index)
+    stack = [(root, "  ", "  ") for root in reversed(children.get(-1, []))]
+    while stack:
+        index, own, below = stack.pop()
+        if len(below) > DEEPEST:
+            own, below = f"{below} ... ", below[:DEEPEST]
+        yield f"{own}{joints[index]['name']}  {' '.join(joints[index]['channels'])}".rstrip()
+        for number, child in enumerate(reversed(children.get(index, []))):
+            last = number == 0
+            stack.append(
+                (child, below + ("└─ " if last else "├─ "), below + ("   " if last else "│  "))
+            )
+
+
+def rate_text(clip: dict[str, Any]) -> str:
+    rate = clip["frame_rate"]
+    if rate is None:
+        return "at an unknown rate"
+    about = "" if clip["frame_rate_exact"] else "about "
+    return f"at {about}{rate:g} Hz ({clip['n_frames'] / rate:.2f} s)"
