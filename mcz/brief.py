@@ -6,6 +6,7 @@ import re
 import reprlib
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
+from itertools import islice
 from typing import Any
 
 WIDEST = 60  # characters of a name
@@ -101,6 +102,12 @@ def skeleton_text(skeleton: Any) -> str:
 
 def source_text(source: Any) -> str:
     return f"<Source {shown(source.path)}: {source.format}, {source.size} bytes>"
+
+
+def clips_text(clips: Any) -> str:
+    names = ", ".join(shown(name) for name in islice(clips, 3))
+    more = f", ... ({len(clips)} in all)" if len(clips) > 3 else ""
+    return f"<Clips of {shown(clips.file_name)}: {names}{more}>"
 
 
 def exceptions_text(exceptions: Any) -> str:

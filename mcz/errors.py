@@ -6,7 +6,9 @@
     ├── MotionError          the motion, skeleton or signal itself is not acceptable
     ├── OptionError          a parameter or an argument is out of its range
     │   ├── AccessError      a file cannot be opened or written, or is in use
-    │   └── ExistsError      the target exists and must not be replaced
+    │   ├── ExistsError      the target exists and must not be replaced
+    │   ├── OutOfRangeError  an index is out of range or of a wrong type: an IndexError, too
+    │   └── UnknownNameError there is no clip of that name: a KeyError, too
     ├── SourceError          a source file (ASF, AMC, BVH, C3D) cannot be parsed
     ├── WorkerError          a process that worked for this one ended unexpectedly
     └── FormatError          the bytes are not a valid MCZ file
@@ -41,6 +43,16 @@ class AccessError(OptionError):
 
 class ExistsError(OptionError):
     """The target exists already, and nobody said that it may be replaced."""
+
+
+class OutOfRangeError(OptionError, IndexError):
+    """An index that is out of range, or cannot be one."""
+
+
+class UnknownNameError(OptionError, KeyError):
+    """A name that means no clip, or several."""
+
+    __str__ = Exception.__str__  # KeyError would show the message in quotes
 
 
 class SourceError(MczError):

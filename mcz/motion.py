@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from mcz import brief
 from mcz.displays import html_of
-from mcz.errors import MotionError
+from mcz.errors import MotionError, OutOfRangeError
+from mcz.indexing import row_numbers
 from mcz.numbers import Grid, GridKind, ordinals_of
 from mcz.numbers.blocks import grid_blocks as grid_blocks
 from mcz.numbers.exceptions import Exceptions as Exceptions
@@ -285,8 +286,50 @@ class Motion:
     def n_frames(self) -> int:
         return self.signals[0].n_frames
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_frames, n_channels) of the motion signal."""
+        return self.n_frames, self.signals[0].n_channels
+
+    def __len__(self) -> int:
+        """The number of frames."""
+        return self.n_frames
+
+    def __bool__(self) -> bool:
+        """True: a motion without frames is a motion, too."""
+        return True
+
+    __iter__ = None  # no sequence: a part of it is a motion
+
+    def __getitem__(self, frames: slice) -> Motion:
+        """``motion[10:20]``: frames 10 to 19 of all signals, with their numbers, as a Motion.
+
+        Its source, if any, then describes no file. Raises OutOfRangeError for all but a slice of
+        step 1.
+        """
+        if not isinstance(frames, slice):
+            raise OutOfRangeError(f"a motion is cut by a slice such as [10:20], not by {frames!r}")
+        chosen = row_numbers(frames, self.n_frames, "frame")
+        if not isinstance(chosen, range) or chosen.step != 1:
+            raise OutOfRangeError(f"{frames} has a step; mcz.resample gives other frame rates")
+        return self.cut(chosen.start, max(chosen.start, chosen.stop))
+
+    def cut(self, start: int, stop: int) -> Motion:
+        """Frames start <= f < stop alone, with their numbers."""
+        if (start, stop) == (0, self.n_frames):
+            return self
+        numbers = self.frame_numbers
+        if numbers is None and start:
+            numbers = np.arange(1, self.n_frames + 1, dtype=np.int64)
+        return replace(
+            self,
+            signals=tuple(signal.cut(start, stop) for signal in self.signals),
+            frame_numbers=None if numbers is None else numbers[start:stop],
+            source=self.source and self.source.cut(start, stop),
+        )
+
     def with_values(self, values: NDArray[np.float64]) -> Motion:
         """The same motion with other values of its motion signal, same shape."""
         signal = replace(self.signals[0], values=np.asarray(values, dtype=np.float64))
-        source = self.source and replace(self.source, size=0, sha256=b"")  # of no known file
+        source = self.source and self.source.of_no_file()
         return replace(self, signals=(signal, *self.signals[1:]), source=source)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from mcz import brief
@@ -13,6 +13,9 @@ class FrameNotes(Protocol):
 
     def cut(self, start: int, stop: int) -> bytes:
         """The notes of frames start <= f < stop as bytes of a segment, b"" where all is usual."""
+
+    def part(self, start: int, stop: int) -> FrameNotes:
+        """The notes of frames start <= f < stop alone, numbered from 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,3 +35,12 @@ class Source:
     sha256: bytes = b""
 
     __repr__ = brief.source_text
+
+    def of_no_file(self) -> Source:
+        """The same for other values or frames than its file had: without size and hash."""
+        return replace(self, size=0, sha256=b"")
+
+    def cut(self, start: int, stop: int) -> Source:
+        """The source of frames start <= f < stop alone."""
+        notes = self.notes and self.notes.part(start, stop)
+        return replace(self, notes=notes).of_no_file()

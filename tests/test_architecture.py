@@ -19,7 +19,7 @@ PACKAGE = Path(mcz.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # What a part may import; a part is the first name after ``mcz.``. Each may import itself.
-GROUND = {"brief", "displays", "errors", "schema", "numbers", "threads"}
+GROUND = {"arguments", "brief", "displays", "errors", "indexing", "schema", "numbers", "threads"}
 MODEL = GROUND | {"motion", "skeleton", "source"}
 # Where motion, codec and container meet: what each of the doors below needs of the layers.
 JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
@@ -30,6 +30,8 @@ ALLOWED = {
     "brief": set(),
     "displays": set(),
     "errors": set(),
+    "arguments": {"errors"},
+    "indexing": {"errors"},
     "schema": {"errors"},
     "numbers": {"brief", "errors", "schema"},
     "source": GROUND,

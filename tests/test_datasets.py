@@ -6,6 +6,7 @@ import multiprocessing
 import pickle
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
 
 import mcz
 from mcz.datasets.caches import FolderCache, MemoryCache, to_size
@@ -102,6 +104,65 @@ def test_batches_are_windows_side_by_side(archive: Path) -> None:
         data[99]
 
 
+INDICES = st.one_of(
+    st.integers(-20, 20),
+    st.integers(-20, 20).map(np.int16),
+    st.slices(16),
+    st.lists(st.integers(-17, 16), max_size=4),
+    st.lists(st.integers(-16, 15), max_size=4).map(tuple),
+    st.lists(st.integers(0, 15), max_size=4).map(lambda each: np.array(each, np.uint8)),
+    arrays(np.int64, array_shapes(min_dims=0, max_side=3), elements=st.integers(-16, 15)),
+    arrays(np.bool_, 16),
+    arrays(np.bool_, st.integers(0, 18)),
+    st.sampled_from([..., None, True, 1.0, "root", [1.5], [[]], {1}, 10**30, (1, 2)]),
+    st.just([[1], [2, 3]]),
+)
+
+
+@given(INDICES)
+def test_windows_are_chosen_as_numpy_does(archive: Path, index: object) -> None:
+    """What NumPy takes for an axis is what it is; all else is an error that is an IndexError."""
+    data = mcz.dataset(archive, "root", window=64, stride=48)
+    assert len(data) == 16
+    numbers = np.arange(16)
+    expected = None
+    if index is not None and index is not True:  # they would add an axis
+        with suppress(IndexError, ValueError):
+            expected = numbers[index]
+    if expected is None:
+        with pytest.raises(mcz.OptionError) as raised:
+            data[index]
+        assert isinstance(raised.value, IndexError)
+        return
+    found = data[index]["root"]
+    assert found.shape == (*np.shape(expected), 64, 3)
+    for number, window in zip(np.ravel(expected), found.reshape(-1, 64, 3), strict=True):
+        np.testing.assert_array_equal(window, data[int(number)]["root"])
+
+
+@given(st.integers(1, 9), st.integers(1, 4), st.integers(0, 2**32))
+def test_each_epoch_has_an_order_of_its_own(
+    archive: Path, size: int, workers: int, seed: int
+) -> None:
+    data = mcz.dataset(archive, "root", window=16, stride=8, cache="40 kB")
+    sampler = data.batch_sampler(size, seed, workers)
+    epochs = [list(sampler) for _ in range(3)]
+    for epoch in epochs:
+        assert len(epoch) == len(sampler)
+        assert sorted(number for batch in epoch for number in batch) == list(range(len(data)))
+    assert epochs[0] != epochs[1] != epochs[2] != epochs[0]
+    sampler.set_epoch(1)
+    assert list(sampler) == epochs[1] and list(sampler) == epochs[2]
+    assert list(data.batch_sampler(size, seed, workers)) == epochs[0]
+    singles = data.sampler(seed)
+    assert list(singles) == data.order(seed).tolist() != list(singles)
+    for wrong in (-1, 1.5, None, "x"):
+        with pytest.raises(mcz.OptionError, match="seed|epoch"):
+            data.order(wrong)
+        with pytest.raises(mcz.OptionError, match="epoch"):
+            sampler.set_epoch(wrong)
+
+
 @given(st.integers(0, 2**32), st.sampled_from(["1 kB", "200 kB", "64 MB"]))
 def test_orders_have_every_window_once(archive: Path, seed: int, cache: str) -> None:
     data = mcz.dataset(archive, "root", window=16, stride=4, cache=cache)
@@ -185,7 +246,7 @@ def test_what_is_asked_for_wrongly(archive: Path, samples: Path) -> None:
         mcz.dataset(samples / "walk.bvh")
     with pytest.raises(mcz.OptionError, match=r"without \.mcz files"):
         mcz.dataset(samples)
-    with pytest.raises(mcz.OptionError, match="batches of 0"):
+    with pytest.raises(mcz.OptionError, match="size is 0"):
         mcz.dataset(archive).batches(0)
 
 
@@ -307,9 +368,10 @@ def test_tensors(archive: Path) -> None:
         for name, array in data[numbers].items():
             assert torch.equal(batch[name], torch.from_numpy(array))
     batches = tensors.batch_sampler(4, 3, workers=2)
-    assert sorted(index for batch in batches for index in batch) == list(range(len(data)))
+    numbers_of_batches = list(batches)
     loader = DataLoader(tensors, batch_sampler=batches, num_workers=2)
-    for numbers, batch in zip(batches, loader, strict=True):
+    batches.set_epoch(0)
+    for numbers, batch in zip(numbers_of_batches, loader, strict=True):
         assert torch.equal(batch["root"], torch.from_numpy(data[numbers]["root"]))
     assert torch.equal(tensors[0]["root"], torch.from_numpy(data[0]["root"]))
     clips = mcz.dataset(archive, "root").torch()

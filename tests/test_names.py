@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
 
 import mcz
 from mcz.cli.common import run
@@ -127,6 +131,102 @@ def test_values_refuse_what_an_array_does(clip: mcz.Clip, key: Any) -> None:
     for values in (clip.values, clip.read()):
         with pytest.raises(IndexError):
             values[key]
+
+
+ROWS = st.one_of(
+    st.integers(-45, 45),
+    st.slices(40),
+    st.lists(st.integers(-41, 40), max_size=4),
+    arrays(
+        np.int8, array_shapes(min_dims=0, max_dims=2, max_side=3), elements=st.integers(-41, 40)
+    ),
+    arrays(np.uint64, 2, elements=st.integers(0, 39)),
+    arrays(np.bool_, st.sampled_from([40, 39, (40, 10)])),
+    st.sampled_from([..., None, True, np.True_, 1.0, "root", [1.5], [], np.array(3), {1}, 10**30]),
+    st.just([[1], [2, 3]]),
+)
+COLUMNS = st.one_of(
+    st.integers(-10, 9), st.slices(10), st.lists(st.integers(-10, 9), min_size=1, max_size=3),
+    arrays(np.bool_, 10), st.sampled_from([..., None]),
+)  # fmt: skip
+
+
+@given(
+    st.tuples(ROWS) | st.tuples(ROWS, COLUMNS) | st.tuples(ROWS, COLUMNS, COLUMNS), st.booleans()
+)
+def test_values_are_an_array_for_any_index(clip: mcz.Clip, key: Any, single: bool) -> None:
+    key = key[0] if single and len(key) == 1 else key
+    try:
+        expected = clip.read()[key]
+    except (IndexError, ValueError, TypeError):
+        with pytest.raises((IndexError, ValueError, TypeError)):
+            clip.values[key]
+    else:
+        found = clip.values[key]
+        assert np.shape(found) == np.shape(expected)
+        np.testing.assert_array_equal(found, expected)
+
+
+@given(st.slices(60))
+def test_a_part_of_a_motion_is_that_of_its_clip(samples: Path, frames: slice) -> None:
+    for name in ("walk.bvh", "walk.c3d", "walk.amc"):
+        motion = mcz.read(samples / name)[:60]
+        target = io.BytesIO()
+        mcz.write(motion, target)
+        with mcz.open(target.getvalue()) as file:
+            clip = file.only_clip()
+            assert len(clip) == len(motion) == 60 and clip.shape == motion.shape and motion and clip
+            start, stop, step = frames.indices(60)
+            if step != 1:
+                with pytest.raises(mcz.OptionError, match="has a step"):
+                    motion[frames]
+                return
+            part, other = motion[frames], clip.motion((start, max(start, stop)))
+            assert part.n_frames == other.n_frames == len(range(start, stop))
+            for one, two in zip(part.signals, other.signals, strict=True):
+                np.testing.assert_array_equal(one.values, two.values)
+            np.testing.assert_array_equal(numbers_of(part), numbers_of(other))
+            written = io.BytesIO()
+            mcz.write(part, written)
+            with mcz.open(written.getvalue()) as again:
+                assert not mcz.verify(written.getvalue())
+                expected = clip.source_bytes((start, max(start, stop)))
+                assert again.only_clip().source_bytes() == expected
+
+
+def numbers_of(motion: mcz.Motion) -> np.ndarray:
+    return np.arange(1, len(motion) + 1) if motion.frame_numbers is None else motion.frame_numbers
+
+
+@pytest.mark.parametrize("key", [3, "a", (1, 2), None, slice("a", None), slice(0, 1.5)], ids=str)
+def test_a_motion_is_no_sequence(samples: Path, key: Any) -> None:
+    motion = mcz.read(samples / "walk.bvh")
+    with pytest.raises(OptionError) as raised:
+        motion[key]
+    assert isinstance(raised.value, IndexError)
+    with pytest.raises(TypeError):
+        iter(motion)
+
+
+def test_clips_are_found_as_files_find_them(samples: Path, tmp_path: Path) -> None:
+    for name in ("walk.bvh", "walk.c3d"):
+        (tmp_path / "in").mkdir(exist_ok=True)
+        (tmp_path / "in" / name).write_bytes((samples / name).read_bytes())
+    mcz.pack(tmp_path / "in", tmp_path / "a.mcz")
+    with mcz.open(tmp_path / "a.mcz") as file:
+        assert len(file.clips) == len(file) == 2
+        for name in file.clips:
+            assert file.clips[name] is file[name]
+            assert name in repr(file.clips)
+        assert file.clips["walk.bvh"] is file["walk.bvh"] is file.clips.get("walk.bvh")
+        assert "walk.bvh" in file.clips and "run" not in file.clips and 3 not in file.clips
+        assert file.clips.get("run") is None
+        for name in ("run", 3, None):
+            for find in (file.clips, file):
+                with pytest.raises(KeyError) as raised:
+                    find[name]
+                assert isinstance(raised.value, mcz.OptionError)
+                assert "a.mcz: " in str(raised.value) and not str(raised.value).startswith("'")
 
 
 def test_one_joint_by_its_name(clip: mcz.Clip, tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def _arrays(file: File, given: argparse.Namespace) -> Iterator[Part]:
         attachment.read()
     clips: Iterable[Clip] = file.clips.values()
     if given.clip is not None:  # by its name, and no other way
-        if given.clip not in file.clips:
+        if given.clip not in file.clips.rows:
             raise OptionError(f"no clip {given.clip!r}")
         clips = [file.only_clip(given.clip)]
     lacking: UnsupportedError | None = None

@@ -83,7 +83,7 @@ class Sources:
                 self._keep(member.target, file)
             elif member.target in self._open:
                 self._open.move_to_end(member.target)
-        return file.clips.get(member.clip) or file.only_clip(member.clip)
+        return file.clips[member.clip]
 
     def close(self) -> None:
         """Close what was opened here; it is opened anew when it is needed."""

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mcz.datasets.members import Member
+from mcz.datasets.samplers import SEED
 from mcz.errors import OptionError
 from mcz.reading.clip import Clip
 
@@ -50,7 +51,7 @@ def split(
         raise OptionError(f"{len(totals)} subjects or the like for {len(parts)} parts")
     names, whole = list(parts), sum(weights)
     shuffled = sorted(totals)
-    np.random.default_rng(seed).shuffle(shuffled)
+    np.random.default_rng(SEED(seed)).shuffle(shuffled)
     filled = dict.fromkeys(names, 0)
     home: dict[str, str] = {}
     for number, label in enumerate(shuffled):

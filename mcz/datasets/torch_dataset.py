@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import Any, Protocol
 
-import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch.utils import data
+
+from mcz.datasets.samplers import WindowBatchSampler, WindowSampler
 
 
 class Windows(Protocol):
@@ -18,8 +18,8 @@ class Windows(Protocol):
     def whole_clips(self) -> bool: ...
     def __len__(self) -> int: ...
     def __getitem__(self, index: Any) -> dict[str, NDArray[Any]]: ...
-    def order(self, seed: int) -> NDArray[np.int64]: ...
-    def pools(self, seed: int) -> list[NDArray[np.int64]]: ...
+    def sampler(self, seed: int) -> WindowSampler: ...
+    def batch_sampler(self, size: int, seed: int, workers: int = 1) -> WindowBatchSampler: ...
 
 
 class TorchDataset(data.Dataset[dict[str, torch.Tensor]]):
@@ -45,22 +45,14 @@ class TorchDataset(data.Dataset[dict[str, torch.Tensor]]):
         batch: dict[str, Any] = {n: torch.from_numpy(a) for n, a in self.dataset[indices].items()}
         return [{name: array[row] for name, array in batch.items()} for row in range(len(indices))]
 
-    def sampler(self, seed: int) -> list[int]:
-        """All indices, for a DataLoader of at most one worker."""
-        return [int(index) for index in self.dataset.order(seed)]
+    def sampler(self, seed: int) -> WindowSampler:
+        """Indices in a new order each epoch, for a DataLoader of at most one worker."""
+        return self.dataset.sampler(seed)
 
-    def batch_sampler(self, size: int, seed: int, workers: int = 1) -> list[list[int]]:
+    def batch_sampler(self, size: int, seed: int, workers: int = 1) -> WindowBatchSampler:
         """Batches of ``size`` indices, for ``DataLoader(batch_sampler=..., num_workers=workers)``.
 
         A DataLoader gives its workers a batch each in turn. Here each gets batches of parts of the
-        data set of its own, so that no two decode the same.
+        data set of its own, so that hardly any two decode the same.
         """
-        pools = self.dataset.pools(seed)
-        if len(pools) < workers:
-            pools = np.array_split(self.dataset.order(seed), workers)
-        batches: list[list[list[int]]] = []
-        for worker in range(workers):
-            own = np.concatenate(pools[worker::workers]).tolist()
-            batches.append([own[at : at + size] for at in range(0, len(own), size)])
-        turns = itertools.zip_longest(*batches)
-        return [batch for turn in turns for batch in turn if batch]
+        return self.dataset.batch_sampler(size, seed, workers)

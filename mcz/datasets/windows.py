@@ -16,8 +16,10 @@ from mcz.brief import counted
 from mcz.datasets.caches import Arrays, Cache, FolderCache, MemoryCache
 from mcz.datasets.fields import FIELDS, Subject, names_of
 from mcz.datasets.members import Member
+from mcz.datasets.samplers import EPOCH, SEED, SIZE, WindowBatchSampler, WindowSampler
 from mcz.datasets.sources import BLOCK, Recipe, Sources
-from mcz.errors import OptionError
+from mcz.errors import OptionError, OutOfRangeError
+from mcz.indexing import row_numbers
 from mcz.poses.conversions import continuous
 from mcz.reading.file import File
 
@@ -151,14 +153,14 @@ class Dataset:
         return self._settings.recipe.subject(self._sources.clip(member), member)
 
     def window(self, index: int) -> Window:
-        """Which clip and frames window ``index`` is; raises IndexError."""
-        member, start, stop = self._place(index)
+        """Clip and frames of window ``index``; raises OutOfRangeError, which is an IndexError."""
+        number = row_numbers(index, len(self), "window")
+        if not isinstance(number, int):
+            raise OutOfRangeError(f"{index!r} is not the number of a window")
+        member, start, stop = self._place(number)
         return Window(member.target, member.clip, start, stop)
 
-    def _place(self, index: int) -> tuple[Member, int, int]:
-        number = index + len(self) if index < 0 else index
-        if not 0 <= number < len(self):
-            raise IndexError(f"window {index} of {len(self)}")
+    def _place(self, number: int) -> tuple[Member, int, int]:
         which = int(np.searchsorted(self._ends, number, side="right"))
         member = self.members[which]
         if self._settings.window is None:
@@ -168,12 +170,23 @@ class Dataset:
         return member, start, start + self._settings.window
 
     def __getitem__(self, index: Any) -> dict[str, NDArray[Any]]:
-        """One window, or a batch of those of a slice, a list or an array of numbers."""
-        if isinstance(index, (int, np.integer)):
-            return self._arrays(*self._place(int(index)))
-        if isinstance(index, slice):
-            index = range(*index.indices(len(self)))
-        return self._batch([int(each) for each in index])
+        """One window, or a batch of those that ``index`` chooses, as NumPy indexes an axis.
+
+        A slice, a list, an array of integers or a mask gives arrays (n, window, ...); an array of
+        two dimensions gives (n, m, window, ...). Raises OutOfRangeError, which is an IndexError.
+        """
+        if isinstance(index, str):
+            raise OutOfRangeError(f"windows come before fields: data[:8][{index!r}]")
+        if isinstance(index, tuple) and len(index) < 2:
+            index = index[0] if index else ...
+        if isinstance(index, tuple):
+            raise OutOfRangeError(f"a data set has one axis, its windows, and no index {index!r}")
+        chosen = row_numbers(index, len(self), "window")
+        if isinstance(chosen, int):
+            return self._arrays(*self._place(chosen))
+        numbers = np.asarray(chosen, np.int64)
+        batch = self._batch(numbers.ravel().tolist())
+        return {name: a.reshape(*numbers.shape, *a.shape[1:]) for name, a in batch.items()}
 
     def __iter__(self) -> Iterator[dict[str, NDArray[Any]]]:
         return (self[index] for index in range(len(self)))
@@ -242,18 +255,18 @@ class Dataset:
             key = self._keys[member] = hashlib.sha256(text).hexdigest()[:32]
         return key
 
-    def order(self, seed: int) -> NDArray[np.int64]:
-        """All windows in an order that follows from ``seed`` and is quick to read.
+    def order(self, seed: int, epoch: int = 0) -> NDArray[np.int64]:
+        """All windows in an order that follows from ``seed`` and ``epoch`` and is quick to read.
 
         Neighbouring windows are kept in runs, the runs are shuffled, then the windows of as many
         runs as the cache holds. A data set that fits in the cache is shuffled as a whole.
         """
-        pools = self.pools(seed)
+        pools = self.pools(seed, epoch)
         return np.concatenate(pools) if pools else np.empty(0, np.int64)
 
-    def pools(self, seed: int) -> list[NDArray[np.int64]]:
-        """The ``order`` of a seed in the parts that are shuffled each for itself."""
-        random = np.random.default_rng(seed)
+    def pools(self, seed: int, epoch: int = 0) -> list[NDArray[np.int64]]:
+        """The ``order`` of an epoch in the parts that are shuffled each for itself."""
+        random = np.random.default_rng([SEED(seed), EPOCH(epoch)])
         runs = self._runs()
         random.shuffle(runs)
         pools: list[list[NDArray[np.int64]]] = [[]]
@@ -296,22 +309,35 @@ class Dataset:
         # Segments reach beyond the ends of a run: two thirds of what is decoded is of use.
         return min(kept, int(decoded // (8 * max(1, n_channels))) * 2 // 3)
 
-    def shuffled(self, seed: int) -> Iterator[dict[str, NDArray[Any]]]:
-        """The windows in the ``order`` of a seed."""
-        return (self[int(index)] for index in self.order(seed))
+    def shuffled(self, seed: int, epoch: int = 0) -> Iterator[dict[str, NDArray[Any]]]:
+        """The windows in the ``order`` of an epoch."""
+        return (self[int(index)] for index in self.order(seed, epoch))
 
     def batches(
-        self, size: int, *, seed: int | None = None, drop_last: bool = False
+        self, size: int, *, seed: int | None = None, epoch: int = 0, drop_last: bool = False
     ) -> Iterator[dict[str, NDArray[Any]]]:
-        """Batches of ``size`` windows, in the ``order`` of a seed or, None, as they come.
+        """Batches of ``size`` windows, in the ``order`` of an epoch or, seed None, as they come.
 
         The last one is smaller where they do not come out even, unless ``drop_last``.
         """
-        if size < 1:
-            raise OptionError(f"batches of {size} windows")
-        numbers = np.arange(len(self)) if seed is None else self.order(seed)
+        size = SIZE(size)
+        numbers = np.arange(len(self)) if seed is None else self.order(seed, epoch)
         stop = len(self) - len(self) % size if drop_last else len(self)
         return (self[numbers[at : at + size]] for at in range(0, stop, size))
+
+    def sampler(self, seed: int) -> WindowSampler:
+        """Numbers of windows in the ``order`` of epoch 0, 1, 2, ... each time it is iterated.
+
+        ``set_epoch`` chooses the next epoch.
+        """
+        return WindowSampler(self, seed)
+
+    def batch_sampler(self, size: int, seed: int, workers: int = 1) -> WindowBatchSampler:
+        """Batches of ``size`` numbers of windows, for workers that take one each in turn.
+
+        Each worker gets windows of clips of its own. A new order each time, as of ``sampler``.
+        """
+        return WindowBatchSampler(self, size, seed, workers)
 
     def part(self, members: Sequence[Member]) -> Dataset:
         """The same of some of its ``members`` alone; files and cache are shared."""

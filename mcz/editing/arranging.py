@@ -76,8 +76,8 @@ def _named(file: File, names: Iterable[str]) -> Plan:
     """The clips, attachments and aliases of these names."""
     found = Plan()
     for name in names:
-        clips = clips_meant(file.clips, file.aliases, name)
-        if name in file.clips:
+        clips = clips_meant(file.clips, name)
+        if name in file.clips.rows:
             found.clips[name] = SAME
         elif name in file.attachments:
             found.attachments[name] = name

@@ -224,7 +224,7 @@ def _of_attachment(file: File, name: str) -> Callable[[], Any]:
 def _of_alias(file: File, of: int, target: bytes) -> Callable[[], Any]:
     """The content of what an alias stands for; of a skeleton's file its id."""
     name = target.decode("utf-8", "replace")
-    if of == payloads.OF_CLIP and name in file.clips:
+    if of == payloads.OF_CLIP and name in file.clips.rows:
         source = file.clips[name].source
         return lambda: None if source is None else source.sha256
     if of == payloads.OF_ATTACHMENT and name in file.attachments:

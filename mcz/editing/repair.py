@@ -246,7 +246,7 @@ class _Repairer(Copier):
 
     def name_of(self, cut: ClipCut) -> str:
         name = cut.name if isinstance(cut, _Run) else cut.clip.name
-        while isinstance(cut, _Run) and name in self.file.clips:
+        while isinstance(cut, _Run) and name in self.file.clips.rows:
             name += "+"
         return name
 

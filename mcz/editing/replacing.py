@@ -35,7 +35,6 @@ from mcz.formats import FORMATS
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
-from mcz.reading.source_info import of_no_file
 from mcz.schema import build, parse
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
@@ -339,7 +338,7 @@ class _AnewEditor(Copier):
             add_note(metadata, "source-note", f"the source file was left out: {error}")
             self.found.left_out.append(f"clip {motion.name}: its source file, as {error}")
             return dataclasses.replace(motion, source=None, metadata=metadata)
-        return dataclasses.replace(motion, source=of_no_file(motion.source))
+        return dataclasses.replace(motion, source=motion.source.of_no_file())
 
     def _record(self, now: dict[str, str], decoded: Sequence[NDArray[Any]]) -> dict[str, str]:
         wanted = self.edited.motion.signals[0].masked()
@@ -383,7 +382,7 @@ def _write_anew(clip: Clip, writer: _AnewEditor) -> Replacement:
 def _source_file(motion: Motion) -> bytes:
     """The source file of a motion whose values are not those of the file that it came from."""
     assert motion.source is not None
-    source = of_no_file(motion.source)
+    source = motion.source.of_no_file()
     data: bytes = FORMATS[source.format].write(dataclasses.replace(motion, source=source))
     return data
 

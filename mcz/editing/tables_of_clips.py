@@ -42,7 +42,7 @@ def from_table(
     head = list(rows[0]) if rows else []
     name_of = _namer(path, head, match)
     columns = _columns(path, head, match, take)
-    known = names_of(file.clips, file.aliases)
+    known = names_of(file.clips)
     said: dict[str, dict[str, str]] = {}
     unknown: list[str] = []
     for row in rows:

@@ -63,6 +63,10 @@ class RowNotes:
         }
         return build(NOTES, fields, "source notes")
 
+    def part(self, start: int, stop: int) -> RowNotes:
+        """The notes of rows start <= r < stop alone, numbered from 0."""
+        return join_notes([(0, stop - start, self.cut(start, stop))])
+
 
 def _runs(values: Ints) -> list[tuple[int, int]]:
     """Start and stop of each run of equal values."""

@@ -71,6 +71,10 @@ class TableNotes:
             fields.pop()
         return build(TABLE_NOTES, {"sections": fields}, "source notes") if fields else b""
 
+    def part(self, start: int, stop: int) -> TableNotes:
+        """The notes of the frames start <= f < stop alone, numbered from 0."""
+        return join_table_notes([(0, stop - start, self.cut(start, stop))])
+
     def of(self, number: int, n_each: int, n_rows: int) -> RowNotes | None:
         """The notes of a section; FormatError where it has another number of rows a frame."""
         if number >= len(self.sections):

@@ -31,7 +31,7 @@ from mcz.reading.preview import Preview, preview
 from mcz.reading.recording import index_of, read_recording, scaling_of
 from mcz.reading.signal_info import SignalInfo, groups_of, read_signal
 from mcz.reading.signal_reader import SignalReader
-from mcz.reading.source_info import SourceInfo, of_no_file, read_source, sourced_skeleton
+from mcz.reading.source_info import SourceInfo, read_source, sourced_skeleton
 from mcz.reading.views import ClipValues, FrameValues, Masked
 from mcz.schema import parse
 from mcz.skeleton import Joints, joint_list
@@ -51,6 +51,19 @@ class Clip(Posed):
 
     def __repr__(self) -> str:
         return f"<Clip {shown(self.name)}: {self.n_frames} frames, {self.n_channels} channels>"
+
+    def __len__(self) -> int:
+        """The number of frames."""
+        return self.n_frames
+
+    def __bool__(self) -> bool:
+        """True: a clip without frames is a clip, too."""
+        return True
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_frames, n_channels) of the motion signal."""
+        return self.n_frames, self.n_channels
 
     @cached_property
     def _fields(self) -> Any:
@@ -360,7 +373,7 @@ class Clip(Posed):
         source = read_source(self.container, fields, info, self.signals[0], frames)
         if (start, stop, resolution) == (0, self.n_frames, 0):
             return source
-        return of_no_file(source)
+        return source.of_no_file()
 
     def preview(self, joints: Joints = None) -> FrameValues:
         """What can be read without decoding the rest: frames, counted from 0, and their values.

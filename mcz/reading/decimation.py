@@ -72,6 +72,5 @@ def _decimated_signal(signal: Signal, step: int) -> Signal:
 def picked_notes(join_notes: JoinNotes, notes: FrameNotes, frames: range) -> FrameNotes:
     """The notes of some frames alone, numbered from 0."""
     if frames.step == 1:
-        n_frames = len(frames)
-        return join_notes([(0, n_frames, notes.cut(frames.start, frames.stop))])
+        return notes.part(frames.start, frames.stop)
     return join_notes([(i, i + 1, notes.cut(f, f + 1)) for i, f in enumerate(frames)])

@@ -32,7 +32,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.clips import Clips
 from mcz.reading.fields import Where, taken
 from mcz.reading.lost_skeletons import restore_skeletons
-from mcz.reading.names import clip_called, clips_meant, listed
+from mcz.reading.names import listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
 from mcz.threads import checked
@@ -80,7 +80,7 @@ class File:
         self.container = container
         self.grows = False  # another process was appending: this is the file up to its last end
         rows = container.directory
-        self.clips: Mapping[str, Clip] = Clips(container)
+        self.clips = Clips(container)
         self.attachments: Mapping[str, Attachment] = {
             name: Attachment(container, row) for name, row in rows.attachments.items()
         }
@@ -103,16 +103,14 @@ class File:
         return True
 
     def __getitem__(self, name: str) -> Clip:
-        """The clip that ``name`` means; raises OptionError, never KeyError."""
-        if not isinstance(name, str):
-            raise OptionError(f"{self.name}: {name!r} is not the name of a clip")
-        return self.only_clip(name)
+        """The clip that ``name`` means; raises UnknownNameError, an OptionError and KeyError."""
+        return self.clips[name]
 
     def __contains__(self, thing: object) -> bool:
         """Whether ``thing`` is a clip of this file, or a name that means one."""
-        if isinstance(thing, str):
-            return len(clips_meant(self.clips, self.aliases, thing)) == 1
-        return isinstance(thing, Clip) and self.clips.get(thing.name) is thing
+        if isinstance(thing, Clip):
+            return thing.name in self.clips.rows and self.clips[thing.name] is thing
+        return thing in self.clips
 
     def __enter__(self) -> File:
         return self
@@ -214,10 +212,7 @@ class File:
         of these where only one clip has it. Raises OptionError, which suggests a name.
         """
         if name is not None:
-            try:
-                return self.clips[clip_called(self.clips, self.aliases, name)]
-            except OptionError as error:
-                raise OptionError(f"{self.name}: {error}") from None
+            return self.clips[name]
         if len(self.clips) != 1:
             names = listed(self.clips)
             raise OptionError(f"{self.name} has {len(self.clips)} clips, choose one: {names}")

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import PurePosixPath
+from typing import TYPE_CHECKING
 
 from mcz.brief import nearest
 from mcz.container import payloads
 from mcz.errors import FormatError, OptionError
-from mcz.reading.clip import Clip
+
+if TYPE_CHECKING:
+    from mcz.reading.clips import Clips
 
 FEW = 8  # names that a message lists
-Aliases = Mapping[str, tuple[int, bytes]]  # name -> (of, target)
 Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
 
 
-def clip_called(clips: Mapping[str, Clip], aliases: Aliases, name: str) -> str:
+def clip_called(clips: Clips, name: str) -> str:
     """The name of the clip that ``name`` means; see ``File.only_clip``. Raises OptionError."""
-    found = clips_meant(clips, aliases, name)
+    found = clips_meant(clips, name)
     if len(found) == 1:
         return found[0]
     if found:
@@ -26,10 +28,10 @@ def clip_called(clips: Mapping[str, Clip], aliases: Aliases, name: str) -> str:
     raise OptionError(f"no clip {name!r}; {_suggestion(clips, name)}")
 
 
-def names_of(clips: Mapping[str, Clip], aliases: Aliases) -> dict[str, set[str]]:
+def names_of(clips: Clips) -> dict[str, set[str]]:
     """What the clips may be called, as ``clips_meant`` finds it, for who asks for many."""
     known: dict[str, set[str]] = {name: {name} for name in clips}
-    for names in _ways(clips, aliases):
+    for names in _ways(clips):
         found: dict[str, set[str]] = {}
         for called, clip in names:
             found.setdefault(called, set()).add(clip)
@@ -37,21 +39,21 @@ def names_of(clips: Mapping[str, Clip], aliases: Aliases) -> dict[str, set[str]]
     return known
 
 
-def clips_meant(clips: Mapping[str, Clip], aliases: Aliases, name: str) -> list[str]:
+def clips_meant(clips: Clips, name: str) -> list[str]:
     """The names of the clips that ``name`` may mean, sorted."""
-    if name in clips:
+    if name in clips.rows:
         return [name]
-    for names in _ways(clips, aliases):
+    for names in _ways(clips):
         found = sorted({clip for known, clip in names if known == name})
         if found:
             return found
     return []
 
 
-def _ways(clips: Mapping[str, Clip], aliases: Aliases) -> Iterator[Named]:
+def _ways(clips: Clips) -> Iterator[Named]:
     """What the clips may be called, the plainest way first; the last reads of their sources."""
     names = [(name, name) for name in clips]
-    others = list(_of_clips(clips, aliases))
+    others = list(_of_clips(clips))
     yield others
     yield _last_parts([*names, *others])
     paths = list(_paths(clips))
@@ -59,16 +61,16 @@ def _ways(clips: Mapping[str, Clip], aliases: Aliases) -> Iterator[Named]:
     yield _last_parts(paths)
 
 
-def _of_clips(clips: Mapping[str, Clip], aliases: Aliases) -> Iterator[tuple[str, str]]:
+def _of_clips(clips: Clips) -> Iterator[tuple[str, str]]:
     """The aliases of clips, which are paths of files, with their suffix and without."""
-    for alias, (of, target) in aliases.items():
+    for alias, (of, target) in clips.aliases.items():
         clip = target.decode("utf-8", "replace")
-        if of == payloads.OF_CLIP and clip in clips:
+        if of == payloads.OF_CLIP and clip in clips.rows:
             yield alias, clip
             yield str(PurePosixPath(alias).parent / PurePosixPath(alias).stem), clip
 
 
-def _paths(clips: Mapping[str, Clip]) -> Iterator[tuple[str, str]]:
+def _paths(clips: Clips) -> Iterator[tuple[str, str]]:
     for clip in clips.values():
         with suppress(FormatError):  # one that is damaged hides no other
             if clip.source is not None:

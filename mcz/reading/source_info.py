@@ -82,8 +82,3 @@ def _skeleton_source(container: Container, id_: bytes) -> Source | None:
         size=source.size,
         sha256=bytes(source.sha256),
     )
-
-
-def of_no_file(source: Source) -> Source:
-    """``source`` for other values or frames than its file had: it has neither size nor hash."""
-    return replace(source, size=0, sha256=b"")

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.indexing import Rows, row_numbers
+
 
 class Masked(NamedTuple):
     """Numbers as they are stored, and which of them are valid (bool, same shape; None: all)."""
@@ -58,48 +60,33 @@ class ClipValues:
         Only the frames that are asked for are decoded, from the first to the last of them.
         """
         rows, *rest = (key if isinstance(key, tuple) else (key,)) or (Ellipsis,)
-        if isinstance(rows, slice):
-            found = self._slice(rows)
-            return found[(slice(None), *rest)] if rest else found
-        if isinstance(rows, (int, np.integer)) and not isinstance(rows, bool):
-            return self._row(int(rows))[tuple(rest)] if rest else self._row(int(rows))
-        chosen = None if rows is None or rows is Ellipsis else np.asarray(rows)
-        if chosen is None or chosen.ndim != 1:
+        if not _is_one_axis(rows):
             whole: NDArray[Any] = np.asarray(self)[key]
             return whole
-        found = self._chosen(chosen)
-        return found[(np.arange(len(found)), *rest)] if rest else found
-
-    def _slice(self, key: slice) -> NDArray[Any]:
-        start, stop, step = key.indices(self._clip.n_frames)
-        if step > 0:
-            return self._clip.read(frames=(start, max(start, stop)))[::step]
-        frames = range(start, stop, step)
-        if not frames:
-            return self._clip.read(frames=(0, 0))
-        return self._clip.read(frames=(frames[-1], frames[0] + 1))[::-1][::-step]
-
-    def _row(self, key: int) -> NDArray[Any]:
-        index = key + self._clip.n_frames if key < 0 else key
-        if not 0 <= index < self._clip.n_frames:
-            raise IndexError(f"frame {key} of {self._clip.n_frames}")
-        row: NDArray[Any] = self._clip.read(frames=(index, index + 1))[0]
-        return row
-
-    def _chosen(self, key: NDArray[Any]) -> NDArray[Any]:
-        """The frames of a list of numbers or of a mask."""
-        if key.dtype == np.bool_ and len(key) != self._clip.n_frames:
-            raise IndexError(f"a mask of {len(key)} for {self._clip.n_frames} frames")
-        if key.dtype.kind not in "bui" and key.size:
-            raise IndexError(f"frames are chosen by numbers, slices or a mask, not by {key.dtype}")
-        numbers = np.flatnonzero(key) if key.dtype == np.bool_ else key.astype(np.int64)
-        numbers = np.where(numbers < 0, numbers + self._clip.n_frames, numbers)
-        if not numbers.size:
-            return self._clip.read(frames=(0, 0))
-        first, last = int(numbers.min()), int(numbers.max())
-        if first < 0 or last >= self._clip.n_frames:
-            raise IndexError(f"frames {first} to {last} of {self._clip.n_frames}")
-        return self._clip.read(frames=(first, last + 1))[numbers - first]
+        chosen = row_numbers(rows, self._clip.n_frames, "frame")
+        first, stop = _span(chosen)
+        found = self._clip.read(frames=(first, stop))
+        if isinstance(chosen, range):
+            return found[(slice(None, None, chosen.step), *rest)]
+        part: NDArray[Any] = found[(chosen - first, *rest)]
+        return part
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.asarray(self._clip.read(), dtype=dtype)
+
+
+def _is_one_axis(key: Any) -> bool:
+    """False for an index that adds an axis, or takes more than one."""
+    if key is None or key is Ellipsis or isinstance(key, (bool, np.bool_)):
+        return False
+    return isinstance(key, slice) or getattr(key, "ndim", 1) < 2
+
+
+def _span(rows: Rows) -> tuple[int, int]:
+    """The frames from the first to the last of ``rows``, (0, 0) for none."""
+    if isinstance(rows, int):
+        return rows, rows + 1
+    if not len(rows):
+        return 0, 0
+    ends = (rows[0], rows[-1]) if isinstance(rows, range) else (rows.min(), rows.max())
+    return int(min(ends)), int(max(ends)) + 1

@@ -193,7 +193,7 @@ def _differences(
     """
     first, *others = files
     for other, name in zip(others, names[1:], strict=True):
-        pairs = [(one, one) for one in first.clips if one in other.clips]
+        pairs = [(one, one) for one in first.clips if one in other.clips.rows]
         if len(first) == len(other) == 1:
             pairs = [(next(iter(first.clips)), next(iter(other.clips)))]
         found, notes = [], []

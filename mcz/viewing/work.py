@@ -184,7 +184,7 @@ class Work:
                     raise Refused(404, f"the file has {len(file)} clips, not {wanted}")
                 yield file, next(islice(file, wanted, None))
             elif wanted is None or isinstance(wanted, str):
-                yield file, file.clips.get(wanted or "") or file.only_clip(wanted)
+                yield file, file.only_clip(wanted or None)
             else:
                 raise Refused(400, "clip is neither a name nor a number")
 

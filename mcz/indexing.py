@@ -1,0 +1,58 @@
+"""Rows chosen as NumPy indexes one axis: by integers, slices, ``...``, lists, arrays and masks."""
+
+from __future__ import annotations
+
+import operator
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import OutOfRangeError
+
+Rows = int | range | NDArray[np.int64]
+
+
+def row_numbers(key: Any, n_rows: int, noun: str) -> Rows:
+    """The rows among ``n_rows`` that ``key`` chooses, each 0 <= row < n_rows.
+
+    An int for an integer, a range for a slice, otherwise int64 of the shape of the index; of a
+    mask (bool, (n_rows,)) the numbers of its True. ``noun`` names a row in messages. Raises
+    OutOfRangeError, which is an IndexError too.
+    """
+    if key is Ellipsis:
+        key = slice(None)
+    if isinstance(key, slice):
+        try:
+            return range(n_rows)[key]
+        except (TypeError, ValueError) as error:
+            raise OutOfRangeError(f"{noun}s {key}: {error}") from None
+    if not isinstance(key, (bool, np.bool_)):
+        with suppress(TypeError):  # no single integer
+            return _single(operator.index(key), n_rows, noun)
+    try:
+        array = np.asarray(key)
+    except ValueError:  # lists of different lengths
+        raise OutOfRangeError(f"{noun}s {key!r} are no array") from None
+    if array.dtype == np.bool_:
+        if array.shape != (n_rows,):
+            raise OutOfRangeError(f"a mask of shape {array.shape} for {n_rows} {noun}s")
+        return np.flatnonzero(array)
+    if array.size == 0 and not isinstance(key, np.ndarray):
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iu":
+        raise OutOfRangeError(
+            f"{noun}s are chosen by integers, slices or a mask, not by {array.dtype}"
+        )
+    wrong = array[(array < -n_rows) | (array >= n_rows)]
+    if wrong.size:
+        raise OutOfRangeError(f"{noun} {wrong[0]} of {n_rows}")
+    numbers = array.astype(np.int64)
+    return np.where(numbers < 0, numbers + n_rows, numbers)
+
+
+def _single(number: int, n_rows: int, noun: str) -> int:
+    if not -n_rows <= number < n_rows:
+        raise OutOfRangeError(f"{noun} {number} of {n_rows}")
+    return number % n_rows
