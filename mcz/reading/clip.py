@@ -26,6 +26,7 @@ from mcz.formats.c3d_recording import Recording
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
 from mcz.numbers.scaling import Scaling
 from mcz.reading.decimation import decimated, decimated_rows
+from mcz.reading.extent import Extent
 from mcz.reading.posing import Posed
 from mcz.reading.preview import Preview, preview
 from mcz.reading.recording import index_of, read_recording, scaling_of
@@ -37,7 +38,7 @@ from mcz.schema import parse
 from mcz.skeleton import Joints, joint_list
 
 
-class Clip(Posed):
+class Clip(Extent, Posed):
     """One clip; nothing is decoded before it is asked for."""
 
     def __init__(self, container: Container, row: ClipRow) -> None:
@@ -51,19 +52,6 @@ class Clip(Posed):
 
     def __repr__(self) -> str:
         return f"<Clip {shown(self.name)}: {self.n_frames} frames, {self.n_channels} channels>"
-
-    def __len__(self) -> int:
-        """The number of frames."""
-        return self.n_frames
-
-    def __bool__(self) -> bool:
-        """True: a clip without frames is a clip, too."""
-        return True
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(n_frames, n_channels) of the motion signal."""
-        return self.n_frames, self.n_channels
 
     @cached_property
     def _fields(self) -> Any:
@@ -261,15 +249,6 @@ class Clip(Posed):
                 f"clip {self.name!r} has resolutions 0 to {info.counts.n_resolutions - 1}, "
                 f"not {resolution}"
             )
-
-    def checked_range(self, frames: tuple[int, int] | None) -> tuple[int, int]:
-        """``frames``, or all; raises OptionError where they are not in the clip."""
-        start, stop = frames if frames is not None else (0, self.n_frames)
-        if not 0 <= start <= stop <= self.n_frames:
-            raise OptionError(
-                f"clip {self.name!r} has frames 0 to {self.n_frames}, not {start}:{stop}"
-            )
-        return start, stop
 
     def groups_of(self, info: SignalInfo, joints: Joints) -> tuple[tuple[int, ...], list[int]]:
         """The groups that hold the channels of these joints, and where each is among theirs."""

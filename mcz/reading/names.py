@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from mcz.brief import nearest
 from mcz.container import payloads
 from mcz.errors import FormatError, OptionError
-
-if TYPE_CHECKING:
-    from mcz.reading.clips import Clips
+from mcz.reading.clip import Clip
 
 FEW = 8  # names that a message lists
+
+
+class Clips(Protocol):
+    """The clips of a file by their own names, and its aliases: name -> (of, target)."""
+
+    @property
+    def rows(self) -> Mapping[str, object]: ...
+    @property
+    def aliases(self) -> Mapping[str, tuple[int, bytes]]: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def values(self) -> Iterable[Clip]: ...
+
+
 Named = Iterable[tuple[str, str]]  # what a clip may be called, and its own name
 
 
