@@ -18,7 +18,7 @@ from mcz.formats.table_rows import begins_with_number, lines_from, read_table, w
 from mcz.formats.table_signals import read_columns
 from mcz.formats.table_source import named_count, names_in, section_of, table_source
 from mcz.formats.text_source import check_text, text_encoding
-from mcz.formats.times import half_digit_of, stated_rate, uniform_rate
+from mcz.formats.times import half_digits_of, rate_of_times, stated_rate
 from mcz.motion import Channel, Joint, Motion, Skeleton
 from mcz.numbers import scan
 
@@ -76,7 +76,8 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
     times = signal.values[:, 0]
     tokens = scan(data, rows.start[:, 0], rows.stop[:, 0])
     stated = stated_rate(header.values.get("datarate", ""))
-    rate, exact = uniform_rate(times, half_digit_of(tokens), [stated] if stated else [])
+    digits = half_digits_of(data, rows.stop[:, 0], tokens)
+    rate, exact = rate_of_times(times, digits, [stated] if stated else [])
     start, stop = header.labels
     counted = named_count(data, 0, start, header.count, rows.n_rows)
     marked = counted + names_in(data[start:stop], names) + data[stop : header.rows]

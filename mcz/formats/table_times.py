@@ -11,7 +11,7 @@ import numpy as np
 from mcz.formats.rows import Rows
 from mcz.formats.table_layout import Clock
 from mcz.formats.table_signals import read_columns
-from mcz.formats.times import find_clock, half_digit_of, uniform_rate
+from mcz.formats.times import find_clock, half_digits_of, rate_of_times
 from mcz.motion import Channel, Signal
 from mcz.numbers import scan
 
@@ -22,7 +22,7 @@ SECOND = Fraction(1)
 class Times:
     """``signals``: one of times where there are some that no clock gives, named ``time``.
 
-    ``rate`` is None where times are not uniform. ``exact``: it is a round or a stated one.
+    ``rate`` is None where times are not whole frames apart. ``exact``: it is round or stated.
     """
 
     clock: Clock | None
@@ -56,11 +56,12 @@ def read_times(
         signals = (replace(read_columns(data, rows, [column]), name="time", channels=channels),)
     rate, exact = None, True
     if whole:
-        half = half_digit_of(tokens)
-        rate, exact = uniform_rate(tokens.values(), half, [rate * unit for rate in stated])
+        digits = half_digits_of(data, rows.stop[present, column], tokens)
+        in_unit = [rate * unit for rate in stated]
+        rate, exact = rate_of_times(tokens.values(), digits, in_unit, rows.numbers)
     if rate is not None:
         rate /= unit
-    elif rows.n_rows < 2 and stated:
+    elif stated and (rows.n_rows < 2 or not len(tokens)):
         rate = stated[0]
     return Times(clock, signals, rate, exact)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -19,6 +20,7 @@ UNITS = (Fraction(1), Fraction(1000, 1001), *(Fraction(1, 10**n) for n in (1, 2,
 MOST = 2**61  # of products, so that they are exact
 LARGEST_DENOMINATOR = 10**6  # of a rate that is no round number
 MOST_DECIMALS = 15
+ZEROS_IN = 8  # rows that show how many zeros end all times
 
 
 def stated_rate(text: str) -> Fraction | None:
@@ -65,7 +67,7 @@ def _decimals(tokens: Tokens) -> int:
 
 
 def _round(rate: Fraction) -> list[Fraction]:
-    """Round rates near ``rate``, and itself."""
+    """Round rates near ``rate``, and itself; none near 0."""
     found = [round(rate / unit) * unit for unit in UNITS]
     return [r for r in (*found, rate.limit_denominator(LARGEST_DENOMINATOR)) if r > 0]
 
@@ -83,28 +85,115 @@ def _offset(ordinals: Ints, numbers: Ints, numerator: int, denominator: int) -> 
     return None if low > high else min(max(low, 0), high)
 
 
-def uniform_rate(
-    times: Floats, half_digit: float, stated: Sequence[Fraction] = ()
+def rate_of_times(
+    times: Floats,
+    half_digits: Sequence[float],
+    stated: Sequence[Fraction] = (),
+    numbers: Ints | None = None,
 ) -> tuple[Fraction | None, bool]:
-    """The rate of times that are uniform to ``half_digit``, half a unit of their last digit.
+    """The rate of times that are whole frames apart, to half a unit of their last digit.
 
-    Returns None where they are not; and whether the rate is a round or a stated one.
+    Frames are counted by ``numbers``, those of the frames in the file, else by rows, else, where
+    rows are missing that nothing counts, by the steps between the times, most of which are one
+    frame. ``half_digits`` are tried in order. Returns None where no count fits; and whether the
+    rate is a round or a stated one.
     """
     if len(times) < 2 or not np.isfinite(times).all() or not times[-1] > times[0]:
         return None, True
-    with np.errstate(over="ignore"):
-        mean = float((len(times) - 1) / (times[-1] - times[0]))
-    if not 1e-9 < mean < 1e9:
-        return None, True
-    tolerance = 2 * half_digit + 8 * float(np.spacing(np.abs(times).max()))
-    index = np.arange(len(times))
-    for rate in dict.fromkeys((*stated, *_round(Fraction(mean)))):
-        if np.abs(times - (times[0] + index / float(rate))).max() <= tolerance:
-            is_round = rate in stated or any((rate / unit).denominator == 1 for unit in UNITS)
-            return rate, is_round
+    counts = [np.arange(len(times)), *([numbers - numbers[0]] if numbers is not None else [])]
+    counts = [count for count in reversed(counts) if count[-1] > 0]
+    noise = 8 * float(np.spacing(np.abs(times).max()))
+    for k, half_digit in enumerate(half_digits):
+        digits = _Digits(2 * half_digit, noise)
+        rate = _rate_by(times, counts, digits, stated)
+        if rate is None:
+            rate = _rate_of_steps(times, digits, stated)
+        if rate is None and k == 0:
+            rate = _rate_by(times, counts, digits, (), coarsely=True)
+        if rate is not None:
+            is_round = any((rate / unit).denominator == 1 for unit in UNITS)
+            return rate, rate in stated or is_round
     return None, True
 
 
-def half_digit_of(tokens: Tokens) -> float:
-    """Half a unit of the last digit that the times have."""
-    return 0.5 * 10.0 ** -_decimals(tokens)
+@dataclass(frozen=True, slots=True)
+class _Digits:
+    """The last ``digit`` of some times, and the ``noise`` of their binary64."""
+
+    digit: float
+    noise: float
+
+    def fit(self, times: Floats, count: Floats | Ints, rate: Fraction, share: float = 0) -> bool:
+        """Whether times are ``count`` frames from one start, each rounded to a digit.
+
+        Digits of more than a quarter of a frame fit almost any rate: only a ``share`` of them may
+        be missed.
+        """
+        spread = np.ptp(times - times[0] - count / float(rate))
+        allowed = self.digit if 4 * self.digit * rate <= 1 else share * self.digit
+        return bool(spread <= allowed + self.noise)
+
+
+def _rate_by(
+    times: Floats,
+    counts: Sequence[Ints],
+    digits: _Digits,
+    stated: Sequence[Fraction],
+    *,
+    coarsely: bool = False,
+) -> Fraction | None:
+    """A stated rate or, near the mean, a round one, by the first of the counts that fits."""
+    candidates = [(count, rate, 1.0) for count in counts for rate in stated]
+    for count in counts:
+        near = _round(_mean_rate(times, count))
+        candidates += [(count, rate, float(coarsely)) for rate in near]
+    fits = (rate for count, rate, share in candidates if digits.fit(times, count, rate, share))
+    return next(fits, None)
+
+
+def _mean_rate(times: Floats, count: Ints) -> Fraction:
+    """Frames a second on average; 0 where that is absurd."""
+    with np.errstate(over="ignore"):
+        mean = float(count[-1] / (times[-1] - times[0]))
+    return Fraction(mean) if 1e-9 < mean < 1e9 else Fraction(0)
+
+
+def _rate_of_steps(times: Floats, digits: _Digits, stated: Sequence[Fraction]) -> Fraction | None:
+    """The rate of rising times most of which follow each other by one frame, others by more.
+
+    Round rates are tried near the mean of the longest run without a gap.
+    """
+    steps = np.diff(times)
+    if not (steps > 0).all():
+        return None
+    edges = np.flatnonzero(steps > 1.5 * np.median(steps))
+    starts, stops = np.append(0, edges + 1), np.append(edges, len(steps))
+    longest = int(np.argmax(stops - starts))
+    run = times[starts[longest] : stops[longest] + 1]
+    if len(run) < 2:
+        return None
+    for rate in (*stated, *_round(_mean_rate(run, np.arange(len(run))))):
+        share = 0.99 if rate in stated else 0.0  # all of a digit: halfway between two frames
+        count = np.rint((times - times[0]) * float(rate))
+        frames = np.diff(count)
+        if (
+            (frames >= 1).all()
+            and 2 * np.count_nonzero(frames == 1) > len(frames)
+            and digits.fit(times, count, rate, share)
+        ):
+            return rate
+    return None
+
+
+def half_digits_of(data: bytes, stop: Ints, tokens: Tokens) -> list[float]:
+    """Half a unit of the last digit that times have, as they are printed and without zeros.
+
+    ``stop``: where each token ends, which zeros may follow that all of them have. These are digits,
+    or say nothing.
+    """
+    places = _decimals(tokens)
+    zeros = 0
+    if places:
+        ends = [int(at) for at in stop[:ZEROS_IN]]
+        zeros = min(len(data[at : at + 32]) - len(data[at : at + 32].lstrip(b"0")) for at in ends)
+    return [0.5 * 10.0**-each for each in dict.fromkeys((places + zeros, places))]

@@ -18,7 +18,7 @@ import mcz
 from mcz.errors import FormatError, LimitError, MotionError, SourceError
 from mcz.formats import FORMATS, sniffed
 from mcz.formats.table_layout import PHRASES, fill, parse_table, with_phrases
-from mcz.formats.times import find_clock, stated_rate, uniform_rate
+from mcz.formats.times import find_clock, rate_of_times, stated_rate
 from mcz.motion import Motion
 from mcz.numbers import GridKind, scan
 from mcz.sample import bvh_walk, marker_walk
@@ -348,12 +348,12 @@ def test_a_clock_is_found_where_times_are_rounded(
 
 def test_rates() -> None:
     times = np.arange(50) / 119.88
-    assert uniform_rate(np.round(times, 6), 5e-7) == (Fraction(120000, 1001), True)
-    assert uniform_rate(np.round(times, 6), 5e-7, [Fraction("119.88")])[0] == Fraction("119.88")
-    assert uniform_rate(np.arange(30) / 60, 0.0)[0] == 60
-    assert uniform_rate(np.array([0.0, 0.1, 0.3]), 5e-3) == (None, True)
-    assert uniform_rate(np.array([0.0, np.inf]), 5e-3) == (None, True)
-    assert uniform_rate(np.array([0.0]), 5e-3) == (None, True)
+    assert rate_of_times(np.round(times, 6), [5e-7]) == (Fraction(120000, 1001), True)
+    assert rate_of_times(np.round(times, 6), [5e-7], [Fraction("119.88")])[0] == Fraction("119.88")
+    assert rate_of_times(np.arange(30) / 60, [0.0])[0] == 60
+    assert rate_of_times(np.array([0.0, 0.1, 0.3]), [5e-3]) == (None, True)
+    assert rate_of_times(np.array([0.0, np.inf]), [5e-3]) == (None, True)
+    assert rate_of_times(np.array([0.0]), [5e-3]) == (None, True)
     assert stated_rate("1e999999999") is None
     assert stated_rate(" 119.88") == Fraction("119.88")
 

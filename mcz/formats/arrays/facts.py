@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from mcz.formats.arrays.files import Array
-from mcz.formats.times import UNITS, uniform_rate
+from mcz.formats.times import UNITS, rate_of_times
 
 TIMES = ("time", "times", "timestamp", "timestamps")
 RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps")
@@ -36,8 +36,8 @@ def rate_of(arrays: Sequence[Array], n_frames: int) -> tuple[Fraction | None, bo
         half = 0.0
         if np.isfinite(times).all():
             half = float(np.spacing(np.abs(array.numbers).max())) / 2
-            half = max(half, EVEN * abs(float(times[-1] - times[0])) / (n_frames - 1) / 2)
-        own, own_exact = uniform_rate(times, half, () if rate is None else (rate,))
+            half = max(half, EVEN * abs(float(np.median(np.diff(times)))) / 2)
+        own, own_exact = rate_of_times(times, [half], () if rate is None else (rate,))
         if own is None:
             return None, True, ["the times are not uniform"]
         odd = [] if rate in (None, own) else [f"{float(own):g} frames a second by {array.name}"]
