@@ -275,7 +275,7 @@ def test_sources_come_back_without_python(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_rate_that_is_not_the_files_is_told(samples: Path, tmp_path: Path) -> None:
-    report = mcz.pack(samples, tmp_path / "a.mcz", rate=100)
+    report = mcz.pack(samples, tmp_path / "a.mcz", rate=100, force_rate=True)
     said = {outcome.path: " ".join(outcome.notes) for outcome in report.outcomes}
     for name in ("walk.c3d", "walk.bvh"):
         assert "120 frames a second are kept as 100" in said[name]

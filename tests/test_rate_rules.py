@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,7 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
 from mcz.formats import FORMATS
+from mcz.sample import sample_files
 
 GAP = (*range(124, 127), *range(130, 136))  # numbers of frames: 127 to 129 are missing
 
@@ -116,3 +120,63 @@ def test_any_gap(rate: Fraction, runs: list[tuple[int, int]], first: int, places
     assert found is not None and abs(found / rate - 1) < 2e-3  # 119.88 prints as 120 in few rows
     away = np.array([float(Fraction(n - first) / rate) for n in numbers])
     assert np.abs(away - np.rint(away * float(found)) / float(found)).max() < 3 * 10.0**-places
+
+
+def folder_of(tmp_path: Path) -> Path:
+    """An AMC, which states no rate, and a BVH of 60 frames a second."""
+    folder = tmp_path / "takes"
+    folder.mkdir()
+    files = sample_files()
+    for name in ("walk.asf", "walk.amc"):
+        (folder / name).write_bytes(files[name])
+    bvh = re.sub(rb"Frame Time: \S+", b"Frame Time: 0.0166667", files["walk.bvh"])
+    (folder / "run.bvh").write_bytes(bvh)
+    return folder
+
+
+def test_pack_uses_a_rate_for_files_that_state_none(tmp_path: Path) -> None:
+    folder, target = folder_of(tmp_path), tmp_path / "a.mcz"
+    report = mcz.pack(folder, target, rate=120)
+    notes = {o.path: o.notes for o in report.outcomes}
+    with mcz.open(target) as file:
+        assert {clip.name: clip.frame_rate for clip in file} == {"walk": 120, "run": 60}
+    assert "it states 60 frames a second; --force-rate makes it 120" in notes["run.bvh"]
+    assert not notes["walk.amc"]
+    mcz.pack(folder, target, rate=120, force_rate=True, force=True)
+    with mcz.open(target) as file:
+        assert {clip.frame_rate for clip in file} == {120}
+
+
+def test_append_uses_a_rate_for_files_that_state_none(tmp_path: Path) -> None:
+    folder, target = folder_of(tmp_path), tmp_path / "a.mcz"
+    mcz.encode(folder / "walk.amc", target)
+    mcz.append([folder / "run.bvh"], target, rate=120)
+    with mcz.open(target) as file:
+        assert [clip.frame_rate for clip in file] == [None, 60]
+    other = tmp_path / "b.mcz"
+    mcz.encode(folder / "walk.amc", other)
+    mcz.append([folder / "run.bvh"], other, rate=120, force_rate=True)
+    with mcz.open(other) as file:
+        assert [clip.frame_rate for clip in file] == [None, 120]
+
+
+@pytest.mark.parametrize("rate", [0, -1, float("nan"), float("inf"), 1e400])
+def test_a_rate_that_is_none_is_refused(rate: float, tmp_path: Path) -> None:
+    folder = folder_of(tmp_path)
+    with pytest.raises(mcz.OptionError, match="frame rate"):
+        mcz.pack(folder, tmp_path / "a.mcz", rate=rate)
+
+
+@pytest.mark.parametrize("command", ["pack", "append"])
+def test_force_rate_on_the_command_line(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, target = folder_of(tmp_path), tmp_path / "a.mcz"
+    (folder / "walk.amc").unlink()
+    mcz.encode(folder / "walk.asf", target)
+    arguments = [command, str(folder), str(target), "--rate", "120"]
+    arguments += ["--force"] if command == "pack" else []
+    assert run(cli, "mcz", arguments) == 0
+    assert "--force-rate makes it 120" in capsys.readouterr().err
+    with mcz.open(target) as file:
+        assert [clip.frame_rate for clip in file] == [60]

@@ -11,8 +11,10 @@ from mcz.cli.common import Exit, Failure, about, existing, say
 from mcz.cli.options import (
     copies_option,
     encoding_options,
+    force_rate_option,
     jobs_option,
     json_option,
+    rate_option,
     threads_option,
 )
 from mcz.cli.outcomes import conclude
@@ -52,6 +54,8 @@ from mcz.cli.progress import Progress
 )
 @copies_option("where the file has some")
 @encoding_options
+@rate_option()
+@force_rate_option
 @threads_option
 @jobs_option
 @json_option

@@ -16,7 +16,6 @@ from mcz.cli.common import (
     plural,
     say,
     to_frames,
-    to_rate,
 )
 from mcz.cli.delivery import Output, check_count, deliver
 from mcz.cli.made import Made, facts_of, told
@@ -26,6 +25,7 @@ from mcz.cli.options import (
     force_option,
     json_option,
     key_error_option,
+    rate_option,
     salvage_option,
     threads_option,
     up_option,
@@ -110,13 +110,7 @@ if TYPE_CHECKING:
     help="Length unit, where the clip does not know it (with --to glb or usda).",
 )
 @key_error_option
-@click.option(
-    "--rate",
-    metavar="R",
-    callback=to_rate,
-    help="Frames a second, where the clip does not know them (--to bvh, c3d, glb or usda, "
-    "--post-filter).",
-)
+@rate_option("Frames a second, in place of the clip's own (with --to, --post-filter).")
 @click.option(
     "--solve-ik",
     "solve",

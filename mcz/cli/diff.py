@@ -22,7 +22,6 @@ from mcz.cli.common import (
     opened,
     print_json,
     to_frames,
-    to_rate,
 )
 from mcz.cli.diff_lines import lines_of
 from mcz.cli.options import (
@@ -31,6 +30,7 @@ from mcz.cli.options import (
     decoded_option,
     json_option,
     model_option,
+    rate_option,
     up_option,
     where_option,
 )
@@ -76,9 +76,7 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     type=click.Path(readable=False),
     help="The ASF of an AMC, or none.",
 )
-@click.option(
-    "--rate", metavar="R", callback=to_rate, help="Frames a second of a file that does not say."
-)
+@rate_option()
 @up_option("Axis that points up, of a file that does not say.")
 @arrays_option
 @model_option

@@ -23,10 +23,12 @@ from mcz.cli.common import (
 )
 from mcz.cli.figures import reached
 from mcz.cli.options import (
+    ITS_RATE_HELP,
     copies_option,
     encoding_options,
     force_option,
     json_option,
+    rate_option,
     threads_option,
 )
 from mcz.cli.progress import Progress
@@ -58,6 +60,7 @@ if TYPE_CHECKING:
 )
 @copies_option("no")
 @encoding_options
+@rate_option(ITS_RATE_HELP)
 @force_option
 @threads_option
 @json_option

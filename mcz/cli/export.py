@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import click
 
-from mcz.cli.common import Exit, about, existing, to_rate
+from mcz.cli.common import Exit, about, existing
 from mcz.cli.options import (
     UNITS,
     clips_option,
@@ -15,6 +15,7 @@ from mcz.cli.options import (
     jobs_option,
     json_option,
     key_error_option,
+    rate_option,
     threads_option,
     where_option,
 )
@@ -29,9 +30,7 @@ from mcz.cli.suffixes import TARGETS
 @click.option("--to", "target", type=click.Choice(TARGETS), required=True, help="The format.")
 @clips_option
 @where_option
-@click.option(
-    "--rate", metavar="R", callback=to_rate, help="Frames a second of clips that do not say it."
-)
+@rate_option()
 @click.option("--unit", type=click.Choice(UNITS), help="Length unit of clips that say none.")
 @key_error_option
 @decoded_option

@@ -10,8 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import about, existing, opened, to_frames, to_rate
-from mcz.cli.options import UNITS, arrays_option, decoded_option, model_option, up_option
+from mcz.cli.common import about, existing, opened, to_frames
+from mcz.cli.options import (
+    UNITS,
+    arrays_option,
+    decoded_option,
+    model_option,
+    rate_option,
+    up_option,
+)
 
 if TYPE_CHECKING:
     from mcz.motion import Motion
@@ -29,12 +36,7 @@ def moving_options(function: Function) -> Function:
         click.option(
             "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B, from 0."
         ),
-        click.option(
-            "--rate",
-            metavar="R",
-            callback=to_rate,
-            help="Frames a second of a file that does not say.",
-        ),
+        rate_option(),
         click.option("--unit", type=click.Choice(UNITS), help="Length unit of a file without."),
         up_option("Axis that points up, of a file that does not say."),
         click.option(

@@ -13,6 +13,8 @@ from mcz.cli.common import echo, to_params, to_rate
 
 EFFORTS = ("fast", "normal", "best")  # as in mcz.codecs, which takes longer to import
 UNITS = ("mm", "cm", "dm", "m", "in", "ft")
+RATE_HELP = "Frames a second (120, 29.97, 30000/1001) of files that state none."
+ITS_RATE_HELP = "Frames a second (120, 29.97, 30000/1001), in place of what the source states."
 Function = Callable[..., Any]
 
 
@@ -203,8 +205,20 @@ def key_error_option(function: Function) -> Function:
     )(function)
 
 
+def rate_option(help_text: str = RATE_HELP) -> Callable[[Function], Function]:
+    """``--rate``, as the argument ``rate``, by default of files that state none."""
+    return click.option("--rate", metavar="R", callback=to_rate, help=help_text)
+
+
+def force_rate_option(function: Function) -> Function:
+    """``--force-rate``, as the argument ``force_rate``."""
+    return click.option(
+        "--force-rate", is_flag=True, help="Use --rate also where a file states another."
+    )(function)
+
+
 def encoding_options(function: Function) -> Function:
-    """``--codec --effort --param --rate --unit --up ...``, as the arguments of those names."""
+    """``--codec --effort --param --unit --up ...``, as the arguments of those names."""
     options = (
         click.option("--codec", metavar="NAME", help="Default: fast, which is lossless."),
         click.option(
@@ -213,12 +227,6 @@ def encoding_options(function: Function) -> Function:
             help="A lossless codec: read fastest, a little smaller, or smallest.",
         ),
         param_option,
-        click.option(
-            "--rate",
-            metavar="R",
-            callback=to_rate,
-            help="Frames a second (120, 29.97, 30000/1001). An AMC does not say its own.",
-        ),
         click.option("--unit", type=click.Choice(UNITS), help="Length unit of the source."),
         up_option("Axis of the source that points up. BVH and AMC do not say theirs."),
         arrays_option,

@@ -13,8 +13,10 @@ from mcz.cli.options import (
     copies_option,
     encoding_options,
     force_option,
+    force_rate_option,
     jobs_option,
     json_option,
+    rate_option,
     threads_option,
 )
 from mcz.cli.outcomes import conclude
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 @click.argument("folder", metavar="DIR", type=click.Path(readable=False))
 @click.argument("target", metavar="OUT.mcz", type=click.Path(readable=False))
 @encoding_options
+@rate_option()
+@force_rate_option
 @click.option("--keep-all", is_flag=True, help="Keep files of other kinds too, as attachments.")
 @click.option(
     "--scheduler",

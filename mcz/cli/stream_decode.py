@@ -24,9 +24,8 @@ from mcz.cli.common import (
     printable,
     say,
     text_output,
-    to_rate,
 )
-from mcz.cli.options import token_option
+from mcz.cli.options import rate_option, token_option
 from mcz.cli.piped import NAME, live_input
 from mcz.cli.rows import NUMBER, STATE
 
@@ -57,12 +56,7 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Smooth positions as coarse coding needs it; rows come 12 frames late.",
 )
-@click.option(
-    "--rate",
-    metavar="R",
-    callback=to_rate,
-    help="Frames a second (with --post-filter), where the clip does not know them.",
-)
+@rate_option("Frames a second of a stream that states none (with --post-filter).")
 @click.option("--float32", "binary", is_flag=True, help="Print little-endian binary32 rows.")
 @click.option("--states", is_flag=True, help="Print which frames are concealed or missing.")
 def command(

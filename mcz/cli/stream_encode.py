@@ -19,9 +19,8 @@ from mcz.cli.common import (
     existing,
     plural,
     say,
-    to_rate,
 )
-from mcz.cli.options import UNITS, force_option, param_option, token_option, up_option
+from mcz.cli.options import UNITS, force_option, param_option, rate_option, token_option, up_option
 from mcz.cli.piped import NAME, live_input, live_output
 from mcz.cli.rows import Rows, skeleton_in
 
@@ -50,7 +49,7 @@ Entry = Callable[[], int | None]
 @token_option
 @click.option("--codec", metavar="NAME", default="online", show_default=True)
 @param_option
-@click.option("--rate", metavar="R", callback=to_rate, help="Frames a second.")
+@rate_option("Frames a second (120, 29.97, 30000/1001).")
 @click.option("--unit", type=click.Choice(UNITS), help="Length unit of the numbers.")
 @up_option("Axis of the numbers that points up.")
 @click.option("--name", metavar="NAME", default="live", help="Of the clip.  [default: live]")

@@ -17,7 +17,6 @@ from mcz.cli.common import (
     plural,
     print_json,
     say,
-    to_rate,
 )
 from mcz.cli.options import (
     EFFORTS,
@@ -29,6 +28,7 @@ from mcz.cli.options import (
     json_option,
     model_option,
     param_option,
+    rate_option,
     salvage_option,
     threads_option,
     to_bytes,
@@ -77,9 +77,7 @@ LOOPBACK = "127.0.0.1"
     type=click.Path(readable=False),
     help="The ASF of an AMC, or none. Default: found as mcz encode finds it.",
 )
-@click.option(
-    "--rate", metavar="R", callback=to_rate, help="Frames a second of a file that does not say."
-)
+@rate_option()
 @click.option("--unit", type=click.Choice(UNITS), help="Length unit of a file that says none.")
 @up_option("Axis that points up, of a file that does not say.")
 @arrays_option

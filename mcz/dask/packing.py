@@ -33,6 +33,7 @@ def pack(
     effort: str | None = None,
     params: Mapping[str, Any] | None = None,
     rate: float | None = None,
+    force_rate: bool = False,
     unit: str | None = None,
     up: str | None = None,
     arrays: str | None = None,
@@ -59,7 +60,15 @@ def pack(
     verbatim = verbatim or keep_all
     params = None if params is None else dict(params)
     terms = Terms(
-        coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up, arrays=arrays, model=model
+        coded,
+        params,
+        rate=rate,
+        force_rate=force_rate,
+        unit=unit,
+        verbatim=verbatim,
+        up=up,
+        arrays=arrays,
+        model=model,
     )
     paths = [os.path.join(root, one.name) for one in taken] if "://" not in root else []  # noqa: PTH118
     inputs = (*paths, *(params or {}).values())

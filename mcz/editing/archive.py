@@ -43,6 +43,7 @@ def pack(
     effort: str | None = None,
     params: Mapping[str, Any] | None = None,
     rate: float | None = None,
+    force_rate: bool = False,
     unit: str | None = None,
     up: str | None = None,
     arrays: str | None = None,
@@ -61,7 +62,8 @@ def pack(
 
     A file that cannot be parsed is reported and left out; ``verbatim`` keeps it as an attachment,
     ``keep_all`` also keeps files of other kinds so, which are skipped otherwise. Paths are stored
-    relative to ``directory``. ``arrays`` and ``model`` are those of ``mcz.read``; ``effort``,
+    relative to ``directory``. ``rate`` is that of files that state none, with ``force_rate`` of
+    all. ``arrays`` and ``model`` are those of ``mcz.read``; ``effort``,
     ``copies`` and ``threads`` are those of ``mcz.write``;
     ``jobs`` processes may work at once, by default one: the bytes are the same. ``mtimes`` keeps
     when each file was last changed as metadata of its clip, so that the same files give other
@@ -78,7 +80,15 @@ def pack(
     verbatim = verbatim or keep_all
     coded = chosen(codec, effort)
     terms = Terms(
-        coded, params, rate=rate, unit=unit, verbatim=verbatim, up=up, arrays=arrays, model=model
+        coded,
+        params,
+        rate=rate,
+        force_rate=force_rate,
+        unit=unit,
+        verbatim=verbatim,
+        up=up,
+        arrays=arrays,
+        model=model,
     )
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
     inputs = (*paths, *(params or {}).values())
@@ -124,6 +134,7 @@ def append(
     params: Mapping[str, Any] | None = None,
     skeleton: str | os.PathLike[str] | None = None,
     rate: float | None = None,
+    force_rate: bool = False,
     unit: str | None = None,
     up: str | None = None,
     arrays: str | None = None,
@@ -142,12 +153,12 @@ def append(
     """Add files after the last valid FOOT of an MCZ file; what it held stays readable throughout.
 
     Each is stored under its path relative to ``root``, or without one under its name alone; of a
-    folder every motion file below it, under its path relative to the folder. A file that the
-    target restores already under the same path is left out as "present", another one under a path
-    that is taken is refused, and one whose content is there under another name is an alias. Of an
-    MCZ file all that it holds is carried over, nothing coded anew; ``rename`` and
-    ``skip_identical`` are those of ``mcz.merge``. When a source cannot be added, nothing is. What
-    is added to a file with recovery data gets its own.
+    folder every motion file below it, under its path relative to the folder. A file that the target
+    restores already under the same path is left out as "present", another one under a path that is
+    taken is refused, and one whose content is there under another name is an alias. Of an MCZ file
+    all that it holds is carried over, nothing coded anew; ``rename`` and ``skip_identical`` are
+    those of ``mcz.merge``, ``rate`` and ``force_rate`` of ``mcz.pack``. When a source cannot be
+    added, nothing is. What is added to a file with recovery data gets its own.
 
     A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
     lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
@@ -161,7 +172,7 @@ def append(
     refuse_inputs(target, (*sources, skeleton, *(params or {}).values()))
     coded = chosen(codec, effort)
     said: dict[str, Any] = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
-    terms = Terms(coded, params, skeleton, verbatim=verbatim, **said)
+    terms = Terms(coded, params, skeleton, force_rate=force_rate, verbatim=verbatim, **said)
     held = [source for source in sources if Path(source).suffix.lower() == ".mcz"]
     files = [source for source in sources if source not in held]
     named, others = sources_named(files, root, target)

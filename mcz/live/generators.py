@@ -225,7 +225,8 @@ class LiveReader:
         from mcz.reading.post_filtering import live_filter
 
         assert self.clip is not None
-        rate = self.clip.frame_rate if self._filter_rate is None else self._filter_rate
+        rate = self.clip.frame_rate
+        rate = self._filter_rate if rate is None else rate
         return live_filter(self.clip.skeleton, rate, self.clip.name)
 
 

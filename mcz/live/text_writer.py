@@ -18,7 +18,7 @@ from mcz.reading.skeletons import NONE, how_given
 from mcz.reading.skeletons import NOTE as SKELETON_NOTE
 from mcz.reading.source_files import read_skeleton
 from mcz.units import facing, in_unit
-from mcz.writing.entry import Terms
+from mcz.writing.entry import Terms, rate_notes
 
 NOTE = "coded live, frame by frame, from {format} text, which was not kept"
 
@@ -87,10 +87,11 @@ def _arriving(
 
 
 def _remark(arriving: Arriving, terms: Terms) -> tuple[str, ...]:
-    """What is to be said of the skeleton that was given."""
+    """What is to be said of the skeleton and the rate that were given."""
+    notes = tuple(rate_notes(arriving.frame_rate, terms))
     if SKELETON_NOTE not in arriving.metadata:
-        return ()
-    return (f"{terms.skeleton} does not fit: {arriving.metadata[SKELETON_NOTE]}",)
+        return notes
+    return (f"{terms.skeleton} does not fit: {arriving.metadata[SKELETON_NOTE]}", *notes)
 
 
 def _push_all(arriving: Arriving, writer: LiveWriter, report: LiveReport) -> None:

@@ -74,19 +74,24 @@ def with_facts(
     if model is not None:
         motion = with_model(motion, model)
     if rate is not None:
-        try:
-            exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))
-            value = exact.limit_denominator(2**52)
-        except (TypeError, ValueError, OverflowError):
-            raise OptionError(f"frame rate {rate!r} is not a number") from None
-        if value <= 0:
-            raise OptionError(f"frame rate {rate} is not positive")
-        motion = replace(motion, frame_rate=value, frame_rate_exact=True)
+        motion = replace(motion, frame_rate=checked_rate(rate), frame_rate_exact=True)
     if unit is not None:
         motion = replace(motion, skeleton=in_unit(motion.skeleton, unit))
     if up is not None:
         motion = replace(motion, skeleton=facing(motion.skeleton, up))
     return motion
+
+
+def checked_rate(rate: Fraction | float) -> Fraction:
+    """``rate`` as a Fraction; raises OptionError where it is no positive number."""
+    try:
+        exact = rate if isinstance(rate, Fraction) else Fraction(float(rate))
+        value = exact.limit_denominator(2**52)
+    except (TypeError, ValueError, OverflowError):
+        raise OptionError(f"frame rate {rate!r} is not a number") from None
+    if value <= 0:
+        raise OptionError(f"frame rate {rate} is not positive")
+    return value
 
 
 def told(

@@ -18,7 +18,7 @@ from mcz.formats import Format, format_of
 from mcz.formats.arrays.kinds import kinds_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.skeletons import NONE, NOTE, Given, Taken, take
-from mcz.reading.source_files import read_bytes, read_skeleton, with_facts
+from mcz.reading.source_files import checked_rate, read_bytes, read_skeleton, with_facts
 from mcz.units import facing, in_unit, unit_cm_of
 from mcz.writing.clip_writer import Progress, write_skeleton
 from mcz.writing.draft import Draft
@@ -33,7 +33,8 @@ class Terms:
     """On which terms source files are taken: how they are coded, and what is said of them.
 
     ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit`` and
-    ``up``, the axis that points up, say what the file does not. ``verbatim``: one that cannot be
+    ``up``, the axis that points up, say what the file does not; ``force_rate``: the rate holds also
+    where the file states one. ``verbatim``: one that cannot be
     parsed is kept as an attachment. ``keep_skeleton``: an ASF is restored as well, under its own
     name. ``arrays`` says what plain arrays are, ``model`` how long the bones of bodies are. Raises
     OptionError for an unknown codec, unit, axis or kind of arrays.
@@ -43,6 +44,7 @@ class Terms:
     params: Mapping[str, Any] | None = None
     skeleton: str | os.PathLike[str] | None = None
     rate: Fraction | float | None = None
+    force_rate: bool = True
     unit: str | None = None
     verbatim: bool = False
     keep_skeleton: bool = False
@@ -52,6 +54,8 @@ class Terms:
 
     def __post_init__(self) -> None:
         by_name(self.codec)
+        if self.rate is not None:
+            checked_rate(self.rate)
         if self.unit is not None:
             unit_cm_of(self.unit)
         facing(Skeleton(()), self.up)
@@ -119,9 +123,11 @@ class Entry:
         taken = take(self.path, given, self.terms.unit, data)
         self._note(taken)
         terms = self.terms
-        facts = terms.rate, terms.unit, terms.up, terms.arrays, terms.model
+        stated = taken.motion.frame_rate
+        rate = terms.rate if terms.force_rate or stated is None else None
+        facts = rate, terms.unit, terms.up, terms.arrays, terms.model
         motion = with_facts(taken.motion, *facts)
-        self.notes += tuple(_contradictions(taken.motion, motion))
+        self.notes += tuple(rate_notes(stated, terms))
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
         if taken.skeleton is not None:
@@ -155,11 +161,17 @@ class Entry:
         return replace(motion, skeleton=replace(motion.skeleton, base=id_))
 
 
-def _contradictions(said: Motion, told: Motion) -> Iterator[str]:
-    """Where the frame rate that the file states is not the one that was asked for."""
-    theirs, ours = said.frame_rate, told.frame_rate
-    if theirs is not None and ours is not None and abs(theirs / ours - 1) > SAME_RATE:
-        yield f"its {float(theirs):g} frames a second are kept as {float(ours):g}, as was asked for"
+def rate_notes(stated: Fraction | None, terms: Terms) -> Iterator[str]:
+    """A note where the frame rate that a file states is not the one that was asked for."""
+    if stated is None or terms.rate is None:
+        return
+    asked = float(checked_rate(terms.rate))
+    if abs(float(stated) / asked - 1) <= SAME_RATE:
+        return
+    if terms.force_rate:
+        yield f"its {float(stated):g} frames a second are kept as {asked:g}, as was asked for"
+    else:
+        yield f"it states {float(stated):g} frames a second; --force-rate makes it {asked:g}"
 
 
 def _refuse_early(source_format: Format, data: bytes, profile: Profile) -> None:
