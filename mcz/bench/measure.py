@@ -196,6 +196,6 @@ def work_of(
 
 def _parse(case: Case, loaded: Loaded) -> Motion:
     path = Path(case.path)
-    source_format = format_of(path)
+    source_format = format_of(path, loaded.data)
     skeleton = loaded.motion.skeleton if source_format.wants_skeleton else None
     return read_source(path, source_format, skeleton, loaded.data)

@@ -32,8 +32,9 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.parts import Filtered, Part, Preview
-from mcz.cli.suffixes import TARGETS, check_kept, suffix_of, target_of
+from mcz.cli.suffixes import TARGETS, check_kept, suffix_of, target_of, target_of_clip
 from mcz.cli.wanted import Wanted, check_options, check_signal, refuse
+from mcz.reading.fidelity import CONVERTED, RESTORED
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -148,7 +149,7 @@ def command(
     refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
     if output == "-" and (as_json or wanted.with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
-    if suffix_of(output) not in TARGETS:
+    if target_of(suffix_of(output)) is None:
         check_options(wanted, salvage)
         check_signal(wanted)
     outputs: list[Output] = []
@@ -160,7 +161,7 @@ def command(
         if not held.clips:
             _check_plain(file, wanted)
             outputs = [_other(held, names)]
-            check_kept(output, outputs[0][1])
+            check_kept(output, outputs[0].name)
         facts: dict[str, Any] = {"damage": held.damage, "unverified_segments": held.unverified}
     deliver(file, output, outputs, force, as_json, facts | facts_of(made))
     if facts["unverified_segments"]:
@@ -188,7 +189,7 @@ def _as_named(clip: Clip, output: str | None, wanted: Wanted, salvage: bool) -> 
     """``wanted`` as the suffix of the output says, unless ``--to`` does."""
     if wanted.target is None:
         plain = not (wanted.solve or wanted.preview)
-        wanted = wanted._replace(target=target_of(clip, output, plain=plain))
+        wanted = wanted._replace(target=target_of_clip(clip, output, plain=plain))
     check_options(wanted, salvage)
     check_signal(wanted)
     return wanted
@@ -223,7 +224,7 @@ def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made
         rate = None if wanted.filtered else wanted.rate
         if wanted.is_scene:
             made.scene = _scene(motion, target, rate, wanted)
-            outputs = [(target, f"{_stem(motion)}.{target}", made.scene.data)]
+            outputs = [Output(target, f"{_stem(motion)}.{target}", made.scene.data, CONVERTED)]
         else:
             outputs = _converted(motion, target, rate, wanted.with_skeleton)
             made.left_out = left_out(motion, target)
@@ -246,7 +247,9 @@ def _part(clip: Clip, wanted: Wanted) -> Part:
 
 def _source(clip: Clip, part: Part) -> Output:
     path = clip.source.path if clip.source else ""
-    return "source", PurePosixPath(path).name or f"{_stem(clip)}.out", part.source_bytes()
+    data = part.source_bytes()
+    name = PurePosixPath(path).name or f"{_stem(clip)}.out"
+    return Output("source", name, data, part.fidelity(data))
 
 
 def _check_moves(clip: Clip) -> None:
@@ -287,7 +290,10 @@ def _converted(
 
     files = converted_files(motion, target, rate, with_skeleton)
     kinds = {"asf": "skeleton"}
-    return [(kinds.get(s, s), f"{_stem(motion)}.{s}", data) for s, data in files.items()]
+    return [
+        Output(kinds.get(s, s), f"{_stem(motion)}.{s}", data, CONVERTED)
+        for s, data in files.items()
+    ]
 
 
 def _export(clip: Clip, target: str, part: Part, wanted: Wanted) -> Output:
@@ -301,14 +307,14 @@ def _export(clip: Clip, target: str, part: Part, wanted: Wanted) -> Output:
     if wanted.signal is not None:
         units = channel_units(clip.skeleton, channels)
         table = part.of_signal(signal, wanted.stored, names, units)
-        return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
+        return Output(target, f"{_stem(clip)}.{target}", EXPORTS[target](table), CONVERTED)
     if chosen is not None and channels is None:  # else the table says why there are no joints
         skeleton = clip.skeleton
         names = [names[c] for joint in chosen for c in skeleton.columns(skeleton.find(joint))]
     table = part.table(chosen, names)
     if target == "npz" and chosen is None and channels is None and not wanted.preview:
         table = replace(table, motion=part.motion())
-    return target, f"{_stem(clip)}.{target}", EXPORTS[target](table)
+    return Output(target, f"{_stem(clip)}.{target}", EXPORTS[target](table), CONVERTED)
 
 
 def _beside(clip: Clip, wanted: Wanted) -> tuple[str, ...]:
@@ -339,7 +345,7 @@ def _skeleton(held: File, wanted: bytes) -> Output:
     """The skeleton's own file; its name is that of the alias that refers to it."""
     names = [name for name, (_, target) in held.aliases.items() if target == wanted]
     name = PurePosixPath(names[0]).name if names else "skeleton.asf"
-    return "skeleton", name, held.skeleton_bytes(wanted)
+    return Output("skeleton", name, held.skeleton_bytes(wanted), RESTORED)
 
 
 def _other(held: File, wanted: tuple[str, ...]) -> Output:
@@ -355,4 +361,5 @@ def _other(held: File, wanted: tuple[str, ...]) -> Output:
     if name is None or name not in held.attachments:
         shown = ", ".join(names) or "nothing"
         raise Failure(f"no clips; choose with --clip among {shown}", Exit.USAGE)
-    return "attachment", PurePosixPath(name).name, held.attachments[name].read()
+    data = held.attachments[name].read()
+    return Output("attachment", PurePosixPath(name).name, data, RESTORED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from mcz.cli.common import (
     Exit,
@@ -21,7 +21,14 @@ from mcz.cli.common import (
 )
 from mcz.cli.suffixes import is_folder
 
-Output = tuple[str, str, bytes]  # kind, file name, content
+
+class Output(NamedTuple):
+    """A file to write; ``result`` is a word for how it was made: "restored", "converted", ..."""
+
+    kind: str
+    name: str
+    data: bytes
+    result: str
 
 
 def check_count(output: str | None, count: int) -> None:
@@ -47,7 +54,7 @@ def deliver(
     inputs = (sys.stdin if file == "-" else file,)
     if output == "-":
         refuse_inputs(sys.stdout, inputs)
-        data = outputs[0][2]
+        data = outputs[0].data
         (binary_output if b"\0" in data else text_output)().write(data)
         return
     paths = _paths(file, output, outputs)
@@ -61,14 +68,15 @@ def deliver(
         with about(output):
             Path(output).mkdir(parents=True, exist_ok=True)
     rows = []
-    for path, (kind, _, data) in zip(paths, outputs, strict=True):
-        write_output(path, data, force)
-        rows.append({"path": str(path), "kind": kind, "bytes": len(data)})
+    for path, made in zip(paths, outputs, strict=True):
+        write_output(path, made.data, force)
+        row = {"path": str(path), "kind": made.kind, "bytes": len(made.data)}
+        rows.append(row | {"result": made.result})
     if as_json:
         print_json({"outputs": rows, **facts})
         return
     for row in rows:
-        echo(f"{row['path']}  {row['bytes']:,} bytes")
+        echo(f"{row['path']}  {row['bytes']:,} bytes, {row['result']}")
 
 
 def _paths(file: str, output: str | None, outputs: Sequence[Output]) -> list[Path]:
@@ -77,5 +85,5 @@ def _paths(file: str, output: str | None, outputs: Sequence[Output]) -> list[Pat
     folder = Path() if file == "-" else Path(file).parent
     if output is not None:
         folder = Path(output).parent if named else Path(output)
-    paths = [folder / plain_name(name) for _, name, _ in outputs]
+    paths = [folder / plain_name(made.name) for made in outputs]
     return [Path(str(output)), *paths[1:]] if named else paths

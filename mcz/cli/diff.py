@@ -202,10 +202,13 @@ class _Side:
         frames = self._wanted.frames
         with about(self.path):
             if self.file is None:
-                is_amc = PurePath(self.path).suffix.lower() == ".amc"
                 wanted = self._wanted
-                asf = wanted.skeleton if is_amc else None
-                motion = mcz.read(self.path, skeleton=asf, arrays=wanted.arrays, model=wanted.model)
+                motion = mcz.read(
+                    self.path,
+                    skeleton=wanted.skeleton,
+                    arrays=wanted.arrays,
+                    model=wanted.model,
+                )
                 start, stop = _range(frames, motion.n_frames, self.path)
                 signals = tuple(signal.cut(start, stop) for signal in motion.signals)
                 motion = replace(motion, signals=signals, source=None, frame_numbers=None)

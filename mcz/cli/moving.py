@@ -80,9 +80,7 @@ def moving_of(
         return
     existing(path)
     with about(path):
-        is_amc = PurePath(path).suffix.lower() == ".amc"
-        asf = skeleton if is_amc else None
-        motion = mcz.read(path, skeleton=asf, arrays=arrays, model=model)
+        motion = mcz.read(path, skeleton=skeleton, arrays=arrays, model=model)
         yield told(motion, rate, unit, up)
 
 

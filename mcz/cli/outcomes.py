@@ -8,12 +8,13 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
 from mcz.cli.common import Exit, echo, plural, print_json, say
+from mcz.reading.fidelity import GIVEN_BACK
 
 if TYPE_CHECKING:
     from mcz.editing.outcomes import Outcome, Report
 
 
-HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "restored", "written")
+HELD = ("parsed", "skeleton", "alias", "verbatim", "present", "written", *GIVEN_BACK)
 MANY = 50  # files of one kind that are named for one reason; --json names all
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from mcz.reading.fidelity import CUT, FILTERED, LOSSY, SALVAGED, fidelity_of
 
 if TYPE_CHECKING:
     from mcz.motion import Motion
@@ -31,6 +34,16 @@ class Part:
     def source_bytes(self) -> bytes:
         """The source file, of these frames."""
         return self.clip.source_bytes(self.frames, self.resolution, decimate=self.decimate)
+
+    def fidelity(self, data: bytes) -> str:
+        """A word for how near its ``source_bytes``, ``data``, are to the source file."""
+        whole, source = fidelity_of(self.clip), self.clip.source
+        if whole == LOSSY or self.resolution:
+            return LOSSY
+        is_checked = self.frames is None and not self.clip.container.salvage
+        if is_checked or (source is not None and sha256(data).digest() == source.sha256):
+            return whole
+        return CUT if self.frames is not None else SALVAGED
 
     def motion(self) -> Motion:
         return self.clip.motion(self.frames, self.resolution, decimate=self.decimate)
@@ -78,6 +91,9 @@ class Part:
 
 class Filtered(Part):
     """The same, with the post filter."""
+
+    def fidelity(self, data: bytes) -> str:
+        return FILTERED
 
     def source_bytes(self) -> bytes:
         from mcz.reading.post_filtering import filtered_source

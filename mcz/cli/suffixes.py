@@ -1,4 +1,4 @@
-"""What the suffix of an output says: as what the clip is wanted where ``--to`` does not say it."""
+"""Names of outputs: which format their suffix stands for, where ``--to`` does not say it."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ if TYPE_CHECKING:
 
 CONVERSIONS = ("bvh", "amc", "c3d", "trc", "sto", "mot")
 SCENES = ("glb", "usda")  # animated nodes; mcz.conversion.scenes writes them
-CSV = ("csv", "motive", "vicon")  # source formats whose files are called .csv
-TARGETS = ("csv", "npz", *CONVERSIONS, *SCENES)
-# Formats that decode does not write; a file of that name would hold something else.
+NUMBERS = ("csv", "npz")  # tables; mcz.tables.files writes them
+TARGETS = (*NUMBERS, *CONVERSIONS, *SCENES)
+# Suffixes that decode does not write; a file of that name would hold something else.
 OTHERS = {
-    "mcz": "mcz extract takes clips out of an .mcz",
-    "asf": "--with-skeleton writes the ASF beside it",
-    **dict.fromkeys(("usd", "usdc", "usdz"), "--to usda writes USD as text"),
-    "gltf": "--to glb writes the same as one file",
-    **dict.fromkeys(("tsv", "fbx", "npy", "json"), ""),
+    ".mcz": "mcz extract takes clips out of an .mcz",
+    ".asf": "--with-skeleton writes the ASF beside it",
+    **dict.fromkeys((".usd", ".usdc", ".usdz"), "--to usda writes USD as text"),
+    ".gltf": "--to glb writes the same as one file",
+    **dict.fromkeys((".tsv", ".fbx", ".npy", ".json"), f"--to has {', '.join(TARGETS)}"),
 }
 
 
 def suffix_of(output: str | None) -> str:
-    """The suffix of an output in lower case, without its dot; "" of a folder or standard output."""
+    """The suffix of an output in lower case; "" of a folder or standard output."""
     if output is None or output == "-" or is_folder(output):
         return ""
-    return Path(output).suffix.lower().removeprefix(".")
+    return Path(output).suffix.lower()
 
 
 def is_folder(output: str) -> bool:
@@ -37,32 +37,57 @@ def is_folder(output: str) -> bool:
     return output[-1:] in (os.sep, os.altsep) or Path(output).is_dir()
 
 
-def target_of(clip: Clip, output: str | None, *, plain: bool) -> str | None:
-    """As what ``output`` wants the clip, None for its source file.
+def target_of(suffix: str) -> str | None:
+    """The target whose files have a suffix, None where there is none."""
+    from mcz.formats import FORMATS
 
-    ``plain``: the source file itself will do where the suffix is its own. Raises Failure for a
-    format that cannot be written.
+    suffixes = {name: FORMATS[name].suffixes for name in (*NUMBERS, *CONVERSIONS)}
+    suffixes |= {name: (f".{name}",) for name in SCENES}
+    return next((name for name, known in suffixes.items() if suffix in known), None)
+
+
+def target_of_clip(clip: Clip, output: str | None, *, plain: bool) -> str | None:
+    """The target that ``output`` asks for, None for the source file.
+
+    ``plain``: the source file itself will do where the suffix is one of its own. Raises Failure for
+    a suffix of no format that can be written.
     """
     suffix = suffix_of(output)
-    source = clip.source.format if clip.source is not None else ""
-    source = "csv" if source in CSV else source
-    if suffix in TARGETS:
-        return None if plain and suffix == source else suffix
-    if suffix in OTHERS and not _is_own(suffix, clip):
-        hint = OTHERS[suffix] or f"--to has {', '.join(TARGETS)}"
-        raise Failure(f"{output}: a clip cannot be written as .{suffix}; {hint}", Exit.USAGE)
-    return None
+    own = _suffixes_of(clip)
+    target = target_of(suffix)
+    if not suffix or (suffix in own and (plain or target is None)):
+        return None
+    if target is None:
+        raise _unknown(str(output), suffix, "a clip cannot be written as", own)
+    return target
 
 
-def _is_own(suffix: str, clip: Clip) -> bool:
-    path = clip.source.path if clip.source is not None else ""
-    return PurePosixPath(path).suffix.lower() == f".{suffix}"
+def _suffixes_of(clip: Clip) -> tuple[str, ...]:
+    """The suffixes of the source file: those of its format, and that of its name."""
+    from mcz.formats import FORMATS
+
+    if clip.source is None:
+        return ()
+    own = PurePosixPath(clip.source.path).suffix.lower()
+    return (*FORMATS[clip.source.format].suffixes, *([own] if own else []))
 
 
 def check_kept(output: str | None, name: str) -> None:
-    """Raise Failure where the suffix of an output is that of another format than the file's."""
-    suffix, own = suffix_of(output), PurePosixPath(name).suffix.lower().removeprefix(".")
-    if suffix != own and (suffix in TARGETS or suffix in OTHERS):
-        raise Failure(
-            f"{output}: what is kept is {name}, which is not converted to .{suffix}", Exit.USAGE
-        )
+    """Raise Failure where the suffix of an output is not that of the file ``name`` itself."""
+    suffix, own = suffix_of(output), PurePosixPath(name).suffix.lower()
+    if suffix in ("", own):
+        return
+    if target_of(suffix) is not None or suffix in OTHERS:
+        reason = f"what is kept is {name}, which is not converted to {suffix}"
+        raise Failure(f"{output}: {reason}", Exit.USAGE)
+    raise _unknown(str(output), suffix, f"what is kept is {name}, not", (own,))
+
+
+def _unknown(output: str, suffix: str, text: str, own: tuple[str, ...]) -> Failure:
+    """The refusal of a suffix, with the nearest that would do."""
+    from mcz.brief import nearest
+
+    known = list(dict.fromkeys((*filter(None, own), *(f".{name}" for name in TARGETS))))
+    near = nearest(suffix, known).replace("'", "")
+    hint = OTHERS.get(suffix) or (f"did you mean {near}?" if near else f"known: {' '.join(known)}")
+    return Failure(f"{output}: {text} {suffix}; {hint}", Exit.USAGE)

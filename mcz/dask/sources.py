@@ -15,6 +15,7 @@ from mcz.editing.coded_parts import Ask, Part, coded
 from mcz.editing.folders import files_below, size_of
 from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, MczError, OptionError, SourceError
+from mcz.formats import wants_skeleton
 from mcz.writing.entry import Terms
 
 
@@ -83,7 +84,7 @@ def _opened(url: str) -> tuple[Any, str]:
 def skeletons_beside(name: str, skeletons: list[str]) -> tuple[str, ...]:
     """Of an AMC the ASFs that ``mcz.formats.find`` looks at: in its folder, a sibling ``asf``."""
     path = PurePosixPath(name)
-    if path.suffix.lower() != ".amc":
+    if not wants_skeleton(name):
         return ()
     beside, above = path.parent, path.parent.parent
 

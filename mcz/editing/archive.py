@@ -23,6 +23,7 @@ from mcz.editing.protecting import redundancy_of, still_protect
 from mcz.editing.safe_names import notes_on
 from mcz.editing.stored_files import Content, stored_files
 from mcz.errors import MczError, OptionError, SourceError
+from mcz.formats import wants_skeleton
 from mcz.jobs import limited as jobs_limited
 from mcz.reading.file import File
 from mcz.threads import limited
@@ -256,9 +257,9 @@ def write_in_turn(
 def _write_entry(draft: Draft, entry: Entry, seen: Content) -> str:
     """Write one file, or only its name where the same bytes are there already."""
     digest = entry.digest()
-    is_amc = entry.path.suffix.lower() == ".amc"  # its values hang on the ASF beside it
+    depends = wants_skeleton(entry.path)  # its values hang on the ASF beside it
     writer = draft.writer
-    if digest in seen and not is_amc and not draft.holds(entry.name, digest):
+    if digest in seen and not depends and not draft.holds(entry.name, digest):
         check_name(entry.name)
         with draft.step():
             writer.alias(entry.name, *seen[digest])

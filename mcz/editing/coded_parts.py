@@ -21,6 +21,7 @@ from mcz.editing.carrying import Carrier, Change
 from mcz.editing.folders import size_of
 from mcz.editing.stored_files import Content
 from mcz.errors import MczError, WorkerError
+from mcz.formats import wants_skeleton
 from mcz.jobs import ONE, Answer, useful
 from mcz.jobs.pool import answers
 from mcz.reading.file import open
@@ -153,8 +154,8 @@ def asks(entries: Iterable[Entry], draft: Draft, seen: Content) -> Iterator[Ask 
         except MczError:
             yield None
             continue
-        is_amc = entry.path.suffix.lower() == ".amc"  # its values hang on the ASF beside it
-        is_there = not is_amc and (digest in seen or digest in sent)
+        depends = wants_skeleton(entry.path)  # its values hang on the ASF beside it
+        is_there = not depends and (digest in seen or digest in sent)
         if is_there or entry.name in draft.paths:
             yield None
             continue

@@ -25,7 +25,6 @@ from mcz.reading.file import File, open
 from mcz.writing.clip_writer import Progress
 
 Said = Mapping[str, str | None]  # a key and its value; None: it is not there any more
-WITHOUT_RATE = ("amc", "npy")  # formats of sources that do not state a frame rate
 
 
 def set_metadata(
@@ -122,8 +121,8 @@ def set_rate(
 
 def _check_rate(clip: Clip, rate: Fraction, force: bool) -> None:
     source = clip.source
-    if source is not None and source.format not in WITHOUT_RATE:
-        stated = ", ".join(sorted(set(FORMATS) - {*WITHOUT_RATE, "asf"}))
+    if source is not None and FORMATS[source.format].states_rate:
+        stated = ", ".join(sorted(name for name, known in FORMATS.items() if known.states_rate))
         raise OptionError(
             f"clip {shown(clip.name)}: its source states the rate, as {stated} do; encode it anew"
         )

@@ -18,6 +18,7 @@ from mcz.editing.safe_names import Folder, PortableNames, notes_on
 from mcz.errors import ExistsError, FormatError, MczError, OptionError
 from mcz.jobs import limited
 from mcz.reading.clip import Clip
+from mcz.reading.fidelity import RESTORED, fidelity_of
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.sharing import shared_out
@@ -70,8 +71,10 @@ def unpack(
         with shared_out(_restored, file, stored) as restoring:
             for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
                 outcome = writing.outcome(one.path, restore)
-                if mtimes and outcome.result == "restored" and one.kind == "clip":
-                    set_time(writing.place, file.clips[one.name].metadata.get("mtime"))
+                if outcome.result == RESTORED:
+                    if mtimes and one.kind == "clip":
+                        set_time(writing.place, file.clips[one.name].metadata.get("mtime"))
+                    outcome = replace(outcome, result=_fidelity(file, one))
                 if salvage and isinstance(writing.error, FormatError):
                     outcome = replace(outcome, result="damaged")
                 report.outcomes.append(outcome)
@@ -144,6 +147,16 @@ def _of_alias(file: File, name: str, of: int, target: bytes) -> bytes:
     return _of_thing(file, "clip" if of == payloads.OF_CLIP else "attachment", called)
 
 
+def _fidelity(file: File, one: Stored) -> str:
+    """The word for a file that was written: only of a clip it may be another than "restored"."""
+    if one.kind == "alias":
+        of, target = file.aliases[one.name]
+        clip = file.clips.get(target.decode("utf-8", "replace")) if of == payloads.OF_CLIP else None
+    else:
+        clip = file.clips[one.name] if one.kind == "clip" else None
+    return RESTORED if clip is None else fidelity_of(clip)
+
+
 class _Writing:
     """Writes files below a folder, no two to one place; ``error`` is that of the last one."""
 
@@ -165,7 +178,7 @@ class _Writing:
             result = "exists" if isinstance(error, ExistsError) else "failed"
             return Outcome(path, result, 0, f"{path}: {error}")
         self.error = None
-        return Outcome(path, "restored", size, "" if as_path == path else f"as {as_path}")
+        return Outcome(path, RESTORED, size, "" if as_path == path else f"as {as_path}")
 
     def _write(self, path: str, restore: Callable[[], bytes]) -> tuple[int, str]:
         as_path = str(safe_path(path))

@@ -25,9 +25,12 @@ __all__ = [
     "format_by_id",
     "format_of",
     "is_table",
+    "likely_formats",
     "recording_of",
-    "sniffed",
+    "wants_skeleton",
 ]
+
+HEAD_BYTES = 2**20
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +65,11 @@ class Format:
     has_more_joints: Callable[..., bool] | None = None
     bones: Callable[..., dict[str, int]] | None = None
     is_motion: Callable[[bytes], bool] | None = None
+
+    @property
+    def suffix(self) -> str:
+        """The usual suffix of its files."""
+        return self.suffixes[0]
 
 
 def _of(module: str, name: str) -> Callable[..., Any]:
@@ -169,14 +177,22 @@ FORMATS: dict[str, Format] = {
 }
 
 
-def format_of(path: str | Path) -> Format:
-    """The format of a file by its suffix, in any case; raises SourceError."""
+def format_of(path: str | Path, data: bytes | None = None) -> Format:
+    """The format of a file by its suffix, in any case; raises SourceError.
+
+    ``data`` are the bytes of the file: where they begin as those of another format do, it is that;
+    but rows of numbers alone, as in any CSV, tell nothing.
+    """
     suffix = Path(path).suffix.lower()
-    for source_format in FORMATS.values():
-        if suffix in source_format.suffixes:
-            return source_format
-    known = ", ".join(dict.fromkeys(s for f in FORMATS.values() for s in f.suffixes))
-    raise SourceError(f"{Path(path).name}: no source format has the suffix {suffix!r}, but {known}")
+    own = next((f for f in FORMATS.values() if suffix in f.suffixes), None)
+    if own is None:
+        known = ", ".join(dict.fromkeys(s for f in FORMATS.values() for s in f.suffixes))
+        name = Path(path).name
+        raise SourceError(f"{name}: no source format has the suffix {suffix!r}, but {known}")
+    found = () if data is None else likely_formats(data)
+    if not found or found[0] == "csv" or any(suffix in FORMATS[n].suffixes for n in found):
+        return own
+    return FORMATS[found[0]]
 
 
 def is_table(path: str | Path) -> bool:
@@ -185,27 +201,42 @@ def is_table(path: str | Path) -> bool:
     return any(f.is_table for f in FORMATS.values() if suffix in f.suffixes)
 
 
-def sniffed(data: bytes) -> str | None:
-    """The name of the format that ``data`` seems to be of, None where it seems to be of none."""
-    if data.startswith(b"\x93NUMPY"):
-        return "npy"
-    if data.startswith(b"PK\3\4"):
-        return "npz"
-    start = data.removeprefix(b"\xef\xbb\xbf").lstrip()[:16].upper()
+def wants_skeleton(path: str | Path, data: bytes | None = None) -> bool:
+    """Whether the format of a file, see ``format_of``, has its skeleton in another file."""
+    try:
+        return format_of(path, data).wants_skeleton
+    except SourceError:
+        return False
+
+
+def likely_formats(data: bytes) -> tuple[str, ...]:
+    """The names of the formats whose files begin as ``data`` does, the likeliest first.
+
+    Where a suffix has several formats, it is the one that the content has. What tells a text from
+    others stands in its first ``HEAD_BYTES``.
+    """
+    head = data[:HEAD_BYTES]
+    if head.startswith(b"\x93NUMPY"):
+        return ("npy",)
+    if head.startswith(b"PK\3\4"):
+        return ("npz",)
+    start = head.removeprefix(b"\xef\xbb\xbf").lstrip()[:16].upper()
     if start.startswith(b"HIERARCHY"):
-        return "bvh"
-    if data[1:2] == b"\x50" and not data[:1].isspace() and not start[:1].isalpha():
-        return "c3d"
-    if start.startswith(b"PATHFILETYPE"):
-        return "trc"
-    if re.search(rb"(?im)^[ \t]*endheader[ \t]*\r?$", data):
-        return "sto"
-    if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", data):
-        return "asf"
-    kind: str | None = _of("csv_files", "kind_of")(data)
+        return ("bvh",)
+    if head[1:2] == b"\x50" and b"\0" in head[:512]:
+        return ("c3d",)
+    if re.match(rb"PATHFILETYPE[ \t]", start):
+        return ("trc",)
+    if re.search(rb"(?im)^[ \t]*endheader[ \t]*\r?$", head):
+        return ("sto", "mot")
+    if re.search(rb"(?im)^[ \t]*:(bonedata|hierarchy)\b", head):
+        return ("asf",)
+    kind: str | None = _of("csv_files", "kind_of")(head)
     if kind in ("motive", "vicon"):
-        return kind
-    return "amc" if _of("amc", "is_amc")(data) else kind
+        return (kind,)
+    if _of("amc", "is_amc")(head):
+        return ("amc",)
+    return () if kind is None else (kind,)
 
 
 def recording_of(source: Source | None) -> Any:

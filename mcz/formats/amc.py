@@ -27,6 +27,9 @@ from mcz.motion import Motion, Skeleton, Source
 
 _BLANK = rb"[\x00-\x09\x0b-\x20]"
 _FIRST_FRAME = re.compile(rb"(?m)^" + _BLANK + rb"*+[-+]?[0-9]++" + _BLANK + rb"*+$")
+_FIRST_BONE = re.compile(
+    _FIRST_FRAME.pattern + rb"\s++[^\W\d][^\s,;]*+[ \t]++[-+.]?[0-9]"  # a name and its values
+)
 _LINES = re.compile(rb"[^\n]+")
 _WORDS = re.compile(rb"[^\x00-\x20]+")
 _NUMBER = re.compile(rb"[-+]?[0-9]+")
@@ -153,8 +156,8 @@ def bones(data: bytes, *, whole: bool = False) -> dict[str, int]:
 
 
 def is_amc(data: bytes) -> bool:
-    """Whether there is a line with a frame number."""
-    return _FIRST_FRAME.search(data) is not None
+    """Whether there is a line with a frame number, and then one with a bone and its values."""
+    return _FIRST_BONE.search(data) is not None
 
 
 def arrive(lines: Iterator[bytes], skeleton: Skeleton | None = None) -> Arriving:

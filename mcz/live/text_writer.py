@@ -10,7 +10,7 @@ from typing import Any
 from mcz.codecs import by_name
 from mcz.container.writer import Sink
 from mcz.errors import OptionError
-from mcz.formats import FORMATS, sniffed
+from mcz.formats import FORMATS, likely_formats
 from mcz.formats.line_by_line import Arriving
 from mcz.live.writer import LiveWriter
 from mcz.motion import Skeleton
@@ -122,7 +122,7 @@ def codes_live(codec: str, params: Mapping[str, Any]) -> bool:
 
 def format_name_of(data: bytes) -> str:
     """The name of the source format that ``data`` looks like; raises OptionError."""
-    name = sniffed(data)
-    if name is None:
+    found = likely_formats(data)
+    if not found:
         raise OptionError("it looks like no known format; say which it is")
-    return name
+    return found[0]

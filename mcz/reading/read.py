@@ -8,11 +8,10 @@ from fractions import Fraction
 from pathlib import Path
 
 from mcz.errors import OptionError, SkeletonWarning
-from mcz.formats import format_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.file import open
 from mcz.reading.skeletons import take
-from mcz.reading.source_files import with_facts
+from mcz.reading.source_files import load, with_facts
 
 
 def read(
@@ -44,10 +43,10 @@ def read(
         with open(path, max_decoded=max_decoded, threads=threads) as file:
             motion = file.only_clip(clip).motion()
     else:
-        source_format = format_of(path)
+        source_format, data = load(path)
         if source_format.is_skeleton:
             raise OptionError(f"{path}: a skeleton without motion (mcz.read_skeleton reads it)")
-        taken = take(path, skeleton)
+        taken = take(path, skeleton, data=data)
         if taken.remark:
             warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)
         motion = taken.motion

@@ -17,7 +17,7 @@ from mcz.formats import Format, format_of
 from mcz.formats.bones import Match, matched
 from mcz.formats.find import Candidate, skeletons_around
 from mcz.motion import Motion, Skeleton
-from mcz.reading.source_files import read_bytes, read_skeleton, read_source
+from mcz.reading.source_files import load, read_skeleton, read_source
 from mcz.units import in_unit
 
 NONE = "none"  # given in place of a skeleton file: do without
@@ -70,8 +70,7 @@ def take(
     none, or None to look around. The metadata say how it was found. Raises SourceError where no
     skeleton can be taken, and as ``read_source`` does.
     """
-    source_format = format_of(path)
-    data = read_bytes(path) if data is None else data
+    source_format, data = load(path) if data is None else (format_of(path, data), data)
     if not source_format.wants_skeleton:
         return Taken(read_source(path, source_format, None, data), None)
     chosen = choose(path, source_format, data, given)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mcz.errors import MczError, OptionError, SourceError
-from mcz.formats import Format, format_of
+from mcz.formats import FORMATS, Format, format_of, likely_formats
 from mcz.formats.arrays.kinds import with_kinds
 from mcz.formats.arrays.shaped import with_model
 from mcz.motion import Motion, Skeleton
@@ -19,22 +19,40 @@ from mcz.units import facing, in_unit
 def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     """The skeleton in an ASF file, with its source."""
     path = Path(path)
-    source_format = format_of(path)
+    source_format, data = load(path)
     if not source_format.is_skeleton:
         raise OptionError(f"{path}: not a skeleton file")
-    skeleton: Skeleton = _named(path, source_format.read, read_bytes(path), path.stem)
+    skeleton: Skeleton = _named(path, source_format.read, data, path.stem)
     if skeleton.source is None:
         return skeleton
     return replace(skeleton, source=replace(skeleton.source, path=path.name))
 
 
+def load(path: Path) -> tuple[Format, bytes]:
+    """The format of a source file, see ``format_of``, and its bytes; raises SourceError."""
+    format_of(path)  # files of other suffixes are refused unread
+    data = read_bytes(path)
+    return format_of(path, data), data
+
+
+def content_note(path: str | os.PathLike[str], source_format: Format) -> str:
+    """A remark on a file whose suffix is not that of its format, "" where it is."""
+    suffix = Path(path).suffix.lower()
+    if suffix in source_format.suffixes:
+        return ""
+    return f"its content is {source_format.suffix[1:].upper()}, though its suffix is {suffix}"
+
+
 def read_source(
-    path: Path, source_format: Format, skeleton: Skeleton | None, data: bytes | None = None
+    path: Path, source_format: Format, skeleton: Skeleton | None, data: bytes
 ) -> Motion:
-    """The motion in the file ``path``, whose bytes are ``data`` if they were read already."""
+    """The motion in the bytes ``data`` of the file ``path``."""
     arguments = (skeleton,) if source_format.wants_skeleton else ()
-    data = read_bytes(path) if data is None else data
     motion: Motion = _named(path, source_format.read, data, path.stem, *arguments)
+    if note := content_note(path, source_format):
+        notes = filter(None, (note, motion.metadata.get("source-note", "")))
+        metadata = dict(motion.metadata) | {"source-note": "; ".join(notes)}
+        motion = replace(motion, metadata=metadata)
     if motion.source is None:
         return motion
     return replace(motion, source=replace(motion.source, path=path.name))
@@ -45,8 +63,14 @@ def _named(path: Path, reader: Any, data: bytes, *arguments: Any) -> Any:
     try:
         return reader(data, *arguments)
     except MczError as error:
-        error.args = (f"{path}: {error}",)
+        error.args = (f"{path}: {error}{_other_content(path, data)}",)
         raise
+
+
+def _other_content(path: Path, data: bytes) -> str:
+    """A hint where a file that cannot be read begins as one of another suffix does."""
+    found = [FORMATS[name].suffix for name in likely_formats(data)]
+    return f"; it looks like {found[0]}" if found and path.suffix.lower() not in found else ""
 
 
 def read_bytes(path: Path) -> bytes:

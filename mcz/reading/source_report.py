@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from mcz.errors import SkeletonWarning
-from mcz.formats import FORMATS, Format, arrays_of, format_of
+from mcz.formats import FORMATS, Format, arrays_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.recording import recording
 from mcz.reading.recording_report import document_of
 from mcz.reading.report import joint_facts
 from mcz.reading.skeletons import take
-from mcz.reading.source_files import read_bytes, read_skeleton
+from mcz.reading.source_files import load, read_skeleton
 
 SUFFIXES = tuple(suffix for found in FORMATS.values() for suffix in found.suffixes)
 
@@ -34,8 +34,7 @@ def source_info(
     file. ``skeleton`` is the ASF of an AMC. Raises SourceError or OptionError.
     """
     path = Path(path)
-    source_format = format_of(path)
-    data = read_bytes(path)
+    source_format, data = load(path)
     document: dict[str, Any] = {"format": source_format.name, "file_bytes": len(data)}
     if source_format.is_skeleton:
         return document | {"skeletons": [_skeleton_facts(read_skeleton(path))], "clips": []}

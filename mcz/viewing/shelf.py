@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, Protocol
 
 from mcz.container.source import ByteSource
 from mcz.errors import AccessError, LimitError, MczError, OptionError
-from mcz.formats import FORMATS
+from mcz.formats import FORMATS, wants_skeleton
 from mcz.formats.find import skeletons_around
 from mcz.motion import Motion
 from mcz.reading.file import reached
@@ -166,7 +166,7 @@ def _state(path: Path, skeleton: Any = None) -> object:
     except OSError as error:
         raise AccessError(f"{path}: {error.strerror}") from None
     paths = motion_files(files_below(path, None)[0])[0] if is_folder else [path]
-    takes = {one.parent: one for one in paths if one.suffix.lower() == ".amc"}
+    takes = {one.parent: one for one in paths if wants_skeleton(one)}
     around = [found.path for take in takes.values() for found in skeletons_around(take)]
     if takes and isinstance(skeleton, (str, os.PathLike)) and not is_folder:
         around = [Path(skeleton)]
@@ -321,10 +321,10 @@ def put(shelf: Shelf, path: str) -> None:
 def kind_of(path: Path) -> str:
     """The format of a file by its suffix; raises OptionError for one that cannot be shown."""
     suffix = path.suffix.lower()
-    known = {MCZ: "mcz"} | {s: f.name for f in reversed(FORMATS.values()) for s in f.suffixes}
-    if known.get(suffix, "asf") == "asf":
-        shown = " ".join(s for s, name in sorted(known.items()) if name != "asf")
-        raise OptionError(f"{path}: its suffix is none of {shown}")
+    motions = [source_format for source_format in FORMATS.values() if not source_format.is_skeleton]
+    known = {MCZ: "mcz"} | {s: f.name for f in reversed(motions) for s in f.suffixes}
+    if suffix not in known:
+        raise OptionError(f"{path}: its suffix is none of {' '.join(sorted(known))}")
     return known[suffix]
 
 
@@ -332,7 +332,7 @@ def encode(source: Path, out: BinaryIO, said: Mapping[str, Any]) -> None:
     """Write ``source`` as an ``.mcz``, fast."""
     from mcz.writing.file import encode
 
-    skeleton = said.get("skeleton") if source.suffix.lower() == ".amc" else None
+    skeleton = said.get("skeleton") if wants_skeleton(source) else None
     encode(source, out, **{**said, "skeleton": skeleton})
 
 

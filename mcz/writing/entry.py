@@ -14,11 +14,17 @@ from mcz.codecs import DEFAULT, by_name
 from mcz.container.limits import BASE, Profile
 from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError
-from mcz.formats import Format, format_of
+from mcz.formats import Format, format_of, wants_skeleton
 from mcz.formats.arrays.kinds import kinds_of
 from mcz.motion import Motion, Skeleton
 from mcz.reading.skeletons import NONE, NOTE, Given, Taken, take
-from mcz.reading.source_files import checked_rate, read_bytes, read_skeleton, with_facts
+from mcz.reading.source_files import (
+    checked_rate,
+    content_note,
+    read_bytes,
+    read_skeleton,
+    with_facts,
+)
 from mcz.units import facing, in_unit, unit_cm_of
 from mcz.writing.clip_writer import Progress, write_skeleton
 from mcz.writing.draft import Draft
@@ -91,7 +97,7 @@ class Entry:
         digest = hashlib.sha256(data).digest()
         if draft.holds(self.name, digest):
             return "present"
-        given = self._given_skeleton()
+        given = self._given_skeleton(data)
         try:
             with draft.step():
                 result = self._parsed(draft.writer, data, given, progress)
@@ -105,17 +111,18 @@ class Entry:
         draft.paths[self.name] = digest
         return result
 
-    def _given_skeleton(self) -> Given:
+    def _given_skeleton(self, data: bytes) -> Given:
         """The skeleton that was asked for; that it cannot be read is not the source's fault."""
         given = self.terms.skeleton
-        if given is None or given == NONE or self.path.suffix.lower() != ".amc":
+        if given is None or given == NONE or not wants_skeleton(self.path, data):
             return None if given is None else NONE
         self.inputs.append(Path(given))
         return read_skeleton(given)
 
     def _parsed(self, writer: Writer, data: bytes, given: Given, progress: Progress | None) -> str:
-        source_format = format_of(self.path)
+        source_format = format_of(self.path, data)
         if source_format.is_skeleton:
+            self.notes = tuple(filter(None, [content_note(self.path, source_format)]))
             id_ = write_skeleton(writer, in_unit(read_skeleton(self.path), self.terms.unit))
             alias_once(writer, self.name, id_)
             return "skeleton"

@@ -202,9 +202,9 @@ def test_a_suffix_converts(folder: Path, call: Call, suffix: str, start: bytes) 
     assert out.read_bytes().startswith(start)
 
 
-def test_its_own_suffix_and_an_unknown_one_are_the_source(folder: Path, call: Call) -> None:
+def test_its_own_suffix_and_none_are_the_source(folder: Path, call: Call) -> None:
     call("encode", folder / "walk.amc")
-    for name in ("x.amc", "x.AMC", "x.txt", "x"):
+    for name in ("x.amc", "x.AMC", "x"):
         assert call("decode", folder / "walk.mcz", "-o", folder / name)[0] == 0
         assert (folder / name).read_bytes() == (folder / "walk.amc").read_bytes()
 
@@ -221,7 +221,7 @@ def test_what_cannot_be_written_is_refused(folder: Path, call: Call, suffix: str
     out = folder / f"x.{suffix}"
     code, _, errors = call("decode", folder / "walk.mcz", "-o", out)
     assert code == 2
-    assert f"a clip cannot be written as .{suffix}" in errors
+    assert f"a clip cannot be written as .{suffix}; " in errors
     assert not out.exists()
 
 

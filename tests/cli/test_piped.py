@@ -16,7 +16,7 @@ import pytest
 
 import mcz
 from mcz.container.walk_arriving import ArrivingWalker
-from mcz.formats import FORMATS, sniffed
+from mcz.formats import FORMATS, likely_formats
 from mcz.live.strict_reader import live_frames
 from mcz.live.text_writer import encode_live
 from mcz.writing.entry import Terms
@@ -325,12 +325,12 @@ def test_real_clips_live(data: Path) -> None:
 
 
 def test_formats_are_known_by_their_looks(asf: Path) -> None:
-    assert sniffed(HEADER) == "bvh"
-    assert sniffed(b"".join(AMC)) == "amc"
-    assert sniffed(ASF) == "asf"
-    assert sniffed(b"\x02\x50" + bytes(510)) == "c3d"
-    assert sniffed(b"P\x50PP") is None
-    assert sniffed(b"") is None
+    assert likely_formats(HEADER) == ("bvh",)
+    assert likely_formats(b"".join(AMC)) == ("amc",)
+    assert likely_formats(ASF) == ("asf",)
+    assert likely_formats(b"\x02\x50" + bytes(510)) == ("c3d",)
+    assert likely_formats(b"P\x50PP") == ()
+    assert likely_formats(b"") == ()
 
 
 def test_nothing_is_kept_that_was_used() -> None:

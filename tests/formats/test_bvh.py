@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import mcz
 from mcz.container.limits import ARCHIVE, BASE
 from mcz.errors import MotionError, SourceError
-from mcz.formats import amc, asf, bvh, hierarchy, limits, sniffed
+from mcz.formats import amc, asf, bvh, hierarchy, likely_formats, limits
 from mcz.formats.notes import join_notes
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.numbers import Grid, GridKind
@@ -387,7 +387,7 @@ def test_limits_are_those_of_the_largest_profile() -> None:
 @pytest.mark.parametrize("live", [False, True])
 def test_a_byte_order_mark_is_kept(live: bool) -> None:
     data = b"\xef\xbb\xbf" + SMALL
-    assert sniffed(data) == "bvh"
+    assert likely_formats(data) == ("bvh",)
     if live:
         arriving = bvh.arrive(iter(data.splitlines(keepends=True)))
         assert [joint.name for joint in arriving.skeleton.joints] == ["Hips", "left arm"]

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.errors import FormatError, LimitError, MotionError, SourceError
-from mcz.formats import FORMATS, sniffed
+from mcz.formats import FORMATS, likely_formats
 from mcz.formats.table_layout import PHRASES, fill, parse_table, with_phrases
 from mcz.formats.times import find_clock, rate_of_times, stated_rate
 from mcz.motion import Motion
@@ -272,9 +272,9 @@ def test_what_is_no_table_is_refused_with_the_reason(name: str, data: bytes) -> 
     assert REFUSED[name][data] in str(caught.value)
 
 
-def test_sniffed() -> None:
-    assert sniffed(MARKERS) == "trc"
-    assert sniffed(FORCES) == sniffed(QUATERNIONS) == "sto"
+def test_likely_formats() -> None:
+    assert likely_formats(MARKERS) == ("trc",)
+    assert likely_formats(FORCES) == likely_formats(QUATERNIONS) == ("sto", "mot")
 
 
 # Headers
