@@ -61,14 +61,13 @@ class _Awaited(RawIOBase):
 @contextmanager
 def stored(format_name: str | None) -> Iterator[str]:
     """The path of a file, for as long as the block runs, that holds all of standard input."""
-    from mcz.formats import FORMATS
-    from mcz.live.text_writer import format_name_of
+    from mcz.live.text_writer import suffix_of
 
     data = standard_input().read()
     with about(NAME):
-        name = format_name or format_name_of(data)
+        suffix = suffix_of(data, format_name)
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "stdin" / f"stdin{FORMATS[name].suffix}"  # with nothing beside it
+        path = Path(folder) / "stdin" / f"stdin{suffix}"  # with nothing beside it
         path.parent.mkdir()
         path.write_bytes(data)
         yield str(path)

@@ -39,11 +39,9 @@ def is_folder(output: str) -> bool:
 
 def target_of(suffix: str) -> str | None:
     """The target whose files have a suffix, None where there is none."""
-    from mcz.formats import FORMATS
+    from mcz.conversion import suffixes_of
 
-    suffixes = {name: FORMATS[name].suffixes for name in (*NUMBERS, *CONVERSIONS)}
-    suffixes |= {name: (f".{name}",) for name in SCENES}
-    return next((name for name, known in suffixes.items() if suffix in known), None)
+    return next((name for name in TARGETS if suffix in suffixes_of(name)), None)
 
 
 def target_of_clip(clip: Clip, output: str | None, *, plain: bool) -> str | None:
@@ -53,23 +51,13 @@ def target_of_clip(clip: Clip, output: str | None, *, plain: bool) -> str | None
     a suffix of no format that can be written.
     """
     suffix = suffix_of(output)
-    own = _suffixes_of(clip)
+    own = () if clip.source is None else clip.source.suffixes
     target = target_of(suffix)
     if not suffix or (suffix in own and (plain or target is None)):
         return None
     if target is None:
         raise _unknown(str(output), suffix, "a clip cannot be written as", own)
     return target
-
-
-def _suffixes_of(clip: Clip) -> tuple[str, ...]:
-    """The suffixes of the source file: those of its format, and that of its name."""
-    from mcz.formats import FORMATS
-
-    if clip.source is None:
-        return ()
-    own = PurePosixPath(clip.source.path).suffix.lower()
-    return (*FORMATS[clip.source.format].suffixes, *([own] if own else []))
 
 
 def check_kept(output: str | None, name: str) -> None:

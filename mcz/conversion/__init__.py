@@ -17,7 +17,15 @@ from mcz.kinematics import point_set
 from mcz.motion import Motion
 from mcz.reading.source_files import with_facts
 
-__all__ = ["TARGETS", "Fit", "convert", "converted_files", "from_positions", "left_out"]
+__all__ = [
+    "TARGETS",
+    "Fit",
+    "convert",
+    "converted_files",
+    "from_positions",
+    "left_out",
+    "suffixes_of",
+]
 
 TARGETS = {
     "bvh": to_bvh,
@@ -27,6 +35,11 @@ TARGETS = {
     "sto": to_storage,
     "mot": to_storage,
 }
+
+
+def suffixes_of(target: str) -> tuple[str, ...]:
+    """The suffixes of files of a target: of a format, or of a scene."""
+    return FORMATS[target].suffixes if target in FORMATS else (f".{target}",)
 
 
 def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Motion:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from mcz.conversion import TARGETS, converted_files, left_out
+from mcz.conversion import TARGETS, converted_files, left_out, suffixes_of
 from mcz.conversion.scenes import WRITERS, to_scene
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.safe_names import Folder
@@ -115,7 +115,8 @@ def _files(clip: Clip, to: str, motion: Motion, key_error: float | None) -> Iter
         yield _named(clip, suffix), files[suffix], notes
 
 
-def _named(clip: Clip, suffix: str) -> str:
-    """The clip's name with the suffix, that of its source file left out."""
-    path = PurePosixPath(clip.name)
-    return clip.name if path.suffix == f".{suffix}" else f"{clip.name}.{suffix}"
+def _named(clip: Clip, to: str) -> str:
+    """The clip's name with the suffix of the format ``to``, unless it has one."""
+    suffixes = suffixes_of(to)
+    own = PurePosixPath(clip.name).suffix.lower()
+    return clip.name if own in suffixes else f"{clip.name}{suffixes[0]}"

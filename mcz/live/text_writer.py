@@ -120,9 +120,9 @@ def codes_live(codec: str, params: Mapping[str, Any]) -> bool:
     return all(options[name] == value for name, value in found.live_options.items())
 
 
-def format_name_of(data: bytes) -> str:
-    """The name of the source format that ``data`` looks like; raises OptionError."""
-    found = likely_formats(data)
+def suffix_of(data: bytes, format_name: str | None) -> str:
+    """The suffix of files of a source format, or of what ``data`` looks like; OptionError."""
+    found = likely_formats(data) if format_name is None else (format_name,)
     if not found:
         raise OptionError("it looks like no known format; say which it is")
-    return found[0]
+    return FORMATS[found[0]].suffix

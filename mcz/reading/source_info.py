@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import PurePosixPath
 from typing import Any
 
 from mcz.container import payloads
 from mcz.container.reader import Container
-from mcz.formats import Format, format_by_id
+from mcz.formats import FORMATS, Format, format_by_id
 from mcz.motion import FrameNotes, Skeleton, Source
 from mcz.reading.decimation import picked_notes
 from mcz.reading.signal_info import SignalInfo
@@ -21,6 +22,12 @@ class SourceInfo:
     path: str
     size: int
     sha256: bytes
+
+    @property
+    def suffixes(self) -> tuple[str, ...]:
+        """The suffixes, in lower case, of its format, and that of its name."""
+        own = PurePosixPath(self.path).suffix.lower()
+        return (*FORMATS[self.format].suffixes, *([own] if own else []))
 
 
 def read_source(
