@@ -75,6 +75,7 @@ if TYPE_CHECKING:
         resample,
         root,
         rotations,
+        times,
         velocities,
     )
     from mcz.reading.clip import Clip
@@ -159,6 +160,7 @@ _HOMES = {
         "resample",
         "root",
         "rotations",
+        "times",
         "velocities",
     ),
     "mcz.pictures.plotting": ("Plotted", "plot"),
@@ -292,6 +294,7 @@ __all__ = [
     "split",
     "stream_decode",
     "stream_encode",
+    "times",
     "to_c3d",
     "to_ezc3d",
     "to_glb",

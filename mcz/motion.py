@@ -16,6 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz import brief
+from mcz.clock import (
+    START,
+    Counting,
+    Timeline,
+    column_of,
+    has_times,
+    known_times,
+    numbered,
+    numbers_or_rows,
+    time_signal,
+    timeline_of,
+)
 from mcz.displays import html_of
 from mcz.errors import MotionError, OutOfRangeError
 from mcz.indexing import row_numbers
@@ -243,8 +255,10 @@ class Motion:
     """A skeleton in motion: the motion signal first, then any others (analog, ...).
 
     ``frame_rate`` in frames a second, None while unknown; ``frame_rate_exact`` is False where the
-    source gave a rounded frame time. ``frame_numbers`` (int64) is None for 1, 2, 3, ...
-    ``metadata`` maps keys of SPEC.md's registry, or private ``x-`` keys, to text.
+    source gave a rounded frame time. ``frame_numbers`` (int64) is None for 1, 2, 3, ...; they count
+    ``number_step`` from a frame to the next, more than 1 where frames were left out evenly.
+    ``metadata`` maps keys of SPEC.md's registry, or private ``x-`` keys, to text. All of them, a
+    signal of times and the source say when each frame was: ``times``.
     """
 
     skeleton: Skeleton
@@ -255,6 +269,7 @@ class Motion:
     metadata: Mapping[str, str] = field(default_factory=dict)
     source: Source | None = None
     frame_numbers: NDArray[np.int64] | None = None
+    number_step: int = 1
 
     __repr__ = brief.motion_text
     _repr_html_ = html_of
@@ -315,21 +330,85 @@ class Motion:
         return self.cut(chosen.start, max(chosen.start, chosen.stop))
 
     def cut(self, start: int, stop: int) -> Motion:
-        """Frames start <= f < stop alone, with their numbers."""
+        """Frames start <= f < stop alone, with their numbers and times."""
         if (start, stop) == (0, self.n_frames):
             return self
         numbers = self.frame_numbers
         if numbers is None and start:
             numbers = np.arange(1, self.n_frames + 1, dtype=np.int64)
-        return replace(
+        made = replace(
             self,
             signals=tuple(signal.cut(start, stop) for signal in self.signals),
             frame_numbers=None if numbers is None else numbers[start:stop],
             source=self.source and self.source.cut(start, stop),
         )
+        if START not in self.metadata:
+            return made
+        return made.at_times(self.timeline and self.timeline.cut(slice(start, stop)))
 
     def with_values(self, values: NDArray[np.float64]) -> Motion:
         """The same motion with other values of its motion signal, same shape."""
         signal = replace(self.signals[0], values=np.asarray(values, dtype=np.float64))
         source = self.source and self.source.of_no_file()
         return replace(self, signals=(signal, *self.signals[1:]), source=source)
+
+    @property
+    def timeline(self) -> Timeline | None:
+        """When every frame was, None where neither times nor a rate are known."""
+        column = None
+        index = time_signal(self.signals)
+        first = self.signals[0]
+        if first.channels is None and has_times(self.skeleton) and first.samples_per_frame == 1:
+            index = 0
+        if index is not None:
+            signal = self.signals[index]
+            channels = self.skeleton.channels if index == 0 else signal.channels or ()
+            column = column_of(signal.masked()[:, 0], signal.grids[0], channels[0].unit)
+        numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
+        clock = self.source.clock if self.source is not None else None
+        counting = Counting(numbers, self.frame_rate, self.number_step)
+        return timeline_of(counting, self.metadata, clock, column)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """The time of every frame in seconds, (n_frames,): see ``mcz.times``; OptionError."""
+        return known_times(self.name, self.timeline)
+
+    def without_source(self) -> Motion:
+        """The same motion without its source, at the same times."""
+        return replace(self, source=None).at_times(self.timeline)
+
+    def counted_by_ones(self) -> Motion:
+        """The same motion at the same times with a ``number_step`` of 1, as files have it.
+
+        Where its source prints the frame numbers, they are kept, and it gets a signal ``time``.
+        """
+        if self.number_step == 1:
+            return self
+        motion, timeline = replace(self, number_step=1), self.timeline
+        if self.source is None or timeline is None:
+            return motion.at_times(timeline)
+        return motion._with_time_signal(timeline)
+
+    def at_times(self, timeline: Timeline | None) -> Motion:
+        """This motion at these times, which its source does not tell; None: at unknown ones.
+
+        Frame numbers are kept where they give such times; else they are others, or the motion gets
+        a signal ``time``.
+        """
+        metadata = {key: text for key, text in self.metadata.items() if key != START}
+        motion = replace(self, metadata=metadata)
+        own = motion.timeline
+        if timeline is None or not self.n_frames or (own and own.is_near(timeline)):
+            return motion
+        numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
+        found = numbered(timeline, numbers)
+        if found is not None:
+            metadata |= {START: found.start} if found.start else {}
+            return replace(motion, frame_numbers=found.numbers, metadata=metadata, number_step=1)
+        return motion._with_time_signal(timeline)
+
+    def _with_time_signal(self, timeline: Timeline) -> Motion:
+        channels = (Channel("", "time", "s"),)
+        signal = Signal(timeline.times[:, None].copy(), name="time", channels=channels)
+        return replace(self, signals=(*self.signals, signal))

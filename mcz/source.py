@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mcz import brief
 
@@ -18,12 +22,25 @@ class FrameNotes(Protocol):
         """The notes of frames start <= f < stop alone, numbered from 0."""
 
 
+class SourceClock(Protocol):
+    """The times that a source gives to frame numbers; a source format defines it."""
+
+    def times(
+        self, numbers: NDArray[np.int64], rate: Fraction | None
+    ) -> NDArray[np.float64] | None:
+        """The times of frames in seconds; None where ``rate``, in frames a second, is missing."""
+
+    def rounding(self, rate: Fraction | None) -> float:
+        """The most seconds by which a printed time is off."""
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
     """What is needed, beside the values, to restore a source file byte for byte.
 
     ``template`` is shared by clips that were printed alike; ``detail`` belongs to this clip;
-    ``notes`` holds what is said frame by frame. All three are defined by the source format.
+    ``notes`` holds what is said frame by frame. All three are defined by the source format, as is
+    ``clock``: the times that the template gives to frame numbers, None where it gives none.
     """
 
     format: str
@@ -33,6 +50,7 @@ class Source:
     path: str = ""
     size: int = 0
     sha256: bytes = b""
+    clock: SourceClock | None = field(default=None, repr=False)
 
     __repr__ = brief.source_text
 

@@ -20,7 +20,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # What a part may import; a part is the first name after ``mcz.``. Each may import itself.
 GROUND = {"arguments", "brief", "displays", "errors", "indexing", "schema", "numbers", "threads"}
-MODEL = GROUND | {"motion", "skeleton", "source"}
+MODEL = GROUND | {"clock", "motion", "skeleton", "source"}
 # Where motion, codec and container meet: what each of the doors below needs of the layers.
 JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
 DOORS = {"reading", "writing", "editing", "live", "conversion"}
@@ -36,7 +36,8 @@ ALLOWED = {
     "numbers": {"brief", "errors", "schema"},
     "source": GROUND,
     "skeleton": GROUND | {"source"},
-    "motion": GROUND | {"skeleton", "source"},
+    "clock": GROUND | {"skeleton", "source"},
+    "motion": GROUND | {"clock", "skeleton", "source"},
     "kinematics": MODEL,
     "angles": MODEL | {"whole_turns"},
     "whole_turns": MODEL,

@@ -46,7 +46,7 @@ def from_ezc3d(c3d: Any, *, name: str = "motion") -> Motion:
         return motion
     note = "; ".join(filter(None, (motion.metadata.get("source-note"), NOTE)))
     metadata = {**motion.metadata, "source-note": note}
-    return replace(motion, signals=signals, source=None, metadata=metadata)
+    return replace(motion, signals=signals, metadata=metadata).without_source()
 
 
 def to_ezc3d(motion: Motion) -> Any:

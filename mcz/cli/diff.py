@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
 from pathlib import PurePath
@@ -210,8 +210,7 @@ class _Side:
                     model=wanted.model,
                 )
                 start, stop = _range(frames, motion.n_frames, self.path)
-                signals = tuple(signal.cut(start, stop) for signal in motion.signals)
-                motion = replace(motion, signals=signals, source=None, frame_numbers=None)
+                motion = motion.cut(start, stop)
                 ratios = None
             else:
                 clip = self.file.only_clip(name)

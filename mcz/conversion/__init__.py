@@ -64,7 +64,7 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
             f"motion {motion.name!r}: its frame rate is unknown, and {to.upper()} states one; "
             "give the rate"
         )
-    return replace(TARGETS[to](motion), source=None)
+    return replace(TARGETS[to](motion), source=None).at_times(motion.timeline)
 
 
 def converted_files(

@@ -123,7 +123,7 @@ def from_positions(motion: Motion, base: Skeleton) -> Solved:
         signals=(signal, *motion.signals[1:]),
         metadata=without_note(motion),
         source=None,
-    )
+    ).at_times(motion.timeline)
     return Solved(solved, _fit(base, values, seen, virtual, first.samples_per_frame))
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from mcz.clock import has_times
 from mcz.conversion.markers import to_c3d
-from mcz.formats.table_plain import has_times
 from mcz.motion import Motion
 from mcz.numbers import Grid, GridKind
 

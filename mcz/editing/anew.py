@@ -72,13 +72,14 @@ def joints_alone(cut: ClipCut) -> Motion:
     )
     metadata = dict(motion.metadata)
     add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
-    return replace(
+    made = replace(
         motion,
         skeleton=skeleton,
         signals=(signal, *motion.signals[1:]),
         source=None,
         metadata=metadata,
     )
+    return made.at_times(motion.timeline)
 
 
 def settings_of_joints(clip: Clip) -> dict[str, Any]:

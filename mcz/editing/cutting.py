@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from mcz.clock import START, numbered
 from mcz.codecs.contract import Codec
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
@@ -207,6 +208,8 @@ def clip_fields(cut: ClipCut, skeleton: bytes, fields: Any) -> dict[str, Any]:
         metadata |= frame_number_metadata(numbers if given else None)
     if cut.joints is not None:
         add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
+    if cut.joints is not None or START in metadata:
+        keep_times(cut, metadata)
     return dict(fields) | {
         "flags": fields.flags & ~payloads.OPEN_CLIP,
         "skeleton": skeleton,
@@ -217,6 +220,19 @@ def clip_fields(cut: ClipCut, skeleton: bytes, fields: Any) -> dict[str, Any]:
             _signal_fields(part, own) for part, own in zip(cut.signals, fields.signals, strict=True)
         ],
     }
+
+
+def keep_times(cut: ClipCut, metadata: dict[str, str]) -> None:
+    """Make frame numbers and ``start-time`` tell the times of a cut, whose source may be gone."""
+    metadata.pop(START, None)
+    if cut.clip.timeline is None or not cut.n_frames:
+        return
+    frames = slice(cut.start, cut.stop)
+    found = numbered(cut.clip.timeline.cut(frames), cut.clip.frame_numbers[frames])
+    if found is not None:
+        metadata.pop(KEY, None)
+        metadata |= frame_number_metadata(found.numbers)
+        metadata |= {START: found.start} if found.start else {}
 
 
 def add_note(metadata: dict[str, str], key: str, text: str) -> None:

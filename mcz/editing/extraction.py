@@ -39,6 +39,7 @@ from mcz.editing.cutting import (
     clip_fields,
     cut_segment,
     cut_skeleton,
+    keep_times,
     plan_cut,
 )
 from mcz.errors import MotionError, OptionError
@@ -297,6 +298,7 @@ class Copier:
                 data = FORMATS[motion.source.format].write(motion)
             except MotionError as error:
                 new["source"] = []
+                keep_times(cut, metadata)
                 add_note(metadata, "source-note", f"the source file was left out: {error}")
                 self.found.left_out.append(f"clip {cut.clip.name}: its source file, as {error}")
                 return b"", hashes

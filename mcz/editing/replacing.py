@@ -337,7 +337,7 @@ class _AnewEditor(Copier):
             metadata = dict(motion.metadata)
             add_note(metadata, "source-note", f"the source file was left out: {error}")
             self.found.left_out.append(f"clip {motion.name}: its source file, as {error}")
-            return dataclasses.replace(motion, source=None, metadata=metadata)
+            return dataclasses.replace(motion, metadata=metadata).without_source()
         return dataclasses.replace(motion, source=motion.source.of_no_file())
 
     def _record(self, now: dict[str, str], decoded: Sequence[NDArray[Any]]) -> dict[str, str]:

@@ -17,6 +17,7 @@ from mcz.formats.line_by_line import Arriving
 from mcz.formats.notes import join_notes
 from mcz.formats.table_notes import join_table_notes
 from mcz.motion import FrameNotes, Source
+from mcz.source import SourceClock
 
 __all__ = [
     "FORMATS",
@@ -48,6 +49,8 @@ class Format:
     much of what is written. ``recording(name, template, detail)`` is what the source
     says beside all numbers, None where it says nothing; see ``mcz.Recording``. ``is_motion(data)``
     says of a suffix that others use, too, whether a file that begins so seems to be of this format.
+    ``clock(template)`` gives the times that the template states, None where frame numbers and the
+    rate alone do.
     """
 
     name: str
@@ -65,6 +68,7 @@ class Format:
     has_more_joints: Callable[..., bool] | None = None
     bones: Callable[..., dict[str, int]] | None = None
     is_motion: Callable[[bytes], bool] | None = None
+    clock: Callable[[bytes], SourceClock | None] | None = None
 
     @property
     def suffix(self) -> str:
@@ -115,6 +119,7 @@ FORMATS: dict[str, Format] = {
             _of("c3d", "write"),
             states_rate=True,
             recording=_of("c3d_recording", "recording"),
+            clock=_of("c3d_layout", "clock_of"),
         ),
         Format(
             "c3d-outputs",  # a C3D whose points are not all points; the table gives c3d for .c3d
@@ -124,6 +129,7 @@ FORMATS: dict[str, Format] = {
             _of("c3d", "write"),
             states_rate=True,
             recording=_of("c3d_recording", "recording"),
+            clock=_of("c3d_layout", "clock_of"),
         ),
         *(
             Format(
@@ -135,6 +141,7 @@ FORMATS: dict[str, Format] = {
                 join_table_notes,
                 states_rate=True,
                 is_table=True,
+                clock=_of("table_layout", "clock_of"),
             )
             for format_id, name, module in (
                 (6, "trc", "trc"),
@@ -153,6 +160,7 @@ FORMATS: dict[str, Format] = {
                 states_rate=True,
                 is_table=True,
                 is_motion=_of("csv_files", "is_motion"),
+                clock=_of("table_layout", "clock_of"),
             )
             for format_id, name in ((11, "csv"), (9, "motive"), (10, "vicon"))
         ),

@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from mcz.errors import MotionError
-from mcz.formats.c3d_layout import Kind, Layout
+from mcz.formats.c3d_layout import FrameClock, Kind, Layout
 from mcz.formats.c3d_outputs import NAME as OUTPUTS
 from mcz.formats.c3d_outputs import described
 from mcz.formats.c3d_parameters import BLOCK, INTEL, Order
@@ -81,7 +81,8 @@ def plain(motion: Motion) -> Motion:
     )
     layout = _layout(motion, scale, said, (n_channels, subframes))
     template, detail = layout.build()
-    return replace(motion, signals=tuple(signals), source=Source(layout.format, template, detail))
+    source = Source(layout.format, template, detail, clock=FrameClock())
+    return replace(motion, signals=tuple(signals), source=source)
 
 
 def _analog(signal: Signal | None) -> tuple[Signal | None, Scaling | None]:

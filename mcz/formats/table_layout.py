@@ -8,7 +8,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from math import log10
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mcz.errors import FormatError, LimitError
 from mcz.formats.layout import (
@@ -114,6 +119,25 @@ class Clock:
             raise FormatError("source template: a time is no number of its grid")
         return found
 
+    def times(self, numbers: NDArray[np.int64], rate: Fraction | None) -> NDArray[np.float64]:
+        """The times as they are printed, in seconds."""
+        ordinals = np.array(self.ordinals(numbers.tolist()), np.int64)
+        return self.grid.values(ordinals) / self._per_second(rate)
+
+    def rounding(self, rate: Fraction | None) -> float:
+        """Half a unit of the last digit, in seconds."""
+        return 0.5 * 10.0**-self.grid.digits / self._per_second(rate)
+
+    def _per_second(self, rate: Fraction | None) -> float:
+        """1, or 1000, 10^6 or 10^9, whichever is nearest to the printed units a frame, in frames.
+
+        Of a rate that is unknown, and of times that stand still: 1.
+        """
+        if rate is None or not self.numerator:
+            return 1.0
+        a_frame = self.numerator / (self.denominator * 10**self.grid.digits) * float(rate)
+        return float(10 ** (3 * min(3, max(0, round(log10(a_frame) / 3)))))
+
 
 @dataclass(frozen=True, slots=True)
 class Section:
@@ -168,16 +192,27 @@ def parse_table(template: bytes, detail: bytes, sizes: Sequence[int]) -> list[Se
 def _section(shared: Any, own: Any, sizes: Sequence[int]) -> Section:
     if not shared.signals:  # TABLE-08
         raise FormatError("source template: a section without signals")
-    clock = None
-    if shared.clock:
-        fields = shared.clock[0]
-        if fields.grid.kind not in DECIMALS:  # TABLE-02
-            raise FormatError(f"source template: times on a grid {fields.grid.kind.name}")
-        clock = Clock(fields.grid, fields.numerator, fields.denominator, fields.offset)
+    clock = _clock(shared)
     n_columns = sum(sizes[number] for number in shared.signals) + 1 + len(shared.clock)  # TABLE-01
     rows = parsed_patterns((shared.header,), shared, own, n_columns)
     signals = tuple(shared.signals)
     return Section(signals, shared.header, bool(shared.marks), shared.missing, clock, rows)
+
+
+def clock_of(template: bytes) -> Clock | None:
+    """The clock of the section that the motion is in; FormatError on bad bytes."""
+    shared = parse(TABLE_TEMPLATE, template, "source template", {"runs": MAX_RUNS}).sections
+    section = next((fields for fields in shared if 0 in fields.signals), None)
+    return _clock(section) if section is not None else None
+
+
+def _clock(shared: Any) -> Clock | None:
+    if not shared.clock:
+        return None
+    fields = shared.clock[0]
+    if fields.grid.kind not in DECIMALS:  # TABLE-02
+        raise FormatError(f"source template: times on a grid {fields.grid.kind.name}")
+    return Clock(fields.grid, fields.numerator, fields.denominator, fields.offset)
 
 
 def fill(header: bytes, names: Sequence[str], count: bytes) -> bytes:

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
+from mcz.clock import has_times
 from mcz.errors import MotionError
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.restore import numbers_of
 from mcz.formats.table_layout import Clock, Section, build_table
-from mcz.motion import POSITION_KINDS, Motion, Skeleton, Source
+from mcz.motion import POSITION_KINDS, Motion, Source
 from mcz.numbers import Grid, GridKind
 
 UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m"}
@@ -65,12 +66,6 @@ def plain_storage(motion: Motion, format_name: str = "sto") -> Motion:
     return _with_source(motion, format_name, header, b"nan", items, timed=timed)
 
 
-def has_times(skeleton: Skeleton) -> bool:
-    """Whether the first column is the time, as of a STO or MOT that was read."""
-    channels = skeleton.joints[0].channels if skeleton.joints else ()
-    return len(channels) == 1 and skeleton.joints[0].name == "time" and not channels[0].kind
-
-
 def _with_source(
     motion: Motion,
     format_name: str,
@@ -87,7 +82,7 @@ def _with_source(
     clock = None if timed else _clock(motion)
     rows = Layout((), (Pattern(runs_of(items), b"\n"),))
     template, detail = build_table([Section((0,), header.encode(), True, missing, clock, rows)])
-    source = Source(format_name, template, detail)
+    source = Source(format_name, template, detail, clock=clock)
     return replace(motion, signals=motion.signals[:1], source=source)
 
 

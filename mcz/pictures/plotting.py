@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -106,8 +106,7 @@ def _motion(moving: Moving, cut: tuple[int, int] | None, facts: Any) -> Motion:
     if isinstance(moving, Motion):
         motion = moving
         if cut is not None and cut != (0, moving.n_frames):
-            signals = tuple(signal.cut(*cut) for signal in moving.signals)
-            motion = replace(moving, signals=signals, source=None, frame_numbers=None)
+            motion = moving.cut(*cut)
     else:
         clip: Any = moving
         motion = clip.motion(cut)

@@ -7,6 +7,7 @@ identity. Everything takes a Motion or a Clip, of which only what is needed is d
 
 from __future__ import annotations
 
+from mcz.poses.moving import times
 from mcz.poses.places import Root, accelerations, point_names, positions, root, velocities
 from mcz.poses.resampling import resample
 from mcz.poses.turns import rotations
@@ -19,5 +20,6 @@ __all__ = [
     "resample",
     "root",
     "rotations",
+    "times",
     "velocities",
 ]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import Timeline, known_times
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Floats
 from mcz.motion import Motion, Skeleton
@@ -30,6 +31,8 @@ class Decoded(Protocol):
     def frame_rate(self) -> Fraction | None: ...
     @property
     def signals(self) -> Sequence[Any]: ...
+    @property
+    def timeline(self) -> Timeline | None: ...
     def read(
         self, frames: tuple[int, int] | None = None, joints: Joints = None, resolution: int = 0
     ) -> NDArray[Any]: ...
@@ -102,6 +105,33 @@ def rate_of(moving: Moving) -> float:
     if moving.frame_rate is None:
         raise OptionError(f"{moving.name!r}: its frame rate is unknown; say it when reading")
     return float(moving.frame_rate)
+
+
+def times(moving: Moving, frames: Frames = None, *, signal: int | str = 0) -> NDArray[np.float64]:
+    """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
+
+    In this order: the times that the file has as numbers (a column ``time``, an array of times);
+    those that it gives to frame numbers (TRC, Motive, C3D, ...); the metadata key ``start-time``,
+    the time of the first frame; else (number - 1) / rate, so that frame 1 is at 0 s. Events are on
+    the same clock. ``signal``, by index or name: the times of its samples, which lie evenly from
+    each frame on. ``frames`` (a, b) or a slice. Raises OptionError where neither times nor a rate
+    are known.
+    """
+    start, stop = frame_range(moving, frames)
+    known_times(moving.name, moving.timeline)
+    timeline = cast("Timeline", moving.timeline)
+    per_frame = signal_of(moving, signal).samples_per_frame
+    return timeline.samples(per_frame)[start * per_frame : stop * per_frame]
+
+
+def signal_of(moving: Moving, signal: int | str) -> Any:
+    """A signal by index or name, the first of its name; raises OptionError."""
+    names = [each.name for each in moving.signals]
+    if isinstance(signal, str) and signal in names:
+        return moving.signals[names.index(signal)]
+    if isinstance(signal, str) or not 0 <= signal < len(names):
+        raise OptionError(f"{moving.name!r} has no signal {signal!r}, but {', '.join(names)}")
+    return moving.signals[signal]
 
 
 def as_type(values: NDArray[Any], dtype: Any) -> NDArray[Any]:

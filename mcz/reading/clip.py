@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.brief import shown
+from mcz.clock import START
 from mcz.codecs import by_id
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
@@ -21,7 +22,7 @@ from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.value_hash import value_hash
 from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
-from mcz.formats import FORMATS, format_by_id
+from mcz.formats import FORMATS
 from mcz.formats.c3d_recording import Recording
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
 from mcz.numbers.scaling import Scaling
@@ -32,7 +33,7 @@ from mcz.reading.preview import Preview, preview
 from mcz.reading.recording import index_of, read_recording, scaling_of
 from mcz.reading.signal_info import SignalInfo, groups_of, read_signal
 from mcz.reading.signal_reader import SignalReader
-from mcz.reading.source_info import SourceInfo, read_source, sourced_skeleton
+from mcz.reading.source_info import SourceInfo, read_source, source_info, sourced_skeleton
 from mcz.reading.views import ClipValues, FrameValues, Masked
 from mcz.schema import parse
 from mcz.skeleton import Joints, joint_list
@@ -139,16 +140,7 @@ class Clip(Extent, Posed):
     @property
     def source(self) -> SourceInfo | None:
         """Format, path, size and hash of the source file; None where the clip has none."""
-        if not self._fields.source:
-            return None
-        fields = self._fields.source[0]
-        hashes = self._cend.source_sha256 if self._cend is not None else []
-        return SourceInfo(
-            format_by_id(fields.format).name,
-            fields.path,
-            fields.size,
-            bytes(hashes[0]) if hashes else b"",
-        )
+        return source_info(self._fields, self._cend)
 
     @property
     def quality(self) -> dict[str, str] | None:
@@ -328,8 +320,10 @@ class Clip(Extent, Posed):
             frame_numbers=None if "frame-numbers" not in self.metadata and not start else numbers,
         )
         step = 2**resolution if decimate else 1
-        if step > 1:
-            motion = decimated(motion, step)
+        motion = decimated(motion, step) if step > 1 else motion
+        if step > 1 or START in motion.metadata:
+            timeline = self.timeline and self.timeline.cut(slice(start, stop, step))
+            motion = motion.at_times(timeline)
         return replace(motion, source=self._source(start, stop, resolution, step))
 
     def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:

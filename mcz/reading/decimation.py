@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import numbers_or_rows
 from mcz.motion import Exceptions, FrameNotes, Motion, Signal
 
 JoinNotes = Callable[[Sequence[tuple[int, int, bytes]]], FrameNotes]
@@ -28,14 +29,13 @@ def decimated(motion: Motion, step: int) -> Motion:
 
     Its source is left out.
     """
-    numbers = motion.frame_numbers
-    if numbers is None:
-        numbers = np.arange(1, motion.n_frames + 1)
+    numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
     return replace(
         motion,
         signals=tuple(_decimated_signal(signal, step) for signal in motion.signals),
         frame_rate=None if motion.frame_rate is None else motion.frame_rate / step,
         frame_numbers=numbers[::step],
+        number_step=motion.number_step * step,
         source=None,
     )
 

@@ -51,12 +51,10 @@ def post_filter(motion: Motion, rate: Fraction | float | None = None) -> Motion:
         samples_per_frame=first.samples_per_frame,
         mask=first.mask,
     )
-    return replace(
-        motion,
-        signals=(signal, *motion.signals[1:]),
-        metadata=_noted(motion.metadata),
-        source=None,
+    filtered = replace(
+        motion, signals=(signal, *motion.signals[1:]), metadata=_noted(motion.metadata)
     )
+    return filtered.without_source()
 
 
 def live_filter(skeleton: Skeleton, rate: Fraction | None, name: str = "live") -> PostFilter:
@@ -100,7 +98,7 @@ def filtered_motion(
     rate: Fraction | None = None,
 ) -> Motion:
     """As ``clip.motion``, its positions cut out of the whole clip, filtered; without a source."""
-    motion = replace(_with_places(clip, frames, resolution, decimate, rate), source=None)
+    motion = _with_places(clip, frames, resolution, decimate, rate).without_source()
     first = motion.signals[0]
     signal = Signal(
         first.values, name=first.name, samples_per_frame=first.samples_per_frame, mask=first.mask

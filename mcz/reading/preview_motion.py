@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mcz.clock import Timeline
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
 
@@ -26,12 +27,17 @@ def preview_motion(clip: Clip) -> Motion:
         mask=None if found.mask is None else found.mask[:n_rows],
         channels=info.channels,
     )
-    return Motion(
+    frames, timeline = found.frames[:n_frames], clip.timeline
+    motion = Motion(
         skeleton=clip.skeleton,
         signals=(signal,),
         frame_rate=None if rate is None else rate / found.step,
         frame_rate_exact=clip.frame_rate_exact,
         name=clip.name,
         metadata={k: v for k, v in clip.metadata.items() if k != "frame-numbers"},
-        frame_numbers=clip.frame_numbers[found.frames[:n_frames]],
+        frame_numbers=clip.frame_numbers[frames],
+        number_step=found.step,
     )
+    if timeline is not None:
+        timeline = Timeline(timeline.times[frames], motion.frame_rate, timeline.rounding)
+    return motion.at_times(timeline)

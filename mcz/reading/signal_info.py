@@ -44,6 +44,10 @@ class SignalInfo:
     spare: int = 0
 
     @property
+    def samples_per_frame(self) -> int:
+        return self.layout.samples_per_frame
+
+    @property
     def codec(self) -> Codec:
         """Raises UnsupportedError where this reader lacks the codec."""
         return by_id(self.codec_id, self.codec_version)

@@ -8,10 +8,12 @@ from typing import Any
 
 from mcz.container import payloads
 from mcz.container.reader import Container
+from mcz.errors import UnsupportedError
 from mcz.formats import FORMATS, Format, format_by_id
 from mcz.motion import FrameNotes, Skeleton, Source
 from mcz.reading.decimation import picked_notes
 from mcz.reading.signal_info import SignalInfo
+from mcz.source import SourceClock
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,16 @@ class SourceInfo:
         return (*FORMATS[self.format].suffixes, *([own] if own else []))
 
 
+def source_info(fields: Any, cend: Any) -> SourceInfo | None:
+    """The facts in CLIP and CEND of a clip (None: it has no CEND); None where it has no source."""
+    if not fields.source:
+        return None
+    source = fields.source[0]
+    hashes = cend.source_sha256 if cend is not None else []
+    name = format_by_id(source.format).name
+    return SourceInfo(name, source.path, source.size, bytes(hashes[0]) if hashes else b"")
+
+
 def read_source(
     container: Container, fields: Any, info: SourceInfo, signal: SignalInfo, frames: range
 ) -> Source:
@@ -38,15 +50,37 @@ def read_source(
     ``signal`` is the clip's motion, whose segments hold the notes. Raises FormatError.
     """
     source_format = format_by_id(fields.format)
+    template = container.template(fields.template, fields.format)
     return Source(
         format=info.format,
-        template=container.template(fields.template, fields.format),
+        template=template,
         detail=bytes(fields.detail),
         notes=_notes(container, source_format, signal, frames),
         path=info.path,
         size=info.size,
         sha256=info.sha256,
+        clock=clock_of(source_format, template, signal),
     )
+
+
+def clock_of(source_format: Format, template: bytes, signal: SignalInfo) -> SourceClock | None:
+    """The times that a template gives to the frames of ``signal``, the motion; FormatError."""
+    if source_format.clock is None or signal.layout.samples_per_frame > 1:
+        return None
+    found: SourceClock | None = source_format.clock(template)
+    return found
+
+
+def read_clock(container: Container, fields: Any, signal: SignalInfo) -> SourceClock | None:
+    """The clock of the source of a clip whose CLIP is ``fields``, None where it has none."""
+    if not fields.source:
+        return None
+    source = fields.source[0]
+    try:
+        source_format = format_by_id(source.format)
+    except UnsupportedError:  # nothing is known of it
+        return None
+    return clock_of(source_format, container.template(source.template, source.format), signal)
 
 
 def _notes(

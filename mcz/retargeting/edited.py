@@ -34,7 +34,8 @@ def check_channels(motion: Motion) -> None:
 
 def edited(motion: Motion, skeleton: Skeleton, signal: Signal) -> Motion:
     """``motion`` of another skeleton and signal, without the source file that it no longer is."""
-    return replace(motion, skeleton=skeleton, signals=(signal, *motion.signals[1:]), source=None)
+    made = replace(motion, skeleton=skeleton, signals=(signal, *motion.signals[1:]), source=None)
+    return made.at_times(motion.timeline)
 
 
 def computed(motion: Motion, values: Floats) -> Signal:

@@ -94,7 +94,7 @@ def write_clip(
     options = codec.options(params, inner=True)
     if codec.dial and asked(options) and options[codec.dial.parameter] is None:
         raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
-    motion = _with_source_hash(as_stored(motion))
+    motion = _with_source_hash(as_stored(motion.counted_by_ones()))
     for signal in motion.signals:
         check(f"signal {signal.name!r}: channels", signal.n_channels, writer.profile.channels)
     coded = [

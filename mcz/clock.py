@@ -1,0 +1,301 @@
+"""The time of every frame, in seconds. SPEC.md, "Time", is normative.
+
+A ``Timeline`` is made of what a motion or a clip says: a column of times, a clock of its source, a
+start time, frame numbers and a rate. ``Motion.times``, ``Clip.times`` and ``mcz.times`` give it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import OptionError
+from mcz.numbers import Grid, GridKind
+from mcz.skeleton import Channel, Skeleton
+from mcz.source import SourceClock
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+START = "start-time"  # of the registry
+PER_SECOND = {"": 1.0, "s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}  # units of a column of times
+NAMES = ("time", "times", "timestamp", "timestamps")  # of a signal of times
+JITTER = 1e-6  # of a step: binary times that are off by less are uniform
+EXACT = 1e-10  # seconds: the most by which two times of one clock differ
+GAP = 1.5  # steps: frames further apart are not neighbors
+_NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?")
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """The times of frames in seconds, as their source has them.
+
+    ``times`` float64 (n_frames,), never falling. ``rounding`` is how far each may be from the one
+    that was meant, as of printed decimals. ``note`` tells of times in the source that do not count.
+    """
+
+    times: Floats
+    rate: Fraction | None
+    rounding: float = 0.0
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        self.times.setflags(write=False)
+
+    @cached_property
+    def counts(self) -> Ints | None:
+        """The whole number of 1 / rate from each frame to the next, (n_frames - 1,).
+
+        None where the rate is unknown or the times do not lie on such a grid.
+        """
+        if self.rate is None or not len(self.times):
+            return None
+        rate, since = float(self.rate), self.times - self.times[0]
+        tolerance = 2 * self.rounding + 8 * float(np.spacing(np.abs(self.times).max())) + EXACT
+        frames = np.arange(len(since), dtype=np.float64)
+        for places in (frames, np.concatenate([[0.0], np.rint(np.diff(since) * rate).cumsum()])):
+            if not places[-1] < 2**53:
+                continue
+            off = since - places / rate
+            if len(off) == 0 or off.max() - off.min() <= tolerance:
+                return np.diff(places).astype(np.int64)
+        return None
+
+    @cached_property
+    def even(self) -> Floats:
+        """``times`` without what rounding did to them: at whole multiples of 1 / rate if so."""
+        if self.counts is None or self.rate is None:
+            return self.times
+        places = np.concatenate([[0], self.counts.cumsum()])
+        return self.times[:1] + places / float(self.rate)
+
+    @cached_property
+    def _all_steps(self) -> Floats:
+        if self.counts is None or self.rate is None:
+            return np.diff(self.times)
+        return self.counts / float(self.rate)
+
+    @cached_property
+    def period(self) -> float | None:
+        """The usual seconds from a frame to the next, None where nothing says it."""
+        steps = self._all_steps
+        steps = steps[steps > 0]
+        if self.rate is not None and len(steps) < 3:
+            return 1.0 / float(self.rate)
+        return float(np.median(steps)) if len(steps) else None
+
+    @cached_property
+    def steps(self) -> Floats:
+        """Seconds from each frame to the next, (n_frames - 1,); NaN across a gap."""
+        steps = self._all_steps.copy()
+        if self.period is not None:
+            steps[(steps > GAP * self.period) | (steps <= 0)] = np.nan
+        return steps
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether every frame follows the one before by the same step, up to rounding."""
+        steps = self.steps
+        return len(steps) == 0 or bool(np.isfinite(steps).all() and np.ptp(steps) <= EXACT)
+
+    @property
+    def runs(self) -> list[tuple[int, int]]:
+        """The frames a <= f < b between gaps."""
+        if not len(self.times):
+            return []
+        starts = [0, *(np.flatnonzero(np.isnan(self.steps)) + 1).tolist()]
+        return list(zip(starts, [*starts[1:], len(self.times)], strict=True))
+
+    def is_near(self, other: Timeline) -> bool:
+        """Whether the times are those of ``other``, up to its rounding."""
+        if len(self.times) != len(other.times):
+            return False
+        off = np.abs(self.times - other.even).max(initial=0.0)
+        return bool(off <= other.rounding + EXACT)
+
+    def samples(self, per_frame: int) -> Floats:
+        """The times of ``per_frame`` samples a frame, evenly from each frame on; NaN if unknown."""
+        if per_frame == 1:
+            return self.times
+        if self.rate is not None:
+            lengths = np.full(len(self.times), 1.0 / float(self.rate))
+        else:
+            steps = np.concatenate([self.steps, self.steps[-1:], [np.nan]])[: len(self.times)]
+            lengths = np.where(np.isnan(steps), self.period or np.nan, steps)
+        within = np.arange(per_frame) / per_frame
+        found: Floats = (self.times[:, None] + lengths[:, None] * within).ravel()
+        return found
+
+    def cut(self, frames: slice) -> Timeline:
+        """The times of these frames, at the rate divided by the step of ``frames``."""
+        rate = self.rate and self.rate / (frames.step or 1)
+        return Timeline(self.times[frames], rate, self.rounding, self.note)
+
+
+class Column(NamedTuple):
+    """Times as a file has them, in seconds, and how far rounding may have moved each."""
+
+    times: Floats
+    rounding: float
+
+
+class Timed(Protocol):
+    """A signal, of a Motion or a Clip, that may be one of times."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def channels(self) -> tuple[Channel, ...] | None: ...
+    @property
+    def samples_per_frame(self) -> int: ...
+
+
+def has_times(skeleton: Skeleton) -> bool:
+    """Whether the first column of a motion is the time, as of a STO or MOT that was read."""
+    channels = skeleton.joints[0].channels if skeleton.joints else ()
+    return (
+        len(channels) == 1
+        and skeleton.joints[0].name.lower() == "time"
+        and not channels[0].kind
+        and channels[0].unit in PER_SECOND
+    )
+
+
+def is_time(signal: Timed) -> bool:
+    """Whether a signal holds the time of every frame."""
+    own = signal.channels or ()
+    return (
+        signal.name in NAMES
+        and signal.samples_per_frame == 1
+        and len(own) == 1
+        and not own[0].kind
+        and own[0].unit in PER_SECOND
+        and own[0].unit != ""
+    )
+
+
+def column_of(numbers: NDArray[np.generic], grid: Grid, unit: str) -> Column:
+    """The column of times that ``numbers``, (n_frames,), on ``grid`` are in ``unit``."""
+    per_second = PER_SECOND[unit]
+    times = numbers.astype(np.float64) / per_second
+    if grid.kind in (GridKind.FIXED, GridKind.TRIMMED):
+        return Column(times, 0.5 * 10.0**-grid.digits / per_second)
+    if not len(times) or not np.isfinite(times).all():
+        return Column(times, 0.0)
+    most = np.abs(times).max()
+    half = float(np.spacing(np.float32(most) if grid.kind == GridKind.BINARY32 else most)) / 2
+    if grid.kind == GridKind.GENERAL and most > 0:
+        half = 0.5 * 10.0 ** (np.floor(np.log10(most)) + 1 - grid.digits)
+    span = float(times[-1] - times[0])
+    return Column(times, max(half, JITTER * abs(span) / max(1, len(times) - 1) / 2))
+
+
+class Counting(NamedTuple):
+    """Frame numbers, ``step`` from a frame to the next, of which there are ``rate`` a second."""
+
+    numbers: Ints
+    rate: Fraction | None
+    step: int = 1
+
+
+def timeline_of(
+    counting: Counting,
+    metadata: Mapping[str, str],
+    clock: SourceClock | None = None,
+    column: Column | None = None,
+) -> Timeline | None:
+    """The times of frames; None where nothing tells them.
+
+    ``clock`` is that of the source, ``column`` the times that stand among the values.
+    """
+    note = ""
+    numbers, rate, step = counting
+    if column is not None:
+        note = _fault(column.times)
+        if not note:
+            return Timeline(column.times, rate, column.rounding)
+    if clock is not None:
+        told = clock.times(numbers, rate and rate * step)
+        if told is not None and not _fault(told):
+            return Timeline(told, rate, clock.rounding(rate and rate * step), note)
+    if rate is None:
+        return None
+    if len(numbers) and (np.diff(numbers) <= 0).any():
+        note = note or "the frame numbers do not ascend: rows are counted"
+        numbers = numbers[0] + np.arange(len(numbers)) * step
+    start = metadata.get(START, "") if clock is None else ""
+    if _NUMBER.fullmatch(start) and len(numbers):
+        since = (numbers - numbers[0]) / float(rate * step)
+        return Timeline(float(start) + since, rate, note=note)
+    return Timeline((numbers - 1) / float(rate * step), rate, note=note)
+
+
+def _fault(times: Floats) -> str:
+    """Why times do not count, "" where they do."""
+    if not np.isfinite(times).all():
+        frame = int(np.flatnonzero(~np.isfinite(times))[0])
+        return f"the times do not count: that of frame {frame} is unknown"
+    falls = np.flatnonzero(np.diff(times) < 0)
+    return f"the times do not count: they fall at frame {falls[0] + 1}" if len(falls) else ""
+
+
+def known_times(name: str, timeline: Timeline | None) -> Floats:
+    """The times of the motion or clip ``name``; raises OptionError where nothing tells them."""
+    if timeline is None:
+        raise OptionError(
+            f"{name!r}: its frame rate is unknown, and so are its times; say the rate when "
+            "reading (rate=, --rate)"
+        )
+    return timeline.times
+
+
+class Numbered(NamedTuple):
+    """Frame numbers, and the ``start-time`` that makes them times, "" where none is needed."""
+
+    numbers: Ints
+    start: str
+
+
+def numbered(timeline: Timeline, numbers: Ints) -> Numbered | None:
+    """What gives the times of ``timeline`` at its rate where no source and no column does.
+
+    ``numbers`` are kept where they can be. None where frame numbers cannot give such times.
+    """
+    rate, times = timeline.rate, timeline.even
+    if rate is None or not len(times):
+        return None
+    tolerance = timeline.rounding + EXACT
+    first = float(times[0]) * float(rate) + 1
+    candidates = [numbers]
+    if timeline.counts is not None and abs(first) < 2**52:
+        places = np.concatenate([[0], timeline.counts.cumsum()])
+        candidates.append(round(first) + places)
+    for known in candidates:
+        for start in ("", _decimal(float(times[0]))):
+            found = timeline_of(Counting(known, rate), {START: start})
+            if found is not None and np.abs(found.times - times).max() <= tolerance:
+                return Numbered(known, start)
+    return None
+
+
+def _decimal(seconds: float) -> str:
+    """The shortest decimal without an exponent that reads back as ``seconds``."""
+    return format(Decimal(repr(seconds)), "f")
+
+
+def numbers_or_rows(numbers: Ints | None, n_frames: int) -> Ints:
+    """Frame numbers, 1, 2, 3, ... where there are none."""
+    return np.arange(1, n_frames + 1) if numbers is None else numbers
+
+
+def time_signal(signals: Sequence[Timed]) -> int | None:
+    """The index of the first signal of times behind the motion, None where there is none."""
+    return next((k for k, signal in enumerate(signals) if k and is_time(signal)), None)
