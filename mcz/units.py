@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from fractions import Fraction
 
 from mcz.errors import OptionError
 from mcz.motion import Skeleton
@@ -11,11 +13,24 @@ UNIT_CM = {"mm": 0.1, "cm": 1.0, "dm": 10.0, "m": 100.0, "in": 2.54, "ft": 30.48
 UP_AXES = ("x", "y", "z")
 
 
+_LENGTH = re.compile(r"([0-9]{0,15}\.?[0-9]{0,15}) ?([a-z]+)")
+LEAST_CM, MOST_CM = 1e-6, 1e9
+
+
 def unit_cm_of(unit: str) -> float:
-    """Centimeters of a length unit, a key of ``UNIT_CM``; raises OptionError for another."""
-    if unit not in UNIT_CM:
-        raise OptionError(f"unit {unit!r} is not one of {', '.join(UNIT_CM)}")
-    return UNIT_CM[unit]
+    """Centimeters of a length unit, a key of ``UNIT_CM``, or so many of one; raises OptionError.
+
+    >>> unit_cm_of("in"), unit_cm_of("5.6444cm")
+    (2.54, 5.6444)
+    """
+    match = _LENGTH.fullmatch(unit)
+    if not match or match[2] not in UNIT_CM or match[1] == ".":
+        names = ", ".join(UNIT_CM)
+        raise OptionError(f"unit {unit!r} is not one of {names}, nor a length such as 5.6444cm")
+    found = float(Fraction(match[1] or 1) * Fraction(str(UNIT_CM[match[2]])))
+    if not LEAST_CM <= found <= MOST_CM:
+        raise OptionError(f"unit {unit!r} is not between {LEAST_CM:g} and {MOST_CM:g} cm")
+    return found
 
 
 def in_unit(skeleton: Skeleton, unit: str | None) -> Skeleton:

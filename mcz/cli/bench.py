@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mcz.cli.common import Exit, Failure, about, echo, existing, print_json, say, table
-from mcz.cli.options import UNITS, json_option
+from mcz.cli.options import json_option, unit_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ PAPERS = "python -m tools.papers"
 @click.option(
     "--speeds/--no-speeds", default=True, help="Measure speed and memory too. Default: do."
 )
-@click.option("--unit", type=click.Choice(UNITS), help="Length unit of files that say none.")
+@unit_option("Length unit of files that say none.")
 @click.option(
     "--out",
     metavar="DIR",

@@ -20,7 +20,6 @@ from mcz.cli.common import (
 from mcz.cli.delivery import Output, check_count, deliver
 from mcz.cli.made import Made, facts_of, told
 from mcz.cli.options import (
-    UNITS,
     decoded_option,
     force_option,
     json_option,
@@ -28,6 +27,7 @@ from mcz.cli.options import (
     rate_option,
     salvage_option,
     threads_option,
+    unit_option,
     up_option,
     where_option,
 )
@@ -105,11 +105,7 @@ if TYPE_CHECKING:
     "--stored", is_flag=True, help="Its words as they are stored, not in units (with --signal)."
 )
 @up_option("Axis that points up, where the clip does not know it (with --to c3d, glb or usda).")
-@click.option(
-    "--unit",
-    type=click.Choice(UNITS),
-    help="Length unit, where the clip does not know it (with --to glb or usda).",
-)
+@unit_option("Length unit, where the clip does not know it (with --to glb or usda).")
 @key_error_option
 @rate_option("Frames a second, in place of the clip's own (with --to, --post-filter).")
 @click.option(

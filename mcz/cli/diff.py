@@ -25,12 +25,12 @@ from mcz.cli.common import (
 )
 from mcz.cli.diff_lines import lines_of
 from mcz.cli.options import (
-    UNITS,
     arrays_option,
     decoded_option,
     json_option,
     model_option,
     rate_option,
+    unit_option,
     up_option,
     where_option,
 )
@@ -69,7 +69,7 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
 @click.option(
     "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B of both, from 0."
 )
-@click.option("--unit", type=click.Choice(UNITS), help="Length unit of a file that says none.")
+@unit_option("Length unit of a file that says none.")
 @click.option(
     "--skeleton",
     metavar="FILE.asf",

@@ -8,7 +8,6 @@ import click
 
 from mcz.cli.common import Exit, about, existing
 from mcz.cli.options import (
-    UNITS,
     clips_option,
     decoded_option,
     force_option,
@@ -17,6 +16,7 @@ from mcz.cli.options import (
     key_error_option,
     rate_option,
     threads_option,
+    unit_option,
     where_option,
 )
 from mcz.cli.outcomes import conclude
@@ -31,7 +31,7 @@ from mcz.cli.suffixes import TARGETS
 @clips_option
 @where_option
 @rate_option()
-@click.option("--unit", type=click.Choice(UNITS), help="Length unit of clips that say none.")
+@unit_option("Length unit of clips that say none.")
 @key_error_option
 @decoded_option
 @force_option

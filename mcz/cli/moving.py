@@ -12,11 +12,11 @@ import click
 
 from mcz.cli.common import about, existing, opened, to_frames
 from mcz.cli.options import (
-    UNITS,
     arrays_option,
     decoded_option,
     model_option,
     rate_option,
+    unit_option,
     up_option,
 )
 
@@ -37,7 +37,7 @@ def moving_options(function: Function) -> Function:
             "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B, from 0."
         ),
         rate_option(),
-        click.option("--unit", type=click.Choice(UNITS), help="Length unit of a file without."),
+        unit_option("Length unit of a file without."),
         up_option("Axis that points up, of a file that does not say."),
         click.option(
             "--skeleton",

@@ -12,9 +12,9 @@ import click
 from mcz.cli.common import echo, to_params, to_rate
 
 EFFORTS = ("fast", "normal", "best")  # as in mcz.codecs, which takes longer to import
-UNITS = ("mm", "cm", "dm", "m", "in", "ft")
 RATE_HELP = "Frames a second (120, 29.97, 30000/1001) of files that state none."
 ITS_RATE_HELP = "Frames a second (120, 29.97, 30000/1001), in place of what the source states."
+PRESETS = {"mm": 0.1, "visible": 0.5, "preview": 3.0}  # cm, as those of the codec posewave
 Function = Callable[..., Any]
 
 
@@ -167,6 +167,29 @@ param_option = click.option(
 )
 
 
+def _to_unit(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """Callback of a length unit: ``cm``, or one of so many centimeters, ``5.6444cm``."""
+    from mcz.errors import OptionError
+    from mcz.units import unit_cm_of
+
+    if value is not None:
+        try:
+            unit_cm_of(value)
+        except OptionError as error:
+            raise click.BadParameter(str(error)) from None
+    return value
+
+
+def unit_option(what: str) -> Callable[[Function], Function]:
+    """``--unit``, as the argument ``unit``; ``what`` is its help."""
+    return click.option(
+        "--unit",
+        metavar="UNIT",
+        callback=_to_unit,
+        help=f"{what} mm, cm, dm, m, in, ft, or a length (5.6444cm).",
+    )
+
+
 def up_option(what: str) -> Callable[[Function], Function]:
     """``--up``, as the argument ``up``; ``what`` is its help."""
     return click.option("--up", type=click.Choice(("x", "y", "z")), help=what)
@@ -217,6 +240,22 @@ def force_rate_option(function: Function) -> Function:
     )(function)
 
 
+def _to_quality(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
+    """Callback of the greatest error, a length or a word of ``PRESETS``, in centimeters."""
+    from mcz.errors import OptionError
+    from mcz.units import unit_cm_of
+
+    if value is None or value in PRESETS:
+        return None if value is None else PRESETS[value]
+    try:
+        if value[:1] in "0123456789.":
+            return unit_cm_of(value)
+    except OptionError:
+        pass
+    text = f"{value!r} is not one of {', '.join(PRESETS)}, nor a length such as 0.5mm"
+    raise click.BadParameter(text)
+
+
 def encoding_options(function: Function) -> Function:
     """``--codec --effort --param --unit --up ...``, as the arguments of those names."""
     options = (
@@ -226,14 +265,33 @@ def encoding_options(function: Function) -> Function:
             type=click.Choice(EFFORTS),
             help="A lossless codec: read fastest, a little smaller, or smallest.",
         ),
+        click.option(
+            "--quality",
+            metavar="Q",
+            callback=_to_quality,
+            help="Lossy, no point off by more than a length (0.5mm), or than mm (1 mm), visible "
+            "(5 mm) or preview (3 cm) say. Default of --codec with it: lossy.",
+        ),
         param_option,
-        click.option("--unit", type=click.Choice(UNITS), help="Length unit of the source."),
+        unit_option("Length unit of the source."),
         up_option("Axis of the source that points up. BVH and AMC do not say theirs."),
         arrays_option,
         model_option,
         click.option("--verbatim", is_flag=True, help="Keep what cannot be parsed as attachment."),
         click.option("--archive", is_flag=True, help="Use the profile of large limits."),
     )
+
+    @wraps(function)
+    def command(
+        *args: Any, codec: str | None, quality: float | None, params: dict[str, Any], **others: Any
+    ) -> Any:
+        if quality is not None:
+            if "max_error_cm" in params or "preset" in params:
+                raise click.UsageError("--quality and --param both say what the error may be")
+            codec, params = codec or "lossy", params | {"max_error_cm": quality}
+        return function(*args, codec=codec, params=params, **others)
+
+    encoding: Function = command
     for option in reversed(options):
-        function = option(function)
-    return function
+        encoding = option(encoding)
+    return encoding

@@ -23,9 +23,20 @@ def skeleton_lines(skeleton: dict[str, Any]) -> Iterator[str]:
     name = f" {skeleton['name']}" if skeleton["name"] else ""
     id_ = f" ({skeleton['id'][:8]})" if "id" in skeleton else ""
     yield f"skeleton{name}{id_}: {', '.join(facts)}"
+    if height := skeleton["height"]:
+        yield _height(height, unit)
     if skeleton.get("base"):
         yield f"  derived from {skeleton['base'][:8]}"
     yield from _tree(skeleton["joints"])
+
+
+def _height(height: float, unit_cm: float | None) -> str:
+    from mcz.kinematics.rest import note_on_height
+
+    if unit_cm is None:
+        return f"  height {height:.3g} units"
+    text = note_on_height(height, unit_cm) or f"height {height * unit_cm:.3g} cm"
+    return f"  {text}"
 
 
 def _is_plain(joints: list[dict[str, Any]]) -> bool:

@@ -20,7 +20,14 @@ from mcz.cli.common import (
     plural,
     say,
 )
-from mcz.cli.options import UNITS, force_option, param_option, rate_option, token_option, up_option
+from mcz.cli.options import (
+    force_option,
+    param_option,
+    rate_option,
+    token_option,
+    unit_option,
+    up_option,
+)
 from mcz.cli.piped import NAME, live_input, live_output
 from mcz.cli.rows import Rows, skeleton_in
 
@@ -50,7 +57,7 @@ Entry = Callable[[], int | None]
 @click.option("--codec", metavar="NAME", default="online", show_default=True)
 @param_option
 @rate_option("Frames a second (120, 29.97, 30000/1001).")
-@click.option("--unit", type=click.Choice(UNITS), help="Length unit of the numbers.")
+@unit_option("Length unit of the numbers.")
 @up_option("Axis of the numbers that points up.")
 @click.option("--name", metavar="NAME", default="live", help="Of the clip.  [default: live]")
 @click.option(

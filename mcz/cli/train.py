@@ -20,7 +20,7 @@ from mcz.cli.common import (
     table,
     write_output,
 )
-from mcz.cli.options import UNITS, force_option, json_option
+from mcz.cli.options import force_option, json_option, unit_option
 from mcz.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ AXES = "xyz"
 @click.option(
     "--every", metavar="N", type=click.IntRange(1), default=1, help="Every N-th frame alone."
 )
-@click.option("--unit", type=click.Choice(UNITS), help="Length unit of files that say none.")
+@unit_option("Length unit of files that say none.")
 @force_option
 @json_option
 def command(

@@ -20,7 +20,6 @@ from mcz.cli.common import (
 )
 from mcz.cli.options import (
     EFFORTS,
-    UNITS,
     arrays_option,
     clips_option,
     decoded_option,
@@ -32,6 +31,7 @@ from mcz.cli.options import (
     salvage_option,
     threads_option,
     to_bytes,
+    unit_option,
     up_option,
     where_option,
 )
@@ -78,7 +78,7 @@ LOOPBACK = "127.0.0.1"
     help="The ASF of an AMC, or none. Default: found as mcz encode finds it.",
 )
 @rate_option()
-@click.option("--unit", type=click.Choice(UNITS), help="Length unit of a file that says none.")
+@unit_option("Length unit of a file that says none.")
 @up_option("Axis that points up, of a file that does not say.")
 @arrays_option
 @model_option

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.kinematics.feet import feet_of
 from mcz.motion import POSITION_KINDS, Skeleton
 
 NO_LENGTHS = "no bone has a length"
+PEOPLE_CM = 80.0, 260.0  # from a small child to a tall person with arms stretched out
+_HEAD = re.compile("head|neck", re.IGNORECASE)
 
 
 def has_no_lengths(skeleton: Skeleton) -> bool:
@@ -34,3 +39,44 @@ def rest_positions(skeleton: Skeleton) -> NDArray[np.float64]:
         if joint.parent >= 0:
             positions[index] += positions[joint.parent]
     return positions
+
+
+def figure_height(skeleton: Skeleton) -> float | None:
+    """The greatest extent at rest of a figure that has feet and a head by name, in length units.
+
+    None of any other, such as a hand, a face, a prop or markers. Standing figures are as high, and
+    those with arms stretched out about as wide.
+    """
+    names = (joint.name for joint in skeleton.joints)
+    if len(feet_of(skeleton)) < 2 or not any(map(_HEAD.search, names)):
+        return None
+    places = rest_positions(skeleton)
+    tails = [
+        place + np.array(tail)
+        for place, joint in zip(places, skeleton.joints, strict=True)
+        for tail in joint.tails
+    ]
+    points = np.vstack([places, *tails])
+    return float(np.ptp(points, axis=0).max()) or None
+
+
+def height_note(skeleton: Skeleton) -> str:
+    """That a figure is as high as no person, which a wrong unit may be the cause of; or ""."""
+    height, unit_cm = figure_height(skeleton), skeleton.unit_cm
+    return "" if height is None or unit_cm is None else note_on_height(height, unit_cm)
+
+
+def note_on_height(height: float, unit_cm: float) -> str:
+    """The same of a height in length units.
+
+    >>> note_on_height(27.5, 2.54)
+    "height 27.5 units = 69.9 cm, which is no person's; is 1 unit = 2.54 cm right?"
+    >>> note_on_height(27.5, 5.6444)
+    ''
+    """
+    if PEOPLE_CM[0] <= height * unit_cm <= PEOPLE_CM[1]:
+        return ""
+    return (
+        f"height {height:.3g} units = {height * unit_cm:,.1f} cm, which is no person's; "
+        f"is 1 unit = {unit_cm:.6g} cm right?"
+    )

@@ -17,6 +17,7 @@ from mcz.container.segments import GROUP_NOTES
 from mcz.errors import ChecksumError, FormatError, MczError, OptionError, UnsupportedError
 from mcz.formats import arrays_of
 from mcz.jobs import limited
+from mcz.kinematics.rest import figure_height
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
@@ -86,6 +87,7 @@ def joint_facts(skeleton: Skeleton) -> dict[str, Any]:
         "n_joints": skeleton.n_joints,
         "n_channels": skeleton.n_channels,
         "unit_cm": skeleton.unit_cm,
+        "height": figure_height(skeleton),
         "angle_unit": skeleton.angle_unit,
         "up_axis": skeleton.up_axis,
         "joints": [

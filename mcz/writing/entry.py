@@ -16,6 +16,7 @@ from mcz.container.writer import Writer
 from mcz.errors import LimitError, MotionError, SourceError
 from mcz.formats import Format, format_of, wants_skeleton
 from mcz.formats.arrays.kinds import kinds_of
+from mcz.kinematics.rest import height_note
 from mcz.motion import Motion, Skeleton
 from mcz.reading.skeletons import NONE, NOTE, Given, Taken, take
 from mcz.reading.source_files import (
@@ -134,7 +135,9 @@ class Entry:
         rate = terms.rate if terms.force_rate or stated is None else None
         facts = rate, terms.unit, terms.up, terms.arrays, terms.model
         motion = with_facts(taken.motion, *facts)
-        self.notes += tuple(rate_notes(stated, terms))
+        self.notes += tuple(
+            filter(None, [*rate_notes(stated, terms), height_note(motion.skeleton)])
+        )
         if motion.source is not None:
             motion = replace(motion, source=replace(motion.source, path=self.name))
         if taken.skeleton is not None:

@@ -12,7 +12,7 @@ from mcz.bench.cache import Cache, default_folder
 from mcz.bench.tasks import Runner
 from mcz.cli.bench import show
 from mcz.cli.common import Exit, about, existing, run
-from mcz.cli.options import UNITS, json_option
+from mcz.cli.options import json_option, unit_option
 from mcz.cli.progress import Progress
 from tools.papers.hou2016.run import hou2016
 from tools.papers.khan2014.run import khan2014
@@ -27,7 +27,7 @@ PAPERS = {"khan2014": khan2014, "khan2016": khan2016, "hou2016": hou2016, "kwak"
 @click.command()
 @click.argument("paper", type=click.Choice([*PAPERS, "all"]))
 @click.argument("clips", nargs=-1, required=True, type=click.Path())
-@click.option("--unit", type=click.Choice(UNITS), help="Length unit of files that say none.")
+@unit_option("Length unit of files that say none.")
 @click.option(
     "--out",
     metavar="DIR",
