@@ -1,7 +1,7 @@
 """Plain CSV files: columns of numbers, with or without rows of names and units.
 
 SPEC.md, "The text of tables", is normative for the way back. Every column is a joint without a
-parent that has one plain scalar.
+parent that has one plain scalar, or all are x, y and z of markers.
 """
 
 from __future__ import annotations
@@ -12,25 +12,41 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from mcz.errors import SourceError
-from mcz.formats.csv_text import first_row, has_decimal_commas, texts_of
+from mcz.formats.csv_text import (
+    count_columns,
+    first_row,
+    has_decimal_commas,
+    is_blank,
+    texts_of,
+)
 from mcz.formats.layout import FRAME_NUMBER
+from mcz.formats.rows import Rows, line_of
+from mcz.formats.table_layout import UNIT_CM
 from mcz.formats.table_rows import TableRows, lines_from, read_table, without_zeros
-from mcz.formats.table_signals import read_columns
+from mcz.formats.table_signals import read_columns, read_text, table_metadata, text_note
 from mcz.formats.table_source import names_in, section_of, table_source
 from mcz.formats.table_times import Times, read_times
 from mcz.formats.text_source import check_text, text_encoding, text_start
+from mcz.formats.times import half_digit_of
 from mcz.motion import Channel, Joint, Motion, Skeleton
+from mcz.numbers import scan
 
 MAX_COLUMNS = 2**18  # of a table; no skeleton is stored with more joints
 
-_TIME = re.compile(
+TIME = re.compile(
     r"(?i)(?:time|t|timestamps?|times|seconds?|secs?|zeit)"
     r"[ _]?[\[(]?(s|sec|secs|seconds?|ms|msec|milliseconds?|us|µs|ns)?[\])]?"
 )
-_FRAME = re.compile(r"(?i)|#|frames?[ _]?(?:#|no\.?|numbers?|index|id)?|index|unnamed: 0")
+FRAME = re.compile(r"(?i)|#|frames?[ _]?(?:#|no\.?|numbers?|index|id)?|index|unnamed: 0")
+_CLOCK = re.compile(r"(?i)time|date|stamp|clock")
 _UNIT = re.compile(
     r"[\[(]?(?:|[munkµ]?(?:m|s|V|N|Pa|A|W|g|Hz)|cm|in|ft|kg|deg|degrees?|°|rad|radians?|%|-|1"
     r"|BW|sec|Nmm|N\.?m+|N\.mm|(?:deg|rad|m{1,2}|cm)/s(?:\^?2|²)?|g)[\])]?"
+)
+_COORDINATE = re.compile(r"(?i)(.*[^._: ])[._: ]([xyz])(?:[ _]?[\[(]?(mm|cm|m|in|ft)[\])]?)?")
+_NO_POSITION = re.compile(
+    r"(?i)(?:.*[^a-z])?(?:accel|acc|gyro?|mag|vel|ang|rot|euler|force|grf|moment|torque|imu)"
+    r"(?:[^a-z]|[a-z]{3,}|$).*"
 )
 _SECONDS = {"m": Fraction(1, 1000), "u": Fraction(1, 10**6), "n": Fraction(1, 10**9)}
 
@@ -55,42 +71,92 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     check_text(data)
     encoding = text_encoding(data)
     head = _head(data, encoding)
-    called = (k for k, n in enumerate(head.names[:8]) if _TIME.fullmatch(n.strip()))
+    called = (k for k, n in enumerate(head.names[:8]) if TIME.fullmatch(n.strip()))
     time = next(called, None) if len(head.names) > 1 else None
     table, cells = _rows(data, head, time)
-    n_values = sum(cell >= 0 for cell in cells) - (time is not None)
-    values = range(n_values)
-    groups: list[Sequence[int]] = [values] if time is None else [values, [n_values]]
-    rows = without_zeros(data, table.rows, groups)
+    text_cells = [cells.index(text.column) for text in table.texts]
+    values = [k for k in range(len(cells)) if cells[k] >= 0 and k not in (time, *text_cells)]
+    if not values:
+        raise SourceError("line 1: no column of numbers beside the times")
+    at = len(values) + sum(text.n_numbers for text in table.texts)
+    timed = time is not None and time not in text_cells
+    rows = without_zeros(data, table.rows, (range(len(values)), [at] if timed else []))
     times = Times(None, (), None, True)
-    if time is not None:
+    if time is not None and timed:
         label = head.names[time].strip()
-        times = read_times(data, rows, n_values, unit=_seconds(label, head.units[time]), name=label)
-    signal = read_columns(data, rows, values)
-    chosen = [k for k, cell in enumerate(cells) if 0 <= cell < n_values]
-    joints = tuple(
-        Joint(head.names[k], channels=(Channel("", "value", head.units[k]),)) for k in chosen
-    )
-    names = [joint.name for joint in joints]
+        times = read_times(data, rows, at, unit=_seconds(label, head.units[time]), name=label)
+    labels = [head.names[k] for k in text_cells]
+    more = (*read_text(data, rows, table.texts, labels, len(values)), *times.signals)
+    if text_cells and rows.numbers is None and not any(map(counts_rows, head.names)):
+        _check_decimals(data, rows, len(values), labels)
+    skeleton = _markers(head, values) or _scalars(head, values)
+    names = [joint.name for joint in skeleton.joints]
     start, stop = head.labels
     marked = data[:start] + names_in(data[start:stop], names) + data[stop : head.rows]
-    signals, said = range(1 + len(times.signals)), (table.missing, times.clock)
-    section = section_of((marked, data[: head.rows]), said, rows, names, signals)
+    said = table.missing, times.clock
+    section = section_of((marked, data[: head.rows]), said, rows, names, range(1 + len(more)))
     return Motion(
-        Skeleton(joints, angle_unit=""),
-        (signal, *times.signals),
+        skeleton,
+        (read_columns(data, rows, range(len(values))), *more),
         times.rate,
         times.exact,
         name,
-        {"name-encoding": encoding} if encoding != "utf-8" else {},
+        table_metadata(encoding, [text_note(labels)]),
         table_source("csv", data, [(section, rows, 1)]),
         rows.numbers,
     )
 
 
+def counts_rows(name: str) -> bool:
+    """Whether a column of this name says when a row was recorded, as a number or in words."""
+    return bool(TIME.fullmatch(name) or (name and FRAME.fullmatch(name)) or _CLOCK.search(name))
+
+
+def _check_decimals(data: bytes, rows: Rows, n_values: int, labels: Sequence[str]) -> None:
+    """Refuse texts beside integers alone where nothing counts the rows: a list is no motion."""
+    present = rows.stop[:, :n_values] > 0
+    start, stop = rows.start[:, :n_values][present], rows.stop[:, :n_values][present]
+    if not len(start) or half_digit_of(scan(data, start, stop)) == 0.5:
+        raise SourceError(
+            f"line {line_of(data, int(start.max(initial=0)))}: column {labels[0][:40]!r} is text "
+            f"beside integers, without times or frame numbers; a list, and no motion"
+        )
+
+
+def _scalars(head: _Head, values: Sequence[int]) -> Skeleton:
+    """A joint with one plain scalar for each column."""
+    joints = (Joint(head.names[k], channels=(Channel("", "value", head.units[k]),)) for k in values)
+    return Skeleton(tuple(joints), angle_unit="")
+
+
+def _markers(head: _Head, values: Sequence[int]) -> Skeleton | None:
+    """Markers where all columns are x, y and z of them, such as LASI.x, LASI.y, LASI.z.
+
+    None where one is not, and where a name or unit says that it is of no position.
+    """
+    joints, units = [], set()
+    for k in range(0, len(values), 3):
+        found = [_COORDINATE.fullmatch(head.names[column]) for column in values[k : k + 3]]
+        axes = [match[2].lower() if match else "" for match in found]
+        name = found[0][1] if found[0] else ""
+        if sorted(axes) != ["x", "y", "z"] or any(match and match[1] != name for match in found):
+            return None
+        if _NO_POSITION.fullmatch(name):
+            return None
+        joints.append(Joint(name, channels=tuple(Channel(f"t{axis}") for axis in axes)))
+        units |= {
+            (head.units[column] or (match and match[3]) or "").lower()
+            for column, match in zip(values[k : k + 3], found, strict=True)
+        }
+    if units - {"", *UNIT_CM} or len({joint.name for joint in joints}) < len(joints):
+        return None
+    unit_cm = UNIT_CM.get(units.pop()) if len(units) == 1 else None
+    return Skeleton(tuple(joints), unit_cm=unit_cm, angle_unit="")
+
+
 def _rows(data: bytes, head: _Head, time: int | None) -> tuple[TableRows, list[int]]:
     """The rows, and the column of each cell; that of the times is the last one."""
-    numbered = _FRAME.fullmatch(head.names[0].strip()) is not None and len(head.names) > 1
+    numbered = FRAME.fullmatch(head.names[0].strip()) is not None and len(head.names) > 1
     numbered = numbered and head.labels != (0, 0)
     for first in (FRAME_NUMBER, 0) if numbered else (0,):
         cells = [0] * len(head.names)
@@ -108,7 +174,11 @@ def _rows(data: bytes, head: _Head, time: int | None) -> tuple[TableRows, list[i
             continue
         try:
             columns = [[cell] for cell in cells]
-            return read_table(data, head.rows, at, columns, head.separator, free=True), cells
+            numbers_at = at - (time is not None)
+            table = read_table(
+                data, head.rows, at, columns, head.separator, free=True, numbers_at=numbers_at
+            )
+            return table, cells
         except SourceError:
             if first != FRAME_NUMBER:
                 raise
@@ -127,26 +197,26 @@ def _head(data: bytes, encoding: str) -> _Head:
         hint = "no row of numbers in the first lines; no table" if lines else "an empty file"
         raise SourceError(f"line 1: {hint}")
     number, separator, n_cells = found
-    above = [(at, line) for at, line in lines[:number] if line.strip()]
+    above = [(at, line) for at, line in lines[:number] if not is_blank(line)]
     texts = [texts_of(line, separator, encoding) for _, line in above]
-    while texts and len(texts[-1]) == n_cells + 1 and not texts[-1][-1]:
-        texts[-1].pop()
+    rows = lines[number][0] or text_start(data)
+    heads = [cells for cells in texts[-2:] if len(cells) >= n_cells]
+    n_cells = count_columns(heads, data[rows:], separator)
+    if n_cells > MAX_COLUMNS:
+        raise SourceError(f"line {number + 1}: {n_cells} columns, limit {MAX_COLUMNS}")
     units, labels = [""] * n_cells, (0, 0)
-    if len(texts) > 1 and len(texts[-2]) == len(texts[-1]) >= n_cells and _are_units(texts[-1]):
-        units = [unit.strip("[]()") for unit in texts.pop()]
+    if len(texts) > 1 and len(texts[-2]) >= n_cells and _are_units(texts[-1]):
+        units = [unit.strip("[]()") for unit in texts.pop()[:n_cells]]
+        units += [""] * (n_cells - len(units))
         above.pop()
     names: list[str] = []
     if texts and len(texts[-1]) >= n_cells:
         at, line = above[-1]
-        names, labels = texts[-1], (at, at + len(line))
+        names, labels = texts[-1][:n_cells], (at, at + len(line))
         names[0] = names[0].removeprefix("# ") or names[0]
-    n_cells = max(n_cells, len(names))
-    if n_cells > MAX_COLUMNS:
-        raise SourceError(f"line {number + 1}: {n_cells} columns, limit {MAX_COLUMNS}")
     names = names or [f"column {k + 1}" for k in range(n_cells)]
+    names[1:] = [label or f"column {k + 2}" for k, label in enumerate(names[1:])]
     names = [_printable(label) for label in names]
-    units += [""] * (n_cells - len(units))
-    rows = lines[number][0] or text_start(data)
     return _Head(rows, separator, names, [_printable(u) for u in units], labels)
 
 
@@ -161,6 +231,6 @@ def _printable(text: str) -> str:
 
 def _seconds(label: str, unit: str) -> Fraction:
     """What a unit of the times is in seconds."""
-    match = _TIME.fullmatch(label)
+    match = TIME.fullmatch(label)
     stated = (match[1] if match else None) or unit or "s"
     return _SECONDS.get(stated[0].lower().replace("µ", "u"), Fraction(1))

@@ -6,30 +6,28 @@ Frame and Sub Frame, and all others are columns of numbers, or no table of them.
 
 from __future__ import annotations
 
-import re
-
-from mcz.errors import MotionError
-from mcz.formats.csv_text import cells_of, first_row, is_row
+from mcz.errors import MotionError, SourceError
+from mcz.formats.columns import counts_rows, read_columns_of
+from mcz.formats.csv_text import cells_of, first_row, is_blank, is_like, is_row, texts_of
+from mcz.formats.motive import HEAD, read_motive
 from mcz.formats.table_restore import restore_table
 from mcz.formats.table_rows import lines_from
 from mcz.formats.text_source import BOM
+from mcz.formats.vicon import AXIS, read_vicon
 from mcz.motion import Motion
 
 SNIFFED = 2**16  # bytes at the start that tell the kind
 NAMES = ("csv", "motive", "vicon")
 
-_MOTIVE = re.compile(rb'[ \t]*"?Format Version"?,')
-_VICON = re.compile(rb'(?im)^[ \t]*"?Frame"?([,;\t])[ \t]*"?Sub Frame"?(?=[,;\t\r\n])')
-
 
 def kind_of(data: bytes) -> str | None:
     """ "motive", "vicon" or "csv"; None for what has no row of numbers near its start."""
     start = data[:SNIFFED]
-    if _MOTIVE.match(start.removeprefix(BOM)):
+    if HEAD.match(start.removeprefix(BOM)):
         return "motive"
-    if _VICON.search(start):
+    if AXIS.search(start):
         return "vicon"
-    return "csv" if first_row(lines_from(start, 0)) else None
+    return "csv" if first_row(lines_from(_whole_lines(data), 0)) else None
 
 
 def is_motion(data: bytes) -> bool:
@@ -41,15 +39,22 @@ def is_motion(data: bytes) -> bool:
     kind = kind_of(data)
     if kind != "csv":
         return kind is not None
-    start = data[:SNIFFED]
-    whole = start if len(data) < SNIFFED else start[: start.rfind(b"\n") + 1]
-    lines = lines_from(whole, 0)
+    lines = lines_from(_whole_lines(data), 0)
     found = first_row(lines)
     if found is None:
         return False
     number, separator, _ = found
-    rows = (cells_of(line, separator) for _, line in lines[number:] if line.strip())
-    return all(map(is_row, rows)) and separator is not None
+    cells = [cells_of(line, separator) for _, line in lines[number:] if not is_blank(line)]
+    if separator is not None and all(map(is_row, cells)):
+        return True
+    names = texts_of(lines[number - 1][1], separator, "latin-1") if number else []
+    return any(map(counts_rows, names)) and all(is_like(row, cells[0]) for row in cells)
+
+
+def _whole_lines(data: bytes) -> bytes:
+    """The start of ``data`` that is looked at, without a line that is cut off."""
+    start = data[:SNIFFED]
+    return start if len(data) < SNIFFED else start[: start.rfind(b"\n") + 1]
 
 
 def read(data: bytes, name: str = "motion") -> Motion:
@@ -57,18 +62,10 @@ def read(data: bytes, name: str = "motion") -> Motion:
 
     Raises SourceError, with the number of the line.
     """
-    kind = kind_of(data)
-    if kind == "motive":
-        from mcz.formats.motive import read_motive
-
-        return read_motive(data, name)
-    if kind == "vicon":
-        from mcz.formats.vicon import read_vicon
-
-        return read_vicon(data, name)
-    from mcz.formats.columns import read_columns_of
-
-    return read_columns_of(data, name)
+    if b"\n" not in data and data.strip(b"\r").count(b"\r"):
+        raise SourceError("line 1: lines end with carriage returns alone; save it with line feeds")
+    reader = {"motive": read_motive, "vicon": read_vicon}.get(kind_of(data) or "", read_columns_of)
+    return reader(data, name)
 
 
 def write(motion: Motion) -> bytes:

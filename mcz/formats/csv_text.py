@@ -9,8 +9,14 @@ from mcz.formats.limits import MOST_CHANNELS, check
 from mcz.formats.text_source import BOM
 
 SEPARATORS: tuple[bytes | None, ...] = (b",", b";", b"\t", None)  # None: blanks
-NOT_THERE = (b"", b"NA", b"N/A", b"null", b"NULL", b"None")  # what programs write for no number
+# words for a number that is not there, those of spreadsheets among them
+NO_NUMBER = (
+    *(b"NA", b"N/A", b"null", b"NULL", b"None"),
+    *(b"#N/A", b"#DIV/0!", b"#VALUE!", b"#REF!", b"#NUM!"),
+)
+NOT_THERE = (b"", *NO_NUMBER)
 MOST_CELLS = MOST_CHANNELS
+BLANK_CELLS = b' \t\r\n,;"'  # bytes of cells that say nothing
 LOOKED_AT = 64  # lines in which rows of numbers have to begin
 
 _NUMBER = re.compile(
@@ -18,7 +24,7 @@ _NUMBER = re.compile(
     rb"|[0-9]\.#[a-z]+[0-9]*)"
 )
 _QUOTED = re.compile(rb'[ \t]*"((?:[^"]|"")*)"[ \t]*')
-_COMMA = re.compile(rb"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
+DECIMAL_COMMA = re.compile(rb"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
 
 
 def cells_of(line: bytes, separator: bytes | None) -> list[bytes]:
@@ -30,19 +36,58 @@ def cells_of(line: bytes, separator: bytes | None) -> list[bytes]:
         return line.split()
     if b'"' not in line:
         return [cell.strip() for cell in line.split(separator)]
-    cells, at = [], 0
-    while True:
+    spans, _ = cell_spans(line, separator, n + 1)
+    return [line[start:stop].replace(b'""', b'"') for start, stop in spans]
+
+
+def cell_spans(line: bytes, separator: bytes, most: int) -> tuple[list[tuple[int, int]], int]:
+    """Start and stop of the first ``most`` cells, blanks and quotes around them left out.
+
+    Also returns where the next cell begins, ``len(line)`` where there is none. A separator within
+    quotes is text. A blank cell lies at its end.
+    """
+    spans: list[tuple[int, int]] = []
+    at, size = 0, len(line)
+    while len(spans) < most:
         quoted = _QUOTED.match(line, at)
         if quoted and line[quoted.end() : quoted.end() + 1] in (b"", separator):
-            cells.append(quoted[1].replace(b'""', b'"').strip())
+            start, stop = quoted.span(1)
             end = quoted.end()
         else:
             found = line.find(separator, at)
-            end = found if found >= 0 else len(line)
-            cells.append(line[at:end].strip())
-        if end >= len(line):
-            return cells
+            start, stop = at, found if found >= 0 else size
+            end = stop
+        bare = line[start:stop].strip()
+        start = start + line[start:stop].index(bare) if bare else stop
+        spans.append((start, start + len(bare)))
+        if end >= size:
+            return spans, size
         at = end + len(separator)
+    return spans, at
+
+
+def is_blank(line: bytes) -> bool:
+    """Whether all cells of a line are blank, as of the empty lines that spreadsheets fill up."""
+    return not line.removeprefix(BOM).strip(BLANK_CELLS)
+
+
+def count_columns(heads: Sequence[Sequence[str]], rows: bytes, separator: bytes | None) -> int:
+    """How many columns a table has: up to the last cell that is not blank in any line.
+
+    ``heads``: the cells of the lines above the rows. Spreadsheets fill all lines up to one width,
+    so a blank cell at the end of a line is no column. Beyond the heads, all rows are looked at,
+    where the first one has more cells.
+    """
+    named = max((_filled(cells) for cells in heads), default=0)
+    if len(cells_of(rows[: rows.find(b"\n") + 1 or len(rows)], separator)) <= named:
+        return named
+    filled = (_filled(cells_of(line, separator)) for line in rows.split(b"\n"))
+    return max(named, *filled)
+
+
+def _filled(cells: Sequence[str] | Sequence[bytes]) -> int:
+    """The number of cells up to the last one that is not blank."""
+    return next((k for k in range(len(cells), 0, -1) if cells[k - 1]), 0)
 
 
 def texts_of(line: bytes, separator: bytes | None, encoding: str) -> list[str]:
@@ -53,10 +98,46 @@ def texts_of(line: bytes, separator: bytes | None, encoding: str) -> list[str]:
 def first_row(
     lines: Sequence[tuple[int, bytes]],
 ) -> tuple[int, bytes | None, int] | None:
-    """The number of the first line of numbers, its separator and how many cells it has.
+    """The number of the first row of numbers, its separator and how many cells it has.
 
-    A line of names may look so; it has no other one below.
+    Some columns may be text. A line of names may look like numbers; it has no other one below.
     """
+    found = _first_numbers(lines)
+    if found is None and not has_decimal_commas(lines):
+        found = _last_row(lines)
+    if found is None:
+        return None
+    number, separator, n_cells = found
+    if separator is not None:
+        number = _first_like(lines, number, separator)
+    return number, separator, n_cells
+
+
+def _first_like(lines: Sequence[tuple[int, bytes]], number: int, separator: bytes) -> int:
+    """The first of the rows that end with line ``number``, some of whose cells may be texts.
+
+    Below a line of names alone, one with numbers is a row, even where a word stands for a number.
+    """
+    cells = cells_of(lines[number][1], separator)
+    above = [_some_cells(line, separator) for _, line in lines[max(number - 2, 0) : number]]
+    while number and is_like(above[-1], cells):
+        number -= 1
+        above = [_some_cells(line, separator) for _, line in lines[max(number - 2, 0) : number]]
+    if len(above) == 2 and len(above[0]) == len(above[1]) == len(cells):
+        n_names, n_numbers = (sum(map(_is_number, line)) for line in above)
+        if not n_names and 2 * n_numbers > len(cells):
+            return number - 1
+    return number
+
+
+def _is_number(cell: bytes) -> bool:
+    return _NUMBER.fullmatch(cell) is not None
+
+
+def _first_numbers(
+    lines: Sequence[tuple[int, bytes]],
+) -> tuple[int, bytes | None, int] | None:
+    """The first line whose cells are all numbers or blank."""
     first = None
     for number, (_, line) in enumerate(lines[:LOOKED_AT]):
         found = [
@@ -72,6 +153,36 @@ def first_row(
         if below is None or is_row(_some_cells(below, separator)):
             return number, separator, n_cells
     return first
+
+
+def _last_row(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes, int] | None:
+    """The last line that is looked at, if it has numbers among its cells, and names or rows above.
+
+    A column of text has no line of numbers alone, and the last line is the least likely header.
+    """
+    looked_at = [k for k, (_, line) in enumerate(lines[:LOOKED_AT]) if not is_blank(line)]
+    if len(looked_at) < 2:
+        return None
+    number = looked_at[-1]
+    found = [
+        (len(cells), separator)
+        for separator in (b",", b";", b"\t")
+        if len(cells := _some_cells(lines[number][1], separator)) > 1
+        and any(map(_NUMBER.fullmatch, cells))
+        and len(_some_cells(lines[looked_at[-2]][1], separator)) == len(cells)
+    ]
+    if not found:
+        return None
+    n_cells, separator = max(found, key=lambda entry: entry[0])
+    return number, separator, n_cells
+
+
+def is_like(cells: Sequence[bytes], others: Sequence[bytes]) -> bool:
+    """Whether a line has as many cells as another, and numbers where that has numbers."""
+    if len(cells) != len(others):
+        return False
+    pairs = [cell for cell, other in zip(cells, others, strict=True) if _NUMBER.fullmatch(other)]
+    return is_row(pairs)
 
 
 def _some_cells(line: bytes, separator: bytes | None) -> list[bytes]:
@@ -94,7 +205,7 @@ def is_row(cells: Sequence[bytes]) -> bool:
 def has_decimal_commas(lines: Sequence[tuple[int, bytes]]) -> bool:
     """Whether cells between semicolons or tabs are numbers such as 1,5."""
     return any(
-        len(cells := cells_of(line, separator)) > 1 and any(map(_COMMA.fullmatch, cells))
+        len(cells := cells_of(line, separator)) > 1 and any(map(DECIMAL_COMMA.fullmatch, cells))
         for _, line in lines[:LOOKED_AT]
         for separator in (b";", b"\t")
     )

@@ -11,14 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mcz.errors import SourceError
-from mcz.formats.csv_text import cells_of, texts_of
+from mcz.formats.csv_text import count_columns, is_blank, texts_of
 from mcz.formats.layout import FRAME_NUMBER
 from mcz.formats.rows import line_of
 from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
-from mcz.formats.table_signals import read_columns
+from mcz.formats.table_signals import read_columns, read_text, table_metadata, text_note
 from mcz.formats.table_source import named_count, names_in, section_of, table_source
 from mcz.formats.table_times import Times, read_times
-from mcz.formats.text_source import check_text, text_encoding
+from mcz.formats.text_source import BOM, check_text, text_encoding
 from mcz.formats.times import stated_rate
 from mcz.motion import Channel, Joint, Motion, Skeleton
 
@@ -32,9 +32,10 @@ UNITS = {
 LOCAL = ("local", "parent")  # coordinate spaces in which a bone is seen from its parent
 MAX_HEAD = 32  # lines above the rows
 
-_AXIS = re.compile(rb'"?Frame"?,"?Time')
+HEAD = re.compile(rb'[ \t]*"?Format Version"?([,;\t])')
+_AXIS = re.compile(rb'[ \t]*"?Frame"?[,;\t]"?Time')
 _ORDER = re.compile(r"(?i)(?=.*x)(?=.*y)(?=.*z)[xyz]{3}")
-_COUNT = re.compile(rb"(?i),\"?Total Exported Frames\"?,([0-9]+)")
+_COUNT = re.compile(rb'(?i)[,;\t]"?Total Exported Frames"?[,;\t]"?([0-9]+)')
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +46,14 @@ class _Head:
     columns: list[tuple[str, ...]]  # type, name, id, parent, kind, axis
     labels: tuple[int, int]
     rows: int
+    separator: bytes
+
+    def label(self, column: int | None) -> str:
+        """The name of a column of text; None: that of the times."""
+        if column is None:
+            return "Time"
+        _, name, _, _, what, axis = self.columns[column]
+        return " ".join(filter(None, (name, what, axis))) or f"column {column + 3}"
 
 
 @dataclass(slots=True)
@@ -67,27 +76,40 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     objects = _objects(head)
     order = [column for found in objects for column in found.columns]
     place = {column: k for k, column in enumerate(order)}
-    time = len(order)
-    cells = [[FRAME_NUMBER], [time], *([place[column]] for column in range(time))]
-    table = read_table(data, head.rows, time + 1, cells, b",")
-    rows = without_zeros(data, table.rows, ([time], range(time)))
+    n = len(order)
+    cells = [[FRAME_NUMBER], [n], *([place[column]] for column in range(n))]
+    table = read_table(data, head.rows, n + 1, cells, head.separator, numbers_at=n)
+    texts = [order[text.column] if text.column < n else None for text in table.texts]
+    objects = _without(objects, texts)
+    n_values = sum(len(found.columns) for found in objects)
+    time = n_values + sum(text.n_numbers for text in table.texts)
+    rows = without_zeros(
+        data, table.rows, (range(time, table.rows.start.shape[1]), range(n_values))
+    )
     stated = [
         rate
         for key in ("export frame rate", "capture frame rate")
         if (rate := stated_rate(head.said.get(key, "")))
     ]
-    times = read_times(data, rows, time, stated)
+    times = Times(None, (), None, True)
+    if None not in texts:
+        times = read_times(data, rows, time, stated)
+    labels = [head.label(column) for column in texts]
+    text_signal = read_text(data, rows, table.texts, labels, n_values)
+    more = (*text_signal, *times.signals)
     names = [found.name for found in objects]
     text = _marked(data, head, names, rows.n_rows), data[: head.rows]
-    signals = range(1 + len(times.signals))
+    signals = range(1 + len(more))
     section = section_of(text, (table.missing, times.clock), rows, names, signals)
     return Motion(
         _skeleton(head, objects),
-        (read_columns(data, rows, range(time)), *times.signals),
+        (read_columns(data, rows, range(n_values)), *more),
         times.rate,
         times.exact,
         name,
-        _metadata(encoding, head.said, rows.n_rows, times, bool(stated)),
+        table_metadata(
+            encoding, [text_note(labels), *_notes(head.said, rows.n_rows, times, bool(stated))]
+        ),
         table_source("motive", data, [(section, rows, 1)]),
         rows.numbers,
     )
@@ -103,24 +125,26 @@ def _marked(data: bytes, head: _Head, names: Sequence[str], n_rows: int) -> byte
 
 
 def _head(data: bytes, encoding: str) -> _Head:
-    lines = [entry for entry in lines_from(data, 0)[:MAX_HEAD] if entry[1].strip()]
+    lines = [entry for entry in lines_from(data, 0)[:MAX_HEAD] if not is_blank(entry[1])]
+    match = HEAD.match(data.removeprefix(BOM))
+    separator = match[1] if match else b","
     axis = next((k for k, (_, line) in enumerate(lines) if _AXIS.match(line)), None)
     if axis is None or axis < 3:
         raise SourceError(f"line {len(lines)}: no line Frame,Time below names; no Motive file")
     if axis + 1 == len(lines) or not begins_with_number(lines[axis + 1][1]):
         at = lines[axis][0]
         raise SourceError(f"line {line_of(data, at) + 1}: no row of numbers after Frame,Time")
-    first = texts_of(lines[0][1], b",", encoding)
+    first = texts_of(lines[0][1], separator, encoding)
     said = {key.lower(): value for key, value in zip(first[::2], first[1::2], strict=False)}
-    rows = [texts_of(line, b",", encoding) for _, line in lines[1 : axis + 1]]
-    width = max(len(rows[-1]), len(cells_of(lines[axis + 1][1], b",")))
+    rows = [texts_of(line, separator, encoding) for _, line in lines[1 : axis + 1]]
+    width = max(2, count_columns(rows, data[lines[axis + 1][0] :], separator))
     numbers = _numbers(rows)
     columns = [
         tuple(rows[n][k] if n is not None and k < len(rows[n]) else "" for n in numbers)
         for k in range(2, width)
     ]
     at, line = lines[1 + (numbers[1] or 0)]
-    return _Head(said, columns, (at, at + len(line)), lines[axis + 1][0])
+    return _Head(said, columns, (at, at + len(line)), lines[axis + 1][0], separator)
 
 
 def _numbers(rows: Sequence[Sequence[str]]) -> tuple[int | None, ...]:
@@ -149,6 +173,17 @@ def _objects(head: _Head) -> list[_Object]:
     if _ORDER.fullmatch(order):
         for one in found:
             _sort_rotations(one, order.lower())
+    return found
+
+
+def _without(objects: Sequence[_Object], columns: Sequence[int | None]) -> list[_Object]:
+    """The objects without these columns, and without those that have no other."""
+    found = []
+    for one in objects:
+        kept = [k for k, column in enumerate(one.columns) if column not in columns]
+        one.columns = [one.columns[k] for k in kept]
+        one.channels = [one.channels[k] for k in kept]
+        found += [one] if kept else []
     return found
 
 
@@ -182,14 +217,11 @@ def _skeleton(head: _Head, objects: Sequence[_Object]) -> Skeleton:
     return Skeleton(tuple(joints), unit_cm=UNITS.get(head.said.get("length units", "").lower()))
 
 
-def _metadata(
-    encoding: str, said: dict[str, str], n_rows: int, times: Times, is_stated: bool
-) -> dict[str, str]:
+def _notes(said: dict[str, str], n_rows: int, times: Times, is_stated: bool) -> list[str]:
     notes = []
     declared = said.get("total exported frames", "")
     if declared and declared != str(n_rows):
         notes.append(f"{declared[:40]} frames are declared, {n_rows} are there")
     if is_stated and times.rate is None:
         notes.append("the times are not uniform")
-    metadata = {"name-encoding": encoding} if encoding != "utf-8" else {}
-    return metadata | ({"source-note": "; ".join(notes)} if notes else {})
+    return notes

@@ -15,7 +15,7 @@ from mcz.formats.rows import line_of
 from mcz.formats.table_plain import plain_storage
 from mcz.formats.table_restore import beside, restore_table
 from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
-from mcz.formats.table_signals import read_columns
+from mcz.formats.table_signals import read_columns, table_metadata
 from mcz.formats.table_source import named_count, names_in, section_of, table_source
 from mcz.formats.text_source import check_text, text_encoding
 from mcz.formats.times import half_digits_of, rate_of_times, stated_rate
@@ -89,7 +89,7 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
         rate,
         exact,
         name,
-        _metadata(encoding, header.values, rows.n_rows),
+        table_metadata(encoding, [_note(header.values, rows.n_rows)]),
         table_source(format_name, data, [(section, rows, 1)]),
     )
 
@@ -151,12 +151,11 @@ def _channels(size: int, kind: str, unit: str) -> tuple[Channel, ...]:
     return tuple(Channel("", name, unit) for name in names)
 
 
-def _metadata(encoding: str, values: dict[str, str], n_rows: int) -> dict[str, str]:
-    metadata = {"name-encoding": encoding} if encoding != "utf-8" else {}
+def _note(values: dict[str, str], n_rows: int) -> str:
     declared = next((values[key] for key in _COUNTS if key in values), None)
-    if declared is not None and declared != str(n_rows):
-        metadata["source-note"] = f"{declared[:40]} frames are declared, {n_rows} are there"
-    return metadata
+    if declared is None or declared == str(n_rows):
+        return ""
+    return f"{declared[:40]} frames are declared, {n_rows} are there"
 
 
 def write_sto(motion: Motion) -> bytes:

@@ -69,6 +69,7 @@ PHRASES = {  # and others: what stands in many headers
     30: b",Total Frames in Take,",
     31: b",Total Exported Frames,",
 }
+UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54, "ft": 30.48}  # as headers name units
 MOST = 2**62  # of ordinals, so that they fit an int64
 MAX_HEADER = 2**26  # bytes of a header with its marks filled
 MAX_SECTIONS = 64  # TABLE-07

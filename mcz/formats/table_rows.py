@@ -7,7 +7,6 @@ the patterns that lay them out.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -16,19 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
+from mcz.formats.csv_text import BLANK_CELLS, cell_spans
 from mcz.formats.layout import BLANKS, FRAME_NUMBER, FREE, FULL, MAX_WIDTH, Pattern, runs_of
 from mcz.formats.rows import DENSE, Rows, Token, line_of, read_rows
-from mcz.numbers import Tokens, scan
+from mcz.formats.text_columns import TextColumn, check_points, odd_cells, split_text
+from mcz.numbers import scan
 
 Bools = NDArray[np.bool_]
 
 LOOKED_AT = 64  # rows, for columns that are padded
 _BLANKS = b" \t\r\n"
 _AROUND = _BLANKS + b'"'  # of a cell
-_NONE = (b"NA", b"N/A", b"null", b"NULL", b"None")  # what is no number, and stands for one
 _WORDS = re.compile(rb"[^ \t\r\n]+")
 _PART = b","  # between the numbers of a cell
-_FIRST = re.compile(rb"[ \t]*([-+]?(?:[0-9]|\.[0-9])[^ \t\r\n,;]*)")
+_FIRST = re.compile(rb'[ \t]*"?[-+]?\.?[0-9]')
 
 
 def lines_from(data: bytes, at: int) -> list[tuple[int, bytes]]:
@@ -67,7 +67,7 @@ class RowCells:
         while True:
             end = self.data.find(b"\n", at) + 1 or len(self.data)
             line = self.data[at:end]
-            if line.strip(_BLANKS):
+            if line.strip(_BLANKS if self.free else BLANK_CELLS):
                 break
             if end == len(self.data):
                 return None
@@ -89,12 +89,16 @@ class RowCells:
             words = islice(_WORDS.finditer(line), most + 1)
             found = [(at + m.start(), at + m.end()) for m in words]
             rest = line if len(found) > most else b""
+        elif b'"' in line:
+            spans, end = cell_spans(line.rstrip(b"\r\n"), self.separator, most)
+            rest = line[end:].strip(_AROUND + self.separator)
+            found = [(at + start, at + stop) for start, stop in spans]
         else:
             cells = line.rstrip(b"\r\n").split(self.separator, most)
             rest = cells.pop().strip(_AROUND + self.separator) if len(cells) > most else b""
             found = []
             for cell in cells:
-                bare = cell.strip(_AROUND)
+                bare = cell.strip(_BLANKS)
                 start = at + (cell.index(bare) if bare else len(cell))
                 found.append((start, start + len(bare)))
                 at += len(cell) + len(self.separator)
@@ -125,10 +129,14 @@ class RowCells:
 
 @dataclass(frozen=True, slots=True)
 class TableRows:
-    """All rows, and what stands for a missing value; a missing one has start and stop 0."""
+    """All rows, and what stands for a missing value; a missing one has start and stop 0.
+
+    ``texts``: the columns that are text, which ``rows`` have the numbers of.
+    """
 
     rows: Rows
     missing: bytes
+    texts: tuple[TextColumn, ...] = ()
 
 
 def read_table(
@@ -139,11 +147,17 @@ def read_table(
     separator: bytes | None,
     *,
     free: bool = False,
+    numbers_at: int | None = None,
 ) -> TableRows:
     """Read all rows of ``data`` from offset ``at`` on; ``free``: they may begin with none.
 
-    Raises SourceError for what is no table, and where ``read_rows`` does.
+    ``numbers_at``: in front of which column the numbers of text columns come; None: text is left
+    where it is, and no number. Raises SourceError for what is no table, and where ``read_rows``
+    does.
     """
+    whole = data
+    if free:  # lines of blank cells at the end are no rows
+        data = data[: data.find(b"\n", len(data.rstrip(BLANK_CELLS))) + 1 or len(data)]
 
     def attempt(blanks: bool) -> Rows:
         cells = RowCells(data, columns, separator, blanks, free)
@@ -155,8 +169,11 @@ def read_table(
     if not rows.n_rows:
         raise SourceError(f"line {line_of(data, min(at, len(data)))}: no row of numbers")
     blank = (rows.stop > 0) & (rows.start == rows.stop)
-    words = _words(data, rows, blank)
-    missing, n_missing = words.most_common(1)[0] if words else (b"", 0)
+    odd = odd_cells(data, rows)
+    texts = odd.text_columns() if numbers_at is not None else []
+    check_points(data, odd, rows.start, texts)
+    blank[:, texts] = False
+    missing, n_missing = odd.missing(texts)
     if n_missing <= np.count_nonzero(blank):
         missing = b""
     elif blank.any():  # both: what is blank is left out of the layout
@@ -165,7 +182,18 @@ def read_table(
     gone = blank
     if missing:
         gone = blank | _are(data, rows, missing)
-    return TableRows(_without(rows, gone), missing)
+        gone[:, texts] = False
+    rows = followed_by(_without(rows, gone), whole[len(data) :])
+    if not texts or numbers_at is None:
+        return TableRows(rows, missing)
+    rows, found = split_text(data, rows, texts, numbers_at)
+    return TableRows(rows, missing, tuple(found))
+
+
+def followed_by(rows: Rows, rest: bytes) -> Rows:
+    """``rows`` with what follows the last one."""
+    ending = rows.patterns[last_pattern(rows)].tail if rows.ending is None else rows.ending
+    return replace(rows, ending=ending + rest) if rest else rows
 
 
 def _padded(data: bytes, at: int, cells: RowCells) -> dict[int, int]:
@@ -187,28 +215,6 @@ def _padded(data: bytes, at: int, cells: RowCells) -> dict[int, int]:
         if any(n for n, _ in seen) and all(n == max(0, width - size) for n, size in seen):
             widths[column] = width
     return {column: width for column, width in widths.items() if 1 < width <= MAX_WIDTH}
-
-
-def _words(data: bytes, rows: Rows, blank: Bools) -> Counter[bytes]:
-    """How often each spelling of a number that is none occurs."""
-    found: Counter[bytes] = Counter()
-    for word in _NONE:
-        if word in data and (n := int(np.count_nonzero(_are(data, rows, word)))):
-            found[word] = n
-    if re.search(rb"(?i)nan|#", data) is None:
-        return found
-    chosen = (rows.stop > 0) & ~blank
-    tokens = scan(data, rows.start[chosen], rows.stop[chosen])
-    nan = _are_nan(tokens)
-    return found + Counter(tokens[nan].texts().tolist())
-
-
-def _are_nan(tokens: Tokens) -> Bools:
-    found = np.zeros(len(tokens), np.bool_)
-    bad = tokens.bad()
-    good = np.flatnonzero(~bad)
-    found[good] = np.isnan(tokens[good].values())
-    return found
 
 
 def _are(data: bytes, rows: Rows, word: bytes) -> Bools:

@@ -12,11 +12,14 @@ import numpy as np
 
 from mcz.formats.rows import Rows
 from mcz.formats.signals import read_signal
-from mcz.motion import Exceptions, Signal
+from mcz.formats.text_columns import TextColumn
+from mcz.motion import Channel, Exceptions, Signal
 from mcz.numbers import Grid, bits_of, fit, scan
 
 RUN_BITS = 48  # of one more run of grids in CLIP, and of what its heads need
 EXCEPTION_BITS = 200
+TEXT = "text"  # the signal of the numbers in text columns
+MAX_NOTE = 200
 MOST_TRIED = 2048  # columns; of more each may take long, and has little to gain
 
 
@@ -60,6 +63,39 @@ def read_columns(data: bytes, rows: Rows, columns: Sequence[int]) -> Signal:
             tuple(text for _, _, text in entries),
         ),
     )
+
+
+def read_text(
+    data: bytes, rows: Rows, texts: Sequence[TextColumn], labels: Sequence[str], at: int
+) -> tuple[Signal, ...]:
+    """The signal of the numbers in text columns, which begin with column ``at``, if there are any.
+
+    ``labels``: of each text column.
+    """
+    channels = [
+        Channel("", f"{label}.{k + 1}" if text.n_numbers > 1 else label)
+        for text, label in zip(texts, labels, strict=True)
+        for k in range(text.n_numbers)
+    ]
+    if not channels:
+        return ()
+    signal = read_columns(data, rows, range(at, at + len(channels)))
+    return (replace(signal, name=TEXT, channels=tuple(channels)),)
+
+
+def text_note(labels: Sequence[str]) -> str:
+    """A note that these columns are text; "" for none."""
+    verb = "column is" if len(labels) == 1 else "columns are"
+    return f"{len(labels)} {verb} text: {', '.join(labels)}"[:MAX_NOTE] if labels else ""
+
+
+def table_metadata(encoding: str, notes: Sequence[str]) -> dict[str, str]:
+    """What the metadata of a clip say of its source: the encoding of its names, what is odd."""
+    found = {
+        "name-encoding": encoding if encoding != "utf-8" else "",
+        "source-note": "; ".join(filter(None, notes)),
+    }
+    return {key: value for key, value in found.items() if value}
 
 
 def _better(

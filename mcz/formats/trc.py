@@ -13,18 +13,17 @@ from dataclasses import dataclass
 from mcz.errors import SourceError
 from mcz.formats.layout import FRAME_NUMBER
 from mcz.formats.rows import Rows
-from mcz.formats.table_layout import NEXT, SAME
+from mcz.formats.table_layout import NEXT, SAME, UNIT_CM
 from mcz.formats.table_plain import plain_trc
 from mcz.formats.table_restore import restore_table
 from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
-from mcz.formats.table_signals import read_columns
+from mcz.formats.table_signals import read_columns, table_metadata
 from mcz.formats.table_source import named_count, names_in, section_of, table_source
 from mcz.formats.table_times import Times, read_times
 from mcz.formats.text_source import check_text, text_encoding
 from mcz.formats.times import stated_rate
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Skeleton
 
-UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54, "ft": 30.48}
 POSITION = tuple(Channel(kind) for kind in POSITION_KINDS)
 
 _LABELS = re.compile(rb"(?i)[ \t]*frame#?[ \t]")
@@ -72,7 +71,7 @@ def read_trc(data: bytes, name: str = "motion") -> Motion:
         times.rate,
         times.exact,
         name,
-        _metadata(encoding, [*note, *_notes(header.values, len(labels), rows.n_rows)]),
+        table_metadata(encoding, [*note, *_notes(header.values, len(labels), rows.n_rows)]),
         table_source("trc", data, [(section, rows, 1)]),
         rows.numbers,
     )
@@ -150,11 +149,6 @@ def _notes(values: dict[str, str], n_labels: int, n_rows: int) -> list[str]:
     if declared != str(n_labels):
         notes.append(f"{declared[:40] or 'no'} markers are declared, {n_labels} are named")
     return notes
-
-
-def _metadata(encoding: str, notes: Sequence[str]) -> dict[str, str]:
-    metadata = {"name-encoding": encoding} if encoding != "utf-8" else {}
-    return metadata | ({"source-note": "; ".join(notes)} if notes else {})
 
 
 def write_trc(motion: Motion) -> bytes:

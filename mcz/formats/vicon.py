@@ -1,8 +1,8 @@
-"""CSV files of Vicon Nexus (its ASCII export), which have several sections: bytes -> Motion.
+"""CSV files of Vicon Nexus (its ASCII export) and Tracker, of several sections: bytes -> Motion.
 
-SPEC.md, "The text of tables", is normative for the way back. The trajectories are the motion, every
-marker a joint without a parent; the other sections are signals, of several rows a frame where the
-file has sub frames.
+SPEC.md, "The text of tables", is normative for the way back. The trajectories, else the objects are
+the motion, every marker and object a joint without a parent; the other sections are signals, of
+several rows a frame where the file has sub frames.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-from mcz.formats.csv_text import cells_of, texts_of
+from mcz.formats.csv_text import count_columns, texts_of
 from mcz.formats.layout import FRAME_NUMBER
 from mcz.formats.rows import Rows, line_of
-from mcz.formats.table_layout import MAX_SECTIONS, Section
+from mcz.formats.table_layout import MAX_SECTIONS, UNIT_CM, Section
 from mcz.formats.table_rows import (
     TableRows,
     begins_with_number,
-    last_pattern,
+    followed_by,
     read_table,
     without_zeros,
 )
-from mcz.formats.table_signals import read_columns
+from mcz.formats.table_signals import TEXT, read_columns, read_text, table_metadata, text_note
 from mcz.formats.table_source import names_in, section_of, table_source
 from mcz.formats.text_source import check_text, text_encoding
 from mcz.formats.times import stated_rate
@@ -35,11 +35,16 @@ from mcz.numbers import scan
 
 Ints = NDArray[np.int64]
 
-UNIT_CM = {"mm": 0.1, "cm": 1.0, "m": 100.0, "in": 2.54, "ft": 30.48}
-MOTIONS = ("trajectories", "segments")  # sections whose positions are points, the first first
+MOTIONS = ("trajectories", "objects", "segments")  # sections with positions, the first first
+POSITIONS = {"tx": "tx", "ty": "ty", "tz": "tz"}
+QUATERNION = {"rx": "qx", "ry": "qy", "rz": "qz", "rw": "qw"}
+HELICAL = {"rx": "vx", "ry": "vy", "rz": "vz"}  # an axis times an angle
 
-_AXIS = re.compile(rb'(?im)^[ \t]*"?Frame"?([,;\t])[ \t]*"?Sub Frame"?(?=[,;\t\r\n])[^\n]*\n?')
-_END = re.compile(rb"(?m)^(?![ \t]*[-+]?[0-9])")
+AXIS = re.compile(
+    rb'(?im)^(?:\xef\xbb\xbf)?[ \t]*"?Frame"?([,;\t])[ \t]*"?Sub Frame"?(?=[,;\t\r\n])[^\n]*\n?'
+)
+_END = re.compile(rb'(?m)^(?![ \t]*"?[-+]?\.?[0-9])')
+_OBJECT = re.compile(r"(?i)Global Angle(?: \((\w+)\))? (?=\S)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +59,7 @@ class _Part:
     rate: str
     labels: tuple[int, int]
     groups: list[tuple[str, list[tuple[str, str]]]]  # name, and axis and unit of each column
+    texts: tuple[str, ...] = ()  # names of the columns that are text, which no group has
 
     @property
     def n_columns(self) -> int:
@@ -84,7 +90,7 @@ def read_vicon(data: bytes, name: str = "motion") -> Motion:
     encoding = text_encoding(data)
     parts = _parts(data, encoding)
     found = [_read(data, part) for part in parts]
-    found[-1].rows = _followed_by(found[-1].rows, data[parts[-1].stop :])
+    found[-1].rows = followed_by(found[-1].rows, data[parts[-1].stop :])
     first = _motion_of(found)
     rated = found[first or 0]
     numbers = rated.numbers[:: rated.n_each]
@@ -101,14 +107,14 @@ def read_vicon(data: bytes, name: str = "motion") -> Motion:
     return Motion(
         Skeleton(
             joints,
-            unit_cm=None if first is None else _unit_cm(parts[first]),
-            angle_unit="",
+            unit_cm=None if first is None else _unit_cm(found[first].part),
+            angle_unit="" if first is None else _angle_unit(found[first].part),
         ),
         signals,
         rate and rate / rated.n_each,
         True,
         name,
-        {"name-encoding": encoding} if encoding != "utf-8" else {},
+        table_metadata(encoding, [text_note([t for one in found for t in one.part.texts])]),
         table_source("vicon", data, sections),
         None if usual else numbers,
     )
@@ -118,7 +124,7 @@ def _parts(data: bytes, encoding: str) -> list[_Part]:
     """The sections: each line Frame,Sub Frame with the lines above it and the rows below."""
     parts: list[_Part] = []
     at = 0
-    for match in _AXIS.finditer(data):
+    for match in AXIS.finditer(data):
         if match.start() < at:
             continue
         rows, end = match.end(), match.end()
@@ -156,8 +162,7 @@ def _part(
     names = texts_of(data[slice(*labels)], separator, encoding)
     axes = texts_of(data[axis:below], separator, encoding)
     units = texts_of(data[below:rows], separator, encoding) if rows > below else []
-    line = data[rows : data.find(b"\n", rows) + 1 or len(data)]
-    width = max(len(axes), len(cells_of(line, separator)))
+    width = count_columns((names, axes, units), data[rows:stop], separator)
     groups: list[tuple[str, list[tuple[str, str]]]] = []
     for k in range(2, width):
         name = names[k] if k < len(names) else ""
@@ -174,8 +179,10 @@ def _read(data: bytes, part: _Part) -> _Read:
     """The rows of a section, with the frame of each and how many rows a frame has."""
     n = part.n_columns
     cells = [[FRAME_NUMBER], [n], *([k] for k in range(n))]
-    table = read_table(data[: part.stop], part.rows, n + 1, cells, part.separator)
-    rows = without_zeros(data, table.rows, (range(n),))
+    table = read_table(data[: part.stop], part.rows, n + 1, cells, part.separator, numbers_at=n)
+    part = _without(part, [text.column for text in table.texts])
+    n = table.rows.start.shape[1] - 1
+    rows = without_zeros(data, table.rows, (range(part.n_columns),))
     numbers = rows.numbers if rows.numbers is not None else np.arange(1, rows.n_rows + 1)
     steps = np.flatnonzero(np.diff(numbers))
     n_each = int(steps[0]) + 1 if len(steps) else rows.n_rows
@@ -193,14 +200,26 @@ def _read(data: bytes, part: _Part) -> _Read:
     return _Read(part, table, rows, numbers, n_each, not in_order)
 
 
-def _followed_by(rows: Rows, rest: bytes) -> Rows:
-    """``rows`` of the last section, with what follows it."""
-    ending = rows.patterns[last_pattern(rows)].tail if rows.ending is None else rows.ending
-    return replace(rows, ending=ending + rest) if rest else rows
+def _without(part: _Part, texts: Sequence[int]) -> _Part:
+    """``part`` without the columns that are text, and with their names."""
+    groups: list[tuple[str, list[tuple[str, str]]]] = []
+    labels = []
+    at = 0
+    for name, columns in part.groups:
+        kept = []
+        for axis, unit in columns:
+            if at in texts:
+                labels.append(f"{name}.{axis}")
+            else:
+                kept.append((axis, unit))
+            at += 1
+        groups += [(name, kept)] if kept else []
+    labels += ["Sub Frame"] if at in texts else []
+    return replace(part, groups=groups, texts=tuple(labels))
 
 
 def _motion_of(found: Sequence[_Read]) -> int | None:
-    """Which section is the motion: trajectories, else segments, else one of a row a frame."""
+    """The section of the motion: trajectories, objects, segments, else one of a row a frame."""
     able = [k for k, one in enumerate(found) if one.n_each == 1]
     for title in MOTIONS:
         for k in able:
@@ -229,6 +248,7 @@ def _signals(
     for k, one in enumerate(found):
         part, mine = one.part, []
         n = part.n_columns
+        more = []
         if k == first:
             mine = [0]
         elif n:
@@ -237,12 +257,16 @@ def _signals(
                 for name, columns in part.groups
                 for axis, unit in columns
             )
-            mine = [len(signals)]
-            signals.append(_signal(data, one, range(n), part.title, channels))
-        if one.spare or not mine:
+            more.append(_signal(data, one, range(n), part.title, channels))
+        for text in read_text(data, one.rows, one.table.texts, part.texts, n):
+            name = TEXT if k == first else f"{part.title} {TEXT}"
+            more.append(replace(text, name=name, samples_per_frame=one.n_each))
+        if one.spare or not (mine or more):
             channel = Channel("", "Sub Frame")
-            mine.append(len(signals))
-            signals.append(_signal(data, one, [n], f"{part.title} sub frames", (channel,)))
+            last = one.rows.start.shape[1] - 1
+            more.append(_signal(data, one, [last], f"{part.title} sub frames", (channel,)))
+        mine += range(len(signals), len(signals) + len(more))
+        signals += more
         numbers.append(mine)
     return tuple(signals), numbers
 
@@ -257,31 +281,54 @@ def _signal(
 def _joints(part: _Part) -> tuple[Joint, ...]:
     return tuple(
         Joint(
-            name,
+            _OBJECT.sub("", name, 1) if part.title.lower() == "objects" else name,
             channels=tuple(
-                Channel(kind) if (kind := _kind(part, axis)) else Channel("", axis, unit)
+                Channel(kinds[axis.lower()]) if axis.lower() in kinds else Channel("", axis, unit)
                 for axis, unit in columns
             ),
         )
         for name, columns in part.groups
+        for kinds in (_kinds(part, name, columns),)
     )
 
 
 def _unit_cm(part: _Part) -> float | None:
     """The unit of the positions in cm, None where there are none, or of several units."""
-    units = {
-        unit.lower() for _, columns in part.groups for axis, unit in columns if _kind(part, axis)
-    }
+    units = _units(part, "t")
     return UNIT_CM.get(units.pop()) if len(units) == 1 else None
 
 
-def _kind(part: _Part, axis: str) -> str:
-    """The kind of a channel, "" of a plain scalar: how segments are turned, no file says."""
-    kinds = {
-        "trajectories": {"x": "tx", "y": "ty", "z": "tz"},
-        "segments": {"tx": "tx", "ty": "ty", "tz": "tz"},
+def _angle_unit(part: _Part) -> str:
+    """The unit of the rotation vectors, "" where there are none, or of several units."""
+    units = _units(part, "v")
+    return (units & {"rad", "deg"}).pop() if len(units) == 1 and units & {"rad", "deg"} else ""
+
+
+def _units(part: _Part, kind: str) -> set[str]:
+    """The units of all channels whose kind begins with ``kind``."""
+    return {
+        unit.lower()
+        for name, columns in part.groups
+        for axis, unit in columns
+        if _kinds(part, name, columns).get(axis.lower(), "").startswith(kind)
     }
-    return kinds.get(part.title.lower(), {}).get(axis.lower(), "")
+
+
+def _kinds(part: _Part, name: str, columns: Sequence[tuple[str, str]]) -> dict[str, str]:
+    """The kind of the channel of each axis; of others, no file says what they are.
+
+    The angles of segments, for one: about which axes, in which order.
+    """
+    title = part.title.lower()
+    if title == "trajectories":
+        return {"x": "tx", "y": "ty", "z": "tz"}
+    if title not in MOTIONS:
+        return {}
+    if {axis.lower() for axis, _ in columns} >= set(QUATERNION):
+        return POSITIONS | QUATERNION
+    turned = _OBJECT.match(name) if title == "objects" else None
+    is_helical = turned is not None and (turned[1] or "helical").lower() == "helical"
+    return POSITIONS | HELICAL if is_helical else POSITIONS
 
 
 def _section(data: bytes, one: _Read, names: Sequence[str], signals: Sequence[int]) -> Section:
