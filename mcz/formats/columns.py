@@ -86,7 +86,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
         label = head.names[time].strip()
         times = read_times(data, rows, at, unit=_seconds(label, head.units[time]), name=label)
     labels = [head.names[k] for k in text_cells]
-    more = (*read_text(data, rows, table.texts, labels, len(values)), *times.signals)
+    more = (*read_text(data, rows, table.texts, labels, (len(values), 1)), *times.signals)
     if text_cells and rows.numbers is None and not any(map(counts_rows, head.names)):
         _check_decimals(data, rows, len(values), labels)
     skeleton = _markers(head, values) or _scalars(head, values)

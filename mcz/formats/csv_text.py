@@ -24,6 +24,7 @@ _NUMBER = re.compile(
     rb"|[0-9]\.#[a-z]+[0-9]*)"
 )
 _QUOTED = re.compile(rb'[ \t]*"((?:[^"]|"")*)"[ \t]*')
+_QUOTED_BY_TABS = re.compile(rb' *"((?:[^"]|"")*)" *')
 DECIMAL_COMMA = re.compile(rb"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
 
 
@@ -48,8 +49,9 @@ def cell_spans(line: bytes, separator: bytes, most: int) -> tuple[list[tuple[int
     """
     spans: list[tuple[int, int]] = []
     at, size = 0, len(line)
+    in_quotes = _QUOTED_BY_TABS if separator == b"\t" else _QUOTED
     while len(spans) < most:
-        quoted = _QUOTED.match(line, at)
+        quoted = in_quotes.match(line, at)
         if quoted and line[quoted.end() : quoted.end() + 1] in (b"", separator):
             start, stop = quoted.span(1)
             end = quoted.end()
@@ -116,18 +118,18 @@ def first_row(
 def _first_like(lines: Sequence[tuple[int, bytes]], number: int, separator: bytes) -> int:
     """The first of the rows that end with line ``number``, some of whose cells may be texts.
 
-    Below a line of names alone, one with numbers is a row, even where a word stands for a number.
+    Right below a line of names alone, all lines with numbers are rows: a word may stand for one.
     """
     cells = cells_of(lines[number][1], separator)
-    above = [_some_cells(line, separator) for _, line in lines[max(number - 2, 0) : number]]
-    while number and is_like(above[-1], cells):
+    above = [_some_cells(line, separator) for _, line in lines[:number]]
+    while number and is_like(above[number - 1], cells):
         number -= 1
-        above = [_some_cells(line, separator) for _, line in lines[max(number - 2, 0) : number]]
-    if len(above) == 2 and len(above[0]) == len(above[1]) == len(cells):
-        n_names, n_numbers = (sum(map(_is_number, line)) for line in above)
-        if not n_names and 2 * n_numbers > len(cells):
-            return number - 1
-    return number
+    first = number
+    while first and len(above[first - 1]) == len(cells) and any(map(_is_number, above[first - 1])):
+        first -= 1
+    names = above[first - 1] if first else []
+    is_named = len(names) == len(cells) and all(names[1:]) and not any(map(_is_number, names))
+    return first if is_named else number
 
 
 def _is_number(cell: bytes) -> bool:

@@ -95,7 +95,7 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     if None not in texts:
         times = read_times(data, rows, time, stated)
     labels = [head.label(column) for column in texts]
-    text_signal = read_text(data, rows, table.texts, labels, n_values)
+    text_signal = read_text(data, rows, table.texts, labels, (n_values, 1))
     more = (*text_signal, *times.signals)
     names = [found.name for found in objects]
     text = _marked(data, head, names, rows.n_rows), data[: head.rows]

@@ -23,8 +23,8 @@ BLOCK = 512  # rows that may have a grid of their own
 WORTH = 32  # exceptions that a change of grid must save
 
 
-def read_signal(data: bytes, rows: Rows) -> Signal:
-    """The motion signal of ``rows``; raises SourceError for a token that is no number.
+def read_signal(data: bytes, rows: Rows, n_each: int = 1) -> Signal:
+    """The signal of ``rows``, ``n_each`` a frame; SourceError for a token that is no number.
 
     A token that is absent has mask False and the value of the row before (0 in the first row).
     """
@@ -42,7 +42,7 @@ def read_signal(data: bytes, rows: Rows) -> Signal:
     if not dense:
         _hold(values, mask)
     of_token = np.nonzero(mask)
-    grids, changes, printed = _grids(tokens, of_token[1], of_token[0], shape[1])
+    grids, changes, printed = _grids(tokens, of_token[1], of_token[0], shape[1], n_each)
     odd = np.flatnonzero(~printed)
     return Signal(
         values,
@@ -51,6 +51,7 @@ def read_signal(data: bytes, rows: Rows) -> Signal:
         exceptions=Exceptions(
             of_token[0][odd], of_token[1][odd], tuple(tokens[odd].texts()) if len(odd) else ()
         ),
+        samples_per_frame=n_each,
         grid_changes=changes,
     )
 
@@ -62,7 +63,11 @@ def _hold(values: NDArray[np.float64], mask: Bools) -> None:
 
 
 def _grids(
-    tokens: Tokens, column: NDArray[np.int64], row: NDArray[np.int64], n_columns: int
+    tokens: Tokens,
+    column: NDArray[np.int64],
+    row: NDArray[np.int64],
+    n_columns: int,
+    n_each: int,
 ) -> tuple[tuple[Grid, ...], tuple[tuple[int, int, Grid], ...], Bools]:
     """The grid of every column, its changes, and which tokens the grids print."""
     common = choose_grid(tokens)
@@ -80,7 +85,7 @@ def _grids(
         if np.count_nonzero(mine_printed) > np.count_nonzero(printed[at]):
             grids[c], printed[at] = grid, mine_printed
         if np.count_nonzero(~printed[at]) >= WORTH:
-            blocks, printed[at] = _by_blocks(tokens[at], row[at], grids[c], printed[at])
+            blocks, printed[at] = _by_blocks(tokens[at], row[at], grids[c], printed[at], n_each)
             changes += [(first, c, change) for first, change in blocks]
     return tuple(grids), tuple(sorted(changes, key=lambda change: change[:2])), printed
 
@@ -105,17 +110,22 @@ def _common_grid(
 
 
 def _by_blocks(
-    tokens: Tokens, row: NDArray[np.int64], grid: Grid, printed: Bools
+    tokens: Tokens, row: NDArray[np.int64], grid: Grid, printed: Bools, n_each: int
 ) -> tuple[list[tuple[int, Grid]], Bools]:
-    """Changes (row, grid) of a column where another grid saves exceptions; what is printed then."""
+    """Changes (row, grid) of a column where another grid saves exceptions; what is printed then.
+
+    They lie between frames of ``n_each`` rows.
+    """
     changes: list[tuple[int, Grid]] = []
     result = printed.copy()
-    for start in range(0, len(row), BLOCK):
-        block = slice(start, start + BLOCK)
+    firsts = -(-row[::BLOCK] // n_each) * n_each
+    edges = [*np.unique(np.searchsorted(row, firsts)).tolist(), len(row)]
+    for start, stop in pairwise(edges):
+        block = slice(start, stop)
         usual = grid.ordinals_of_tokens(tokens[block])[1]
         best, _, better = fit(tokens[block])
         if np.count_nonzero(better) >= np.count_nonzero(usual) + WORTH:
-            changes.append((int(row[start]), best))
+            changes.append((int(row[start]) // n_each * n_each, best))
             grid, usual = best, better
         result[block] = usual
     return changes, result

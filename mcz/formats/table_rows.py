@@ -186,7 +186,8 @@ def read_table(
     rows = followed_by(_without(rows, gone), whole[len(data) :])
     if not texts or numbers_at is None:
         return TableRows(rows, missing)
-    rows, found = split_text(data, rows, texts, numbers_at)
+    cell_numbers = {column: list(columns).index([column]) + 1 for column in texts}
+    rows, found = split_text(data, rows, cell_numbers, numbers_at)
     return TableRows(rows, missing, tuple(found))
 
 

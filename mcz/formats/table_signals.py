@@ -30,10 +30,10 @@ def of_columns(rows: Rows, columns: Sequence[int]) -> Rows:
     return replace(rows, start=np.ascontiguousarray(start), stop=np.ascontiguousarray(stop))
 
 
-def read_columns(data: bytes, rows: Rows, columns: Sequence[int]) -> Signal:
-    """The signal of these columns; raises SourceError for a token that is no number."""
+def read_columns(data: bytes, rows: Rows, columns: Sequence[int], n_each: int = 1) -> Signal:
+    """The signal of these columns, ``n_each`` rows a frame; SourceError for what is no number."""
     rows = of_columns(rows, columns)
-    signal = read_signal(data, rows)
+    signal = read_signal(data, rows, n_each)
     tried = range(min(len(columns), MOST_TRIED))
     found = {c: better for c in tried if (better := _better(data, rows, signal, c))}
     if not found:
@@ -66,12 +66,18 @@ def read_columns(data: bytes, rows: Rows, columns: Sequence[int]) -> Signal:
 
 
 def read_text(
-    data: bytes, rows: Rows, texts: Sequence[TextColumn], labels: Sequence[str], at: int
+    data: bytes,
+    rows: Rows,
+    texts: Sequence[TextColumn],
+    labels: Sequence[str],
+    at: tuple[int, int],
 ) -> tuple[Signal, ...]:
-    """The signal of the numbers in text columns, which begin with column ``at``, if there are any.
+    """The signal of the numbers in text columns, if there are any.
 
-    ``labels``: of each text column.
+    ``labels``: of each text column. ``at``: the first column of the numbers, and how many rows a
+    frame has.
     """
+    first, n_each = at
     channels = [
         Channel("", f"{label}.{k + 1}" if text.n_numbers > 1 else label)
         for text, label in zip(texts, labels, strict=True)
@@ -79,7 +85,7 @@ def read_text(
     ]
     if not channels:
         return ()
-    signal = read_columns(data, rows, range(at, at + len(channels)))
+    signal = read_columns(data, rows, range(first, first + len(channels)), n_each)
     return (replace(signal, name=TEXT, channels=tuple(channels)),)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -115,11 +115,12 @@ class _Shape:
 
 
 def split_text(
-    data: bytes, rows: Rows, columns: Sequence[int], at: int
+    data: bytes, rows: Rows, columns: Mapping[int, int], at: int
 ) -> tuple[Rows, list[TextColumn]]:
     """``rows`` without the text ``columns``; those of their numbers come in front of column ``at``.
 
-    Raises SourceError where the texts have too many different letters and signs.
+    ``columns``: which cell of a line each is, from 1. Raises SourceError where the texts have too
+    many different letters and signs.
     """
     shapes: list[tuple[Ints, list[_Shape]]] = []  # of each column: the shape of each row, and all
     numbers: list[tuple[Ints, Ints]] = []  # start and stop of each column of numbers
@@ -151,9 +152,10 @@ def split_text(
         return_inverse=True,
     )
     if len(layouts) > MAX_PATTERNS:
+        most = max(zip(columns, shapes, strict=True), key=lambda entry: len(entry[1][1]))[0]
         raise SourceError(
-            f"line {line_of(data, int(rows.start[:, columns[0]].max()))}: the texts of column "
-            f"{columns[0] + 1} differ in more than {MAX_PATTERNS} ways beside their digits"
+            f"line {line_of(data, int(rows.start[:, most].max()))}: the texts of column "
+            f"{columns[most]} differ in more than {MAX_PATTERNS} ways beside their digits"
         )
     of_row = of_row.ravel()
     order = np.argsort(-np.bincount(of_row), kind="stable")

@@ -258,9 +258,8 @@ def _signals(
                 for axis, unit in columns
             )
             more.append(_signal(data, one, range(n), part.title, channels))
-        for text in read_text(data, one.rows, one.table.texts, part.texts, n):
-            name = TEXT if k == first else f"{part.title} {TEXT}"
-            more.append(replace(text, name=name, samples_per_frame=one.n_each))
+        text = read_text(data, one.rows, one.table.texts, part.texts, (n, one.n_each))
+        more += [t if k == first else replace(t, name=f"{part.title} {TEXT}") for t in text]
         if one.spare or not (mine or more):
             channel = Channel("", "Sub Frame")
             last = one.rows.start.shape[1] - 1
@@ -274,8 +273,8 @@ def _signals(
 def _signal(
     data: bytes, one: _Read, columns: Sequence[int], name: str, channels: tuple[Channel, ...]
 ) -> Signal:
-    signal = read_columns(data, one.rows, columns)
-    return replace(signal, name=name, channels=channels, samples_per_frame=one.n_each)
+    signal = read_columns(data, one.rows, columns, one.n_each)
+    return replace(signal, name=name, channels=channels)
 
 
 def _joints(part: _Part) -> tuple[Joint, ...]:

@@ -145,6 +145,8 @@ def column_files(draw: st.DrawFn) -> bytes:
         draw(st.sampled_from([[""], ["NaN"], ["nan", ""], ["NA"]])) if n_columns > 1 else ["nan"]
     )
     rows = draw(tables(n_rows, n_columns, holes))
+    if not any("".join(row) for row in rows):
+        rows[0][0] = "0"
     names = [quoted(draw(NAMES)) for _ in range(n_columns)]
     if draw(st.booleans()):
         names.insert(0, draw(st.sampled_from(["time", "t", "Time (s)", "timestamp_ms"])))
