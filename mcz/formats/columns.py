@@ -27,9 +27,7 @@ from mcz.formats.table_signals import read_columns, read_text, table_metadata, t
 from mcz.formats.table_source import names_in, section_of, table_source
 from mcz.formats.table_times import Times, read_times
 from mcz.formats.text_source import check_text, text_encoding, text_start
-from mcz.formats.times import half_digit_of
 from mcz.motion import Channel, Joint, Motion, Skeleton
-from mcz.numbers import scan
 
 MAX_COLUMNS = 2**18  # of a table; no skeleton is stored with more joints
 
@@ -116,7 +114,7 @@ def _check_decimals(data: bytes, rows: Rows, n_values: int, labels: Sequence[str
     """Refuse texts beside integers alone where nothing counts the rows: a list is no motion."""
     present = rows.stop[:, :n_values] > 0
     start, stop = rows.start[:, :n_values][present], rows.stop[:, :n_values][present]
-    if not len(start) or half_digit_of(scan(data, start, stop)) == 0.5:
+    if b"." not in b"".join(data[a:b] for a, b in zip(start, stop, strict=True)):
         raise SourceError(
             f"line {line_of(data, int(start.max(initial=0)))}: column {labels[0][:40]!r} is text "
             f"beside integers, without times or frame numbers; a list, and no motion"

@@ -145,7 +145,7 @@ def column_files(draw: st.DrawFn) -> bytes:
         draw(st.sampled_from([[""], ["NaN"], ["nan", ""], ["NA"]])) if n_columns > 1 else ["nan"]
     )
     rows = draw(tables(n_rows, n_columns, holes))
-    if not any("".join(row) for row in rows):
+    if all(cell in holes for row in rows for cell in row):
         rows[0][0] = "0"
     names = [quoted(draw(NAMES)) for _ in range(n_columns)]
     if draw(st.booleans()):
