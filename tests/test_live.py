@@ -727,6 +727,51 @@ def test_an_interrupt_before_any_line_leaves_a_whole_clip() -> None:
     assert len(values) == 3
 
 
+def test_a_block_that_fails_leaves_no_end() -> None:
+    rows = frames(6)
+    for error in (ValueError("x"), OSError("x"), SystemExit(1), mcz.MotionError("x")):
+        out = io.BytesIO()
+        with pytest.raises(type(error)), LiveWriter(out, skeleton(), "stairs") as writer:
+            for row in rows:
+                writer.push(row)
+            raise error
+        writer.close()  # does nothing any more
+        found = []
+        with pytest.raises(mcz.TruncatedError):
+            for number, _, _ in live_frames(io.BytesIO(out.getvalue())):
+                found.append(number)
+        assert found == list(range(6))
+        with pytest.raises(mcz.TruncatedError):
+            mcz.open(out.getvalue())
+        with mcz.open(out.getvalue(), salvage=True) as file:
+            np.testing.assert_array_equal(file.clips["live"].read(), rows)
+        with pytest.raises(mcz.MotionError, match="closed"):
+            writer.push(rows[0])
+
+
+def test_heartbeats_are_skipped_by_every_reader(tmp_path: Path) -> None:
+    rows = frames(12)
+    out = io.BytesIO()
+    with LiveWriter(out, skeleton(), "stairs", {"every": 4}) as writer:
+        writer.heartbeat()
+        for row in rows:
+            writer.push(row)
+            writer.heartbeat()
+            writer.heartbeat()
+    data = out.getvalue()
+    writer.heartbeat()
+    assert out.getvalue() == data
+    assert mcz.verify(data) == []
+    with mcz.open(data) as file:
+        np.testing.assert_array_equal(file.clips["live"].read(), rows)
+    use(data)
+    use(data, salvage=True)
+    for lost in ("refuse", "missing", "hold", "linear"):
+        found = list(mcz.stream_decode(data, lost=lost))
+        assert [frame.state for frame in found] == ["decoded"] * 12
+        np.testing.assert_array_equal([frame.values for frame in found], rows)
+
+
 def test_a_second_interrupt_does_not_wait() -> None:
     class Stuck(io.BytesIO):
         def write(self, data: Any, /) -> int:

@@ -9,7 +9,8 @@ from io import BufferedReader, FileIO, RawIOBase
 from pathlib import Path
 from select import select
 from tempfile import TemporaryDirectory
-from typing import Any, BinaryIO
+from time import monotonic
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from mcz.cli.common import (
     Exit,
@@ -17,10 +18,16 @@ from mcz.cli.common import (
     about,
     binary_output,
     check_new,
+    code_of,
     echo,
     plural,
+    reason,
     say,
 )
+from mcz.errors import MczError
+
+if TYPE_CHECKING:
+    from mcz.live.writer import LiveTraffic, LiveWriter
 
 NAME = "standard input"
 PATIENCE = 0.3  # seconds of waiting for input between two looks whether there was an interrupt
@@ -33,29 +40,45 @@ def standard_input() -> BinaryIO:
     return sys.stdin.buffer
 
 
-def live_input() -> BinaryIO:
+def live_input(timeout: float | None = None) -> BinaryIO:
     """Standard input of which lines are read as they come, and an interrupt is never missed."""
     stream = standard_input()
     raw = getattr(stream, "raw", None)
     if raw is None or sys.platform == "win32":  # which cannot wait for a pipe
+        if timeout is not None and raw is not None:
+            raise Failure("--timeout needs --connect on Windows", Exit.USAGE)
         return stream
-    return BufferedReader(_Awaited(raw))
+    return BufferedReader(Awaited(raw, timeout))
 
 
-class _Awaited(RawIOBase):
-    """Waits for bytes without reading: a read does not see an interrupt that came just before."""
+class Awaited(RawIOBase):
+    """Waits for bytes without reading: a read does not see an interrupt that came just before.
 
-    def __init__(self, raw: FileIO) -> None:
-        self._raw = raw
+    It ends where ``raw`` does, where the connection breaks, and after ``timeout`` seconds without a
+    byte (None: never); ``ending`` says which of the last two it was.
+    """
+
+    def __init__(self, raw: RawIOBase, timeout: float | None = None) -> None:
+        self._raw, self._timeout = raw, timeout
+        self.ending: str | None = None
 
     def readable(self) -> bool:
         return True
 
     def readinto(self, buffer: Any, /) -> int | None:
+        if self.ending is not None:
+            return 0
+        until = None if self._timeout is None else monotonic() + self._timeout
         with suppress(OSError, ValueError):  # a descriptor that cannot be waited for
             while not select([self._raw], [], [], PATIENCE)[0]:
-                pass
-        return self._raw.readinto(buffer)
+                if until is not None and monotonic() >= until:
+                    self.ending = f"nothing came for {self._timeout:g} s"
+                    return 0
+        try:
+            return self._raw.readinto(buffer)
+        except ConnectionError as error:
+            self.ending = error.strerror or "the connection broke"
+            return 0
 
 
 @contextmanager
@@ -77,7 +100,7 @@ def encode_lines(
     target: str | None, force: bool, format_name: str | None, skeleton: str | None, **options: Any
 ) -> None:
     """Encode standard input frame by frame to ``target``, - or None being standard output."""
-    from mcz.live.text_writer import encode_live
+    from mcz.live.text_writer import begin_live
     from mcz.writing.entry import Terms
 
     for name in ("verbatim", "archive", "copies", "effort"):
@@ -88,13 +111,58 @@ def encode_lines(
     others = () if target in (None, "-") else (str(target),)
     with about(NAME, *others), live_output(target, force) as sink:
         terms = Terms(skeleton=skeleton, **options)
-        report = encode_live(iter(stream.readline, b""), sink, name, terms)
-    for remark in report.remarks:
+        live = begin_live(iter(stream.readline, b""), sink, name, terms)
+        with live.writer, aborting(live.writer):
+            live.push_all()
+    for remark in live.remarks:
         say(f"{NAME}: {remark}")
+    report_live(target, live.writer)
+
+
+@contextmanager
+def aborting(writer: LiveWriter) -> Iterator[None]:
+    """Say of an error that it leaves the clip without an end."""
+    try:
+        yield
+    except MczError as error:
+        count = plural(writer.n_frames, "frame")
+        text = f"{NAME}: {reason(error)}; the stream is aborted after {count}, and has no end"
+        raise Failure(text, code_of(error), path=NAME, kind=type(error).__name__) from error
+
+
+def report_live(target: str | None, writer: LiveWriter) -> None:
+    """Say what was written to ``target``, - or None being a pipe, and what it took."""
+    traffic = writer.traffic
+    rates = ""
+    if traffic.seconds:
+        total, frames, coded = (
+            n / 125 / traffic.seconds for n in (traffic.total, traffic.frames, traffic.coded)
+        )
+        asked = "" if traffic.asked is None else f" ({traffic.asked:g} asked)"
+        rates = (
+            f"; {total:.2f} kbit/s{asked}: {coded:.2f} of coded frames, {frames - coded:.2f} of "
+            f"framing, {total - frames:.2f} before and behind them"
+        )
     if target not in (None, "-"):
-        size = Path(str(target)).stat().st_size
-        held = f"{plural(report.n_frames, 'frame')} of {plural(report.n_channels, 'channel')}"
-        echo(f"{target}: {held}, live; {size:,} bytes")
+        held = (
+            f"{plural(writer.n_frames, 'frame')} of {plural(writer.skeleton.n_channels, 'channel')}"
+        )
+        echo(f"{target}: {held}, live; {traffic.total:,} bytes{rates}")
+    elif rates:
+        say(f"{plural(writer.n_frames, 'frame')}, {traffic.total:,} bytes{rates}")
+    if not traffic.is_held:
+        say(rate_warning(traffic))
+
+
+def rate_warning(traffic: LiveTraffic) -> str:
+    """A line about a rate that framing alone exceeds."""
+    assert traffic.seconds is not None
+    all_, coded = (n / 125 / traffic.seconds for n in (traffic.frames, traffic.coded))
+    return (
+        f"{traffic.asked:g} kbit/s cannot be held: packets, masks and repeated clip headers take "
+        f"{all_ - coded:.2f}, and {all_:.2f} is the least with them; --repeat 0, a longer "
+        "intra_period, fewer gaps or a lower frame rate reduce it"
+    )
 
 
 @contextmanager

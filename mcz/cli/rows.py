@@ -25,7 +25,8 @@ class Rows:
 
     ``names`` are those of the first line; None where ``n_channels`` says that there is none.
     A line ``# set name=value ...`` gives a dict, other lines that begin with # are left out.
-    Raises SourceError, with the number of the line or row, for what is no such row.
+    Raises SourceError, with the number of the line or row, for what is no such row, and for a last
+    line without a line end, which may have been cut.
     """
 
     def __init__(self, stream: BinaryIO, *, binary: bool, n_channels: int | None = None) -> None:
@@ -64,6 +65,8 @@ class Rows:
         self._at += 1
         if len(line) > MOST_LINE:
             raise SourceError(f"line {self._at}: longer than {MOST_LINE} bytes")
+        if not line.endswith(b"\n") and line.strip():
+            raise SourceError(f"line {self._at} has no line end: the source was cut off")
         return line.removesuffix(b"\n").removesuffix(b"\r")
 
     def _text_rows(self) -> Iterator[Row]:

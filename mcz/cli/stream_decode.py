@@ -28,6 +28,9 @@ from mcz.cli.common import (
 from mcz.cli.options import rate_option, token_option
 from mcz.cli.piped import NAME, live_input
 from mcz.cli.rows import NUMBER, STATE
+from mcz.errors import TruncatedError
+
+TIMEOUT = 30.0  # seconds; ``mcz stream encode --listen`` sends a heartbeat every 5
 
 if TYPE_CHECKING:
     from mcz.live.clip_state import LiveClip
@@ -51,6 +54,13 @@ if TYPE_CHECKING:
 )
 @click.option("--join", is_flag=True, help="The stream may begin anywhere.")
 @click.option(
+    "--timeout",
+    metavar="SECONDS",
+    type=click.FloatRange(min=0),
+    help="End where nothing comes for so long; 0: wait for ever.  [default: 30 with --connect, "
+    "else 0]",
+)
+@click.option(
     "--post-filter",
     "post_filter",
     is_flag=True,
@@ -65,6 +75,7 @@ def command(
     token: str | None,
     lost: Lost,
     join: bool,
+    timeout: float | None,
     post_filter: bool,
     rate: Fraction | None,
     binary: bool,
@@ -75,7 +86,8 @@ def command(
     The stream is FILE.mcz, or standard input. A line of names comes first. CSV rows begin with the
     number of the frame, counted from 0, and have an empty field where a value is missing; with
     --float32 a row is its values alone, NaN there. Standard error says at the end what came; the
-    exit code is 4 where frames are missing, or where the stream was cut off.
+    exit code is 4 where frames are missing, or where the stream was cut off: the source died, the
+    connection broke, or nothing came for --timeout.
     """
     if connect is not None and file != "-":
         raise Failure("FILE.mcz and --connect exclude each other", Exit.USAGE)
@@ -90,16 +102,25 @@ def command(
         refuse_inputs(sys.stdout, (sys.stdin if file == "-" else file,))
 
     where = connect or (NAME if file == "-" else file)
-    with about(where), _stream(file, connect, token) as stream:
+    if timeout is None and connect is not None:
+        timeout = TIMEOUT
+    with about(where), _stream(file, connect, token, timeout or None) as stream:
         join = join or connect is not None
         reader = stream_decode(stream, lost=lost, join=join, post_filter=post_filter, rate=rate)
         try:
             _print_all(reader, _Binary() if binary else _Text(states=states))
         except BrokenPipeError:  # whoever read it has seen enough
             raise
+        except TruncatedError as error:
+            if not reader.summary.stream_bytes:
+                raise
+            say(f"{where}: {error}")
         except BaseException:
             _sum_up(where, reader)
             raise
+        ending = getattr(getattr(stream, "raw", None), "ending", None)
+        if ending is not None:
+            say(f"{where}: {ending}")
         _sum_up(where, reader)
     found = reader.summary
     gone = found.concealed or found.missing or found.skipped or found.n_faults
@@ -108,14 +129,16 @@ def command(
 
 
 @contextmanager
-def _stream(file: str, connect: str | None, token: str | None) -> Iterator[BinaryIO]:
+def _stream(
+    file: str, connect: str | None, token: str | None, timeout: float | None
+) -> Iterator[BinaryIO]:
     if connect is not None:
         from mcz.cli.tcp import connected
 
-        with connected(connect, token) as stream:
+        with connected(connect, token, timeout) as stream:
             yield stream
     elif file == "-":
-        yield live_input()
+        yield live_input(timeout)
     else:
         existing(file)
         with builtins.open(file, "rb") as stream:
@@ -189,7 +212,8 @@ def _sum_up(where: str, reader: LiveReader) -> None:
     rate = reader.clip.frame_rate if reader.clip is not None else None
     if rate and n_frames:
         seconds = float(n_frames / rate)
-        told.append(f"{found.payload_bytes / 125 / seconds:.2f} kbit/s of payload")
+        all_bytes, payload = (n / 125 / seconds for n in (found.stream_bytes, found.payload_bytes))
+        told.append(f"{all_bytes:.2f} kbit/s received, {payload:.2f} of payload")
     if found.is_cut:
         told.append("it was cut off")
     elif not found.is_checked:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from fractions import Fraction
-from pathlib import Path
+from threading import Event, Lock, Thread
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,9 +16,7 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
-    echo,
     existing,
-    plural,
     say,
 )
 from mcz.cli.options import (
@@ -28,13 +27,15 @@ from mcz.cli.options import (
     unit_option,
     up_option,
 )
-from mcz.cli.piped import NAME, live_input, live_output
+from mcz.cli.piped import NAME, aborting, live_input, live_output, rate_warning, report_live
 from mcz.cli.rows import Rows, skeleton_in
 
 if TYPE_CHECKING:
+    from mcz.cli.tcp import Listener
     from mcz.live.writer import LiveWriter
 
-Entry = Callable[[], int | None]
+HEARTBEAT = 5.0  # seconds
+WARN_AFTER = 5.0  # seconds of frames
 
 
 @click.command(short_help="Rows of numbers to a live stream.")
@@ -75,11 +76,19 @@ Entry = Callable[[], int | None]
     show_default=True,
     help="Repeat skeleton and clip header at every N-th frame at which one can join; 0: never.",
 )
+@click.option(
+    "--heartbeat",
+    metavar="SECONDS",
+    type=click.FloatRange(min=0),
+    help="Tell clients every so often that the stream goes on while no row comes; 0: never.  "
+    "[default: 5 with --listen, else 0]",
+)
 @force_option
 def command(
     output: str | None,
     listen: str | None,
     clients: int,
+    heartbeat: float | None,
     token: str | None,
     skeleton: str | None,
     binary: bool,
@@ -93,6 +102,9 @@ def command(
     empty field where a value is missing, or, with --float32, binary ones, NaN there. What mcz
     decode --to csv and mcz stream decode print of markers will do, too. A CSV line
     "# set bitrate=4 gof=20" changes parameters of the codec from its next group of frames on.
+
+    A bad row or one that is cut off aborts the stream: all frames before it are sent, and no end.
+    Standard error says at the end what the stream took, framing included.
     """
     from mcz.writing.inputs import refuse_inputs
 
@@ -107,63 +119,115 @@ def command(
     others = tuple(name for name in (output, skeleton) if name not in (None, "-"))
     with about(NAME, *map(str, others)):
         if listen is not None:
-            with _listening(listen, clients, token) as (sink, tell):
-                _encode(sink, tell, skeleton, binary, **options)
-            return Exit.FINE
-        with live_output(output, force) as sink:
-            held = _encode(sink, None, skeleton, binary, **options)
-    if output not in (None, "-"):
-        size = Path(str(output)).stat().st_size
-        echo(f"{output}: {held}, live; {size:,} bytes")
+            beat = HEARTBEAT if heartbeat is None else heartbeat
+            with _listening(listen, token) as listener:
+                source = _Source(skeleton, binary)
+                writer = _writer(listener, source, **options)
+                listener.entry = lambda: writer.entry
+                with _Heart(writer, beat, listener) as heart, writer:
+                    listener.wait_for(clients)
+                    _push_all(source.rows, writer, heart)
+        else:
+            with live_output(output, force) as sink:
+                source = _Source(skeleton, binary)
+                writer = _writer(sink, source, **options)
+                with _Heart(writer, heartbeat or 0.0) as heart, writer:
+                    _push_all(source.rows, writer, heart)
+    report_live(output, writer)
     return Exit.FINE
 
 
-def _encode(
+class _Source:
+    """The rows on standard input, and the skeleton that their columns are the channels of."""
+
+    def __init__(self, skeleton: str | None, binary: bool) -> None:
+        from mcz.live.generators import markers
+
+        known = None if skeleton is None else skeleton_in(skeleton)
+        n_channels = None if known is None else known.n_channels
+        self.rows = Rows(live_input(), binary=binary, n_channels=n_channels)
+        self.skeleton = markers(self.rows.names or []) if known is None else known
+        self.rows.expect(self.skeleton.n_channels)
+
+
+def _writer(
     sink: Any,
-    tell: Callable[[Entry], None] | None,
-    skeleton: str | None,
-    binary: bool,
+    source: _Source,
     *,
     rate: Fraction | None,
     unit: str | None,
     up: str | None,
     **live: Any,
-) -> str:
-    """Write the stream; returns what it holds in words. ``tell`` is told where one can join.
-
-    ``live``: further arguments of ``LiveWriter``.
-    """
-    from mcz.live.generators import markers
+) -> LiveWriter:
+    """The writer of the stream; ``live`` are further arguments of ``LiveWriter``."""
     from mcz.live.writer import LiveWriter
     from mcz.units import facing, in_unit
 
-    known = None if skeleton is None else skeleton_in(skeleton)
-    n_channels = None if known is None else known.n_channels
-    rows = Rows(live_input(), binary=binary, n_channels=n_channels)
-    if known is None:
-        known = markers(rows.names or [])
-    rows.expect(known.n_channels)
-    writer = LiveWriter(sink, facing(in_unit(known, unit), up), frame_rate=rate, **live)
-    if tell is not None:
-        tell(lambda: writer.entry)
-    with writer:
-        _push_all(rows, writer)
-    return f"{plural(writer.n_frames, 'frame')} of {plural(known.n_channels, 'channel')}"
+    skeleton = facing(in_unit(source.skeleton, unit), up)
+    return LiveWriter(sink, skeleton, frame_rate=rate, **live)
 
 
-def _push_all(rows: Rows, writer: LiveWriter) -> None:
-    for row in rows:
-        if isinstance(row, dict):
-            writer.change(**row)
+def _push_all(rows: Rows, writer: LiveWriter, heart: _Heart) -> None:
+    warned = False
+    with aborting(writer):
+        for row in rows:
+            with heart.lock:
+                if isinstance(row, dict):
+                    writer.change(**row)
+                else:
+                    writer.push(row)
+            traffic = writer.traffic
+            if not warned and (traffic.seconds or 0) >= WARN_AFTER and not traffic.is_held:
+                warned = True
+                say(rate_warning(traffic))
+
+
+class _Heart:
+    """Writes a heartbeat after every ``seconds`` without a frame, from a thread; 0: never.
+
+    Who uses the writer holds ``lock``.
+    """
+
+    def __init__(
+        self, writer: LiveWriter, seconds: float, listener: Listener | None = None
+    ) -> None:
+        self.lock = Lock()
+        self._writer, self._seconds, self._listener = writer, seconds, listener
+        self._is_over = Event()
+        self._thread = Thread(target=self._beat, daemon=True)
+
+    def __enter__(self) -> _Heart:
+        if self._seconds:
+            self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._is_over.set()
+        if self._seconds:
+            self._thread.join()
+
+    def _beat(self) -> None:
+        sent, since = self._writer.traffic.total, monotonic()
+        while not self._is_over.wait(min(self._seconds / 4, 1.0)):
+            with self.lock:
+                now = self._writer.traffic.total
+                if now == sent and monotonic() - since >= self._seconds:
+                    with suppress(OSError):  # the next frame meets it, too
+                        self._write()
+                    now = self._writer.traffic.total
+            if now != sent:
+                sent, since = now, monotonic()
+
+    def _write(self) -> None:
+        if self._listener is None:
+            self._writer.heartbeat()
         else:
-            writer.push(row)
+            self._listener.beat(self._writer.heartbeat)
 
 
 @contextmanager
-def _listening(
-    where: str, n_clients: int, token: str | None
-) -> Iterator[tuple[Any, Callable[[Entry], None]]]:
-    """A sink that sends to clients, and what it is told of the places where one can join."""
+def _listening(where: str, token: str | None) -> Iterator[Listener]:
+    """A sink that sends to clients."""
     from mcz.cli.tcp import Listener
 
     with about(where):
@@ -173,12 +237,7 @@ def _listening(
         who = "everyone who" if token is None else "everyone who has the token and"
         hint = "; --token asks for one" if token is None else ""
         say(f"{who} reaches the port can read the stream, which is not encrypted{hint}")
-
-    def tell(entry: Entry) -> None:
-        listener.entry = entry
-        listener.wait_for(n_clients)
-
     try:
-        yield listener, tell
+        yield listener
     finally:
         listener.close()

@@ -8,11 +8,13 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from hmac import compare_digest
+from io import BufferedReader
 from threading import Condition, Thread
 from time import monotonic, sleep
 from typing import BinaryIO
 
 from mcz.cli.common import Exit, Failure, say
+from mcz.cli.piped import Awaited
 
 MOST_WAITING = 4 * 2**20  # bytes that a client may be behind
 LINGER = 10.0  # seconds that clients have for the rest, once all is coded
@@ -38,20 +40,26 @@ def _is_name(host: str) -> bool:
 
 
 @contextmanager
-def connected(text: str, token: str | None = None) -> Iterator[BinaryIO]:
+def connected(
+    text: str, token: str | None = None, timeout: float | None = None
+) -> Iterator[BinaryIO]:
     """What comes from ``HOST:PORT``, as a binary stream; ``token`` is what the sender may ask for.
 
-    Raises Failure where the sender closes the connection before it has sent anything.
+    The stream ends after ``timeout`` seconds of silence. Raises Failure where nothing comes at all.
     """
     with (
-        socket.create_connection(address_of(text)) as connection,
-        connection.makefile("rb") as stream,
+        socket.create_connection(address_of(text), timeout) as connection,
+        connection.makefile("rb", buffering=0) as raw,
     ):
+        connection.settimeout(None)
         if token is not None:
             connection.sendall(line_of(token))
+        waiting = Awaited(raw, timeout)
+        stream = BufferedReader(waiting)
         if not stream.peek(1):
             hint = "is the --token right?" if token else "it may ask for a --token"
-            raise Failure(f"{text}: the connection was closed before anything came; {hint}")
+            ending = waiting.ending or "the connection was closed before anything came"
+            raise Failure(f"{text}: {ending}; {hint}")
         yield stream
 
 
@@ -74,7 +82,8 @@ class Listener:
 
     The first write is what every client gets first. Later ones are frames: a client that comes
     after the first of them gets those from the next one on for which ``entry`` is not None, which
-    says how many bytes before it are not needed there. One that is ``MOST_WAITING`` bytes behind is
+    says how many bytes before it are not needed there. ``beat`` sends what all clients get and none
+    joins at. One that is ``MOST_WAITING`` bytes behind is
     dropped. With ``token`` a client gets nothing until it has sent a line that is this token.
     Raises OSError where the address cannot be had.
     """
@@ -87,7 +96,7 @@ class Listener:
         self.entry: Callable[[], int | None] = lambda: None
         self._opening: bytes | None = None
         self._is_closed = False
-        self._has_frames = False
+        self._has_frames = self._is_beat = False
         self._clients: list[_Client] = []
         self._changed = Condition()
         self._accepting = Thread(target=self._accept, daemon=True)
@@ -116,16 +125,24 @@ class Listener:
                 self._opening = data
                 self._send(data, None)
             else:
-                self._has_frames = True
+                self._has_frames = self._has_frames or not self._is_beat
                 self._send(data, self.entry())
         return len(data)
+
+    def beat(self, write: Callable[[], None]) -> None:
+        """Let ``write`` write a heartbeat."""
+        self._is_beat = True
+        try:
+            write()
+        finally:
+            self._is_beat = False
 
     def _send(self, data: bytes, entry: int | None) -> None:
         for client in list(self._clients):
             if client.has_joined:
                 client.put(data)
             elif entry is not None:
-                client.has_joined = True
+                client.has_joined = not self._is_beat
                 client.put(data[entry:])
             if client.is_gone:
                 self._clients.remove(client)

@@ -206,6 +206,13 @@ class LiveEncoder(Protocol):
         """
         ...
 
+    def charge(self, n_bytes: int) -> None:
+        """Take in how many bytes the last frame took on the wire, framing and masks included.
+
+        It is called after each ``push`` where the option ``bitrate`` is given.
+        """
+        return
+
 
 class LiveDecoder(Protocol):
     """The inverse: raises FormatError on bad bytes, and takes such a frame for one that was lost.

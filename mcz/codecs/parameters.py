@@ -71,7 +71,7 @@ TARGETS = (
     Parameter(
         "kbps",
         None,
-        "at most so many kilobits of payload a second",
+        "at most so many kilobits of payload a second, framing not counted",
         number("kbps", 1e-9, 1e9),
     ),
     Parameter(

@@ -66,6 +66,7 @@ class Fault:
 
     offset: int
     reason: str
+    is_cut: bool = False  # the stream ended there
 
 
 Event = Piece | Packet | Fault
@@ -192,9 +193,10 @@ class WalkerWithLosses:
         except FormatError as error:
             self._due = None if isinstance(error, _OtherData) else due
             behind = max(self.pipe.start, at + 1 if before is None else before)
-            if isinstance(error, TruncatedError):
+            is_cut = isinstance(error, TruncatedError)
+            if is_cut:
                 behind = self._search(behind)  # raises, too, where nothing is whole
-            return Fault(at, str(error)), behind
+            return Fault(at, str(error), is_cut), behind
 
     def _whole(self, at: int, *, checked: bool = False) -> tuple[Piece | Packet, int]:
         """What is whole at ``at``, and where it ends; raises FormatError.

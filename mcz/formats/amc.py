@@ -225,6 +225,9 @@ class _ArrivingFrames:
             if self._is_whole(bones):
                 yield number, self._row(bones)
                 done = True
+        if self._counts is not None and not done and next(reversed(self._counts)) not in bones:
+            count = f"{len(bones)} of {len(self._counts)} bones"
+            raise self.source.error(f"frame {number} has {count}: the source was cut off")
         if not done:
             yield number, self._row(bones)
 

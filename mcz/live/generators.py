@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcz.errors import FormatError, MotionError, OptionError
+from mcz.errors import FormatError, MotionError, OptionError, TruncatedError
 from mcz.live.clip_state import LiveClip
 from mcz.live.concealment import LOST, LiveFrame, Lost
 from mcz.live.reader_with_losses import FramesWithLosses, StreamSummary
@@ -47,7 +47,7 @@ def stream_encode(
     ``skeleton`` may be names instead, of markers or of their coordinates (see ``markers``).
     ``frames`` gives rows in source units, (n_channels,), NaN where invalid; a mapping among them
     changes parameters of the codec from the next group of frames on. The bytes of a frame are given
-    before the next is asked for. Where ``frames`` raises, the clip is closed first.
+    before the next is asked for. Where ``frames`` raises, so does this, and the stream has no end.
     ``repeat`` and what is raised: see ``LiveWriter``.
     """
     sink = _Bytes()
@@ -63,17 +63,12 @@ def stream_encode(
         repeat=repeat,
     )
     yield sink.take()
-    try:
-        for row in frames:
-            if isinstance(row, Mapping):
-                writer.change(**{str(name): value for name, value in row.items()})
-            else:
-                writer.push(_numbers(row))
-                yield sink.take()
-    except Exception:
-        writer.close()
-        yield sink.take()
-        raise
+    for row in frames:
+        if isinstance(row, Mapping):
+            writer.change(**{str(name): value for name, value in row.items()})
+        else:
+            writer.push(_numbers(row))
+            yield sink.take()
     writer.close()
     yield sink.take()
 
@@ -196,6 +191,9 @@ class LiveReader:
                 yield frame
             if isinstance(source, StrictFrames):
                 summary.is_checked = source.is_checked
+        except TruncatedError:
+            summary.is_cut = True
+            raise
         finally:
             summary.stream_bytes = source.size
 

@@ -105,16 +105,18 @@ class FramesWithLosses:
         """All frames that can be told; raises FormatError where there is no going on."""
         for event in self._walker.events():
             if isinstance(event, Fault):
+                if event.is_cut and self._lost == "refuse":
+                    raise TruncatedError(event.reason)
                 self._fault(f"at {event.offset}: {event.reason}")
             elif isinstance(event, Packet):
                 yield from self._packet(event)
             else:
                 yield from self._piece(event)
+        if self._walker.is_cut and self._lost == "refuse":
+            raise TruncatedError(f"the stream ended at {self.size}")
         yield from self._leave("the stream ended")
         self._summary.is_cut = self._walker.is_cut
         self._summary.is_checked = bool(self._all_checked)
-        if self._walker.is_cut and self._lost == "refuse":
-            raise TruncatedError(f"the stream ended at {self.size}")
 
     def _fault(self, text: str) -> None:
         if self._joining:  # what lies before the place where one joins is no loss

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any
 
 from mcz.codecs import by_name
 from mcz.container.writer import Sink
-from mcz.errors import OptionError
+from mcz.errors import OptionError, SourceError
 from mcz.formats import FORMATS, likely_formats
 from mcz.formats.line_by_line import Arriving
 from mcz.live.writer import LiveWriter
@@ -23,26 +22,52 @@ from mcz.writing.entry import Terms, rate_notes
 NOTE = "coded live, frame by frame, from {format} text, which was not kept"
 
 
-@dataclass(slots=True)
-class LiveReport:
-    """What ``encode_live`` wrote, and what it could not say in the clip."""
+class LiveText:
+    """A motion that arrives as text, and ``writer``, which writes it.
 
-    n_frames: int = 0
-    n_channels: int = 0
-    remarks: tuple[str, ...] = ()
-    is_renumbered: bool = False
+    ``remarks`` are what the clip cannot say, all of them known when ``push_all`` has returned.
+    """
+
+    def __init__(self, arriving: Arriving, writer: LiveWriter, remarks: tuple[str, ...]) -> None:
+        self.writer, self.remarks = writer, remarks
+        self._arriving = arriving
+
+    def push_all(self) -> None:
+        """Write each frame before the next line is read; raises as ``encode_live`` does."""
+        due, is_renumbered = self._arriving.first_number, False
+        for number, values in self._arriving.frames:
+            if number is not None and number != due:
+                if not is_renumbered:
+                    remark = f"frame {number} comes where {due} is due; the clip counts on"
+                    self.remarks = (*self.remarks, remark)
+                is_renumbered, due = True, number
+            self.writer.push(values)
+            due += 1
+        declared, n_frames = self._arriving.declared, self.writer.n_frames
+        if declared not in (None, n_frames):
+            remark = f"{declared} frames are declared, {n_frames} came"
+            if n_frames < declared:
+                raise SourceError(remark)
+            self.remarks = (*self.remarks, remark)
 
 
-def encode_live(
-    lines: Iterable[bytes], sink: Sink, source_format: str, terms: Terms, name: str = "live"
-) -> LiveReport:
+def encode_live(lines: Iterable[bytes], sink: Sink, source_format: str, terms: Terms) -> LiveText:
     """Write the motion that ``lines`` spell to ``sink``, each frame before the next line is read.
 
     ``source_format`` is ``bvh`` or ``amc``; an AMC needs the ``skeleton`` of ``terms``, the path of
-    its ASF. Raises SourceError at text that is none of the format; the clip is closed then with all
-    frames before it. Otherwise raises as ``LiveWriter`` does.
+    its ASF. Raises SourceError at text that is none of the format, at a last line without a line
+    end, and where fewer frames came than are declared; the clip has all frames before that and no
+    end then. Otherwise raises as ``LiveWriter`` does.
     """
-    arriving, base = _arriving(lines, source_format, terms)
+    live = begin_live(lines, sink, source_format, terms)
+    with live.writer:
+        live.push_all()
+    return live
+
+
+def begin_live(lines: Iterable[bytes], sink: Sink, source_format: str, terms: Terms) -> LiveText:
+    """The same up to the first frame; the caller uses the writer as a context manager."""
+    arriving, base = _arriving(_whole_lines(lines), source_format, terms)
     notes = [arriving.metadata.get("source-note", ""), NOTE.format(format=source_format.upper())]
     metadata = dict(arriving.metadata) | {"source-note": "; ".join(filter(None, notes))}
     if base is not None:
@@ -55,18 +80,19 @@ def encode_live(
         terms.params or {},
         frame_rate=arriving.frame_rate if terms.rate is None else Fraction(terms.rate),
         frame_rate_exact=arriving.frame_rate_exact if terms.rate is None else True,
-        name=name,
         metadata=metadata,
         first_number=arriving.first_number,
         base=base,
     )
-    report = LiveReport(n_channels=arriving.skeleton.n_channels, remarks=_remark(arriving, terms))
-    with writer:
-        _push_all(arriving, writer, report)
-    if arriving.declared not in (None, report.n_frames):
-        remark = f"{arriving.declared} frames are declared, {report.n_frames} came"
-        report.remarks = (*report.remarks, remark)
-    return report
+    return LiveText(arriving, writer, _remark(arriving, terms))
+
+
+def _whole_lines(lines: Iterable[bytes]) -> Iterator[bytes]:
+    """Lines as they come; raises SourceError for a last one that may have been cut."""
+    for number, line in enumerate(lines, 1):
+        if not line.endswith(b"\n") and line.strip():
+            raise SourceError(f"line {number} has no line end: the source was cut off")
+        yield line
 
 
 def _arriving(
@@ -92,20 +118,6 @@ def _remark(arriving: Arriving, terms: Terms) -> tuple[str, ...]:
     if SKELETON_NOTE not in arriving.metadata:
         return notes
     return (f"{terms.skeleton} does not fit: {arriving.metadata[SKELETON_NOTE]}", *notes)
-
-
-def _push_all(arriving: Arriving, writer: LiveWriter, report: LiveReport) -> None:
-    due = arriving.first_number
-    for number, values in arriving.frames:
-        if number is not None and number != due:
-            remark = f"frame {number} comes where {due} is due; the clip counts on"
-            if not report.is_renumbered:
-                report.remarks = (*report.remarks, remark)
-            report.is_renumbered = True
-            due = number
-        writer.push(values)
-        due += 1
-        report.n_frames += 1
 
 
 def codes_live(codec: str, params: Mapping[str, Any]) -> bool:

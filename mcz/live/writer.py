@@ -6,7 +6,7 @@ SPEC.md, "Open DATA and packets", is normative.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import MappingProxyType, TracebackType
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.brief import brief
 from mcz.codecs import by_name
 from mcz.codecs.contract import Codec, Encoded, LiveDecoder, LiveEncoder, model_finder
 from mcz.container import payloads
@@ -35,8 +36,36 @@ from mcz.writing.positions import wants_positions
 from mcz.writing.quality import CHUNK, texts_of
 from mcz.writing.signal_source import MemorySource
 
+MOST_OVER = 1.05  # of a rate: that it is held
+
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+
+@dataclass(slots=True)
+class LiveTraffic:
+    """What a live clip took on the wire, in bytes.
+
+    ``total`` bytes were sent, ``frames`` of them with frames, ``coded`` of these as streams of the
+    codec: the others are their framing, masks and repeated clip headers. ``asked`` is the bit rate
+    that the codec was to hold at last, in kbit/s, None without one; ``seconds`` are those of the
+    frames, None where the frame rate is unknown.
+    """
+
+    total: int = 0
+    frames: int = 0
+    coded: int = 0
+    asked: float | None = None
+    seconds: float | None = None
+
+    __repr__ = brief
+
+    @property
+    def is_held(self) -> bool:
+        """False where frames take more than was asked for, and no coarser step would help."""
+        if self.asked is None or not self.seconds:
+            return True
+        return self.frames / 125 / self.seconds <= MOST_OVER * self.asked
 
 
 class LiveWriter:
@@ -51,11 +80,14 @@ class LiveWriter:
     that cannot, for a bad parameter or one that needs all frames, MotionError for a skeleton
     without channels.
 
-    ``entry`` is where, in the bytes that are being written or were last, a reader can join, who has
-    those of the beginning or finds them repeated there; None where that is nowhere.
+    ``traffic`` counts what was sent. ``entry`` is where, in the bytes that are being written or
+    were last, a reader can join, who has those of the beginning or finds them repeated there; None
+    where that is nowhere.
 
-    As a context manager it closes the clip where the block fails, too: what was written is whole.
-    An interrupt amid a frame waits until that is written; a second one leaves the clip cut off.
+    As a context manager it closes the clip, also where an interrupt (Ctrl-C) ends the block, as a
+    recording is ended. Any other exception aborts it: the file stops without CEND and FOOT, and a
+    reader raises TruncatedError behind the last frame. An interrupt amid a frame waits until that
+    is written; a second one leaves the clip cut off.
     """
 
     def __init__(
@@ -80,7 +112,9 @@ class LiveWriter:
         self._repeat, self._n_fresh, self._changed = repeat, 0, set[str]()
         self.codec = by_name(codec)
         self.options = self.codec.options(params)
-        self._outlet = _Outlet(sink)
+        self.traffic = LiveTraffic(asked=self.options.get("bitrate"))
+        self._rate = frame_rate
+        self._outlet = _Outlet(sink, self.traffic)
         self._writer = Writer(self._outlet)
         self._is_open = self._has_data = self._is_stuck = False
         check_metadata(metadata, name)
@@ -126,8 +160,10 @@ class LiveWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if not isinstance(error, OSError):  # the sink itself, it seems
+        if error is None or isinstance(error, KeyboardInterrupt):
             self.close()
+        else:
+            self.abort()
 
     def push(self, values: Floats) -> Floats:
         """Write the next frame, (n_channels,) in source units, NaN where invalid.
@@ -167,12 +203,24 @@ class LiveWriter:
         except LimitError:
             self._is_stuck = True
             raise
+        size = self._outlet.size
         self._outlet.send()
+        self._count(size, len(stream))
         decoded = self._decoder.push(stream, fresh)
         self._digest.update(decoded[None], None if valid is None else valid[None])
         self.n_frames += 1
         self._figures.add(row, decoded)
         return decoded if valid is None else np.where(valid, decoded, np.nan)
+
+    def _count(self, n_bytes: int, n_coded: int) -> None:
+        """Take in what a frame took; the codec pays for what preceded the first one, too."""
+        traffic = self.traffic
+        if traffic.asked is not None:
+            self._encoder.charge(n_bytes if self.n_frames else traffic.total)
+        traffic.frames += n_bytes
+        traffic.coded += n_coded
+        if self._rate:
+            traffic.seconds = float((self.n_frames + 1) / self._rate)
 
     def change(self, /, **params: Any) -> None:
         """Let parameters of the codec have other values from the next group of frames on.
@@ -183,6 +231,8 @@ class LiveWriter:
             raise MotionError("the live clip is closed")
         options = self.codec.options(params)
         self._encoder.change({name: options[name] for name in params})
+        if "bitrate" in params:
+            self.traffic.asked = options["bitrate"]
         self._changed |= set(params)
 
     def _write(self, stream: bytes, fresh: bool, valid: Mask | None) -> None:
@@ -195,20 +245,44 @@ class LiveWriter:
             self._writer.frame(self.n_frames, stream, fresh=fresh)
         else:
             if not self._has_data:
-                self._begin_data()
+                self._begin_data(fresh)
             flags, streams = fresh * FRESH, [stream]
             if valid is not None:
                 flags, streams = flags | MASKS, [build_mask(valid[None]), stream]
             self._writer.segment(SegmentHeader(0, self.n_frames, 1, flags=flags), streams)
 
-    def _begin_data(self) -> None:
-        """Open a DATA, from time to time behind a copy of what is needed to read it."""
-        self.entry = self._outlet.size
-        self._n_fresh += 1
-        if self._repeat and self._n_fresh > 1 and (self._n_fresh - 1) % self._repeat == 0:
-            self._writer.chunk(REPEAT, self._opening, ANCILLARY)  # REPT-02
+    def _begin_data(self, fresh: bool) -> None:
+        """Open a DATA, from time to time behind a copy of what is needed to read it.
+
+        One that does not start ``fresh`` goes on behind a heartbeat, and nobody can join there.
+        """
+        if fresh:
+            self.entry = self._outlet.size
+            self._n_fresh += 1
+            if self._repeat and self._n_fresh > 1 and (self._n_fresh - 1) % self._repeat == 0:
+                self._writer.chunk(REPEAT, self._opening, ANCILLARY)  # REPT-02
         self._writer.open_data()
         self._has_data = True
+
+    def heartbeat(self) -> None:
+        """Write an open DATA without a frame, which readers skip.
+
+        It tells who listens with a timeout that the stream goes on while its source is silent.
+        """
+        if not self._is_open or self._is_stuck:
+            return
+        with held():
+            if self._has_data:
+                self._writer.close_data()
+                self._has_data = False
+            self.entry = self._outlet.size
+            self._writer.open_data()
+            self._writer.close_data()
+            self._outlet.send()
+
+    def abort(self) -> None:
+        """Leave the clip without an end, so that readers see that it is not whole."""
+        self._is_open = False
 
     def close(self) -> None:
         """Write what comes behind the frames: hash, quality record, index."""
@@ -251,8 +325,8 @@ def _coders(
 class _Outlet:
     """Collects what is written and sends it in one call."""
 
-    def __init__(self, sink: Sink) -> None:
-        self._sink = sink
+    def __init__(self, sink: Sink, traffic: LiveTraffic) -> None:
+        self._sink, self._traffic = sink, traffic
         self._parts: list[bytes] = []
 
     def write(self, data: bytes, /) -> None:
@@ -268,6 +342,7 @@ class _Outlet:
         return b"".join(part for part in self._parts if part[:4] in kinds)
 
     def send(self) -> None:
+        self._traffic.total += self.size
         while self._parts:
             data = b"".join(self._parts)
             taken = self._sink.write(data)  # a raw stream may take a part alone

@@ -165,10 +165,33 @@ def test_text_that_breaks_off_leaves_what_was_whole(tmp_path: Path) -> None:
     data = HEADER + LINES[0] + LINES[1] + b"1 2 x 3\n"
     code, _, errors = run("encode", "-", *STEP, "-o", out, data=data)
     assert code == 1
-    assert errors == "mcz: standard input: line 21: b'x' is not a number\n"
-    assert mcz.verify(out) == []
-    with mcz.open(out) as file:
-        assert file.clips["live"].n_frames == 2
+    assert errors == (
+        "mcz: standard input: line 21: b'x' is not a number; the stream is aborted after 2 frames, "
+        "and has no end\n"
+    )
+    assert kept(out) == 2
+
+
+def kept(path: Path) -> int:
+    """The frames in a clip without an end, which only salvage opens."""
+    with pytest.raises(mcz.TruncatedError):
+        mcz.open(path)
+    with mcz.open(path, salvage=True) as file:
+        return file.clips["live"].n_frames
+
+
+def test_a_source_that_dies_in_a_frame_leaves_no_end(tmp_path: Path, asf: Path) -> None:
+    out = tmp_path / "out.mcz"
+    bvh, amc = HEADER + b"".join(LINES), b"".join(AMC)
+    for data, arguments, whole in (
+        (bvh[:-1], (), 2),  # amid the last line, or at its end
+        (bvh[: -len(LINES[2])], (), 2),  # between two lines: 3 frames are declared
+        (amc[: amc.rindex(b" ") + 2], ("--skeleton", asf), 1),
+        (b"".join((*AMC[:4], AMC[5])), ("--skeleton", asf), 1),  # the last bone did not come
+    ):
+        code, _, errors = run("encode", "-", *STEP, *arguments, "-o", out, "--force", data=data)
+        assert (code, "has no end" in errors) == (1, True), data
+        assert kept(out) == whole
 
 
 def test_an_interrupt_ends_a_recording_well(tmp_path: Path) -> None:
@@ -359,7 +382,10 @@ def test_what_is_refused_at_once_leaves_no_file(tmp_path: Path) -> None:
 def test_frames_that_did_not_come_are_remarked(tmp_path: Path) -> None:
     target = tmp_path / "walk.mcz"
     code, _, errors = run("encode", "-", *STEP, "-o", target, data=HEADER + LINES[0])
-    assert code == 0 and "3 frames are declared, 1 came" in errors
+    assert code == 1 and "3 frames are declared, 1 came" in errors
+    more = HEADER + b"".join(LINES) + LINES[0]
+    code, _, errors = run("encode", "-", *STEP, "-o", target, "--force", data=more)
+    assert code == 0 and "3 frames are declared, 4 came" in errors
     whole = HEADER + b"".join(LINES)
     code, _, errors = run("encode", "-", *STEP, "-o", target, "--force", data=whole)
     assert (code, errors) == (0, "")

@@ -233,7 +233,8 @@ def test_parameters_change_by_a_line(tmp_path: Path) -> None:
     changed = changed.replace(b" gof=3", b"")
     code, _, errors = run("encode", *CODER, "-o", path, "--force", data=changed)
     assert (code, "cannot change" in errors) == (2, True)
-    assert mcz.verify(path) == []  # what came before that line
+    strict = run("decode", path)
+    assert (strict[0], strict[1].count(b"\n")) == (4, 2)  # what came before that line, and no end
     bad = NAMES + b"# set step\n"
     assert "not '# set name=value" in run("encode", *CODER, data=bad)[2]
 
@@ -329,7 +330,7 @@ def test_what_a_crash_leaves(tmp_path: Path) -> None:
     assert "cut off" in errors
     assert all(row.endswith(b",decoded") for row in out.splitlines()[1:])
     strict = run("decode", path)
-    assert strict[0] == 1
+    assert strict[0] == 4
     assert strict[1].count(b"\n") == out.count(b"\n")
     assert f"mcz: {path}: " in strict[2]
 
@@ -497,6 +498,127 @@ def test_nobody_is_there() -> None:
         assert (code, "Traceback" in errors) == (1, False)
 
 
+@pytest.mark.parametrize(
+    ("binary", "last"),
+    [
+        (False, b"7,8,9,10,11,12"),  # whole as it seems, but its last number may be longer
+        (False, b"7,8,9"),
+        (False, b"7,8,9,10,11,x\n"),
+        (True, bytes(23)),
+    ],
+)
+def test_a_source_that_dies_in_a_row_aborts_the_stream(binary: bool, last: bytes) -> None:
+    rows = ROWS.astype("<f4").tobytes() if binary else b"".join(map(line, ROWS))
+    with Started(
+        *("encode", *CODER, *(["--float32"] if binary else [])),
+        *("--listen", ":0", "--clients", "1"),
+    ) as sender:
+        sender.say(NAMES)
+        with Started("decode", "--connect", sender.address()) as receiver:
+            sender.say(rows + last)
+            assert sender.end() == 1
+            assert receiver.process.wait() == 4
+            assert receiver.stdout.read().count(b"\n") == 11
+            assert "cut off" in receiver.stderr.read().decode()
+        assert "aborted after 10 frames" in sender.stderr.read().decode()
+
+
+@pytest.mark.parametrize("lost", ["refuse", "missing", "hold", "linear"])
+def test_a_sender_that_is_killed_is_an_aborted_end(lost: str) -> None:
+    with Started("encode", *CODER, "--listen", ":0", "--clients", "1") as sender:
+        sender.say(NAMES)
+        with Started("decode", "--connect", sender.address(), "--lost", lost) as receiver:
+            sender.say(b"".join(map(line, ROWS)))
+            for _ in range(11):
+                receiver.stdout.readline()
+            sender.process.kill()
+            assert receiver.process.wait() == 4
+            assert "cut off" in receiver.stderr.read().decode()
+
+
+def test_a_silent_peer_is_not_waited_for_for_ever() -> None:
+    data = encoded()
+    for part in (data[: len(data) // 2], data[:40], b""):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            address = f"127.0.0.1:{server.getsockname()[1]}"
+            with Started("decode", "--connect", address, "--timeout", "3") as receiver:
+                peer, _ = server.accept()
+                with peer:
+                    peer.sendall(part)
+                    assert receiver.process.wait() == (4 if part else 1)
+                assert "nothing came for 3 s" in receiver.stderr.read().decode()
+    with Started("decode", "--timeout", "3") as receiver:
+        receiver.say(data[: len(data) // 2])
+        assert receiver.process.wait() == 4
+    with Started("decode", "--timeout", "3") as receiver:
+        receiver.say(data)  # all is there, though the pipe stays open
+        assert receiver.process.wait() == 0
+
+
+def test_heartbeats_keep_listeners_while_the_source_is_silent() -> None:
+    sending = ("encode", *CODER, "--listen", ":0", "--clients", "2", "--heartbeat", "0.1")
+    with Started(*sending) as sender:
+        sender.say(NAMES)
+        address = sender.address()
+        receiving = ("decode", "--connect", address, "--timeout", "2", "--states")
+        with Started(*receiving) as first:
+            time.sleep(3)  # the other client is waited for
+            with Started(*receiving) as second:
+                sender.say(line(ROWS[0]))
+                for receiver in (first, second):
+                    assert receiver.stdout.readline().startswith(b"frame")
+                    receiver.stdout.readline()
+                time.sleep(3)
+                sender.say(line(ROWS[1]))
+                assert sender.end() == 0
+                for receiver in (first, second):
+                    assert receiver.process.wait() == 0
+                    assert receiver.stdout.read().startswith(b"1,")
+
+
+def test_a_heartbeat_is_no_place_to_join() -> None:
+    """Who comes late gets heartbeats, and frames from the next place to join on."""
+    sending = ("encode", *CODER, "--listen", ":0", "--clients", "1", "--heartbeat", "0.1")
+    with Started(*sending) as sender:
+        address = tcp.address_of(sender.address())
+        sender.say(NAMES)
+        with socket.create_connection(address) as early, early.makefile("rb") as ahead:
+            first = frames_from(ahead)
+            for number in range(2):
+                sender.say(line(ROWS[number]))
+                assert next(first).number == number
+            with socket.create_connection(address) as late, late.makefile("rb") as stream:
+                data = stream.read1(2000)
+                while len(data) < 2000:  # heartbeats come
+                    data += stream.read1(2000)
+                sender.say(b"".join(map(line, ROWS[2:])))
+                sender.stdin.close()
+                data += stream.read()
+            assert [frame.number for frame in first] == list(range(2, 10))
+        reader = mcz.stream_decode(data, join=True)
+        assert [frame.number for frame in reader] == list(range(4, 10))
+        assert not reader.summary.is_cut
+        assert sender.process.wait() == 0
+
+
+def test_what_the_wire_takes_is_said(tmp_path: Path) -> None:
+    walk = np.cumsum(np.random.default_rng(0).normal(0, 2, (240, 6)), axis=0)
+    data = NAMES + b"".join(map(line, walk))
+    asked = ("--rate", "30", "--param", "bitrate=4")
+    code, out, errors = run("encode", *asked, data=data)
+    assert code == 0
+    sent = len(out) / 125 / 8
+    assert f"240 frames, {len(out):,} bytes; {sent:.2f} kbit/s (4 asked): " in errors
+    path = tmp_path / "a.mcz"
+    code, said, errors = run("encode", *asked, "-o", path, data=data)
+    assert (code, errors) == (0, "")
+    assert f"live; {len(out):,} bytes; {sent:.2f} kbit/s (4 asked): " in said.decode()
+    _, _, errors = run("decode", data=out)
+    assert f"{sent:.2f} kbit/s received, " in errors
+    code, _, errors = run("encode", "--rate", "240", "--param", "bitrate=4", data=data * 1)
+    assert (code, "4 kbit/s cannot be held: packets, " in errors) == (0, True)
+
+
 # Rows, without a process -----------------------------------------------------------
 
 
@@ -507,6 +629,6 @@ def test_columns_that_are_not_values() -> None:
     assert names(b"frame,a.tx,a.ty,a.tz,state\n") == ["a.tx", "a.ty", "a.tz"]
     assert names(b"frame,state\n") == ["frame", "state"]
     assert names(b'"a,b",c\r\n') == ["a,b", "c"]
-    rows = Rows(io.BytesIO(b"frame,a.x,a.y,a.z\n7,1,,nan\n\n# what\n8,1,2,3"), binary=False)
+    rows = Rows(io.BytesIO(b"frame,a.x,a.y,a.z\n7,1,,nan\n\n# what\n8,1,2,3\n"), binary=False)
     rows.expect(3)
     np.testing.assert_array_equal(list(rows), [[1, np.nan, np.nan], [1, 2, 3]])

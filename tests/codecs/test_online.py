@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import replace
 from fractions import Fraction
@@ -211,6 +212,43 @@ def test_a_rate_is_held(control, rate, gof, period, speed) -> None:
     first = 8 * max(len(unit.data) for unit in units_of(coded)) * 120 / 600 / 1000
     assert spent <= rate * 1.05 + first + 16 * groups * 120 / 600 / 1000
     assert np.isfinite(coded.read()).all()
+
+
+@pytest.mark.parametrize("preset", ["default", "rc", "rca"])
+@pytest.mark.parametrize("gaps", [False, True])
+@pytest.mark.parametrize(("hz", "rate"), [(30, 8), (30, 16), (120, 32), (120, 64)])
+def test_a_rate_is_held_on_the_wire(preset, gaps, hz, rate) -> None:
+    """All that is sent up to the last frame: packets, masks, repeated headers, the beginning."""
+    motion = markers(20 * hz, 30)
+    values = motion.values.copy()
+    if gaps:
+        for frame in np.random.default_rng(1).integers(0, len(values), 30).tolist():
+            marker = frame % 30
+            values[frame : frame + 20, 3 * marker : 3 * marker + 3] = np.nan
+    out = io.BytesIO()
+    params = {"preset": preset, "bitrate": rate}
+    with mcz.LiveWriter(out, motion.skeleton, "online", params, frame_rate=Fraction(hz)) as live:
+        for row in values:
+            live.push(row)
+        sent = len(out.getvalue())
+    traffic = live.traffic
+    assert (traffic.asked, traffic.seconds, traffic.total) == (rate, 20.0, len(out.getvalue()))
+    assert traffic.is_held
+    assert sent / 125 / 20.0 == pytest.approx(rate, rel=0.06)
+    assert mcz.verify(out.getvalue()) == []
+
+
+def test_a_rate_that_framing_exceeds_is_not_held() -> None:
+    """A packet takes 7 bytes, 6.7 kbit/s at 120 frames a second."""
+    motion = markers(1200, 30)
+    out = io.BytesIO()
+    params = {"bitrate": 5.0}
+    with mcz.LiveWriter(out, motion.skeleton, "online", params, frame_rate=Fraction(120)) as live:
+        for row in motion.values:
+            live.push(row)
+    assert not live.traffic.is_held
+    assert (live.traffic.frames - live.traffic.coded) / 125 / 10.0 > 6.7
+    assert live.traffic.coded / 125 / 10.0 < 5.0  # nothing is gained by coding any finer
 
 
 @pytest.mark.parametrize("preset", ["default", "rc", "rca"])

@@ -46,6 +46,25 @@ class Plan:
         self.numbers[kernels.SPENT] += more
         self.numbers[kernels.AHEAD] += more
 
+    def charge(self, n_bytes: int, *, intra: bool) -> None:
+        """Take in that the last frame, one of a live stream, had so many bytes with its framing."""
+        kernels, numbers = _kernels(), self.numbers
+        framing = 8.0 * n_bytes - numbers[kernels.LAST]
+        numbers[kernels.SPENT] += framing - numbers[kernels.RESERVED]
+        usual = numbers[kernels.FRAMING]
+        if intra:  # it has a clip header before it, which all frames up to the next one pay for
+            more = framing - usual
+            if numbers[kernels.PERIOD] > 0:
+                numbers[kernels.EXTRA] += more
+                numbers[kernels.OWED] += more
+                framing = usual
+        else:
+            share = kernels.FOLLOW / numbers[kernels.BUFFER] if usual else 1.0
+            numbers[kernels.FRAMING] += (framing - usual) * min(share, 1.0)
+        rate = numbers[kernels.GROUP_BITS] / numbers[kernels.GROUP_FRAMES]
+        ahead = numbers[kernels.AHEAD] + framing
+        numbers[kernels.AHEAD] = min(ahead, rate * numbers[kernels.BUFFER])
+
 
 def plan_of(chosen: Mapping[str, Any], layout: Layout, step: float) -> Plan:
     """The plan at the start of a signal, ``step`` being that of its header.

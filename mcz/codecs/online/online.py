@@ -22,6 +22,7 @@ from mcz.codecs.contract import (
     Encoded,
     Fetch,
     Layout,
+    LiveEncoder,
     Request,
     Segment,
     SignalSource,
@@ -197,7 +198,7 @@ def uses(header: bytes) -> tuple[bytes, ...]:
     return uses_of(parse_header(header).space)
 
 
-class _LiveEncoder:
+class _LiveEncoder(LiveEncoder):
     """One frame a push, each a unit and a segment; fresh ones are intra coded."""
 
     version: int | None = None
@@ -215,7 +216,8 @@ class _LiveEncoder:
         writer = self._writer
         unit = writer.code(self._rows.row(values, valid, writer.coder.at))
         self._rows.keep()
-        return build_units([unit]), unit.kind == INTRA
+        self._is_intra = unit.kind == INTRA
+        return build_units([unit]), self._is_intra
 
     def change(self, options: Mapping[str, Any]) -> None:
         fixed = sorted(set(options) - CHANGEABLE)
@@ -225,6 +227,9 @@ class _LiveEncoder:
                 f"{', '.join(sorted(CHANGEABLE))} can"
             )
         self._writer.change(options)
+
+    def charge(self, n_bytes: int) -> None:
+        self._writer.plan.charge(n_bytes, intra=self._is_intra)
 
 
 class _LiveDecoder:

@@ -123,7 +123,8 @@ PARAMETERS = (
     Parameter(
         "bitrate",
         None,
-        "kilobits a second that the coded frames take, which steps follow; in place of step",
+        "kilobits a second, which steps follow, in place of step: of a live stream all its bytes, "
+        "of a file the coded frames",
         number("bitrate", 1e-3, 1e9),
     ),
     Parameter(

@@ -26,7 +26,10 @@ BUFFER = 10  # frames
 DUE, SPENT, AT, VARIANCE, LTR_VARIANCE, STR_VARIANCE, STR_SUM, LTR_BITS = range(11, 19)
 # ... bits beyond the rate, what an intra coded LTR took beyond another and what of that is still to
 # be paid, bits at a step of 1.
-AHEAD, EXTRA, OWED, STR_COST, LTR_COST, PLAN_SIZE = range(19, 25)
+AHEAD, EXTRA, OWED, STR_COST, LTR_COST = range(19, 24)
+# ... of a live stream: bits of the last frame, of the framing of one on average, and what of that
+# the group set aside for each of its frames.
+LAST, FRAMING, RESERVED, PLAN_SIZE = range(24, 28)
 
 UNKNOWN = -1.0
 MOST_ALPHA = 200.0
@@ -81,6 +84,8 @@ def begin_group(plan: Floats, n_frames: int) -> None:
     if plan[AT] > 1:
         plan[STR_VARIANCE] = plan[STR_SUM] / (plan[AT] - 1)
     plan[DUE] = plan[GROUP_BITS] * (n_frames / plan[GROUP_FRAMES]) + carry
+    plan[RESERVED] = plan[FRAMING]
+    plan[DUE] -= plan[RESERVED] * n_frames
     plan[SPENT] = plan[AT] = plan[STR_SUM] = 0.0
 
 
@@ -106,7 +111,7 @@ def _steady_step(plan: Floats) -> float:
     n_frames = plan[GROUP_FRAMES]
     of_ltr = plan[LTR_COST] if plan[LTR_COST] > 0 else FIRST_COST * plan[STR_COST]
     cost = of_ltr * 2.0 ** (-FALL * plan[LTR_SHIFT]) + plan[STR_COST] * (n_frames - 1)
-    due = plan[GROUP_BITS] - plan[AHEAD] * n_frames / plan[BUFFER]
+    due = plan[GROUP_BITS] - (plan[FRAMING] + plan[AHEAD] / plan[BUFFER]) * n_frames
     if plan[OWED] > 0:
         due -= plan[EXTRA] / plan[PERIOD]
     found = np.log2(cost / max(due, LEAST_SHARE * plan[GROUP_BITS])) / FALL
@@ -164,6 +169,7 @@ def str_step(plan: Floats, n_coefficients: int, n_frames: int, gauss: Floats) ->
 @inner
 def settle(plan: Floats, kind: int, used: float, bits: float, variance: float) -> None:
     """Take in a frame: log2 of its step, its bits, the variance of its decoded coefficients."""
+    plan[LAST] = bits
     plan[SPENT] += bits
     plan[AT] += 1
     plan[VARIANCE] = variance

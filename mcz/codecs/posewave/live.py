@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.codecs import contract
 from mcz.codecs.contract import Layout, Model
 from mcz.codecs.gaps import LiveRows
 from mcz.codecs.posewave.chain import Chain
@@ -30,7 +31,7 @@ JOINING = 480  # frames from one that starts fresh to the next, where the caller
 NEEDS_ALL = ("quality", "lossless", "contacts")
 
 
-class LiveEncoder:
+class LiveEncoder(contract.LiveEncoder):
     """One frame a push: from time to time a fresh segment, else one that goes on.
 
     With a preset each frame is coded with finer and finer steps until no point of it is farther off

@@ -23,6 +23,7 @@ from mcz.codecs.contract import (
     Encoded,
     Fetch,
     Layout,
+    LiveEncoder,
     Request,
     Segment,
     SignalSource,
@@ -264,7 +265,7 @@ class _Coder:
         return bool(fault < 0)
 
 
-class _LiveEncoder:
+class _LiveEncoder(LiveEncoder):
     """One frame a push, each a segment that needs the one before, from time to time a fresh one."""
 
     version: int | None = None
