@@ -266,7 +266,7 @@ def test_decode_refuses(call: Call) -> None:
         (("amc.mcz", "-o", "a.glb"), 2, "its frame rate is unknown, and GLB states times"),
         (("bvh.mcz", "-o", "b.glb", "--key-error", "1"), 2, "give the unit (--unit)"),
         (("bvh.mcz", "--to", "csv", "--key-error", "1"), 2, "--key-error needs --to glb"),
-        (("bvh.mcz", "--to", "c3d", "--unit", "cm"), 2, "--unit needs --to glb or usda"),
+        (("bvh.mcz", "--to", "csv", "--unit", "cm"), 2, "--unit needs --to bvh or amc or c3d"),
         (("bvh.mcz", "--to", "csv", "--up", "z"), 2, "--up needs --to c3d or glb or usda"),
         (("bvh.mcz", "-o", "x.usda", "--key-error", "1"), 2, "--key-error needs --to glb"),
         (("bvh.mcz", "-o", "x.usd"), 2, "--to usda writes USD as text"),

@@ -12,11 +12,11 @@ from mcz.cli.common import (
     Exit,
     Failure,
     damage_of,
-    opened,
     plural,
     say,
     to_frames,
 )
+from mcz.cli.decode_input import SOURCE_GIVEN, Input
 from mcz.cli.delivery import Output, check_count, deliver
 from mcz.cli.made import Made, facts_of, told
 from mcz.cli.options import (
@@ -105,7 +105,7 @@ if TYPE_CHECKING:
     "--stored", is_flag=True, help="Its words as they are stored, not in units (with --signal)."
 )
 @up_option("Axis that points up, where the clip does not know it (with --to c3d, glb or usda).")
-@unit_option("Length unit, where the clip does not know it (with --to glb or usda).")
+@unit_option("Length unit, where the clip does not know it (with --to another format).")
 @key_error_option
 @rate_option("Frames a second, in place of the clip's own (with --to, --post-filter).")
 @click.option(
@@ -139,18 +139,38 @@ def command(
 ) -> Exit:
     """Write the original file of a clip, byte for byte, or its numbers, or another format.
 
-    A file without clips gives its skeleton's ASF or its attachment.
+    A file without clips gives its skeleton's ASF or its attachment. A source file in place of
+    FILE.mcz is converted at once, as by mcz convert.
     """
     wanted = Wanted(**options)
     refuse(unverified and salvage, "--salvage checks all that it reads; leave out --unverified")
+    given = Input(file, salvage=salvage, unverified=unverified, max_decoded=max_decoded)
+    return decode(given, wanted, output, names=names, where=where, force=force, as_json=as_json)
+
+
+def decode(
+    given: Input,
+    wanted: Wanted,
+    output: str | None,
+    *,
+    names: tuple[str, ...],
+    where: str | None,
+    force: bool,
+    as_json: bool,
+) -> Exit:
+    """Write what is wanted of an input, and say what became of it."""
+    file, salvage = given.file, given.salvage
     if output == "-" and (as_json or wanted.with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
+    if given.is_source:
+        given, wanted = given.told(wanted)
+        refuse(output is None and wanted.target is None, f"{file}: {SOURCE_GIVEN}")
     if target_of(suffix_of(output)) is None:
         check_options(wanted, salvage)
         check_signal(wanted)
     outputs: list[Output] = []
     made: dict[str, Made] = {}
-    with opened(file, salvage=salvage, max_decoded=max_decoded, unverified=unverified) as held:
+    with given.opened() as held:
         for clip in _chosen(held, output, names, where):
             found, made[clip.name] = _of_clip(held, clip, _as_named(clip, output, wanted, salvage))
             outputs += [part for part in found if part not in outputs]  # an ASF that clips share
@@ -215,8 +235,8 @@ def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made
             motion, made.fit = _solved(clip, motion)
         elif target in ("amc", "bvh"):
             _check_moves(clip)
-        if wanted.up is not None:
-            motion = with_facts(motion, None, None, wanted.up)
+        unit = wanted.unit if motion.skeleton.unit_cm is None else None
+        motion = with_facts(motion, None, unit, wanted.up)
         rate = None if wanted.filtered else wanted.rate
         if wanted.is_scene:
             made.scene = _scene(motion, target, rate, wanted)

@@ -7,7 +7,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
-from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -183,9 +182,11 @@ class _Side:
         wanted: _Wanted,
         max_decoded: int | None,
     ) -> None:
+        from mcz.reading.file import is_mcz
+
         self.path, self._wanted = path, wanted
         self.file: File | None = None
-        if path == "-" or PurePath(path).suffix.lower() == ".mcz":
+        if path == "-" or is_mcz(path):
             self.file = stack.enter_context(opened(path, max_decoded=max_decoded))
         else:
             existing(path)

@@ -44,7 +44,6 @@ OTHER_NAMES = {
     "check": "verify",
     "compare": "diff",
     "compress": "encode",
-    "convert": "decode --to",
     "cut": "extract",
     "find": "list --where",
     "ls": "list",

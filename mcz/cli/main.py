@@ -15,6 +15,7 @@ COMMANDS = (
     "sample",
     "encode",
     "decode",
+    "convert",
     "info",
     "verify",
     "bag",

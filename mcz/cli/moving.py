@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
-from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -72,9 +71,10 @@ def moving_of(
     What is told of a clip is not in it: whoever draws it is told the same.
     """
     import mcz
+    from mcz.reading.file import is_mcz
     from mcz.reading.source_files import told
 
-    if path == "-" or PurePath(path).suffix.lower() == ".mcz":
+    if path == "-" or is_mcz(path):
         with opened(path, max_decoded=max_decoded) as file, about(path):
             yield file.only_clip(name)
         return

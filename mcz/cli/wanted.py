@@ -12,21 +12,21 @@ from mcz.cli.suffixes import CONVERSIONS, SCENES
 class Wanted(NamedTuple):
     """What of a file is wanted, and as what: the options of these names."""
 
-    frames: tuple[int, int | None] | None
-    joints: str | None
-    resolution: int
-    decimate: bool
-    preview: bool
-    filtered: bool
-    target: str | None
-    rate: Fraction | None
-    solve: bool
-    with_skeleton: bool
-    up: str | None
-    unit: str | None
-    key_error: float | None
-    signal: str | None
-    stored: bool
+    frames: tuple[int, int | None] | None = None
+    joints: str | None = None
+    resolution: int = 0
+    decimate: bool = False
+    preview: bool = False
+    filtered: bool = False
+    target: str | None = None
+    rate: Fraction | None = None
+    solve: bool = False
+    with_skeleton: bool = False
+    up: str | None = None
+    unit: str | None = None
+    key_error: float | None = None
+    signal: str | None = None
+    stored: bool = False
 
     @property
     def is_converted(self) -> bool:
@@ -74,7 +74,10 @@ def check_signal(wanted: Wanted) -> None:
         wanted.up is not None and not (shown or wanted.target == "c3d"),
         f"--up needs --to {' or '.join(('c3d', *SCENES))}",
     )
-    refuse(wanted.unit is not None and not shown, f"--unit needs --to {' or '.join(SCENES)}")
+    refuse(
+        wanted.unit is not None and not wanted.is_converted,
+        f"--unit needs --to {' or '.join((*CONVERSIONS, *SCENES))}",
+    )
     refuse(wanted.key_error is not None and wanted.target != "glb", "--key-error needs --to glb")
 
 

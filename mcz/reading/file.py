@@ -6,13 +6,16 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
+from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
 from mcz.brief import counted, shown
 from mcz.container import payloads
+from mcz.container.chunks import SIGNATURE
 from mcz.container.directory import AttachmentRow
 from mcz.container.metadata import applied
 from mcz.container.reader import Container
@@ -36,6 +39,17 @@ from mcz.reading.names import listed
 from mcz.reading.source_info import sourced_skeleton
 from mcz.schema import parse
 from mcz.threads import checked
+
+
+def is_mcz(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is an MCZ file, by its suffix or by its first bytes; URLs by their suffix."""
+    if str(path).partition("?")[0].lower().endswith(".mcz"):
+        return True
+    try:
+        with Path(path).open("rb") as stream:
+            return stream.read(len(SIGNATURE)) == SIGNATURE
+    except (OSError, ValueError):
+        return False
 
 
 class StoredSkeleton(NamedTuple):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mcz.errors import OptionError, SkeletonWarning
 from mcz.motion import Motion, Skeleton
-from mcz.reading.file import open
+from mcz.reading.file import is_mcz, open
 from mcz.reading.skeletons import take
 from mcz.reading.source_files import load, with_facts
 
@@ -39,7 +39,7 @@ def read(
     ``max_decoded`` and ``threads`` as in ``open``. Raises SourceError, FormatError or OptionError.
     """
     path = Path(path)
-    if path.suffix.lower() == ".mcz":
+    if is_mcz(path):
         with open(path, max_decoded=max_decoded, threads=threads) as file:
             motion = file.only_clip(clip).motion()
     else:

@@ -11,6 +11,7 @@ from typing import Any
 from mcz.errors import SkeletonWarning
 from mcz.formats import FORMATS, Format, arrays_of
 from mcz.motion import Motion, Skeleton
+from mcz.reading.file import is_mcz
 from mcz.reading.recording import recording
 from mcz.reading.recording_report import document_of
 from mcz.reading.report import joint_facts
@@ -21,8 +22,8 @@ SUFFIXES = tuple(suffix for found in FORMATS.values() for suffix in found.suffix
 
 
 def is_source(path: str) -> bool:
-    """Whether a path has the suffix of a source format."""
-    return path.lower().endswith(SUFFIXES)
+    """Whether a path has the suffix of a source format, and its file is no MCZ file."""
+    return path.lower().endswith(SUFFIXES) and not is_mcz(path)
 
 
 def source_info(

@@ -1,0 +1,61 @@
+"""The input of ``mcz decode`` and ``mcz convert``: an .mcz, or a source file coded in memory."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from mcz.cli.common import about, existing, opened, say
+from mcz.cli.wanted import Wanted, refuse
+
+if TYPE_CHECKING:
+    from mcz.reading.file import File
+
+SOURCE_GIVEN = "a source file, no .mcz; -o or --to says what it becomes, mcz encode compresses it"
+NO_LIMIT = 2**53  # of what is decoded: it was made here
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A file, and how it is read; ``facts`` are arguments of ``mcz.encode`` for a source file."""
+
+    file: str
+    salvage: bool = False
+    unverified: bool = False
+    max_decoded: int | None = None
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_source(self) -> bool:
+        from mcz.reading.source_report import is_source
+
+        return is_source(self.file)
+
+    def told(self, wanted: Wanted) -> tuple[Input, Wanted]:
+        """The same with the facts among what is wanted of a source file, and the rest of that."""
+        refuse(self.salvage or self.unverified, "--salvage and --unverified need an .mcz")
+        facts = {"unit": wanted.unit, "up": wanted.up, "rate": wanted.rate}
+        given = replace(self, facts=dict(self.facts) | facts)
+        return given, wanted._replace(unit=None, up=None, rate=None)
+
+    @contextmanager
+    def opened(self) -> Iterator[File]:
+        """The open .mcz; of a source file one in memory, of which every byte is as in a file."""
+        if not self.is_source:
+            options = {"salvage": self.salvage, "unverified": self.unverified}
+            with opened(self.file, max_decoded=self.max_decoded, **options) as file:
+                yield file
+            return
+        import mcz
+
+        existing(self.file)
+        coded = io.BytesIO()
+        with about(self.file):
+            written = mcz.encode(self.file, coded, archive=True, **self.facts)
+            for note in written.notes:
+                say(f"{self.file}: {note}")
+            with mcz.open(coded.getvalue(), max_decoded=NO_LIMIT) as file:
+                yield file

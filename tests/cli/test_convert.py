@@ -1,0 +1,121 @@
+"""``mcz convert``, and ``mcz decode`` of a source file: what two commands do, in one step."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from itertools import permutations
+from pathlib import Path
+
+import pytest
+
+import mcz
+from tests.cli.test_ways_out import Call, call  # noqa: F401
+
+UNITS = ["--unit", "cm"]
+
+
+@pytest.fixture
+def folder(samples: Path, tmp_path: Path) -> Path:
+    for path in samples.iterdir():
+        shutil.copy(path, tmp_path)
+    return tmp_path
+
+
+TO_OTHERS = (".csv", ".npz", ".trc", ".sto", ".mot", ".glb", ".usda", ".c3d")
+PAIRS = [
+    *((".bvh", to) for to in (*TO_OTHERS, ".amc")),
+    *((".amc", to) for to in (*TO_OTHERS, ".bvh")),
+    *((".c3d", to) for to in TO_OTHERS if to != ".c3d"),
+    *permutations((".trc", ".sto", ".csv"), 2),  # numbers alone become no markers: refused alike
+]
+
+
+@pytest.mark.parametrize(("origin", "to"), PAIRS)
+def test_one_step_is_two(folder: Path, call: Call, origin: str, to: str) -> None:  # noqa: F811
+    """Each pair of formats: the bytes are those of encode and decode, nothing else is written."""
+    source = folder / f"walk{origin}"
+    facts = [*UNITS, "--rate", "120"]
+    if not source.exists():
+        assert call("convert", folder / "walk.bvh", source, *facts)[0] == 0
+    before = set(folder.iterdir())
+    one, out, err = call("convert", source, folder / f"one{to}", *facts, "--json")
+    new = set(folder.iterdir()) - before
+    assert call("encode", source, *facts, "-o", folder / "two.mcz")[0] == 0
+    two, out2, err2 = call("decode", folder / "two.mcz", "-o", folder / f"two{to}", "--json")
+    assert one == two
+    if one:
+        assert not new and "which place no joint" in err and "which place no joint" in err2
+        return
+    (output,) = json.loads(out)["outputs"]
+    assert output["result"] == "converted" and new == {folder / f"one{to}"}
+    assert json.loads(out).get("left_out") == json.loads(out2).get("left_out")
+    assert (folder / f"one{to}").read_bytes() == (folder / f"two{to}").read_bytes()
+
+
+def test_what_is_left_out_is_said(folder: Path, call: Call) -> None:  # noqa: F811
+    code, out, err = call("convert", folder / "walk.c3d", folder / "x.trc")
+    assert (code, out) == (0, f"{folder / 'x.trc'}  438,386 bytes, converted\n")
+    assert "left out: signal residuals" in err
+    assert call("decode", folder / "walk.c3d", "-o", folder / "y.trc")[2] == err
+    assert (folder / "x.trc").read_bytes() == (folder / "y.trc").read_bytes()
+
+
+def test_nothing_is_overwritten(folder: Path, call: Call) -> None:  # noqa: F811
+    (folder / "x.trc").write_bytes(b"mine")
+    words = ("convert", folder / "walk.c3d", folder / "x.trc")
+    code, _, err = call(*words)
+    assert code == 2 and "exists; use --force" in err and (folder / "x.trc").read_bytes() == b"mine"
+    assert call(*words, "--force")[0] == 0 and (folder / "x.trc").read_bytes() != b"mine"
+    data = (folder / "walk.bvh").read_bytes()
+    code, _, err = call("convert", folder / "walk.bvh", folder / "walk.bvh", "--force")
+    assert code == 2 and "the input itself" in err and (folder / "walk.bvh").read_bytes() == data
+
+
+def test_to_and_from_mcz(folder: Path, call: Call) -> None:  # noqa: F811
+    assert call("convert", folder / "walk.bvh", folder / "w.mcz", *UNITS)[0] == 0
+    assert mcz.read(folder / "w.mcz").skeleton.unit_cm == 1
+    assert call("convert", folder / "w.mcz", folder / "w.trc")[0] == 0
+    assert call("convert", folder / "w.mcz", folder / "again.bvh")[1].endswith(", restored\n")
+    assert (folder / "again.bvh").read_bytes() == (folder / "walk.bvh").read_bytes()
+    refused = {
+        ("w.mcz", "v.mcz"): "mcz extract takes clips out of an .mcz",
+        ("walk.bvh", "v.mcz", "--frames", "0:9"): "mcz extract takes parts",
+        ("w.mcz", "v.csv", "--skeleton", "none"): "are of source files",
+        ("walk.bvh", "v"): "--to says a format",
+        ("walk.bvh", "v.trcc"): "did you mean .trc?",
+    }
+    for (name, output, *words), text in refused.items():
+        code, _, err = call("convert", folder / name, folder / output, *words)
+        assert code == 2 and text in err and err.count("\n") == 1
+    assert not list(folder.glob("v*"))
+
+
+def test_a_part_in_its_own_format(folder: Path, call: Call) -> None:  # noqa: F811
+    out = call("convert", folder / "walk.amc", folder / "cut.amc", "--frames", "10:20")[1]
+    assert out.endswith(" bytes, cut\n")
+    assert mcz.read(folder / "cut.amc", skeleton="none").n_frames == 10
+    out = call("convert", folder / "walk.amc", folder / "copy.amc")[1]
+    assert out.endswith(" bytes, restored\n")
+    assert (folder / "copy.amc").read_bytes() == (folder / "walk.amc").read_bytes()
+
+
+def test_decode_of_a_source_wants_an_output(folder: Path, call: Call) -> None:  # noqa: F811
+    code, _, err = call("decode", folder / "walk.bvh", "--force")
+    assert code == 2 and "a source file, no .mcz" in err
+    code, _, err = call("decode", folder / "walk.bvh", "-o", folder / "x.csv", "--salvage")
+    assert code == 2 and "need an .mcz" in err
+    assert call("decode", folder / "walk.bvh", "--to", "csv")[0] == 0
+    assert (folder / "walk.csv").exists()
+
+
+def test_an_mcz_file_of_another_name(folder: Path, call: Call) -> None:  # noqa: F811
+    """What a file is called does not make it a source file."""
+    mcz.encode(folder / "walk.c3d", folder / "w.mcz")
+    (folder / "w.mcz").rename(folder / "w.bvh")
+    assert mcz.read(folder / "w.bvh").n_frames == 240
+    out = call("decode", folder / "w.bvh", "-o", folder / "again.c3d")[1]
+    assert out.endswith(", restored\n")
+    assert json.loads(call("info", folder / "w.bvh", "--json")[1])["file_bytes"] > 0
+    code, out, _ = call("diff", folder / "w.bvh", folder / "walk.c3d", "--json")
+    assert code == 0 and json.loads(out)["clips"][0]["mse_raw"] == 0
