@@ -51,37 +51,37 @@ class Timeline:
         self.times.setflags(write=False)
 
     @cached_property
-    def counts(self) -> Ints | None:
-        """The whole number of 1 / rate from each frame to the next, (n_frames - 1,).
+    def places(self) -> Ints | None:
+        """The whole number of 1 / rate from the first frame to each, (n_frames,).
 
         None where the rate is unknown or the times do not lie on such a grid.
         """
         if self.rate is None or not len(self.times):
             return None
         rate, since = float(self.rate), self.times - self.times[0]
-        tolerance = 2 * self.rounding + 8 * float(np.spacing(np.abs(self.times).max())) + EXACT
-        frames = np.arange(len(since), dtype=np.float64)
-        for places in (frames, np.concatenate([[0.0], np.rint(np.diff(since) * rate).cumsum()])):
-            if not places[-1] < 2**53:
-                continue
-            off = since - places / rate
-            if len(off) == 0 or off.max() - off.min() <= tolerance:
-                return np.diff(places).astype(np.int64)
+        noise = 8 * float(np.spacing(np.abs(self.times).max())) + EXACT
+        near, rows = np.rint(since * rate), np.arange(len(since), dtype=np.float64)
+        digit = 2 * self.rounding
+        choices = [(near, min(digit, 1e-3 / rate)), (rows, digit)]
+        if 2 * digit * rate <= 1:  # so that no other frame is as near
+            choices.insert(1, (near, digit))
+        for places, allowed in choices:
+            if places[-1] < 2**53 and np.ptp(since - places / rate) <= allowed + noise:
+                return np.asarray(places, np.int64)
         return None
 
     @cached_property
     def even(self) -> Floats:
         """``times`` without what rounding did to them: at whole multiples of 1 / rate if so."""
-        if self.counts is None or self.rate is None:
+        if self.places is None or self.rate is None:
             return self.times
-        places = np.concatenate([[0], self.counts.cumsum()])
-        return self.times[:1] + places / float(self.rate)
+        return self.times[:1] + self.places / float(self.rate)
 
     @cached_property
     def _all_steps(self) -> Floats:
-        if self.counts is None or self.rate is None:
+        if self.places is None or self.rate is None:
             return np.diff(self.times)
-        return self.counts / float(self.rate)
+        return np.diff(self.places) / float(self.rate)
 
     @cached_property
     def period(self) -> float | None:
@@ -247,14 +247,14 @@ def _fault(times: Floats) -> str:
     return f"the times do not count: they fall at frame {falls[0] + 1}" if len(falls) else ""
 
 
-def known_times(name: str, timeline: Timeline | None) -> Floats:
-    """The times of the motion or clip ``name``; raises OptionError where nothing tells them."""
+def known_timeline(name: str, timeline: Timeline | None) -> Timeline:
+    """That of the motion or clip ``name``; raises OptionError where nothing tells its times."""
     if timeline is None:
         raise OptionError(
             f"{name!r}: its frame rate is unknown, and so are its times; say the rate when "
             "reading (rate=, --rate)"
         )
-    return timeline.times
+    return timeline
 
 
 class Numbered(NamedTuple):
@@ -275,9 +275,8 @@ def numbered(timeline: Timeline, numbers: Ints) -> Numbered | None:
     tolerance = timeline.rounding + EXACT
     first = float(times[0]) * float(rate) + 1
     candidates = [numbers]
-    if timeline.counts is not None and abs(first) < 2**52:
-        places = np.concatenate([[0], timeline.counts.cumsum()])
-        candidates.append(round(first) + places)
+    if timeline.places is not None and abs(first) < 2**52:
+        candidates.append(round(first) + timeline.places)
     for known in candidates:
         for start in ("", _decimal(float(times[0]))):
             found = timeline_of(Counting(known, rate), {START: start})

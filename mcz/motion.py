@@ -22,7 +22,7 @@ from mcz.clock import (
     Timeline,
     column_of,
     has_times,
-    known_times,
+    known_timeline,
     numbered,
     numbers_or_rows,
     time_signal,
@@ -372,7 +372,7 @@ class Motion:
     @property
     def times(self) -> NDArray[np.float64]:
         """The time of every frame in seconds, (n_frames,): see ``mcz.times``; OptionError."""
-        return known_times(self.name, self.timeline)
+        return known_timeline(self.name, self.timeline).times
 
     def without_source(self) -> Motion:
         """The same motion without its source, at the same times."""

@@ -188,8 +188,109 @@ def test_irregular_times_have_no_rate(tmp_path: Path) -> None:
     assert mcz.read(tmp_path / "w.sto").frame_rate is None
 
 
+def test_one_missing_frame_is_a_gap_however_few_digits_are_printed() -> None:
+    times = np.array([0.0, 0.01, 0.02, 0.04, 0.05])
+    line = Timeline(times, Fraction(100), rounding=0.005)
+    near(line.even, times)
+    near(line.steps, [0.01, 0.01, np.nan, 0.01])
+    coarse = np.round(np.arange(50) / 60, 2)
+    near(Timeline(coarse, Fraction(60), rounding=0.005).steps, np.full(49, 1 / 60))
+
+
 def test_steps_are_nan_across_gaps() -> None:
     line = Timeline(np.array([0.0, 0.1, 0.2, 0.9, 1.0]), Fraction(10))
     near(line.steps, [0.1, 0.1, np.nan, 0.1])
     assert line.runs == [(0, 3), (3, 5)]
     assert Timeline(np.arange(9) / 7.0, Fraction(7)).is_uniform
+
+
+def moving(numbers: list[int], rate: int = 100, **facts: object) -> Motion:
+    """One marker that moves at 1 m/s along x and 2 (m/s)/s along y, in mm."""
+    seconds = (np.array(numbers) - 1) / rate
+    values = np.stack([1000 * seconds, 1000 * seconds**2, 0 * seconds], axis=1)
+    motion = markers(len(numbers), rate, frame_numbers=np.array(numbers), **facts)
+    return motion.with_values(values)
+
+
+GAPPED = [*range(101, 111), *range(300, 310), 400, *range(500, 502)]
+
+
+def test_speeds_take_times_and_no_step_over_a_gap() -> None:
+    motion = moving(GAPPED)
+    speed = mcz.velocities(motion, unit="m")[:, 0]
+    near(np.delete(speed[:, 0], 20), np.ones(22))
+    assert np.isnan(speed[20]).all()  # alone between two gaps
+    inner = [k for k in range(1, 19) if k not in (9, 10)]
+    near(speed[inner, 1], 2 * motion.times[inner])
+    near(mcz.velocities(motion, frames=(9, 12), unit="m"), mcz.velocities(motion, unit="m")[9:12])
+    found = mcz.accelerations(motion, unit="m")[:, 0]
+    np.testing.assert_allclose(found[:20, 1], 2, atol=1e-6)
+    assert np.isnan(found[20:]).all()
+    near(mcz.accelerations(motion, frames=(9, 12)), mcz.accelerations(motion)[9:12])
+
+
+def test_speeds_by_irregular_times_are_exact_for_parabolas() -> None:
+    seconds = np.array([0.0, 0.011, 0.019, 0.031, 0.04])
+    motion = markers(5, None).with_values(np.stack([seconds, seconds**2, 0 * seconds], axis=1))
+    motion = replace(motion, signals=(*motion.signals, times_signal(seconds.tolist())))
+    near(mcz.velocities(motion)[1:-1, 0, :2], np.stack([np.ones(3), 2 * seconds[1:-1]], axis=1))
+    np.testing.assert_allclose(mcz.accelerations(motion)[:, 0, 1], 2, atol=1e-6)
+
+
+def test_rounded_times_do_not_shake_speeds(tmp_path: Path) -> None:
+    motion = trc(tmp_path / "w.trc", NUMBERS, digits=3)  # z moves 120 mm a second
+    np.testing.assert_allclose(mcz.velocities(motion)[:, 0, 2], 120, rtol=1e-9)
+
+
+@pytest.mark.parametrize("rate", [200, 100, 50, 30])
+def test_resampling_keeps_gaps_and_times(rate: int) -> None:
+    motion = moving(GAPPED)
+    made = mcz.resample(motion, rate)
+    assert np.isfinite(made.values).all()
+    near(made.values[:, 0] / 1000, made.times)
+    inside = [(1.0, 1.09), (2.99, 3.08), (3.99, 3.99), (4.99, 5.0)]
+    wanted = [k for k in range(6 * rate) if any(a <= 1 + k / rate <= b for a, b in inside)]
+    near(made.times, 1 + np.array(wanted) / rate)
+    near(stored(made).times, made.times)
+    if rate == 100:
+        np.testing.assert_array_equal(made.values, motion.values)
+
+
+def test_resampling_takes_irregular_times() -> None:
+    seconds = np.array([0.5, 0.511, 0.519, 0.531, 0.54, 0.549])
+    motion = markers(6, None).with_values(np.stack([seconds] * 3, axis=1))
+    motion = replace(motion, signals=(*motion.signals, times_signal(seconds.tolist())))
+    made = mcz.resample(motion, 200)
+    near(made.times, 0.5 + np.arange(10) / 200)
+    near(made.values[:, 0], made.times)
+
+
+def test_resampling_keeps_the_time_of_the_first_frame() -> None:
+    made = mcz.resample(moving(list(range(101, 151))), 37)
+    near(made.times[0], 1.0)
+    near(mcz.resample(markers(9, metadata={"start-time": "2.5"}), 33).times[0], 2.5)
+
+
+def test_windows_do_not_span_gaps(tmp_path: Path) -> None:
+    mcz.write(moving(GAPPED), tmp_path / "a.mcz")
+    with mcz.open(tmp_path / "a.mcz") as file:
+        data = mcz.dataset(file, "positions,velocities", window=5, stride=1, unit="m", dtype="f8")
+        assert len(data) == 12
+        assert [part.n_frames for part in data.skipped] == [1, 2]
+        for k in range(12):
+            window = data.window(k)
+            near(data[k]["positions"][0, 0, 0], window.time)
+            near(data[k]["positions"][:, 0, 0], file.only_clip().times[window.start : window.stop])
+            near(data[k]["velocities"][:, 0, 0], np.ones(5))
+        spanning = mcz.dataset(
+            file, "velocities", window=5, stride=1, unit="m", dtype="f8", across_gaps=True
+        )
+        assert len(spanning) == 19
+        speeds = np.concatenate([spanning[k]["velocities"][:, 0, 0] for k in range(16)])
+        near(speeds, np.ones(80))
+        resampled = mcz.dataset(file, "positions,velocities", window=9, rate=200, unit="m")
+        assert len(resampled) == 4
+        np.testing.assert_allclose(
+            resampled[3]["positions"][:, 0, 0], 3.035 + np.arange(9) / 200, 1e-5
+        )
+        np.testing.assert_allclose(resampled[3]["velocities"][:, 0, 0], 1, 1e-4)

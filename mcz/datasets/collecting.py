@@ -43,6 +43,7 @@ def dataset(
     source_rate: Fraction | float | None = None,
     cache: int | str = "64 MB",
     folder: str | os.PathLike[str] | None = None,
+    across_gaps: bool = False,
 ) -> Dataset:
     """Windows of the clips of MCZ files, as arrays: a ``Dataset``.
 
@@ -55,9 +56,10 @@ def dataset(
     of ``File.find``, or a function of a Clip. ``joints`` and ``unit`` as of ``positions``.
     ``cache``: bytes to keep in memory, or in ``folder``, across runs: "64 MB".
 
-    Clips too short for a window are listed in ``Dataset.skipped``. Raises OptionError where clips
-    do not go together: other joints, rates or units; MotionError and FormatError where one cannot
-    be used.
+    Where frames are missing, the parts between are clips of their own, so that no window spans a
+    gap, unless ``across_gaps``. Clips too short for a window are listed in ``Dataset.skipped``.
+    Raises OptionError where clips do not go together: other joints, rates or units; MotionError and
+    FormatError where one cannot be used.
     """
     recipe = _recipe(fields, rate, joints, unit, dtype)
     window, stride = _cut(window, stride)
@@ -75,12 +77,12 @@ def dataset(
                 stack.enter_context(file)
                 opened[name] = file
             for clip in _chosen(file, where):
-                member = _member(clip, name, recipe, assumed)
-                if member.n_frames < (window or 1):
-                    skipped.append(member)
-                    continue
-                agreement.check(clip, member)
-                members.append(member)
+                for member in _members(clip, name, recipe, assumed, across_gaps):
+                    if member.n_frames < (window or 1):
+                        skipped.append(member)
+                        continue
+                    agreement.check(clip, member)
+                    members.append(member)
             if len(opened) > MOST_OPEN:
                 opened.pop(name).close()
         if not members:
@@ -140,14 +142,23 @@ def _chosen(file: File, where: Where | None) -> list[Clip]:
     return list(file.clips.values()) if where is None else file.find(where)
 
 
-def _member(clip: Clip, target: str, recipe: Recipe, assumed: Fraction | None) -> Member:
-    own = clip.frame_rate or assumed
-    member = Member(target, clip.name, clip.n_frames, own, clip.n_frames)
-    if recipe.rate is None:
-        return member
-    if own is None:
-        raise OptionError(f"{member.label}: its frame rate is unknown; say it with source_rate=")
-    return replace(member, n_frames=resampled_frames(clip.n_frames, own, recipe.rate))
+def _members(
+    clip: Clip, target: str, recipe: Recipe, assumed: Fraction | None, across_gaps: bool
+) -> Iterator[Member]:
+    """The parts of a clip between gaps, at the rate of the data set."""
+    own, timeline = clip.frame_rate or assumed, clip.timeline
+    runs = [(0, clip.n_frames)] if timeline is None or across_gaps else timeline.runs
+    for start, stop in runs or [(0, 0)]:
+        n_frames = stop - start
+        time = float(timeline.even[start]) if timeline is not None and stop else None
+        member = Member(target, clip.name, n_frames, own, n_frames, start, time)
+        if recipe.rate is not None and own is None:
+            raise OptionError(
+                f"{member.label}: its frame rate is unknown; say it with source_rate="
+            )
+        if recipe.rate is not None and own is not None:
+            member = replace(member, n_frames=resampled_frames(n_frames, own, recipe.rate))
+        yield member
 
 
 class _Agreement:

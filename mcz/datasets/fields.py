@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +26,7 @@ class Subject:
     """A skeleton as the fields of a data set look at it.
 
     ``joints`` and ``points`` are those that were chosen, by index; ``scale`` times a length unit is
-    the unit that is wanted; ``rate`` in frames a second, 0 while unknown.
+    the unit that is wanted.
     """
 
     skeleton: Skeleton
@@ -33,7 +34,6 @@ class Subject:
     joints: tuple[int, ...]
     points: tuple[int, ...]
     scale: float
-    rate: float
 
     @property
     def columns(self) -> list[int]:
@@ -45,12 +45,19 @@ class Subject:
         return self.poses
 
 
+class Rows(NamedTuple):
+    """Channels of frames, (n_frames, n_channels), and the seconds from each frame to the next."""
+
+    values: Floats
+    steps: Floats
+
+
 @dataclass(frozen=True, slots=True)
 class Field:
     """One array of a window.
 
     ``shape`` is what follows (n_frames, ...); ``names`` what its first such axis is of: "joints",
-    "points", "channels" or "". ``make`` takes the values of all channels, (n_frames, n_channels).
+    "points", "channels" or "". ``make`` takes the values of all channels.
     ``reach``: how many neighbours on either side it looks at; ``needs``: the joints whose channels
     matter. ``lengths``: it is in length units, to be scaled. ``signed``:
     quaternions, whose signs follow from a whole window.
@@ -59,7 +66,7 @@ class Field:
     name: str
     names: str
     shape: Callable[[Subject], tuple[int, ...]]
-    make: Callable[[Subject, Floats], Floats]
+    make: Callable[[Subject, Rows], Floats]
     needs: Callable[[Subject], Iterable[int]]
     reach: int = 0
     posed: bool = True
@@ -80,20 +87,20 @@ def _above_points(subject: Subject) -> list[int]:
     return poses.above(poses.joints_of(subject.points))
 
 
-def _positions(subject: Subject, values: Floats) -> Floats:
-    return subject.kinematics.positions(values, subject.points) * subject.scale
+def _positions(subject: Subject, rows: Rows) -> Floats:
+    return subject.kinematics.positions(rows.values, subject.points) * subject.scale
 
 
-def _root(subject: Subject, values: Floats) -> Floats:
-    return subject.kinematics.origins(values, [0])[:, 0] * subject.scale
+def _root(subject: Subject, rows: Rows) -> Floats:
+    return subject.kinematics.origins(rows.values, [0])[:, 0] * subject.scale
 
 
-def _velocities(subject: Subject, values: Floats) -> Floats:
-    return velocities_of(_positions(subject, values), subject.rate)
+def _velocities(subject: Subject, rows: Rows) -> Floats:
+    return velocities_of(_positions(subject, rows), rows.steps)
 
 
-def _accelerations(subject: Subject, values: Floats) -> Floats:
-    return accelerations_of(_positions(subject, values), subject.rate)
+def _accelerations(subject: Subject, rows: Rows) -> Floats:
+    return accelerations_of(_positions(subject, rows), rows.steps)
 
 
 def _n_points(subject: Subject) -> tuple[int, ...]:
@@ -103,9 +110,9 @@ def _n_points(subject: Subject) -> tuple[int, ...]:
 def _turned(name: str, form: str, tail: tuple[int, ...], world: bool) -> Field:
     """A field of rotations of the chosen joints."""
 
-    def make(subject: Subject, values: Floats) -> Floats:
+    def make(subject: Subject, rows: Rows) -> Floats:
         poses = subject.kinematics
-        turns = (poses.world if world else poses.local)(values, subject.joints)
+        turns = (poses.world if world else poses.local)(rows.values, subject.joints)
         return from_matrices(turns, form)
 
     return Field(
@@ -131,7 +138,7 @@ _FIELDS = [
         "channels",
         "channels",
         lambda subject: (len(subject.columns),),
-        lambda subject, values: values[:, subject.columns],
+        lambda subject, rows: rows.values[:, subject.columns],
         lambda subject: subject.joints,
         posed=False,
     ),
@@ -163,14 +170,14 @@ def subject_of(
     fields: Iterable[Field],
     joints: Joints,
     unit: str | None,
-    rate: float,
+    rate: Fraction | None,
 ) -> Subject:
     """``skeleton`` as these fields look at it; raises MotionError and OptionError."""
     from mcz.kinematics.frames import frame_poses_of
 
     posed = any(field.posed for field in fields)
     lengths = any(field.lengths for field in fields)
-    if not rate and any(field.reach for field in fields):
+    if rate is None and any(field.reach for field in fields):
         raise OptionError("velocities and accelerations need a frame rate (source_rate=)")
     return Subject(
         skeleton,
@@ -178,7 +185,6 @@ def subject_of(
         tuple(joint_numbers(skeleton, joints)),
         tuple(chosen_points(skeleton, joints)) if lengths else (),
         scale_to(skeleton, unit) if lengths else 1.0,
-        rate,
     )
 
 
@@ -201,14 +207,16 @@ def names_of(field: Field, subject: Subject) -> tuple[str, ...]:
 
 
 def features_of(
-    fields: Iterable[Field], subject: Subject, values: Floats, margins: tuple[int, int], dtype: Any
+    fields: Iterable[Field], subject: Subject, rows: Rows, margins: tuple[int, int], dtype: Any
 ) -> dict[str, np.ndarray[Any, Any]]:
-    """The arrays of frames, of whose ``values`` there are ``margins`` more before and after."""
+    """The arrays of frames, of whose ``rows`` there are ``margins`` more before and after."""
+    values, steps = rows
     first, last = margins
     found = {}
     for field in fields:
         low, high = max(0, first - field.reach), max(0, last - field.reach)
-        made = field.make(subject, values[low : len(values) - high])
+        stop = len(values) - high
+        made = field.make(subject, Rows(values[low:stop], steps[low : max(low, stop - 1)]))
         stop = len(made) - (last - high)
         found[field.name] = np.ascontiguousarray(made[first - low : stop], dtype)
     return found

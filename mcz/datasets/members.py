@@ -8,10 +8,11 @@ from fractions import Fraction
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One clip of a data set.
+    """One clip of a data set, or the part of one between two gaps.
 
     ``target`` is what ``mcz.open`` takes, ``n_source`` its frames at ``source_rate`` frames a
-    second (None: unknown), ``n_frames`` those of the data set, at the rate of the data set.
+    second (None: unknown) from frame ``first`` on, at ``time`` in seconds (None: unknown);
+    ``n_frames`` are those of the data set, at the rate of the data set.
     """
 
     target: str
@@ -19,6 +20,8 @@ class Member:
     n_source: int
     source_rate: Fraction | None
     n_frames: int
+    first: int = 0
+    time: float | None = None
 
     @property
     def label(self) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 
 from mcz.container.runs import Runs, SharedRuns
 from mcz.datasets.caches import Arrays
-from mcz.datasets.fields import Field, Subject, features_of, subject_of
+from mcz.datasets.fields import Field, Rows, Subject, features_of, subject_of
 from mcz.datasets.members import Member
 from mcz.kinematics.chain import Floats
 from mcz.poses.moving import values_of
@@ -45,7 +45,7 @@ class Recipe:
 
     def subject(self, clip: Clip, member: Member) -> Subject:
         rate = self.rate or member.source_rate
-        return subject_of(clip.skeleton, self.fields, self.joints, self.unit, float(rate or 0))
+        return subject_of(clip.skeleton, self.fields, self.joints, self.unit, rate)
 
     def step(self, member: Member) -> Fraction:
         """How many frames of the clip one of the data set is."""
@@ -113,7 +113,8 @@ class Sources:
         low, high = max(0, start - recipe.reach), min(member.n_frames, stop + recipe.reach)
         values = _values(recipe, subject, clip, member, low, high)
         margins = start - low, high - stop
-        return features_of(recipe.fields, subject, values, margins, recipe.dtype)
+        steps = _steps(recipe, clip, member, low, high)
+        return features_of(recipe.fields, subject, Rows(values, steps), margins, recipe.dtype)
 
     def _subject(self, recipe: Recipe, clip: Clip, member: Member) -> Subject:
         """Prepared once for each skeleton."""
@@ -139,10 +140,18 @@ def _values(
     needed = sorted({joint for field in recipe.fields for joint in field.needs(subject)})
     step = recipe.step(member)
     if step == 1:
-        return values_of(clip, (low, high), needed)
+        return values_of(clip, (member.first + low, member.first + high), needed)
     times = times_at(range(low, high), step)
     first, last = int(times.before[0]), int(times.after[-1]) + 1
     if times.share.any():  # splines look at one more on either side
         first, last = max(0, first - 1), min(member.n_source, last + 1)
-    old = values_of(clip, (first, last), needed)
+    old = values_of(clip, (member.first + first, member.first + last), needed)
     return resampled(clip.skeleton, old, Times(times.before - first, times.share))
+
+
+def _steps(recipe: Recipe, clip: Clip, member: Member, low: int, high: int) -> Floats:
+    """The seconds from each of these frames to the next; NaN across a gap."""
+    if recipe.step(member) == 1 and recipe.reach and clip.timeline is not None:
+        return clip.timeline.steps[member.first + low : member.first + max(low, high - 1)]
+    rate = recipe.rate or member.source_rate
+    return np.full(max(0, high - low - 1), 1.0 / float(rate) if rate else np.nan)

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -25,17 +26,21 @@ from mcz.reading.file import File
 
 RUNS_SHARE = 4  # a quarter of the cache is for frames as they were decoded
 RUN_BLOCKS = 6  # of windows that stay together until a pool is shuffled
-VERSION = 1  # of what features are: counted up where a kept one would be wrong
+VERSION = 2  # of what features are: counted up where a kept one would be wrong
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Where a window of a data set comes from: frames start <= f < stop, at its rate."""
+    """Where a window of a data set comes from: frames start <= f < stop, at its rate.
+
+    ``time`` is that of its first frame in seconds, on the clock of the clip; None while unknown.
+    """
 
     target: str
     clip: str
     start: int
     stop: int
+    time: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +112,7 @@ class Dataset:
     def __repr__(self) -> str:
         window = self._settings.window
         what = "whole clips" if window is None else f"windows of {counted(window, 'frame')}"
-        clips = counted(len(self.members), "clip")
+        clips = counted(len({member.label for member in self.members}), "clip")
         short = f", {len(self.skipped)} too short" if self.skipped else ""
         return f"<Dataset: {len(self)} {what} of {clips}{short}: {', '.join(self.fields)}>"
 
@@ -158,7 +163,10 @@ class Dataset:
         if not isinstance(number, int):
             raise OutOfRangeError(f"{index!r} is not the number of a window")
         member, start, stop = self._place(number)
-        return Window(member.target, member.clip, start, stop)
+        rate = self._settings.recipe.rate or member.source_rate
+        time = None if member.time is None or rate is None else member.time + start / float(rate)
+        first = ceil(member.first / self._settings.recipe.step(member))
+        return Window(member.target, member.clip, first + start, first + stop, time)
 
     def _place(self, number: int) -> tuple[Member, int, int]:
         which = int(np.searchsorted(self._ends, number, side="right"))
@@ -246,6 +254,7 @@ class Dataset:
         if key is None:
             recipe = self._settings.recipe
             told = [self.fields, recipe.rate, member.source_rate, recipe.joints, recipe.unit]
+            told += [member.first, member.n_source]
             text = repr([*told, recipe.dtype.str, BLOCK, VERSION]).encode()
             if isinstance(self._cache, FolderCache):
                 clip = self._sources.clip(member)

@@ -1,4 +1,8 @@
-"""First and second differences over time, that look only at what is known."""
+"""First and second derivatives over time, that look only at what is known.
+
+``places`` is (n_frames, n, 3), NaN where unknown; ``steps`` are the seconds from each frame to the
+next, (n_frames - 1,), NaN across a gap.
+"""
 
 from __future__ import annotations
 
@@ -7,42 +11,39 @@ import numpy as np
 from mcz.kinematics.chain import Floats
 
 
-def velocities_of(places: Floats, rate: float) -> Floats:
-    """Central differences along the first axis, at an end or beside a gap one-sided.
+def velocities_of(places: Floats, steps: Floats) -> Floats:
+    """The slope of the parabola through three frames, at an end or beside a gap that to the next.
 
-    ``places`` (n_frames, n, 3), NaN where unknown; NaN where a frame or both of its neighbours
-    are. A second difference: ``accelerations_of``.
+    NaN where a frame or both of its neighbors are unknown.
     """
-    before, after = _shifted(places, 1), _shifted(places, -1)
-    no_before, no_after = np.isnan(before), np.isnan(after)
-    first = np.where(no_before, places, before)
-    last = np.where(no_after, places, after)
-    steps = 2.0 - no_before - no_after
-    with np.errstate(invalid="ignore", divide="ignore"):
-        found: Floats = (last - first) * rate / steps
-    found[np.isnan(places)] = np.nan
-    return found
+    before, after, first, last = _slopes(places, steps)
+    with np.errstate(invalid="ignore"):
+        found: Floats = (before * last + after * first) / (first + last)
+    found = np.where(np.isnan(found), before, found)
+    return np.where(np.isnan(found), after, found)
 
 
-def accelerations_of(places: Floats, rate: float) -> Floats:
-    """Second differences; at an end or beside a gap that of the frame next to it.
+def accelerations_of(places: Floats, steps: Floats) -> Floats:
+    """The second derivative of that parabola; at an end or beside a gap that of the next frame.
 
     NaN where a frame is unknown or stands in a run of fewer than three.
     """
+    before, after, first, last = _slopes(places, steps)
     with np.errstate(invalid="ignore"):
-        inner: Floats = (_shifted(places, 1) - 2.0 * places + _shifted(places, -1)) * rate**2
-    found = inner
-    for step in (-1, 1):
-        found = np.where(np.isnan(found), _shifted(inner, step), found)
-    found[np.isnan(places)] = np.nan
+        inner: Floats = 2.0 * (after - before) / (first + last)
+    found = inner.copy()
+    missing = np.isnan(found[:-1]) & ~np.isnan(after[:-1])  # the next frame is a neighbor
+    found[:-1][missing] = inner[1:][missing]
+    missing = np.isnan(found[1:]) & ~np.isnan(before[1:])
+    found[1:][missing] = inner[:-1][missing]
     return found
 
 
-def _shifted(places: Floats, step: int) -> Floats:
-    """What was ``step`` frames before, NaN where there was none."""
-    moved = np.full(places.shape, np.nan)
-    if step > 0:
-        moved[step:] = places[:-step]
-    else:
-        moved[:step] = places[-step:]
-    return moved
+def _slopes(places: Floats, steps: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """The slopes from the frame before and to the next, and the seconds between; NaN: none."""
+    seconds = np.full((len(places) + 1, 1, 1), np.nan)
+    seconds[1:-1, 0, 0] = steps
+    slopes = np.full((len(places) + 1, *places.shape[1:]), np.nan)
+    with np.errstate(invalid="ignore", over="ignore"):
+        slopes[1:-1] = np.diff(places, axis=0) / seconds[1:-1]
+    return slopes[:-1], slopes[1:], seconds[:-1], seconds[1:]

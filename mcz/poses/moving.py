@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, Protocol, cast
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clock import Timeline, known_times
+from mcz.clock import Timeline, known_timeline
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Floats
 from mcz.motion import Motion, Skeleton
@@ -100,13 +100,6 @@ def scale_to(skeleton: Skeleton, unit: str | None) -> float:
     return skeleton.unit_cm / wanted
 
 
-def rate_of(moving: Moving) -> float:
-    """Frames a second; raises OptionError while unknown."""
-    if moving.frame_rate is None:
-        raise OptionError(f"{moving.name!r}: its frame rate is unknown; say it when reading")
-    return float(moving.frame_rate)
-
-
 def times(moving: Moving, frames: Frames = None, *, signal: int | str = 0) -> NDArray[np.float64]:
     """The time of every frame of a Motion or Clip in seconds, (n_frames,), never falling.
 
@@ -118,8 +111,7 @@ def times(moving: Moving, frames: Frames = None, *, signal: int | str = 0) -> ND
     are known.
     """
     start, stop = frame_range(moving, frames)
-    known_times(moving.name, moving.timeline)
-    timeline = cast("Timeline", moving.timeline)
+    timeline = known_timeline(moving.name, moving.timeline)
     per_frame = signal_of(moving, signal).samples_per_frame
     return timeline.samples(per_frame)[start * per_frame : stop * per_frame]
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.brief import among, brief
+from mcz.clock import known_timeline
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics import first_points
 from mcz.kinematics import point_names as names_of_points
@@ -23,7 +24,6 @@ from mcz.poses.moving import (
     as_type,
     frame_range,
     joint_numbers,
-    rate_of,
     scale_to,
     values_of,
 )
@@ -99,13 +99,14 @@ def velocities(
 ) -> NDArray[Any]:
     """How fast the points move, (n_frames, n_points, 3), in length units (or ``unit``) a second.
 
-    Central differences, (p[t+1] - p[t-1]) / 2 x rate; at the ends of the clip and beside gaps
-    one-sided. A part of the frames has the numbers of the whole. Arguments and errors are those of
-    ``positions``; OptionError also where the frame rate is unknown.
+    Central differences by the times of the frames, (p[t+1] - p[t-1]) / 2 x rate where these are
+    uniform; one-sided at the ends of the clip, beside unknown positions and beside missing frames,
+    over which no difference is taken: a frame alone between two gaps has none, NaN. A part of the
+    frames has the numbers of the whole. Arguments and errors are those of ``positions``;
+    OptionError also where the times are unknown.
     """
-    rate = rate_of(moving)
     found = _with_neighbours(moving, joints, frames, unit, 1)
-    return as_type(_cut(velocities_of(found.places, rate), found), dtype)
+    return as_type(_cut(velocities_of(found.places, found.steps), found), dtype)
 
 
 def accelerations(
@@ -118,19 +119,22 @@ def accelerations(
 ) -> NDArray[Any]:
     """How the velocity of the points changes, in length units (or ``unit``) a second squared.
 
-    (p[t+1] - 2 p[t] + p[t-1]) x rate^2; at an end or beside a gap that of the frame next to it.
-    Otherwise as ``velocities``.
+    (p[t+1] - 2 p[t] + p[t-1]) x rate^2 where times are uniform; at an end or beside a gap that of
+    the frame next to it, NaN in a run of fewer than three. Otherwise as ``velocities``.
     """
-    rate = rate_of(moving)
     found = _with_neighbours(moving, joints, frames, unit, 2)
-    return as_type(_cut(accelerations_of(found.places, rate), found), dtype)
+    return as_type(_cut(accelerations_of(found.places, found.steps), found), dtype)
 
 
 @dataclass(frozen=True, slots=True)
 class _Near:
-    """Places of some frames and of those around them; ``first`` and ``stop`` among ``places``."""
+    """Places of some frames and of those around them; ``first`` and ``stop`` among ``places``.
+
+    ``steps`` are the seconds from each of them to the next, NaN across a gap.
+    """
 
     places: Floats
+    steps: Floats
     first: int
     stop: int
 
@@ -139,10 +143,11 @@ def _with_neighbours(
     moving: Moving, joints: Joints, frames: Frames, unit: str | None, reach: int
 ) -> _Near:
     scale = scale_to(moving.skeleton, unit)
+    steps = known_timeline(moving.name, moving.timeline).steps
     start, stop = frame_range(moving, frames)
     low, high = max(0, start - reach), min(moving.n_frames, stop + reach)
     places = _positions(moving, joints, (low, high)) * scale
-    return _Near(places, start - low, stop - low)
+    return _Near(places, steps[low : max(low, high - 1)], start - low, stop - low)
 
 
 def _cut(values: Floats, near: _Near) -> Floats:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import PER_SECOND, Timeline, has_times, is_time, known_timeline
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import IDENTITY, Chain, Floats, Link, chain_of
 from mcz.kinematics.euler import ORDERS, euler_angles
@@ -16,6 +18,9 @@ from mcz.kinematics.rotation_vectors import matrices_of_vectors, nearest_vector
 from mcz.motion import Motion, Signal, Skeleton, frame_rate_of
 from mcz.poses.conversions import from_matrices, slerp
 
+Ints = NDArray[np.int64]
+
+ALIGNED = 1e-6  # of a frame: a new frame so near to an old one falls upon it
 MOST_VALUES = 2**31  # of what is made: a rate of 1e9 would be a mistake, not a wish
 
 
@@ -24,10 +29,15 @@ class Times:
     """The new frames between the old: frame ``before`` and the next, and how far between, 0 to 1.
 
     ``before`` int64 (n,), ``share`` float64 (n,): 0 where a new frame falls upon an old one.
+    ``runs``, int64 (n, 2), are the first and last old frame without a gap between, None: all.
+    ``weights``, (2, n): the time between the two frames, divided by that from the frame before, and
+    to the frame after, None: of frames at equal distances, 1/2.
     """
 
     before: NDArray[np.int64]
     share: Floats
+    runs: NDArray[np.int64] | None = None
+    weights: Floats | None = None
 
     @property
     def after(self) -> NDArray[np.int64]:
@@ -42,55 +52,111 @@ def resample(motion: Motion, rate: Fraction | float, *, drop_signals: bool = Fal
     the shorter way round each. Positions, lengths and all else run along Catmull-Rom splines
     through four frames. A frame that coincides with one of ``motion`` is that frame, bit for bit.
     No filter is applied: at a lower rate what is faster than half of it folds back, as wherever
-    frames are left out. A value between frames of which one is unknown is unknown: gaps stay gaps.
+    frames are left out. New frames lie between old ones by their times: a value between frames of
+    which one is unknown is unknown, and where frames are missing there are none in the result
+    either, whose frame numbers have the gap.
 
-    Other signals cannot follow: OptionError unless ``drop_signals``. The result has no source and
-    no frame numbers. Raises OptionError where the rate of ``motion`` is unknown, MotionError for a
-    ``rate`` that is none.
+    Other signals cannot follow: OptionError unless ``drop_signals``. The result has no source, and
+    the times of the old. Raises OptionError where the times of ``motion`` are unknown, MotionError
+    for a ``rate`` that is none.
     """
     wanted = frame_rate_of(rate, motion.name)
-    if motion.frame_rate is None:
-        raise OptionError(f"motion {motion.name!r}: its frame rate is unknown; say it when reading")
-    if len(motion.signals) > 1 and not drop_signals:
-        names = ", ".join(signal.name for signal in motion.signals[1:])
+    timeline, first = known_timeline(motion.name, motion.timeline), motion.signals[0]
+    others = [signal.name for signal in motion.signals[1:] if not is_time(signal)]
+    if others and not drop_signals:
         raise OptionError(
-            f"motion {motion.name!r}: signals beside the motion ({names}) are not resampled; leave "
-            "them out with drop_signals=True"
+            f"motion {motion.name!r}: signals beside the motion ({', '.join(others)}) are not "
+            "resampled; leave them out with drop_signals=True"
         )
-    if motion.signals[0].samples_per_frame > 1:
+    if first.samples_per_frame > 1:
         raise MotionError(f"motion {motion.name!r}: several samples a frame")
-    times = times_of(motion.n_frames, Fraction(motion.frame_rate), wanted, motion.signals[0])
-    own = motion.signals[0].channels is not None
+    numbers, times = times_of(timeline, wanted, first)
+    own = first.channels is not None
     old = np.asarray(motion.values, np.float64)
     values = resampled(None if own else motion.skeleton, old, times)
-    mask = None
-    if motion.signals[0].mask is not None:
-        mask = ~np.isnan(values)
-    signal = Signal(values, name=motion.signals[0].name, mask=mask)
-    if motion.signals[0].channels is not None:
-        signal = replace(signal, channels=motion.signals[0].channels)
-    return replace(
+    new = timeline.even[:1] + numbers / float(wanted)
+    if not own and has_times(motion.skeleton):
+        values[:, 0] = new * PER_SECOND[motion.skeleton.channels[0].unit]
+    mask = ~np.isnan(values) if first.mask is not None else None
+    start = float(new[0] * float(wanted)) if len(new) else 0.0
+    base = round(start) if abs(start) < 2**52 and abs(start - round(start)) < ALIGNED else 0
+    counted = numbers + base + 1
+    made = replace(
         motion,
-        signals=(signal,),
+        signals=(replace(Signal(values, name=first.name, mask=mask), channels=first.channels),),
         frame_rate=wanted,
         source=None,
-        frame_numbers=None,
-        metadata={k: v for k, v in motion.metadata.items() if k != "frame-numbers"},
+        frame_numbers=None if (counted == np.arange(1, len(counted) + 1)).all() else counted,
+        number_step=1,
     )
+    return made.at_times(Timeline(new, wanted, timeline.rounding))
 
 
-def times_of(n_frames: int, rate: Fraction, wanted: Fraction, signal: Signal) -> Times:
-    """Where the frames of rate ``wanted`` lie among ``n_frames`` at ``rate``, in exact arithmetic.
+def times_of(timeline: Timeline, wanted: Fraction, signal: Signal) -> tuple[Ints, Times]:
+    """The frames at rate ``wanted`` that lie within the runs of ``timeline``, counted from 0 at its
+    first time, and where they lie.
 
-    Raises OptionError where they would be too many.
+    In exact arithmetic where times lie at whole multiples of 1 / rate. Raises OptionError where
+    they would be too many.
     """
-    if not n_frames:
-        return Times(np.empty(0, np.int64), np.empty(0))
-    count = resampled_frames(n_frames, rate, wanted)
-    step = rate / wanted
-    if count * max(1, signal.n_channels) > MOST_VALUES:
-        raise OptionError(f"{n_frames} frames at {rate} a second make {count} at {wanted}")
-    return times_at(range(count), step)
+    even, room = timeline.even, MOST_VALUES // max(1, signal.n_channels)
+    parts: list[tuple[Ints, Times]] = []
+    for run in timeline.runs:
+        frames, lie = _frames_within(timeline, wanted, run)
+        room -= len(frames)
+        if room < 0:
+            raise OptionError(
+                f"{len(even)} frames in {even[-1] - even[0]:g} s make too many at {wanted} a second"
+            )
+        parts.append((np.array(frames, np.int64), lie(frames)))
+    if not parts:
+        return np.empty(0, np.int64), Times(np.empty(0, np.int64), np.empty(0))
+    numbers, found = zip(*parts, strict=True)
+    if len(parts) == 1:
+        return numbers[0], found[0]
+    ends = np.array(timeline.runs, np.int64) - [0, 1]
+    half = [np.full((2, len(n)), 0.5) for n in numbers]
+    weights = [h if f.weights is None else f.weights for f, h in zip(found, half, strict=True)]
+    times = Times(
+        np.concatenate([each.before for each in found]),
+        np.concatenate([each.share for each in found]),
+        np.repeat(ends, [len(each) for each in numbers], axis=0),
+        np.concatenate(weights, axis=1),
+    )
+    return np.concatenate(numbers), times
+
+
+def _frames_within(
+    timeline: Timeline, wanted: Fraction, run: tuple[int, int]
+) -> tuple[range, Callable[[range], Times]]:
+    """The new frames in a run of the old, and what tells where they lie."""
+    start, stop = run
+    places, rate = timeline.places, timeline.rate
+    if places is not None and rate and places[stop - 1] - places[start] == stop - start - 1:
+        step, first = rate / wanted, int(places[start])
+        frames = range(ceil(first / step), int((first + stop - start - 1) / step) + 1)
+        return frames, lambda frames: _moved(times_at(frames, step), start - first)
+    since = (timeline.even[start:stop] - timeline.even[0]) * float(wanted)
+    frames = range(ceil(since[0] - ALIGNED), int(since[-1] + ALIGNED) + 1)
+    return frames, lambda frames: _between(np.array(frames, np.float64), since, start)
+
+
+def _moved(times: Times, by: int) -> Times:
+    return Times(times.before + by, times.share)
+
+
+def _between(frames: Floats, since: Floats, start: int) -> Times:
+    """Where ``frames`` lie among old ones at ``since``, rising, whose first is frame ``start``."""
+    before = np.clip(np.searchsorted(since, frames, side="right") - 1, 0, max(0, len(since) - 2))
+    after = np.minimum(before + 1, len(since) - 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.nan_to_num((frames - since[before]) / (since[after] - since[before]))
+    share[share < ALIGNED] = 0.0
+    upon = share > 1 - ALIGNED
+    steps = np.concatenate([[np.nan], np.diff(since), [np.nan] * 2])  # up to each frame
+    own = steps[before + 1]
+    weights = np.stack([own / (own + steps[before]), own / (own + steps[before + 2])])
+    return Times(before + upon + start, np.where(upon, 0.0, share), weights=weights)
 
 
 def resampled_frames(n_frames: int, rate: Fraction, wanted: Fraction) -> int:
@@ -120,22 +186,25 @@ def resampled(skeleton: Skeleton | None, old: Floats, times: Times) -> Floats:
 
 def splines(old: Floats, times: Times) -> Floats:
     """Catmull-Rom splines through the rows of ``old``, straight on where a neighbour is missing."""
-    p0, p1 = _rows(old, times.before - 1), old[times.before]
-    p2, p3 = old[times.after], _rows(old, times.after + 1)
+    runs = times.runs
+    low, high = (0, len(old) - 1) if runs is None else (runs[:, 0], runs[:, 1])
+    p0, p1 = _rows(old, times.before - 1, low, high), old[times.before]
+    p2, p3 = old[times.after], _rows(old, times.after + 1, low, high)
+    before, after = times.weights if times.weights is not None else np.full((2, 1), 0.5)
     with np.errstate(invalid="ignore", over="ignore"):
-        p0 = np.where(np.isnan(p0), 2 * p1 - p2, p0)
-        p3 = np.where(np.isnan(p3), 2 * p2 - p1, p3)
+        way = p2 - p1
+        first = np.where(np.isnan(p0), way, (p2 - p0) * before[:, None])
+        last = np.where(np.isnan(p3), way, (p3 - p1) * after[:, None])
         t = times.share[:, None]
-        curve: Floats = p1 + t / 2 * (
-            (p2 - p0) + t * ((2 * p0 - 5 * p1 + 4 * p2 - p3) + t * (3 * (p1 - p2) + p3 - p0))
-        )
+        bend = 3 * way - 2 * first - last + t * (first + last - 2 * way)
+        curve: Floats = p1 + t * (first + t * bend)
     return np.where(t > 0, curve, p1)
 
 
-def _rows(old: Floats, frames: NDArray[np.int64]) -> Floats:
-    """Rows of ``old``, NaN where a frame lies outside."""
+def _rows(old: Floats, frames: Ints, low: Ints | int, high: Ints | int) -> Floats:
+    """Rows of ``old``, NaN where a frame lies outside of ``low`` to ``high``."""
     rows = old[np.clip(frames, 0, len(old) - 1)]
-    rows[(frames < 0) | (frames >= len(old))] = np.nan
+    rows[(frames < low) | (frames > high)] = np.nan
     return rows
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clock import Timeline, known_times
+from mcz.clock import Timeline, known_timeline
 from mcz.displays import html_of
 from mcz.reading.timelines import Stored, clip_timeline
 from mcz.skeleton import Joints, joint_list
@@ -44,7 +44,7 @@ class Posed:
 
         At most the column of times is decoded.
         """
-        return known_times(self._clip.name, self.timeline)
+        return known_timeline(self._clip.name, self.timeline).times
 
     @property
     def joint_names(self) -> tuple[str, ...]:
