@@ -30,6 +30,7 @@ UNITS = {
     "feet": 30.48,
 }
 LOCAL = ("local", "parent")  # coordinate spaces in which a bone is seen from its parent
+QUATERNION = {"qx", "qy", "qz", "qw"}
 MAX_HEAD = 32  # lines above the rows
 
 HEAD = re.compile(rb'[ \t]*"?Format Version"?([,;\t])')
@@ -92,7 +93,9 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
         if (rate := stated_rate(head.said.get(key, "")))
     ]
     times = Times(None, (), None, True)
-    if None not in texts:
+    if None in texts:
+        stated = []
+    else:
         times = read_times(data, rows, time, stated)
     labels = [head.label(column) for column in texts]
     text_signal = read_text(data, rows, table.texts, labels, (n_values, 1))
@@ -170,10 +173,19 @@ def _objects(head: _Head) -> list[_Object]:
         before = mine
         found[-1].columns.append(column)
         found[-1].channels.append(channel)
-    if _ORDER.fullmatch(order):
-        for one in found:
+    for one in found:
+        if _ORDER.fullmatch(order):
             _sort_rotations(one, order.lower())
+        elif not {channel.kind for channel in one.channels} >= QUATERNION:
+            one.channels = [_without_kind(channel) for channel in one.channels]
     return found
+
+
+def _without_kind(channel: Channel) -> Channel:
+    """A part of a rotation whose other parts are missing, or angles in no order, says nothing."""
+    if channel.kind not in QUATERNION:
+        return channel
+    return Channel("", f"Rotation {channel.kind[1].upper()}")
 
 
 def _without(objects: Sequence[_Object], columns: Sequence[int | None]) -> list[_Object]:

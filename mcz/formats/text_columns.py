@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +21,15 @@ from mcz.formats.csv_text import DECIMAL_COMMA, NO_NUMBER
 from mcz.formats.layout import MAX_PATTERNS, Pattern, runs_of
 from mcz.formats.notes import RowNotes
 from mcz.formats.padding import padding
-from mcz.formats.rows import Rows, line_of
+from mcz.formats.rows import DENSE, FEW_CELLS, Rows, line_of
 from mcz.numbers import scan
 from mcz.numbers.tokens import kernels
 
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-FEW_TEXTS = 16  # of a column, which are laid out whole
+FEW_TEXTS = 16  # of a column, which are laid out whole where
+ROWS_A_TEXT = 8  # so many rows have the same, on average
 _DIGITS = re.compile(rb"[0-9]+")
 _PLAIN = re.compile(rb"0|[1-9][0-9]{0,14}")
 
@@ -209,8 +211,11 @@ def _split(
     """
     texts = [data[a:b] for a, b in zip(start.tolist(), stop.tolist(), strict=True)]
     counts = Counter(texts)
-    whole = len(counts) <= FEW_TEXTS
+    n_changes = sum(text != after for text, after in pairwise(texts))
+    whole = len(counts) <= FEW_TEXTS and ROWS_A_TEXT * n_changes <= len(texts)
     widths = [] if whole else _widths(counts)
+    if len(start) * sum(widths) > DENSE * len(data) + FEW_CELLS:
+        widths = []  # more cells than bytes: a few texts of many digits
     edges = np.cumsum([0, *(width or 1 for width in widths)]).tolist()
     split = {text: _shape(text, widths, edges, first, is_padded) for text in counts}
     shapes = list(dict.fromkeys(shape for shape, _ in split.values()))

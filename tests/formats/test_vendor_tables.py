@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.errors import SourceError
+from mcz.errors import LimitError, SourceError
 from mcz.formats import FORMATS
 from mcz.formats.csv_files import is_motion
 from mcz.formats.csv_text import first_row
@@ -71,6 +72,31 @@ def table_of(rows: list[list[str]], separator: str, quoting: int, eol: str) -> b
     return out.getvalue().encode()
 
 
+HELICAL = (
+    b"Objects\n100\n,,Global Angle Wand:Wand,,,,,,\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n"
+    b",,rad,rad,rad,mm,mm,mm\n1,0,0,0,0.5,100,5.5,900\n2,0,0,0,0.6,101,5.5,900\n"
+)
+QUATERNION = (
+    b"Objects\n200\n,,Global Angle (Quaternion) Wand:Wand,,,,,,,Global Angle (Quaternion) Car:Car\n"
+    b"Frame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ,RX,RY,RZ,RW,TX,TY,TZ\n"
+    b",,,,,,mm,mm,mm,,,,,mm,mm,mm\n1,0,0,0,0,1,100,20.5,900,0,0,0.6,0.8,-100,5,800\n"
+    b"2,0,0,0,0.6,0.8,101,20.5,902,,,,,,,\n"
+)
+
+
+def take(n_frames: int) -> bytes:
+    """A take of Motive with a time code of 30 frames a second and a marker."""
+    lines = [
+        "Format Version,1.24,Capture Frame Rate,120,Length Units,Millimeters",
+        *("", ",Type,,Marker,Marker,Marker", ",Name,,Toe,Toe,Toe", ",,,Position,Position,Position"),
+        "Frame,Time (Seconds),TimeCode,X,Y,Z",
+    ]
+    for k in range(n_frames):
+        code = f"15:{k // 7200:02d}:{k // 120 % 60:02d}:{k // 4 % 30:02d}.{k % 4:02d}"
+        lines.append(f"{k},{k / 120:.6f},{code},{k / 8:.3f},{np.sin(k / 40):.3f},{k % 3}.250")
+    return ("\r\n".join(lines) + "\r\n").encode()
+
+
 @given(TABLES, st.data())
 def test_a_spreadsheet_that_saves_a_table_changes_nothing(
     data: bytes, choice: st.DataObject
@@ -124,19 +150,6 @@ def test_columns_of_text_stay_beside_the_numbers(data: bytes, kind: str) -> None
         assert "Clock0" in motion.metadata["source-note"]
 
 
-def take(n_frames: int) -> bytes:
-    """A take of Motive with a time code of 30 frames a second and a marker."""
-    lines = [
-        "Format Version,1.24,Capture Frame Rate,120,Length Units,Millimeters",
-        *("", ",Type,,Marker,Marker,Marker", ",Name,,Toe,Toe,Toe", ",,,Position,Position,Position"),
-        "Frame,Time (Seconds),TimeCode,X,Y,Z",
-    ]
-    for k in range(n_frames):
-        code = f"15:{k // 7200:02d}:{k // 120 % 60:02d}:{k // 4 % 30:02d}.{k % 4:02d}"
-        lines.append(f"{k},{k / 120:.6f},{code},{k / 8:.3f},{np.sin(k / 40):.3f},{k % 3}.250")
-    return ("\r\n".join(lines) + "\r\n").encode()
-
-
 @pytest.mark.parametrize("codec", ["lossless", "best", "mrdwt"])
 def test_a_time_code_is_cut_and_outlives_loss(codec: str) -> None:
     data, target, part = take(600), io.BytesIO(), io.BytesIO()
@@ -175,6 +188,32 @@ def test_texts_that_have_no_pattern_are_refused() -> None:
         FORMATS["csv"].read(text.encode(), "table")
 
 
+@given(st.sampled_from([take(12), QUATERNION, HELICAL]), st.data())
+def test_text_that_is_damaged_is_read_exactly_or_refused(
+    data: bytes, choice: st.DataObject
+) -> None:
+    at, bit = choice.draw(st.integers(0, len(data) - 1)), choice.draw(st.integers(0, 7))
+    damaged = data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :]
+    try:
+        motion = FORMATS["csv"].read(damaged, "table")
+    except (SourceError, LimitError) as error:
+        assert "\n" not in str(error)
+    else:
+        assert FORMATS["csv"].write(motion) == damaged
+
+
+def test_long_digits_do_not_take_columns_of_every_row() -> None:
+    rows = [f"{k},{k},a{k:05d}" for k in range(5000)]
+    rows[7] = f"7,7,a{'07' * 50_000}"
+    tracemalloc.start()
+    try:
+        with pytest.raises(SourceError, match="more than 1024 ways"):
+            FORMATS["csv"].read("\n".join(["time,x,id", *rows]).encode(), "table")
+        assert tracemalloc.get_traced_memory()[1] < 2**27
+    finally:
+        tracemalloc.stop()
+
+
 def test_rows_above_the_first_without_text_are_rows() -> None:
     motion = back(b"time,x,event\n0,1,start\n1,2,\n2,3,\n3,4,stop\n")
     assert [joint.name for joint in motion.skeleton.joints] == ["x"]
@@ -187,16 +226,22 @@ def test_a_time_in_words_is_kept_as_text() -> None:
     assert motion.metadata["source-note"] == "1 column is text: timestamp"
 
 
-HELICAL = (
-    b"Objects\n100\n,,Global Angle Wand:Wand,,,,,,\nFrame,Sub Frame,RX,RY,RZ,TX,TY,TZ\n"
-    b",,rad,rad,rad,mm,mm,mm\n1,0,0,0,0.5,100,5.5,900\n2,0,0,0,0.6,101,5.5,900\n"
-)
-QUATERNION = (
-    b"Objects\n200\n,,Global Angle (Quaternion) Wand:Wand,,,,,,,Global Angle (Quaternion) Car:Car\n"
-    b"Frame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ,RX,RY,RZ,RW,TX,TY,TZ\n"
-    b",,,,,,mm,mm,mm,,,,,mm,mm,mm\n1,0,0,0,0,1,100,20.5,900,0,0,0.6,0.8,-100,5,800\n"
-    b"2,0,0,0,0.6,0.8,101,20.5,902,,,,,,,\n"
-)
+def test_angles_whose_order_is_not_said_are_scalars() -> None:
+    """A take of 1.22 as a spreadsheet left it: no row says Rotation Type, and W is missing."""
+    motion = back(
+        b"Format Version,1.22,Take Name,a,Capture Frame Rate,60,,\n,,,,,,,\n"
+        b",,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body\n"
+        b",,Shank,Shank,Shank,Shank,Shank,Shank\n,,1,1,1,1,1,1\n"
+        b",,Rotation,Rotation,Rotation,Position,Position,Position\n"
+        b"Frame,Time (Seconds),X,Y,Z,X,Y,Z\n0,0,-5.9,29.5,2.25,1,2,3\n"
+        b"1,0.016667,-5.8,29.5,2,1,2,3\n"
+    )
+    (shank,) = motion.skeleton.joints
+    assert shank.name == "Shank"
+    assert [channel.kind for channel in shank.channels] == ["", "", "", "tx", "ty", "tz"]
+    assert [channel.name for channel in shank.channels[:3]] == [
+        f"Rotation {axis}" for axis in "XYZ"
+    ]
 
 
 def test_objects_of_vicon_tracker_are_joints() -> None:
