@@ -30,6 +30,7 @@ PER_SECOND = {"": 1.0, "s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}  # units of a 
 NAMES = ("time", "times", "timestamp", "timestamps")  # of a signal of times
 JITTER = 1e-6  # of a step: binary times that are off by less are uniform
 EXACT = 1e-10  # seconds: the most by which two times of one clock differ
+SAME_RATE = 1e-5  # relative: frame rates that differ by less are one
 GAP = 1.5  # steps: frames further apart are not neighbors
 _NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?")
 
@@ -293,6 +294,11 @@ def _decimal(seconds: float) -> str:
 def numbers_or_rows(numbers: Ints | None, n_frames: int) -> Ints:
     """Frame numbers, 1, 2, 3, ... where there are none."""
     return np.arange(1, n_frames + 1) if numbers is None else numbers
+
+
+def usual_step(numbers: Ints | None) -> int:
+    """The usual step from a frame number to the next."""
+    return 1 if numbers is None or len(numbers) < 2 else int(np.median(np.diff(numbers)))
 
 
 def time_signal(signals: Sequence[Timed]) -> int | None:

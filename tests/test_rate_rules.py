@@ -6,6 +6,7 @@ import io
 import re
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -180,3 +181,113 @@ def test_force_rate_on_the_command_line(
     assert "--force-rate makes it 120" in capsys.readouterr().err
     with mcz.open(target) as file:
         assert [clip.frame_rate for clip in file] == [60]
+
+
+WIDE = tuple(range(124, 164))
+SOURCES = {  # a file, where its rate stands, and that at 50 a second
+    "bvh": (sample_files()["walk.bvh"], rb"Frame Time: (\S+)", b"0.02"),
+    "trc": (trc(WIDE), rb"\n(\S+)\t\S+\t\d+\t1\tmm", b"50.00"),
+    "motive.csv": (motive(WIDE), rb"Export Frame Rate,([^,]+)", b"50.000000"),
+    "vicon.csv": (vicon(WIDE), rb"\n(\d+)\n", b"50"),
+}
+
+
+def corrected(suffix: str, tmp_path: Path, **options: Any) -> tuple[Path, bytes]:
+    """A clip of 50 frames a second whose source states another rate, and the source."""
+    data = SOURCES[suffix][0]
+    path, target = tmp_path / (suffix if "." in suffix else f"a.{suffix}"), tmp_path / "a.mcz"
+    path.write_bytes(data)
+    mcz.encode(path, target, rate=50, **options)
+    return target, data
+
+
+def stated(suffix: str, data: bytes) -> bytes:
+    found = re.search(SOURCES[suffix][1], data)
+    assert found is not None
+    return found[1]
+
+
+@pytest.mark.parametrize("suffix", SOURCES)
+def test_parts_state_a_corrected_rate(suffix: str, tmp_path: Path) -> None:
+    target, data = corrected(suffix, tmp_path)
+    wanted = SOURCES[suffix][2]
+    with mcz.open(target) as file:
+        clip = file.only_clip()
+        assert clip.source_bytes() == data
+        assert clip.source_bytes((0, clip.n_frames)) == data
+        part = clip.source_bytes((3, 9))
+        assert stated(suffix, part) == wanted
+        times = clip.times
+        assert np.allclose(np.diff(times), 0.02, atol=1e-9)
+    cut = tmp_path / "cut.mcz"
+    mcz.extract(target, cut, frames=(3, 9))
+    with mcz.open(cut) as file:
+        assert file.only_clip().source_bytes() == part
+        assert np.abs(file.only_clip().times - times[3:9]).max() < 1e-9
+    again = read(part, suffix, tmp_path)
+    start = 0.06 if suffix == "bvh" else 0.0  # which it cannot state
+    assert again.frame_rate == 50
+    assert np.abs(again.times + start - times[3:9]).max() < 0.006
+    assert mcz.verify(cut) == []
+
+
+def test_lossy_copies_state_a_corrected_rate(tmp_path: Path) -> None:
+    target, _ = corrected("bvh", tmp_path, codec="mrdwt")
+    with mcz.open(target) as file:
+        assert stated("bvh", file.only_clip().source_bytes()) == b"0.02"
+
+
+def test_a_c3d_states_a_corrected_rate(tmp_path: Path) -> None:
+    path, target = tmp_path / "walk.c3d", tmp_path / "a.mcz"
+    path.write_bytes(sample_files()["walk.c3d"])
+    mcz.encode(path, target, rate=50)
+    with mcz.open(target) as file:
+        clip = file.only_clip()
+        assert clip.source_bytes() == path.read_bytes()
+        part = tmp_path / "part.c3d"
+        part.write_bytes(clip.source_bytes((3, 9)))
+    again = mcz.read(part)
+    assert (again.frame_rate, again.n_frames) == (50, 6)
+    assert "rate" not in again.metadata.get("source-note", "")  # header and parameters agree
+    assert np.frombuffer(part.read_bytes(), "<f4", 1, 20)[0] == 50
+
+
+@pytest.mark.parametrize("suffix", ["sto", "npz", "bvh", "trc"])
+def test_a_rate_that_the_source_contradicts_is_said(
+    suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = {"sto": sto(WIDE), "npz": npz(WIDE)}.get(suffix) or SOURCES[suffix][0]
+    path, target = tmp_path / f"a.{suffix}", tmp_path / "a.mcz"
+    path.write_bytes(data)
+    mcz.encode(path, target, rate=50)
+    back = tmp_path / f"back.{suffix}"
+    assert run(cli, "mcz", ["decode", str(target), "-o", str(back)]) == 0
+    own = f"{float(mcz.read(path).frame_rate):g}"
+    told = f"its source states {own} frames a second, the clip has 50"
+    assert back.read_bytes() == data
+    assert f"clip a: {told}" in capsys.readouterr().err
+    assert run(cli, "mcz", ["unpack", str(target), str(tmp_path / "out")]) == 0
+    assert told in capsys.readouterr().err
+    part = tmp_path / f"part.{suffix}"
+    assert run(cli, "mcz", ["decode", str(target), "--frames", "3:9", "-o", str(part)]) == 0
+    assert (told in capsys.readouterr().err) == (suffix in ("sto", "npz"))  # times are numbers
+
+
+def test_a_rate_that_is_the_source_s_is_not_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for suffix, make in FILES.items():
+        path, target = tmp_path / (suffix if "." in suffix else f"a.{suffix}"), tmp_path / "a.mcz"
+        path.write_bytes(make(GAP))
+        mcz.encode(path, target, force=True)
+        back = tmp_path / "back.bin"
+        capsys.readouterr()
+        with mcz.open(target) as file:
+            clip = file.only_clip()
+            whole, part = clip.source_bytes(), clip.source_bytes((0, 2))
+        assert whole == make(GAP)
+        arguments = ["unpack", str(target), str(tmp_path / "out"), "--force"]
+        assert run(cli, "mcz", arguments) == 0
+        assert "states" not in capsys.readouterr().err
+        assert not back.exists()
+        assert len(part) < len(whole)

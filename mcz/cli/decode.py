@@ -229,6 +229,7 @@ def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made
     part = _part(clip, wanted)
     if target is None:
         outputs = [_source(clip, part)]
+        made.notes = _rate_notes(clip, part, wanted)
     elif wanted.is_converted:
         motion = part.motion()
         if wanted.solve:
@@ -238,6 +239,7 @@ def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made
         unit = wanted.unit if motion.skeleton.unit_cm is None else None
         motion = with_facts(motion, None, unit, wanted.up)
         rate = None if wanted.filtered else wanted.rate
+        made.notes = _corrected(clip, rate)
         if wanted.is_scene:
             made.scene = _scene(motion, target, rate, wanted)
             outputs = [Output(target, f"{_stem(motion)}.{target}", made.scene.data, CONVERTED)]
@@ -250,6 +252,26 @@ def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made
     if wanted.with_skeleton and target != "amc":
         outputs.append(_skeleton(held, _sourced(held, clip)))
     return outputs, made
+
+
+def _rate_notes(clip: Clip, part: Part, wanted: Wanted) -> tuple[str, ...]:
+    """A note where the text that was written states another rate than the clip has."""
+    from mcz.reading.rate_notes import rate_note
+
+    if wanted.decimate:
+        return ()
+    is_file = not wanted.filtered and clip.gives_file(part.frames, wanted.resolution)
+    note = rate_note(clip, is_file=is_file)
+    return () if note is None else (f"clip {clip.name}: {note}",)
+
+
+def _corrected(clip: Clip, rate: Fraction | None) -> tuple[str, ...]:
+    """A note where ``--rate`` replaces a rate that the clip has."""
+    own = clip.frame_rate
+    if own is None or rate is None or own == rate:
+        return ()
+    text = f"{float(own):g} frames a second are written as {float(rate):g}, as was asked for"
+    return (f"clip {clip.name}: its {text}",)
 
 
 def _part(clip: Clip, wanted: Wanted) -> Part:

@@ -18,12 +18,14 @@ class Made:
     fit: Fit | None = None
     scene: SceneFile | None = None
     left_out: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def facts_of(clips: Mapping[str, Made]) -> dict[str, Any]:
     """What ``--json`` says: of one clip "fit" and "scene", of more "fits" and "scenes" by name.
 
-    "left_out" has by the names of clips what their formats have no place for.
+    "left_out" has by the names of clips what their formats have no place for, "notes" what else is
+    to be known of them.
     """
     fits = {name: _fit(made.fit) for name, made in clips.items() if made.fit is not None}
     scenes = {name: _scene(made.scene) for name, made in clips.items() if made.scene is not None}
@@ -33,8 +35,11 @@ def facts_of(clips: Mapping[str, Made]) -> dict[str, Any]:
             facts[key] = next(iter(found.values()))
         elif found:
             facts[f"{key}s"] = found
-    left = {name: list(made.left_out) for name, made in clips.items() if made.left_out}
-    return facts | ({"left_out": left} if left else {})
+    for key in ("left_out", "notes"):
+        texts = {name: list(getattr(made, key)) for name, made in clips.items()}
+        texts = {name: found for name, found in texts.items() if found}
+        facts |= {key: texts} if texts else {}
+    return facts
 
 
 def told(clips: Mapping[str, Made]) -> Iterator[str]:
@@ -45,6 +50,7 @@ def told(clips: Mapping[str, Made]) -> Iterator[str]:
         if made.scene is not None:
             yield from _scene_told(made.scene)
         yield from made.left_out
+        yield from made.notes
 
 
 def _scene(scene: SceneFile) -> dict[str, Any]:

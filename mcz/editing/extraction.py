@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any, BinaryIO
 
 from mcz.brief import brief
+from mcz.clock import usual_step
 from mcz.container import payloads
 from mcz.container.chunks import (
     read_chunk,
@@ -44,9 +45,12 @@ from mcz.editing.cutting import (
 )
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
+from mcz.motion import Motion
+from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.signal_reader import SignalReader
+from mcz.reading.source_rates import stating_rate
 from mcz.schema import build, parse
 from mcz.skeleton import Joints
 from mcz.writing.atomic import replacing
@@ -130,6 +134,17 @@ def extract(
         with replacing(target, force=force, inputs=(source,)) as stream:
             copier = Copier(file, stream, progress, copies)
             return copier.run(cuts, alone=alone)
+
+
+def with_stated_rate(
+    writer: Writer, motion: Motion, held: Mapping[str, Any], clip: Clip
+) -> tuple[Motion, Mapping[str, Any]]:
+    """``motion`` and its CLIP_SOURCE ``held`` with a template that states the rate of ``clip``."""
+    changed = stating_rate(motion, usual_step(clip.frame_numbers))
+    if changed is motion or changed.source is None:
+        return motion, held
+    template = writer.template(held["format"], changed.source.template)
+    return changed, dict(held) | {"template": template}
 
 
 class Copier:
@@ -293,6 +308,7 @@ class Copier:
         elif held:
             motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
             hashes = [value_hash(signal.stored, signal.mask) for signal in motion.signals]
+            motion, held[0] = with_stated_rate(self.writer, motion, held[0], cut.clip)
             assert motion.source is not None
             try:
                 data = FORMATS[motion.source.format].write(motion)

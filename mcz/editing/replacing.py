@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.brief import brief
+from mcz.clock import usual_step
 from mcz.container import payloads
 from mcz.container.chunks import read_chunk
 from mcz.container.directory import ClipRow, SegmentRow
@@ -28,13 +29,14 @@ from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeade
 from mcz.container.value_hash import value_hash
 from mcz.editing.anew import check_anew, settings_of, write_anew
 from mcz.editing.cutting import ClipCut, add_note, cut_segment, plan_cut
-from mcz.editing.extraction import Copier
+from mcz.editing.extraction import Copier, with_stated_rate
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
 from mcz.errors import AccessError, MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
+from mcz.reading.source_rates import stating_rate
 from mcz.schema import build, parse
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
@@ -209,6 +211,8 @@ class _Editor(Copier):
         motion, held = self.recoded.decoded, fields["source"]
         if motion.source is None or not held:
             return b""
+        clip = self.file.clips[self.name]
+        motion, held[0] = with_stated_rate(self.writer, motion, held[0], clip)
         try:
             data = _source_file(motion)
         except MotionError as error:
@@ -329,6 +333,7 @@ class _AnewEditor(Copier):
 
     def _sourced(self, motion: Motion) -> Motion:
         """The motion with a source of its own values, or none where there can be none."""
+        motion = stating_rate(motion, usual_step(self.edited_clip.frame_numbers))
         if motion.source is None:
             return motion
         try:

@@ -21,6 +21,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fidelity import RESTORED, fidelity_of
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
+from mcz.reading.rate_notes import rate_note
 from mcz.reading.sharing import shared_out
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
@@ -74,7 +75,7 @@ def unpack(
                 if outcome.result == RESTORED:
                     if mtimes and one.kind == "clip":
                         set_time(writing.place, file.clips[one.name].metadata.get("mtime"))
-                    outcome = replace(outcome, result=_fidelity(file, one))
+                    outcome = replace(outcome, result=_fidelity(file, one), notes=_notes(file, one))
                 if salvage and isinstance(writing.error, FormatError):
                     outcome = replace(outcome, result="damaged")
                 report.outcomes.append(outcome)
@@ -145,6 +146,15 @@ def _of_alias(file: File, name: str, of: int, target: bytes) -> bytes:
     if called not in (file.clips if of == payloads.OF_CLIP else file.attachments):
         raise FormatError(f"alias {name!r} names {target!r}, which is not there")
     return _of_thing(file, "clip" if of == payloads.OF_CLIP else "attachment", called)
+
+
+def _notes(file: File, one: Stored) -> tuple[str, ...]:
+    """Where a source that was written states another frame rate than its clip has."""
+    if one.kind != "clip":
+        return ()
+    clip = file.clips[one.name]
+    note = rate_note(clip, is_file=clip.gives_file())
+    return () if note is None else (note,)
 
 
 def _fidelity(file: File, one: Stored) -> str:

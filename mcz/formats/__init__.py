@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -45,10 +46,12 @@ class Format:
     ``bones(data, whole=False)``: of a format that wants a skeleton, how many values each bone of
     the first frame, or of all, has. ``has_more_joints(data, most)`` says after a quick look whether
     a file surely has more, None where nobody can. ``states_rate``: the template holds the frame
-    rate, so that it does not suit another. ``is_table``: its header names every column, which is
-    much of what is written. ``recording(name, template, detail)`` is what the source
-    says beside all numbers, None where it says nothing; see ``mcz.Recording``. ``is_motion(data)``
-    says of a suffix that others use, too, whether a file that begins so seems to be of this format.
+    rate, so that it does not suit another; ``restate(template, rate)`` gives that rate and a
+    template that states another one, see ``stated_rates``. ``is_table``: its header names every
+    column, which is much of what is written. ``recording(name, template, detail)`` is what the
+    source says beside all numbers, None where it says nothing; see ``mcz.Recording``.
+    ``is_motion(data)`` says of a suffix that others use, too, whether a file that begins so seems
+    to be of this format.
     ``clock(template)`` gives the times that the template states, None where frame numbers and the
     rate alone do.
     """
@@ -67,6 +70,7 @@ class Format:
     recording: Callable[[str, bytes, bytes], Any] | None = None
     has_more_joints: Callable[..., bool] | None = None
     bones: Callable[..., dict[str, int]] | None = None
+    restate: Callable[[bytes, Fraction], Any] | None = None
     is_motion: Callable[[bytes], bool] | None = None
     clock: Callable[[bytes], SourceClock | None] | None = None
 
@@ -110,6 +114,7 @@ FORMATS: dict[str, Format] = {
             states_rate=True,
             arrive=_of("bvh", "arrive"),
             has_more_joints=_of("hierarchy", "has_more_joints"),
+            restate=_of("stated_rates", "restate_bvh"),
         ),
         Format(
             "c3d",
@@ -118,6 +123,7 @@ FORMATS: dict[str, Format] = {
             _of("c3d", "read"),
             _of("c3d", "write"),
             states_rate=True,
+            restate=_of("stated_rates", "restate_c3d"),
             recording=_of("c3d_recording", "recording"),
             clock=_of("c3d_layout", "clock_of"),
         ),
@@ -128,6 +134,7 @@ FORMATS: dict[str, Format] = {
             _of("c3d", "read"),
             _of("c3d", "write"),
             states_rate=True,
+            restate=_of("stated_rates", "restate_outputs"),
             recording=_of("c3d_recording", "recording"),
             clock=_of("c3d_layout", "clock_of"),
         ),
@@ -141,6 +148,7 @@ FORMATS: dict[str, Format] = {
                 join_table_notes,
                 states_rate=True,
                 is_table=True,
+                restate=_of("stated_rates", "restate_table"),
                 clock=_of("table_layout", "clock_of"),
             )
             for format_id, name, module in (
@@ -159,6 +167,7 @@ FORMATS: dict[str, Format] = {
                 join_table_notes,
                 states_rate=True,
                 is_table=True,
+                restate=_of("stated_rates", "restate_table"),
                 is_motion=_of("csv_files", "is_motion"),
                 clock=_of("table_layout", "clock_of"),
             )

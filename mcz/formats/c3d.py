@@ -66,7 +66,7 @@ def read(data: bytes, name: str = "motion") -> Motion:
     joints = tuple(Joint(names[number], channels=POSITION) for number in split.points)
     unit_cm = _unit_cm(parameters)
     skeleton = Skeleton(joints, unit_cm=unit_cm, angle_unit="", up_axis=said.up_axis)
-    rate, exact = _rate(data, parameters)
+    rate, exact = rate_of(data, parameters)
     numbers = np.arange(shape.first, shape.first + shape.n_frames, dtype=np.int64)
     scale, note = _scale(data, parameters) if shape.word == 2 and shape.n_points else (1.0, "")
     notes = [*shape.notes, *([note] if note else [])]
@@ -97,7 +97,7 @@ def _unit_cm(parameters: Parameters) -> float | None:
     return UNIT_CM.get(unit.decode("latin-1").strip().lower())
 
 
-def _rate(data: bytes, parameters: Parameters) -> tuple[Fraction | None, bool]:
+def rate_of(data: bytes, parameters: Parameters) -> tuple[Fraction | None, bool]:
     """Frames a second, and whether that is exactly the float of the file.
 
     The simplest rate that the float is nearest to: an integer, one divided by 1.001, one of at

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import SAME_RATE
 from mcz.errors import FormatError, LimitError
 from mcz.formats.layout import (
     BIT,
@@ -121,13 +122,30 @@ class Clock:
         return found
 
     def times(self, numbers: NDArray[np.int64], rate: Fraction | None) -> NDArray[np.float64]:
-        """The times as they are printed, in seconds."""
+        """The times as they are printed, in seconds; at ``rate`` where that corrects the clock's.
+
+        It does where neither it nor as many times it as the usual step of ``numbers`` is.
+        """
         ordinals = np.array(self.ordinals(numbers.tolist()), np.int64)
-        return self.grid.values(ordinals) / self._per_second(rate)
+        times = self.grid.values(ordinals) / self._per_second(rate)
+        own = self.frames_a_second(rate)
+        if own is None or rate is None or len(numbers) < 2:
+            return times
+        steps = (1, int(np.median(np.diff(numbers))))
+        if any(abs(own / rate - step) <= SAME_RATE * step for step in steps):
+            return times
+        return times * float(own / rate)
 
     def rounding(self, rate: Fraction | None) -> float:
         """Half a unit of the last digit, in seconds."""
         return 0.5 * 10.0**-self.grid.digits / self._per_second(rate)
+
+    def frames_a_second(self, rate: Fraction | None) -> Fraction | None:
+        """The frame numbers in a second of this clock; None of times that stand still."""
+        if not self.numerator:
+            return None
+        unit = Fraction(10**self.grid.digits) * int(self._per_second(rate))
+        return unit * self.denominator / self.numerator
 
     def _per_second(self, rate: Fraction | None) -> float:
         """1, or 1000, 10^6 or 10^9, whichever is nearest to the printed units a frame, in frames.
@@ -193,7 +211,7 @@ def parse_table(template: bytes, detail: bytes, sizes: Sequence[int]) -> list[Se
 def _section(shared: Any, own: Any, sizes: Sequence[int]) -> Section:
     if not shared.signals:  # TABLE-08
         raise FormatError("source template: a section without signals")
-    clock = _clock(shared)
+    clock = parsed_clock(shared)
     n_columns = sum(sizes[number] for number in shared.signals) + 1 + len(shared.clock)  # TABLE-01
     rows = parsed_patterns((shared.header,), shared, own, n_columns)
     signals = tuple(shared.signals)
@@ -204,10 +222,10 @@ def clock_of(template: bytes) -> Clock | None:
     """The clock of the section that the motion is in; FormatError on bad bytes."""
     shared = parse(TABLE_TEMPLATE, template, "source template", {"runs": MAX_RUNS}).sections
     section = next((fields for fields in shared if 0 in fields.signals), None)
-    return _clock(section) if section is not None else None
+    return parsed_clock(section) if section is not None else None
 
 
-def _clock(shared: Any) -> Clock | None:
+def parsed_clock(shared: Any) -> Clock | None:
     if not shared.clock:
         return None
     fields = shared.clock[0]

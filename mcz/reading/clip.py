@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.brief import shown
-from mcz.clock import START
+from mcz.clock import START, usual_step
 from mcz.codecs import by_id
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
@@ -34,6 +34,7 @@ from mcz.reading.recording import index_of, read_recording, scaling_of
 from mcz.reading.signal_info import SignalInfo, groups_of, read_signal
 from mcz.reading.signal_reader import SignalReader
 from mcz.reading.source_info import SourceInfo, read_source, source_info, sourced_skeleton
+from mcz.reading.source_rates import stating_rate
 from mcz.reading.views import ClipValues, FrameValues, Masked
 from mcz.schema import parse
 from mcz.skeleton import Joints, joint_list
@@ -376,18 +377,27 @@ class Clip(Extent, Posed):
     ) -> bytes:
         """The source file, byte for byte (of a lossy clip: like it), or a part of it.
 
-        The arguments are those of ``motion``. Raises ChecksumError where a lossless clip does not
-        give back the bytes it was made of.
+        The arguments are those of ``motion``. What is not the file itself states the frame rate of
+        the clip, where its format can. Raises ChecksumError where a lossless clip does not give
+        back the bytes it was made of.
         """
         info = self.source
         if info is None:
             raise OptionError(f"clip {self.name!r} has no source file; choose a format with --to")
         check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
-        data: bytes = FORMATS[info.format].write(self._motion(frames, resolution, decimate))
-        lossless = all(signal.codec.lossless for signal in self.signals)
-        if frames is None and not resolution and lossless and not self.container.salvage:
+        motion = self._motion(frames, resolution, decimate)
+        is_file = self.gives_file(frames, resolution)
+        if not is_file:
+            motion = stating_rate(motion, usual_step(self.frame_numbers))
+        data: bytes = FORMATS[info.format].write(motion)
+        if is_file and not self.container.salvage:
             self._check_source(data, info)
         return data
+
+    def gives_file(self, frames: tuple[int, int] | None = None, resolution: int = 0) -> bool:
+        """Whether ``source_bytes`` gives the very file that the clip was made of."""
+        whole = self.checked_range(frames) == (0, self.n_frames) and not resolution
+        return whole and all(signal.codec.lossless for signal in self.signals)
 
     def _check_source(self, data: bytes, info: SourceInfo) -> None:
         digest = hashlib.sha256(data).digest()

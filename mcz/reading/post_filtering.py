@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import usual_step
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.kinematics import point_set
@@ -22,6 +23,7 @@ from mcz.motion import Motion, Signal, Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.decimation import decimated_rows
 from mcz.reading.source_files import with_facts
+from mcz.reading.source_rates import stating_rate
 from mcz.transforms.post_filter import PostFilter, filter_rows
 
 Floats = NDArray[np.float64]
@@ -118,7 +120,9 @@ def filtered_source(
     motion = _with_places(clip, frames, resolution, decimate, rate)
     if clip.source is None or motion.source is None:
         raise OptionError(f"clip {clip.name!r} has no source file; choose a format with --to")
-    data: bytes = FORMATS[clip.source.format].write(motion)
+    data: bytes = FORMATS[clip.source.format].write(
+        stating_rate(motion, usual_step(clip.frame_numbers))
+    )
     return data
 
 

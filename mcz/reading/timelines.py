@@ -37,13 +37,13 @@ class Stored(Protocol):
 
 def clip_timeline(clip: Stored) -> Timeline | None:
     """When every frame of a clip was, None where neither times nor a rate are known."""
-    column = _column(clip)
+    column = times_column(clip)
     clock = read_clock(clip.container, clip._fields, clip.signals[0])
     counting = Counting(clip.frame_numbers, clip.frame_rate)
     return timeline_of(counting, clip.metadata, clock, column)
 
 
-def _column(clip: Stored) -> Column | None:
+def times_column(clip: Stored) -> Column | None:
     """The times that stand among the values; None where there are none."""
     first = clip.signals[0]
     if first.channels is None and first.samples_per_frame == 1 and has_times(clip.skeleton):

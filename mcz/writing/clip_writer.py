@@ -26,6 +26,7 @@ from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Skeleton, Source
+from mcz.reading.source_rates import stating_rate
 from mcz.schema import MAX_COUNT, build
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
 from mcz.writing.signal_source import MemorySource, as_stored, settle
@@ -187,9 +188,11 @@ def _write_signal(
 
 def _with_source_hash(motion: Motion) -> Motion:
     """The motion with size and hash of its source file, which was changed or cut since."""
-    source = motion.source
-    if source is None or source.sha256:
+    if motion.source is None or motion.source.sha256:
         return motion
+    motion = stating_rate(motion)
+    source = motion.source
+    assert source is not None
     signals = tuple(settle(signal)[1] for signal in motion.signals)  # as a reader will have them
     data = FORMATS[source.format].write(replace(motion, signals=signals))
     digest = hashlib.sha256(data).digest()

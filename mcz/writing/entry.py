@@ -10,6 +10,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from mcz.clock import SAME_RATE
 from mcz.codecs import DEFAULT, by_name
 from mcz.container.limits import BASE, Profile
 from mcz.container.writer import Writer
@@ -26,13 +27,12 @@ from mcz.reading.source_files import (
     read_skeleton,
     with_facts,
 )
+from mcz.reading.source_rates import stating_rate
 from mcz.units import facing, in_unit, unit_cm_of
 from mcz.writing.clip_writer import Progress, write_skeleton
 from mcz.writing.draft import Draft
 from mcz.writing.names import alias_once, check_name, clip_name
 from mcz.writing.tuning import write_tuned
-
-SAME_RATE = 1e-3  # relative: 120 frames a second are what 0.0083333 seconds mean
 
 
 @dataclass(frozen=True)
@@ -145,6 +145,8 @@ class Entry:
         name = clip_name(self.name, writer.directory)
         motion = replace(motion, name=name)
         codec, params = by_name(self.terms.codec), self.terms.params or {}
+        if not codec.lossless:  # the file does not come back: what comes states its rate
+            motion = stating_rate(motion)
         self.quality = write_tuned(writer, motion, codec, params, progress)
         return "parsed"
 

@@ -1,0 +1,192 @@
+"""Frame rates that templates of sources state, and templates that state another one.
+
+A clip may have another rate than its source states: one that was corrected. The file as it was is
+restored as it was; whatever else is written in its style states the rate of the clip.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from mcz.clock import SAME_RATE
+from mcz.errors import SourceError
+from mcz.formats.c3d import rate_of
+from mcz.formats.c3d_layout import C3D_OUTPUTS_TEMPLATE, C3D_TEMPLATE
+from mcz.formats.c3d_parameters import FLOAT, INTEGER, find_parameters, parse_parameters
+from mcz.formats.layout import MAX_RUNS, TEMPLATE
+from mcz.formats.rates import frame_rate, frame_time
+from mcz.formats.table_layout import (
+    PHRASES,
+    TABLE_TEMPLATE,
+    Clock,
+    parsed_clock,
+    with_phrases,
+)
+from mcz.formats.times import stated_rate
+from mcz.schema import build, parse
+
+HEADER_RATE = 20  # where the header of a C3D has a binary32 of the rate
+WHERE = "source template"
+MOST_DECIMALS = 16
+
+_FRAME_TIME = re.compile(rb"(?i)Frame\s+Time\s*:\s*([^\s]+)")
+_TRC_KEYS = re.compile(rb"(?i)(?m)^[ \t]*(DataRate\b[^\r\n]*)\r?\n([^\r\n]*)")
+_TRC_RATES = (b"datarate", b"camerarate", b"origdatarate")
+_MOTIVE = re.compile(rb'(?i),"?(?:Capture|Export) Frame Rate"?,"?([0-9.]+)')
+_VICON = re.compile(  # two lines above that of the axes
+    rb'(?im)^"?([0-9.]+)[^\r\n]*\r?\n[^\n]*\n[ \t]*"?Frame"?[,;\t][ \t]*"?Sub Frame'
+)
+_PHRASE_MARKS = re.compile(b"[" + re.escape(bytes(PHRASES)) + b"]")
+_WORDS = re.compile(rb"[^\t ]+")
+
+
+class Restated(NamedTuple):
+    """The rate that a template states, and the template that states another one."""
+
+    rate: Fraction
+    template: bytes
+
+
+def restate_bvh(template: bytes, rate: Fraction) -> Restated | None:
+    """A template of BVH at another rate; None where it states none."""
+    fields = parse(TEMPLATE, template, WHERE, {"runs": MAX_RUNS})
+    parts = [bytes(part) for part in fields.header]
+    found = _FRAME_TIME.search(parts[-1]) if parts else None
+    if found is None:
+        return None
+    stated, _ = frame_rate(found[1].decode("latin-1"))
+    if stated is None:
+        return None
+    text = _like(found[1], 1 / rate, lambda text: frame_rate(text)[0] == rate)
+    parts[-1] = _replaced(parts[-1], found.span(1), text or frame_time(rate).encode())
+    return Restated(stated, build(TEMPLATE, dict(fields) | {"header": parts}, WHERE))
+
+
+def restate_c3d(template: bytes, rate: Fraction) -> Restated | None:
+    """A template of C3D at another rate; None where it states none."""
+    return _of_c3d(C3D_TEMPLATE, template, rate, lambda fields, head: dict(fields) | head)
+
+
+def restate_outputs(template: bytes, rate: Fraction) -> Restated | None:
+    """A template of C3D with outputs of models at another rate; None where it states none."""
+
+    def with_head(fields: Any, head: dict[str, bytes]) -> dict[str, Any]:
+        return dict(fields) | {"file": dict(fields.file) | head}
+
+    return _of_c3d(C3D_OUTPUTS_TEMPLATE, template, rate, with_head)
+
+
+def _of_c3d(
+    schema: Any,
+    template: bytes,
+    rate: Fraction,
+    with_head: Callable[[Any, dict[str, bytes]], dict[str, Any]],
+) -> Restated | None:
+    fields = parse(schema, template, WHERE)
+    shared = fields.file if schema is C3D_OUTPUTS_TEMPLATE else fields
+    head = bytearray(shared.head)
+    try:
+        order, start = find_parameters(bytes(head))
+    except SourceError:
+        return None  # the parameters follow the data
+    parameters = parse_parameters(bytes(head), order, start)
+    stated, _ = rate_of(bytes(head), parameters)
+    if stated is None:
+        return None
+    head[HEADER_RATE : HEADER_RATE + 4] = order.build_real(float(rate))
+    rates = (("POINT", rate), ("ANALOG", rate * shared.subframes))
+    for group, value in rates:
+        found = parameters.get(group, "RATE")
+        if found is None or found.type not in (FLOAT, INTEGER):
+            continue
+        if found.type == INTEGER and (value.denominator > 1 or value > 0xFFFF):
+            return Restated(stated, template)
+        text = order.build_real(float(value)) if found.type == FLOAT else b""
+        text = text or order.build_integer(int(value))
+        head[found.at : found.at + len(text)] = text
+    return Restated(stated, build(schema, with_head(fields, {"head": bytes(head)}), WHERE))
+
+
+def restate_table(template: bytes, rate: Fraction) -> Restated | None:
+    """A template of a table at another rate; None where neither a clock nor a header states one."""
+    fields = parse(TABLE_TEMPLATE, template, WHERE, {"runs": MAX_RUNS})
+    first = next((section for section in fields.sections if 0 in section.signals), None)
+    if first is None:
+        return None
+    clock = parsed_clock(first)
+    stated = _vicon_rate(first) if clock is None else clock.frames_a_second(rate)
+    if stated is None:
+        return None
+    factor = rate / stated
+    sections = []
+    for section in fields.sections:
+        header = _in_header(_text(section), factor)
+        made: dict[str, Any] = {"header": with_phrases(header) if section.marks else header}
+        own = parsed_clock(section)
+        scaled = None if own is None else _scaled(own, factor)
+        if own is not None and scaled is None:
+            return Restated(stated, template)
+        made["clock"] = [] if scaled is None else [scaled]
+        sections.append(dict(section) | made)
+    return Restated(stated, build(TABLE_TEMPLATE, {"sections": sections}, WHERE))
+
+
+def _text(section: Any) -> bytes:
+    """The header with its phrases, but for the other marks."""
+    header = bytes(section.header)
+    if not section.marks:
+        return header
+    return _PHRASE_MARKS.sub(lambda mark: PHRASES[mark[0][0]], header)
+
+
+def _vicon_rate(section: Any) -> Fraction | None:
+    found = _VICON.search(_text(section))
+    return stated_rate(found[1].decode("latin-1")) if found else None
+
+
+def _in_header(header: bytes, factor: Fraction) -> bytes:
+    """``header`` with all rates of the recording that it states multiplied."""
+    places = [found.span(1) for found in (*_MOTIVE.finditer(header), *_VICON.finditer(header))]
+    keys = _TRC_KEYS.search(header)
+    if keys is not None:
+        values = [match.span() for match in _WORDS.finditer(header, *keys.span(2))]
+        named = zip(keys[1].split(), values, strict=False)
+        places += [value for key, value in named if key.lower() in _TRC_RATES]
+    for start, stop in sorted(places, reverse=True):
+        old = stated_rate(header[start:stop].decode("latin-1"))
+        if old is not None:
+            rate = old * factor
+            text = _like(header[start:stop], rate, _is_near(rate))
+            header = _replaced(header, (start, stop), text)
+    return header
+
+
+def _scaled(clock: Clock, factor: Fraction) -> dict[str, Any] | None:
+    """A clock whose times are divided by ``factor``; None where its terms are too large."""
+    step = Fraction(clock.numerator, clock.denominator) / factor
+    half = Fraction(1, 2)  # that rounds to the nearest time; an exact clock needs none
+    old = Fraction(clock.offset, clock.denominator) - half * (1 - Fraction(1, clock.denominator))
+    numerator, denominator = step.numerator * 2, step.denominator * 2
+    offset = round((old / factor + half) * denominator)
+    if max(numerator, denominator, abs(offset)) >= 2**52:
+        return None
+    terms = {"numerator": numerator, "denominator": denominator, "offset": offset}
+    return {"grid": clock.grid, **terms}
+
+
+def _like(old: bytes, number: Fraction, means_it: Callable[[str], bool]) -> bytes:
+    """``number`` with the decimals of ``old``, or more where it takes more; b"": none will do."""
+    places = len(old.partition(b".")[2]) if re.fullmatch(rb"[0-9]*\.?[0-9]*", old) else 0
+    texts = (f"{float(number):.{digits}f}" for digits in range(places, MOST_DECIMALS))
+    return next((text.encode() for text in texts if float(text) and means_it(text)), b"")
+
+
+def _is_near(rate: Fraction) -> Callable[[str], bool]:
+    return lambda text: abs(Fraction(text) / rate - 1) <= SAME_RATE
+
+
+def _replaced(data: bytes, place: tuple[int, int], text: bytes) -> bytes:
+    return data[: place[0]] + text + data[place[1] :]

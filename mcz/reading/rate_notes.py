@@ -1,0 +1,43 @@
+"""Notes where a source states another frame rate than its clip has."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import cast
+
+from mcz.clock import usual_step
+from mcz.formats import format_by_id
+from mcz.formats.times import rate_of_times
+from mcz.reading.clip import Clip
+from mcz.reading.source_rates import contradiction, is_one_of
+from mcz.reading.timelines import Stored, times_column
+
+
+def rate_note(clip: Clip, *, is_file: bool) -> str | None:
+    """A note where what ``source_bytes`` gives states another rate than ``clip`` has.
+
+    ``is_file``: it gives the very file. Raises FormatError on bad bytes.
+    """
+    rate = clip.frame_rate
+    if rate is None or clip.source is None:
+        return None
+    stated = _stated(clip, rate, is_file=is_file)
+    if stated is None:
+        return None
+    return f"its source states {float(stated):g} frames a second, the clip has {float(rate):g}"
+
+
+def _stated(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
+    """The rate that the text states, None where it is that of the clip or none."""
+    step = usual_step(clip.frame_numbers)
+    fields = clip._fields.source[0]
+    template = clip.container.template(fields.template, fields.format)
+    found = contradiction(format_by_id(fields.format).name, template, rate, step)
+    if found is not None:
+        stated: Fraction = found.rate
+        return stated if is_file or found.template == template else None
+    column = times_column(cast(Stored, clip))
+    if column is None:
+        return None
+    own, _ = rate_of_times(column.times, [column.rounding])
+    return own if own is not None and not is_one_of(own / rate, step) else None
