@@ -29,6 +29,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 FEW_TEXTS = 16  # of a column, which are laid out whole where
+FEW_CHANGES = 64  # they change as seldom, or
 ROWS_A_TEXT = 8  # so many rows have the same, on average
 _DIGITS = re.compile(rb"[0-9]+")
 _PLAIN = re.compile(rb"0|[1-9][0-9]{0,14}")
@@ -212,7 +213,8 @@ def _split(
     texts = [data[a:b] for a, b in zip(start.tolist(), stop.tolist(), strict=True)]
     counts = Counter(texts)
     n_changes = sum(text != after for text, after in pairwise(texts))
-    whole = len(counts) <= FEW_TEXTS and ROWS_A_TEXT * n_changes <= len(texts)
+    seldom = n_changes <= max(FEW_CHANGES, len(texts) // ROWS_A_TEXT)
+    whole = len(counts) <= FEW_TEXTS and seldom
     widths = [] if whole else _widths(counts)
     if len(start) * sum(widths) > DENSE * len(data) + FEW_CELLS:
         widths = []  # more cells than bytes: a few texts of many digits
