@@ -30,6 +30,7 @@ from mcz.cli.options import (
     where_option,
 )
 from mcz.cli.progress import Progress
+from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
     from mcz.editing.extraction import ExtractedClip, Extraction
@@ -91,6 +92,7 @@ def command(
     if "-" in (file, output):
         raise Failure("extract reads and writes files, not standard streams", Exit.USAGE)
     existing(file)
+    output = file_in(output, file)
     with about(file, output), hinted(file, {"salvage": salvage}), Progress() as progress:
         found = mcz.extract(
             file,
