@@ -55,8 +55,8 @@ if TYPE_CHECKING:
 @click.option(
     "--recode",
     is_flag=True,
-    help="Decode joints that are coded together with others, and code them anew, if lossy with "
-    "another small error. Default: such joints are refused.",
+    help="Decode and code anew, if lossy with another small error, joints that are coded together "
+    "with others (by default refused), and frames beside which others would stay stored.",
 )
 @clips_option
 @where_option
@@ -127,7 +127,8 @@ def _lines(output: str, found: Extraction) -> Iterator[str]:
 
 def _parts(clip: ExtractedClip) -> Iterator[str]:
     start, stop = clip.frames
-    stored = "" if clip.stored_frames == stop - start else f" ({clip.stored_frames:,} stored)"
+    is_all = clip.stored_frames == stop - start
+    stored = "" if is_all else f" ({clip.stored_frames:,} stored; --recode drops the others)"
     yield f"frames {start}:{stop}{stored}"
     if clip.joints is not None:
         yield f"joints {' '.join(clip.joints)}"
