@@ -5,9 +5,13 @@ from __future__ import annotations
 import hashlib
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from io import BytesIO
+from typing import BinaryIO
 
 import numpy as np
 
+from mcz.errors import AccessError
 from mcz.recovery.code import LANE, encoded, runs_of
 from mcz.recovery.field import Ints
 from mcz.recovery.packets import Key, build_packet, short_hash
@@ -33,10 +37,9 @@ def made(shape: Shape, read: READ, step: Step | None = None) -> tuple[Key, Itera
 def _packets(key: Key, read: READ, hashes: bytes, step: Step | None) -> Iterator[bytes]:
     shape = key.shape
     sections = table_sections(shape, hashes)
-    with tempfile.TemporaryFile() as spool:
-        blocks = recovery_blocks(shape, read, step, spool)
+    with _recovery_blocks(shape, read, step) as block_of:
         for kind, index, _ in shape.packets():
-            body = blocks[index].tobytes() if kind else sections[index].tobytes()
+            body = block_of(index) if kind else sections[index].tobytes()
             yield build_packet(key, kind, index, body)
 
 
@@ -49,25 +52,48 @@ def table_sections(shape: Shape, hashes: bytes) -> Ints:
     return np.concatenate([own, more])
 
 
-def recovery_blocks(shape: Shape, read: READ, step: Step | None, spool: object) -> Ints:
-    """The recovery blocks, a row each; of large ones some columns at a time."""
-    lanes = shape.block_size // LANE
-    size = runs_of(shape.n_recovery)
+@contextmanager
+def _recovery_blocks(shape: Shape, read: READ, step: Step | None) -> Iterator[READ]:
+    """A function that gives each recovery block; of many some lanes are computed at a time.
+
+    Raises AccessError where there is no room for them while they are made.
+    """
     total = shape.n_recovery * shape.block_size
-    if size * shape.block_size <= AT_ONCE and total <= IN_MEMORY:
-        return encoded(_rows(shape, read, 0, lanes, step), shape.n_blocks, shape.n_recovery, lanes)
-    width = max(1, AT_ONCE // (size * LANE))
-    form = (shape.n_recovery, lanes)
-    found = np.zeros(form, np.int64) if total <= IN_MEMORY else _mapped(spool, form)
+    with ExitStack() as stack:
+        try:
+            spool = BytesIO() if total <= IN_MEMORY else tempfile.TemporaryFile()  # noqa: SIM115
+            stack.callback(_close, spool)
+            for index, lane, data in _columns(shape, read, step):
+                spool.seek(index * shape.block_size + LANE * lane)
+                spool.write(data)
+            spool.flush()
+        except OSError as error:
+            place = f"{tempfile.gettempdir()}: {error.strerror or error}"
+            text = f"{place}; recovery data take {total:,} bytes there while they are made"
+            raise AccessError(text) from error
+
+        def block_of(index: int) -> bytes:
+            spool.seek(index * shape.block_size)
+            return spool.read(shape.block_size)
+
+        yield block_of
+
+
+def _close(spool: BinaryIO) -> None:
+    with suppress(OSError):  # of a full disk, which has been told
+        spool.close()
+
+
+def _columns(shape: Shape, read: READ, step: Step | None) -> Iterator[tuple[int, int, bytes]]:
+    """Number, first lane and bytes of parts of the recovery blocks."""
+    lanes = shape.block_size // LANE
+    width = max(1, min(lanes, AT_ONCE // (runs_of(shape.n_recovery) * LANE)))
     for start in range(0, lanes, width):
         stop = min(start + width, lanes)
         rows = _rows(shape, read, start, stop, step)
-        found[:, start:stop] = encoded(rows, shape.n_blocks, shape.n_recovery, stop - start)
-    return found
-
-
-def _mapped(spool: object, form: tuple[int, int]) -> Ints:
-    return np.memmap(spool, np.int64, "w+", shape=form)  # type: ignore[call-overload, no-any-return]
+        found = encoded(rows, shape.n_blocks, shape.n_recovery, stop - start)
+        for index, part in enumerate(found):
+            yield index, start, part.tobytes()
 
 
 def _rows(
