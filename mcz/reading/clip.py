@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
 from dataclasses import replace
-from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -14,143 +12,32 @@ from numpy.typing import NDArray
 
 from mcz.brief import shown
 from mcz.clock import START, usual_step
-from mcz.codecs import by_id
-from mcz.container import payloads
-from mcz.container.directory import ClipRow
-from mcz.container.frame_numbers import parse_frame_numbers
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.value_hash import value_hash
-from mcz.errors import ChecksumError, FormatError, OptionError, UnsupportedError
+from mcz.errors import ChecksumError, FormatError, OptionError
 from mcz.formats import FORMATS
-from mcz.formats.c3d_recording import Recording
 from mcz.motion import Motion, Signal, Skeleton, Source, joint_columns
-from mcz.numbers.scaling import Scaling
 from mcz.reading.decimation import decimated, decimated_rows
-from mcz.reading.extent import Extent
 from mcz.reading.posing import Posed
 from mcz.reading.preview import Preview, preview
-from mcz.reading.recording import index_of, read_recording, scaling_of
-from mcz.reading.signal_info import SignalInfo, groups_of, read_signal
+from mcz.reading.signal_info import SignalInfo, groups_of
 from mcz.reading.signal_reader import SignalReader
-from mcz.reading.source_info import SourceInfo, read_source, source_info, sourced_skeleton
+from mcz.reading.source_info import SourceInfo, read_source, sourced_skeleton
 from mcz.reading.source_rates import stating_rate
+from mcz.reading.stored_clip import StoredClip
 from mcz.reading.views import ClipValues, FrameValues, Masked
-from mcz.schema import parse
 from mcz.skeleton import Joints, joint_list
 
 
-class Clip(Extent, Posed):
+class Clip(StoredClip, Posed):
     """One clip; nothing is decoded before it is asked for."""
-
-    def __init__(self, container: Container, row: ClipRow) -> None:
-        self.container = container
-        self._row = row
-        self.name = row.name
-        self.n_frames = row.n_frames
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _reopened, (self.container, self.name)
 
     def __repr__(self) -> str:
         return f"<Clip {shown(self.name)}: {self.n_frames} frames, {self.n_channels} channels>"
-
-    @cached_property
-    def _fields(self) -> Any:
-        return self.container.clip(self._row)
-
-    @cached_property
-    def _cend(self) -> Any:
-        fields = self.container.cend(self._row)
-        if fields is not None and len(fields.source_sha256) != len(self._fields.source):  # CEND-01
-            raise FormatError(f"clip {self.name!r}: a source without a hash, or a hash without it")
-        return fields
-
-    @cached_property
-    def skeleton(self) -> Skeleton:
-        """The skeleton of the clip, its own source file not read."""
-        return self.container.skeleton(self._row.skeleton)
-
-    @property
-    def skeleton_id(self) -> bytes:
-        return self._row.skeleton
-
-    @cached_property
-    def base_skeleton(self) -> Skeleton | None:
-        """The skeleton that this one was derived from, with its own source file if it has one."""
-        base = self.skeleton.base
-        return sourced_skeleton(self.container, base) if base else None
-
-    @property
-    def frame_rate(self) -> Fraction | None:
-        """Frames a second, None while unknown."""
-        if not self._row.rate_numerator:
-            return None
-        if not self._row.rate_denominator:
-            raise FormatError(f"clip {self.name!r}: frame rate with the denominator 0")
-        return Fraction(self._row.rate_numerator, self._row.rate_denominator)
-
-    @property
-    def frame_rate_exact(self) -> bool:
-        return not self._fields.flags & payloads.ROUNDED_RATE
-
-    @cached_property
-    def metadata(self) -> Mapping[str, str]:
-        """Keys of the registry, or ``x-...``, and texts, as META chunks have changed them."""
-        return self.container.metadata(self._row)
-
-    @property
-    def frame_numbers(self) -> NDArray[np.int64]:
-        """The number of every frame; 1, 2, 3, ... unless the metadata say otherwise."""
-        where = f"clip {self.name!r}: frame numbers"
-        check_decoded(where, 8 * self.n_frames, self.container.max_decoded)
-        said = self.metadata.get("frame-numbers", "1")
-        return parse_frame_numbers(said, self.n_frames, self.name)
-
-    @property
-    def damage(self) -> list[str]:
-        """What salvage found wrong with this clip."""
-        return self._row.damage
-
-    @cached_property
-    def signals(self) -> tuple[SignalInfo, ...]:
-        """The signals, the motion first."""
-        fields = self._fields
-        if not fields.signals:  # CLIP-05
-            raise FormatError(f"clip {self.name!r} has no signal")
-        skeleton, rate = self.skeleton, self.frame_rate
-        return tuple(
-            read_signal(self.container, self._row, fields, index, skeleton, rate)
-            for index in range(len(fields.signals))
-        )
-
-    @property
-    def n_channels(self) -> int:
-        """Channels of the motion signal."""
-        return self._row.signals[0].n_channels
-
-    @property
-    def codec(self) -> str:
-        """Name of the codec of the motion signal, ``codec N`` where it is unknown."""
-        row = self._row.signals[0]
-        try:
-            return by_id(row.codec, row.codec_version).name
-        except UnsupportedError:
-            return f"codec {row.codec}"
-
-    @property
-    def source(self) -> SourceInfo | None:
-        """Format, path, size and hash of the source file; None where the clip has none."""
-        return source_info(self._fields, self._cend)
-
-    @property
-    def quality(self) -> dict[str, str] | None:
-        """The quality record, None where the clip has none."""
-        for chunk in self._row.ancillary:
-            if chunk.type == b"QUAL":
-                fields = parse(payloads.QUAL, self.container.payload(chunk), chunk.label)
-                return {entry.key: entry.value for entry in fields.entries}
-        return None
 
     @property
     def values(self) -> ClipValues:
@@ -215,22 +102,6 @@ class Clip(Extent, Posed):
         if not self.container.salvage:
             self.check_hash(info, values, mask)
 
-    def find_signal(self, signal: int | str) -> int:
-        """The index of a signal given by index or name, the first of its name; OptionError."""
-        return signal if isinstance(signal, int) else index_of(self.signals, signal, self.name)
-
-    @cached_property
-    def recording(self) -> Recording | None:
-        """What the source says beside all numbers: events, force platforms, units, descriptions.
-
-        None where it says nothing of the kind: only C3D does. Raises FormatError on bad bytes.
-        """
-        return read_recording(self.container, self._fields)
-
-    def scaling(self, signal: int) -> Scaling | None:
-        """What the stored numbers of a signal mean; None where they are the values; FormatError."""
-        return scaling_of(self.signals, signal, lambda: self.recording)
-
     def _info(self, signal: int) -> SignalInfo:
         if not 0 <= signal < len(self.signals):
             raise OptionError(f"clip {self.name!r} has {len(self.signals)} signals, not {signal}")
@@ -264,18 +135,6 @@ class Clip(Extent, Posed):
                 f"clip {self.name!r}, signal {info.index}: value hash is {found.hex()}, "
                 f"stored is {stored.hex()}"
             )
-
-    @cached_property
-    def value_hashes(self) -> tuple[bytes, ...]:
-        """The SHA-256 of the values and the mask of every signal, as the file states them."""
-        if self._cend is None:  # of a damaged file
-            raise FormatError(f"clip {self.name!r} has no CEND")
-        hashes = tuple(bytes(each) for each in self._cend.value_sha256)
-        if len(hashes) != len(self.signals):  # CEND-02
-            raise FormatError(
-                f"clip {self.name!r}: {len(hashes)} hashes of {len(self.signals)} signals"
-            )
-        return hashes
 
     def motion(
         self,
@@ -344,7 +203,13 @@ class Clip(Extent, Posed):
         skip = self.signals[0].skip
         frames = range(start + skip, stop + skip, step)
         fields = self._fields.source[0]
-        source = read_source(self.container, fields, info, self.signals[0], frames)
+        try:
+            if self._row.skeleton != self._fields.skeleton:  # what salvage has in its place
+                raise FormatError("the names of its skeleton are lost")
+            source = read_source(self.container, fields, info, self.signals[0], frames)
+        except FormatError as error:
+            self._complain(f"its source file is lost: {error}", error)
+            return None
         if (start, stop, resolution) == (0, self.n_frames, 0):
             return source
         return source.of_no_file()
@@ -386,6 +251,10 @@ class Clip(Extent, Posed):
             raise OptionError(f"clip {self.name!r} has no source file; choose a format with --to")
         check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
         motion = self._motion(frames, resolution, decimate)
+        if motion.source is None and self.container.salvage:
+            raise FormatError(
+                f"clip {self.name!r}: its source file is lost; --to gives its numbers"
+            )
         is_file = self.gives_file(frames, resolution)
         if not is_file:
             motion = stating_rate(motion, usual_step(self.frame_numbers))

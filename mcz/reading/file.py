@@ -100,7 +100,7 @@ class File:
         }
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _file, (self.container,)
+        return file_of, (self.container,)
 
     def __repr__(self) -> str:
         held = f"{counted(len(self.clips), 'clip')}, {counted(len(self.attachments), 'attachment')}"
@@ -316,7 +316,8 @@ def reached(target: Any) -> ByteSource:
         raise AccessError(f"{target}: {text}") from None
 
 
-def _file(container: Container) -> File:
+def file_of(container: Container) -> File:
+    """The file in ``container``, with the lost skeletons that salvage can make again."""
     if container.salvage:
         restore_skeletons(container)
     return File(container)
@@ -326,7 +327,7 @@ def _opened(source: ByteSource, options: Mapping[str, Any]) -> File:
     """The file; while another process appends to it, the file up to its last end."""
     while True:
         try:
-            return _file(Container(source, **options))
+            return file_of(Container(source, **options))
         except TruncatedError as error:
             size = source.size_now()
             if source.grows():
@@ -337,6 +338,6 @@ def _opened(source: ByteSource, options: Mapping[str, Any]) -> File:
             if size == source.size:  # nobody is at it, or has been meanwhile
                 raise
             source = source.up_to(size)
-    file = _file(Container(source.up_to(end), **options))
+    file = file_of(Container(source.up_to(end), **options))
     file.grows = True
     return file

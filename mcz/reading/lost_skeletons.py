@@ -1,4 +1,4 @@
-"""Skeletons that a damaged file has lost, made again from the ASF that they came of.
+"""Skeletons that a damaged file has lost, made again from the source files that they came of.
 
 The id of a skeleton is a hash of its bytes: what has the id is what was lost.
 """
@@ -6,22 +6,32 @@ The id of a skeleton is a hash of its bytes: what has the id is what was lost.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from fractions import Fraction
+from itertools import islice, product
 from pathlib import PurePosixPath
+from typing import Any
+
+import numpy as np
 
 from mcz.container import payloads
+from mcz.container.directory import ClipRow
 from mcz.container.packed import pack_skeleton
 from mcz.container.reader import Container
 from mcz.container.skeletons import UP_AXES, build_skeleton
 from mcz.container.writer import payload_id
 from mcz.errors import MczError
-from mcz.formats import FORMATS
-from mcz.motion import Skeleton
+from mcz.formats import FORMATS, format_by_id
+from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, Source
+from mcz.numbers import GridKind
+from mcz.reading.clip import Clip
+from mcz.reading.signal_reader import SignalReader
 from mcz.units import UNIT_CM
 
 ASF = FORMATS["asf"]
+LOST = "its skeleton is lost; its channels have no names"
 NAMELESS = "skeleton"  # what a skeleton is called where neither its file nor a path says it
 
 
@@ -37,6 +47,55 @@ def restore_skeletons(container: Container) -> None:
         if base[0] == b"SKEL":
             with suppress(MczError):
                 _restore(container, lost, _of_base(container, base[1]), f"SKEL {base[1].hex()}")
+    for row in list(container.directory.clips.values()) if lost else ():
+        if row.skeleton in lost:
+            with suppress(MczError):
+                _restore(container, lost, _of_clip(container, row), f"the source of {row.name!r}")
+    for row in list(container.directory.clips.values()) if lost else ():
+        if row.skeleton in lost:
+            with suppress(MczError):
+                _without_joints(container, row)
+
+
+def _without_joints(container: Container, row: ClipRow) -> None:
+    """Let a clip whose skeleton is lost for good have plain channels, if its hashes then are right.
+
+    Codecs of channels need no more of a skeleton than which of them belong together.
+    """
+    fields = container.clip(row)
+    motion = _of_zeros(fields, row, None)
+    for sizes in _joint_sizes(motion.skeleton.n_channels, fields.signals[0].groups.kind):
+        names = iter(motion.skeleton.joints[0].channels)
+        joints = [Joint("", channels=tuple(islice(names, size))) for size in sizes]
+        payload = build_skeleton(Skeleton(tuple(joints), unit_cm=None), None)
+        container.add_shared(b"SKEL", payload)
+        other = replace(row, skeleton=payload_id(payload), damage=[LOST])
+        if _has_its_hashes(Clip(container, other), container.strictly()):
+            row.skeleton = other.skeleton
+            row.damage.append(LOST)
+            container.damage.append(f"clip {row.name!r}: {LOST}")
+            return
+
+
+def _joint_sizes(n_channels: int, kind: int) -> Iterator[list[int]]:
+    """How many channels each joint may have had: one way unless that decides about groups."""
+    yield [n_channels]
+    if kind == payloads.GROUP_JOINT:
+        yield from ([size] * (n_channels // size) for size in (1, 3) if n_channels % size == 0)
+        if n_channels % 3 == 0:
+            yield [6, *[3] * (n_channels // 3 - 2)]
+
+
+def _has_its_hashes(clip: Clip, container: Container) -> bool:
+    """Whether the values of a clip, read strictly, are those that it says it has."""
+    try:
+        for info in clip.signals:
+            groups = tuple(range(info.counts.n_groups))
+            reader = SignalReader(container, info, groups, 0, clip.name)
+            clip.check_hash(info, *reader.read(info.skip, info.skip + clip.n_frames))
+    except MczError:
+        return False
+    return True
 
 
 def _restore(
@@ -73,10 +132,73 @@ def _of_asf(container: Container, template: bytes, lost: set[bytes]) -> Iterator
         "sha256": hashlib.sha256(text).digest(),
     }
     for name in _names(container, lost):
-        skeleton: Skeleton = ASF.read(text, name)
-        for unit_cm in dict.fromkeys((skeleton.unit_cm, None, *UNIT_CM.values())):
-            payload = build_skeleton(replace(skeleton, unit_cm=unit_cm), source)
-            yield from (payload, pack_skeleton(payload))
+        yield from _payloads(ASF.read(text, name), source)
+
+
+def _payloads(skeleton: Skeleton, source: Mapping[str, Any] | None) -> Iterator[bytes]:
+    """The payloads of SKEL of a skeleton, under each length unit that it may have been given."""
+    for unit_cm in dict.fromkeys((skeleton.unit_cm, None, *UNIT_CM.values())):
+        payload = build_skeleton(replace(skeleton, unit_cm=unit_cm), source)
+        yield from (payload, pack_skeleton(payload))
+
+
+def _of_clip(container: Container, row: ClipRow) -> Iterator[bytes]:
+    """The payloads of SKEL that writers make of a clip's own file: the header says them all.
+
+    What position channels do to the offset the frames decide, which may be lost: all ways.
+    """
+    fields = container.clip(row)
+    for source in fields.source:
+        form = format_by_id(source.format)
+        template = container.template(bytes(source.template), source.format)
+        text = form.write(_of_zeros(fields, row, Source(form.name, template, bytes(source.detail))))
+        for base in _bases(container) if form.wants_skeleton else (None,):
+            arguments = () if not form.wants_skeleton else (base,)
+            skeleton: Skeleton = form.read(text, row.name, *arguments).skeleton
+            for up_axis in dict.fromkeys((skeleton.up_axis, *UP_AXES)):
+                for joints in dict.fromkeys(_ways(skeleton.joints)):
+                    other = replace(skeleton, up_axis=up_axis, joints=joints)
+                    yield from _payloads(other, None)
+
+
+def _of_zeros(fields: Any, row: ClipRow, source: Source | None) -> Motion:
+    """A motion like that of a clip, all of whose values are zero, on a joint of plain channels."""
+    signals = []
+    for index, own in enumerate(fields.signals):
+        grids = tuple(run.grid for run in own.grids for _ in range(run.n_channels))
+        is_integer = bool(grids) and all(grid.kind == GridKind.INTEGER for grid in grids)
+        shape = row.n_frames * own.samples_per_frame, len(grids)
+        values = np.zeros(shape, np.int64 if is_integer else np.float64)
+        plain = tuple(Channel("", f"{column}") for column in range(len(grids)))
+        signals.append(
+            Signal(
+                values, grids, own.name, own.samples_per_frame, channels=plain if index else None
+            )
+        )
+    joint = Joint("", channels=tuple(Channel("", f"{n}") for n in range(signals[0].n_channels)))
+    return Motion(Skeleton((joint,)), tuple(signals), Fraction(1), name=row.name, source=source)
+
+
+def _bases(container: Container) -> Iterator[Skeleton | None]:
+    """None, and every skeleton of the file."""
+    yield None
+    for kind, id_ in list(container.directory.shared):
+        if kind == b"SKEL":
+            with suppress(MczError):
+                yield replace(container.skeleton(id_), base=id_)
+
+
+def _ways(joints: tuple[Joint, ...]) -> Iterator[tuple[Joint, ...]]:
+    """The joints, whose positions add to the offset or replace it, of roots and of others."""
+    moving = [any(c.kind in POSITION_KINDS for c in joint.channels) for joint in joints]
+    yield joints
+    for of_roots, of_others in product((True, False), repeat=2):
+        yield tuple(
+            replace(joint, adds_to_offset=of_roots if joint.parent < 0 else of_others)
+            if moves
+            else joint
+            for joint, moves in zip(joints, moving, strict=True)
+        )
 
 
 def _of_base(container: Container, base: bytes) -> Iterator[bytes]:

@@ -34,11 +34,13 @@ def read_recording(container: Container, fields: Any) -> Recording | None:
         return None
     source = fields.source[0]
     try:
-        name = format_by_id(source.format).name
+        form = format_by_id(source.format)
     except UnsupportedError:  # nothing is known of it
         return None
+    if form.recording is None:
+        return None
     template = container.template(source.template, source.format)
-    found: Recording | None = recording_of(Source(name, template, bytes(source.detail)))
+    found: Recording | None = recording_of(Source(form.name, template, bytes(source.detail)))
     return found
 
 

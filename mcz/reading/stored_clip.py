@@ -1,0 +1,194 @@
+"""What the chunks of a clip say of it, its values apart: parsed when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.codecs import by_id
+from mcz.container import payloads
+from mcz.container.directory import ClipRow
+from mcz.container.frame_numbers import parse_frame_numbers
+from mcz.container.limits import check_decoded
+from mcz.container.reader import Container
+from mcz.errors import FormatError, UnsupportedError
+from mcz.formats.c3d_recording import Recording
+from mcz.motion import Skeleton
+from mcz.numbers.scaling import Scaling
+from mcz.reading.extent import Extent
+from mcz.reading.recording import index_of, read_recording, scaling_of
+from mcz.reading.signal_info import SignalInfo, read_signal
+from mcz.reading.source_info import SourceInfo, source_info, sourced_skeleton
+from mcz.schema import parse
+
+
+class StoredClip(Extent):
+    """What CLIP, CEND and the chunks that belong to a clip say."""
+
+    def __init__(self, container: Container, row: ClipRow) -> None:
+        self.container = container
+        self._row = row
+        self.name = row.name
+        self.n_frames = row.n_frames
+
+    @cached_property
+    def _fields(self) -> Any:
+        return self.container.clip(self._row)
+
+    @cached_property
+    def _cend(self) -> Any:
+        fields = self.container.cend(self._row)
+        if fields is not None and len(fields.source_sha256) != len(self._fields.source):  # CEND-01
+            raise FormatError(f"clip {self.name!r}: a source without a hash, or a hash without it")
+        return fields
+
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        """The skeleton of the clip, its own source file not read."""
+        return self.container.skeleton(self._row.skeleton)
+
+    @property
+    def skeleton_id(self) -> bytes:
+        return self._row.skeleton
+
+    @cached_property
+    def base_skeleton(self) -> Skeleton | None:
+        """The skeleton that this one was derived from, with its own source file if it has one."""
+        base = self.skeleton.base
+        return sourced_skeleton(self.container, base) if base else None
+
+    @property
+    def frame_rate(self) -> Fraction | None:
+        """Frames a second, None while unknown."""
+        if not self._row.rate_numerator:
+            return None
+        if not self._row.rate_denominator:
+            raise FormatError(f"clip {self.name!r}: frame rate with the denominator 0")
+        return Fraction(self._row.rate_numerator, self._row.rate_denominator)
+
+    @property
+    def frame_rate_exact(self) -> bool:
+        return not self._fields.flags & payloads.ROUNDED_RATE
+
+    @cached_property
+    def metadata(self) -> Mapping[str, str]:
+        """Keys of the registry, or ``x-...``, and texts, as META chunks have changed them."""
+        return self.container.metadata(self._row)
+
+    @property
+    def frame_numbers(self) -> NDArray[np.int64]:
+        """The number of every frame; 1, 2, 3, ... unless the metadata say otherwise."""
+        where = f"clip {self.name!r}: frame numbers"
+        check_decoded(where, 8 * self.n_frames, self.container.max_decoded)
+        said = self.metadata.get("frame-numbers", "1")
+        return parse_frame_numbers(said, self.n_frames, self.name)
+
+    @property
+    def damage(self) -> list[str]:
+        """What salvage found wrong with this clip."""
+        return self._row.damage
+
+    @cached_property
+    def signals(self) -> tuple[SignalInfo, ...]:
+        """The signals, the motion first."""
+        fields = self._fields
+        if not fields.signals:  # CLIP-05
+            raise FormatError(f"clip {self.name!r} has no signal")
+        skeleton, rate = self.skeleton, self.frame_rate
+        return tuple(
+            read_signal(self.container, self._row, fields, index, skeleton, rate)
+            for index in range(len(fields.signals))
+        )
+
+    @property
+    def n_channels(self) -> int:
+        """Channels of the motion signal."""
+        return self._row.signals[0].n_channels
+
+    @property
+    def codec(self) -> str:
+        """Name of the codec of the motion signal, ``codec N`` where it is unknown."""
+        row = self._row.signals[0]
+        try:
+            return by_id(row.codec, row.codec_version).name
+        except UnsupportedError:
+            return f"codec {row.codec}"
+
+    @property
+    def source(self) -> SourceInfo | None:
+        """Format, path, size and hash of the source file; None where the clip has none."""
+        return source_info(self._fields, self._cend)
+
+    @property
+    def quality(self) -> dict[str, str] | None:
+        """The quality record, None where the clip has none."""
+        for chunk in self._row.ancillary:
+            if chunk.type == b"QUAL":
+                fields = parse(payloads.QUAL, self.container.payload(chunk), chunk.label)
+                return {entry.key: entry.value for entry in fields.entries}
+        return None
+
+    def find_signal(self, signal: int | str) -> int:
+        """The index of a signal given by index or name, the first of its name; OptionError."""
+        return signal if isinstance(signal, int) else index_of(self.signals, signal, self.name)
+
+    @cached_property
+    def recording(self) -> Recording | None:
+        """What the source says beside all numbers: events, force platforms, units, descriptions.
+
+        None where it says nothing of the kind: only C3D does. Raises FormatError on bad bytes.
+        """
+        try:
+            return self._recording()
+        except FormatError as error:
+            self._complain(f"what its source says of the recording is lost: {error}", error)
+            return None
+
+    def _recording(self) -> Recording | None:
+        return read_recording(self.container, self._fields)
+
+    def scaling(self, signal: int) -> Scaling | None:
+        """What the stored numbers of a signal mean; None where they are the values; FormatError.
+
+        None also where salvage finds the source damaged that told it: the numbers are whole.
+        """
+        try:
+            return scaling_of(self.signals, signal, self._recording)
+        except FormatError as error:
+            name = self.signals[signal].name
+            self._complain(f"the numbers of signal {name} are as they were stored: {error}", error)
+            return None
+
+    def is_scaled(self, signal: int) -> bool:
+        """Whether the stored numbers of a signal have a meaning that its source tells, or told."""
+        try:
+            return scaling_of(self.signals, signal, self._recording) is not None
+        except FormatError:
+            if not self.container.salvage:
+                raise
+            return True
+
+    def _complain(self, text: str, error: FormatError) -> None:
+        """Add to what salvage found wrong, once; raise ``error`` where nothing is salvaged."""
+        if not self.container.salvage:
+            raise error
+        line = f"clip {self.name!r}: {text}"
+        if line not in self.container.damage:
+            self.container.damage.append(line)
+
+    @cached_property
+    def value_hashes(self) -> tuple[bytes, ...]:
+        """The SHA-256 of the values and the mask of every signal, as the file states them."""
+        if self._cend is None:  # of a damaged file
+            raise FormatError(f"clip {self.name!r} has no CEND")
+        hashes = tuple(bytes(each) for each in self._cend.value_sha256)
+        if len(hashes) != len(self.signals):  # CEND-02
+            raise FormatError(
+                f"clip {self.name!r}: {len(hashes)} hashes of {len(self.signals)} signals"
+            )
+        return hashes
