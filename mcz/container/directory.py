@@ -220,3 +220,4 @@ class Found:
     ends: dict[int, int] = field(default_factory=dict)  # of open DATA chunks, by their offsets
     # What salvage could not take in: its offset, and the chunk where its header is sound.
     broken: list[tuple[int, Chunk | None]] = field(default_factory=list)
+    doubts: bool = False  # it was not clear which clip something belongs to

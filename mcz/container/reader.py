@@ -50,7 +50,7 @@ from mcz.container.packets import (
     head_size,
     is_head,
 )
-from mcz.container.restoring import is_like, restored
+from mcz.container.restoring import is_like, salvaged
 from mcz.container.runs import Runs
 from mcz.container.scan import scan
 from mcz.container.segments import (
@@ -115,15 +115,9 @@ class Container:
         return other
 
     def _salvage(self) -> Directory:
-        found = scan(self.source, salvage=True)
-        better, notes = restored(self.source, found)
-        if better is not None:  # SALV-06
-            self.source = better
-            found = scan(better, salvage=True)
+        self.source, found, notes = salvaged(self.source)
         self.damage = notes + found.damage
         self.broken, self.feet = found.broken, found.feet
-        if not found.chunks:
-            raise FormatError("nothing can be salvaged: no chunk is whole")
         return found.directory
 
     def _open(self) -> Directory:

@@ -1,17 +1,56 @@
-"""What copies give back of a damaged file. SPEC.md, "Salvage", is normative."""
+"""What copies and the index give back of a damaged file. SPEC.md, "Salvage", is normative."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
 from operator import eq
 
-from mcz.container.chunks import COPY, FOOT, Chunk, read_chunk, read_payload
+from mcz.container import payloads
+from mcz.container.chunks import (
+    COPIED,
+    COPY,
+    CRC,
+    FOOT,
+    HEADER,
+    Chunk,
+    build_chunk,
+    parse_header,
+    read_chunk,
+    read_payload,
+)
 from mcz.container.copies import Copy, parse_copies
-from mcz.container.directory import Found
+from mcz.container.directory import Directory, Found, parse_head
+from mcz.container.index import parse_index
+from mcz.container.limits import BASE, index_limit
 from mcz.container.overlay import Overlay
-from mcz.container.source import ByteSource
+from mcz.container.packets import read_packets
+from mcz.container.scan import scan
+from mcz.container.source import ByteSource, Forward
+from mcz.container.writer import build_head
 from mcz.errors import FormatError, MczError
+from mcz.schema import build
+
+MOST_READ = 4  # times the bytes of a file, in search of a bit
+
+
+def salvaged(source: ByteSource) -> tuple[ByteSource, Found, list[str]]:
+    """A damaged file with what can be put right in it, a salvaging scan of it, and what was wrong.
+
+    Raises FormatError where no chunk is whole.
+    """
+    found = scan(source, salvage=True)
+    better, notes = restored(source, found)
+    if better is not None:  # SALV-06
+        source, found = better, scan(better, salvage=True)
+    if found.doubts and (owners := owners_of(source, found)):
+        found = scan(source, salvage=True, owners=owners)
+    notes += restore_from_index(source, found)
+    if not found.chunks:
+        raise FormatError("nothing can be salvaged: no chunk is whole")
+    return source, found, notes
 
 
 def restored(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str]]:
@@ -25,8 +64,14 @@ def restored(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str
     notes: list[str] = []
     sound = _Sound(found)
     parts: dict[int, bytes] = {}
-    for copy in _copies(source, found, notes):
+    for copy, shift in _placed(source, found, list(_copies(source, found, notes))):
+        if shift is None:
+            notes.append(f"a copy of {copy.label} is not used: where it belongs is not clear")
+            continue
+        copy = replace(copy, offset=copy.offset + shift)
         chunk = copy.chunk
+        if copy.offset < 0 or copy.stop > source.size:
+            continue
         if source.read(copy.offset, len(chunk)) == chunk:
             continue
         fault = _fault(source, copy)
@@ -35,7 +80,73 @@ def restored(source: ByteSource, found: Found) -> tuple[Overlay | None, list[str
             continue
         notes.append(f"{copy.label}: {fault}; its copy is used")  # SALV-07
         parts[copy.offset] = chunk
+    for offset, header in _mended_headers(source, found):
+        if not any(at <= offset < at + len(part) for at, part in parts.items()):
+            notes.append(f"chunk at {offset}: one bit of its header is wrong, and put right")
+            parts[offset] = header
     return (Overlay(source, parts) if parts else None), notes
+
+
+def _mended_headers(source: ByteSource, found: Found) -> Iterator[tuple[int, bytes]]:
+    """The headers of which one bit is wrong: with that turned both of a chunk's checks hold."""
+    left = MOST_READ * source.size
+    for offset, chunk in found.broken:
+        if chunk is None and offset + HEADER.size <= source.size:
+            given = int.from_bytes(source.read(offset, HEADER.size), "little")
+            for bit in range(8 * HEADER.size):
+                header = (given ^ 1 << bit).to_bytes(HEADER.size, "little")
+                with suppress(FormatError):
+                    mended = parse_header(header, offset)
+                    if mended.type == COPY:  # those are made anew
+                        continue
+                    left -= HEADER.size if mended.length is None else mended.size
+                    if left < 0:
+                        return
+                    _check_all(Overlay(source, {offset: header}), mended)
+                    yield offset, header
+                    break
+
+
+def _check_all(source: ByteSource, chunk: Chunk) -> None:
+    """Check all of a chunk, of an open one its first packet; raises FormatError."""
+    if chunk.length is None:
+        if next(read_packets(Forward(source, chunk.payload_offset), source.size), None) is None:
+            raise FormatError(f"chunk {chunk.label} has no packet")
+    else:
+        read_payload(source, chunk, chunk.size)
+
+
+def _placed(
+    source: ByteSource, found: Found, copies: list[Copy]
+) -> Iterator[tuple[Copy, int | None]]:
+    """Each copy, and by how much what it is of lies elsewhere than it says.
+
+    Bytes that were put in or cut out before a COPY shift all that it says. The copied chunks that
+    are whole tell it, for the damaged ones between them, too; None where they do not agree.
+    """
+    places: dict[tuple[bytes, int | None, bytes], list[int]] = {}
+    for one in found.chunks:
+        if one.type in COPIED:
+            crc = source.read(one.offset + one.size - CRC.size, CRC.size)
+            places.setdefault((one.type, one.length, crc), []).append(one.offset)
+    known: list[int | None] = []
+    for copy in copies:
+        key = copy.type, len(copy.payload), copy.chunk[-CRC.size :]
+        near = sorted(abs(at - copy.offset) for at in places.get(key, []))
+        ats = [at for at in places.get(key, []) if abs(at - copy.offset) == near[0]]
+        known.append(ats[0] - copy.offset if ats else None)
+    before, behind = _carried(known), _carried(known[::-1])[::-1]
+    for copy, own, last, following in zip(copies, known, before, behind, strict=True):
+        around = {shift for shift in (last, following) if shift is not None} or {0}
+        yield copy, own if own is not None else around.pop() if len(around) == 1 else None
+
+
+def _carried(known: list[int | None]) -> list[int | None]:
+    """Each number that is known, or the last one before it."""
+    found: list[int | None] = []
+    for one in known:
+        found.append(one if one is not None or not found else found[-1])
+    return found
 
 
 def _copies(source: ByteSource, found: Found, notes: list[str]) -> Iterator[Copy]:
@@ -79,6 +190,53 @@ def _fault(source: ByteSource, copy: Copy) -> str:
     except FormatError as error:
         return str(error)
     return ""
+
+
+def owners_of(source: ByteSource, found: Found) -> dict[tuple[int, int], str]:
+    """Whose the segments and CENDs are, as the last index says that is whole; see ``scan``."""
+    listed = _last_index(source, found)
+    owners: dict[tuple[int, int], str] = {}
+    with suppress(FormatError):
+        for name, clip in listed.clips.items() if listed is not None else ():
+            owners |= {(row.offset, row.size): name for row in clip.segments}
+            if clip.cend is not None:
+                owners[clip.cend.offset, clip.cend.size] = name
+    return owners
+
+
+def _last_index(source: ByteSource, found: Found) -> Directory | None:
+    """The last index of a damaged file, where it is whole."""
+    for chunk in reversed(found.chunks):
+        if chunk.type == b"INDX":
+            with suppress(FormatError):
+                payload = read_payload(source, chunk, chunk.size)
+                return parse_index(payload, index_limit(source.size))
+    return None
+
+
+def restore_from_index(source: ByteSource, found: Found) -> list[str]:
+    """Let a salvaged file have HEAD and aliases that are lost from the last index that is whole.
+
+    Without one it gets the HEAD of this version. Returns what was lost.
+    """
+    directory, notes = found.directory, []
+    listed = _last_index(source, found)
+    if listed is not None and not directory.head:
+        with suppress(FormatError):
+            parse_head(listed.head)
+            directory.head = listed.head
+            notes.append("no HEAD; it is taken from the index")
+    for name, (of, target) in listed.aliases.items() if listed is not None else ():
+        if name not in directory.aliases:
+            directory.aliases[name] = of, target
+            notes.append(f"the alias {name!r} is lost; it is taken from the index")
+            fields = {"name": name, "of": of, "target": target}
+            alias = build_chunk(b"ALIA", build(payloads.ALIA, fields, "ALIA"))
+            found.broken = [b for b in found.broken if not is_like(source, b[0], alias)]
+    if not directory.head:
+        notes.append("no HEAD; the file is read as one of this version")
+        directory.head = build_head(BASE)
+    return notes
 
 
 def is_like(source: ByteSource, offset: int, chunk: bytes) -> bool:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 from mcz.container import payloads, strict
+from mcz.container.bounds import NOBODY, Bounds, Owners
 from mcz.container.chunks import (
     ANCILLARY,
     FLAGS_OF,
@@ -37,26 +38,28 @@ from mcz.container.directory import (
     parse_head,
     signal_rows,
 )
-from mcz.container.limits import BASE, PROFILES, Search, check, index_limit
-from mcz.container.packets import CHECK_SIZE, SHORT, Packet, check_number, read_packets
-from mcz.container.segments import FRESH, SegmentHeader, parse_header
+from mcz.container.limits import PROFILES, Search, check, index_limit
+from mcz.container.packets import CHECK_SIZE, read_packets
+from mcz.container.segments import header_of, parse_header
 from mcz.container.source import ByteSource, Forward
 from mcz.container.strict_ancillary import check_ancillary
-from mcz.container.writer import build_head, payload_id
+from mcz.container.writer import payload_id
 from mcz.errors import FormatError, LimitError, TruncatedError, UnsupportedError
 from mcz.schema import parse
 
 PEEK = 64  # enough for the fields of a segment before its table
 
 
-def scan(source: ByteSource, *, salvage: bool = False, whole: bool = False) -> Found:
+def scan(
+    source: ByteSource, *, salvage: bool = False, whole: bool = False, owners: Owners = NOBODY
+) -> Found:
     """Walk the file. ``whole`` also checks the crc of every chunk (salvage always does) and,
-    unless salvaging, what is in it and whether INDX agrees with it.
+    unless salvaging, what is in it and whether INDX agrees with it; ``owners``: see ``Bounds``.
 
     Raises FormatError at the first fault unless ``salvage``; a TruncatedError carries the end
     of the last valid FOOT.
     """
-    walker = Walker(source, salvage, whole or salvage)
+    walker = Walker(source, salvage, whole or salvage, Bounds(owners))
     try:
         walker.walk()
     except TruncatedError as error:
@@ -69,8 +72,9 @@ def scan(source: ByteSource, *, salvage: bool = False, whole: bool = False) -> F
 class Walker:
     """The state of a walk; ``chunk`` is the one that it is in."""
 
-    def __init__(self, source: ByteSource, salvage: bool, whole: bool) -> None:
+    def __init__(self, source: ByteSource, salvage: bool, whole: bool, bounds: Bounds) -> None:
         self.source = source
+        self.bounds = bounds
         self.salvage = salvage
         self.whole = whole
         self.strict = whole and not salvage
@@ -105,6 +109,8 @@ class Walker:
                 self._note(error)  # SALV-03
                 self.found.broken.append((begin, named_chunk(self.source, begin)))
                 at = self._skip(begin, at)  # SALV-01, SALV-02, SALV-04
+            else:
+                self.bounds.is_sound()
         self._finish()
 
     def _whole_until(self) -> int | None:
@@ -239,6 +245,7 @@ class Walker:
     def _begin_clip(self, chunk: Chunk) -> None:
         self._outside(chunk)
         self.clip, self.first = None, []
+        self.bounds.begin()
         fields = parse(payloads.CLIP, self._payload(chunk), chunk.label)
         if not fields.name or fields.name in self.found.directory.clips:  # CLIP-01, GRAM-06
             raise FormatError(f"chunk {chunk.label}: clip name {fields.name!r} is empty or taken")
@@ -270,28 +277,17 @@ class Walker:
         told = False  # a segment of signal 0 has said which frame it is
         for packet in read_packets(read, self.profile.packet_bytes):
             start = read.at - CHECK_SIZE - len(packet.body)
-            header = self._header_of(packet, start, told)
+            header = header_of(packet, start, self.first[0] if told else None)
             self._segment(SegmentRow(start, len(packet.body), header, packet.kind))
             told = told or header.signal == 0
             yield read.at
         yield read.at
 
-    def _header_of(self, packet: Packet, start: int, told: bool) -> SegmentHeader:
-        """What a packet says of its segment; ``told``: one before it said which frame is due."""
-        if packet.kind in SHORT:
-            if not told:  # PACK-14
-                raise FormatError(f"packet at {start}: none before it in its DATA tells its frame")
-            check_number(packet, self.first[0])
-            return SegmentHeader(0, self.first[0], 1, flags=FRESH if packet.fresh else 0)  # PACK-12
-        header, _ = parse_header(packet.body)
-        if packet.fresh != bool(header.flags & FRESH):  # PACK-11
-            raise FormatError(f"packet at {start}: it and its segment differ in starting fresh")
-        return header
-
     def _segment(self, row: SegmentRow) -> None:
         header, offset = row.header, row.offset
         if self.clip is None:
             raise FormatError(f"DATA at {offset - HEADER.size} is outside a clip")
+        self.bounds.check(self.clip.name, "DATA", offset, row.size)
         if header.signal >= len(self.first):
             raise FormatError(f"DATA at {offset - HEADER.size}: signal {header.signal}")  # DATA-06
         due = self.first[header.signal]
@@ -306,10 +302,12 @@ class Walker:
         if self.clip is None:
             raise FormatError(f"{chunk.label} is outside a clip")
         fields = parse(payloads.CEND, self._payload(chunk), chunk.label)
+        self.bounds.check(self.clip.name, "CEND", chunk.offset, chunk.size)
         self.clip.n_frames, self.clip.cend = fields.n_frames, chunk
         self._close_clip()
 
     def _close_clip(self) -> None:
+        self.bounds.begin()
         if self.clip is None:
             return
         clip, self.clip = self.clip, None
@@ -354,6 +352,9 @@ class Walker:
     def _repeat(self, chunk: Chunk, payload: bytes) -> None:
         """Take in the chunks of a REPT: of a clip that is open, those that may have been lost."""
         held = self.found.directory
+        own = b"" if self.clip is None else self._payload(self.clip.clip)
+        if self.bounds.doubt and not self.bounds.settle(payload, chunk.offset, own):
+            self._close_clip()
         if self.clip is None:
             for inner in chunks_in(payload, chunk.payload_offset):
                 if inner.type != b"HEAD" or not held.head:
@@ -392,6 +393,7 @@ class Walker:
     def _skip(self, at: int, done: int) -> int | None:
         """Where to go on after a fault in what begins at ``at`` and was good up to ``done``."""
         self.index = None
+        self.bounds.begin_fault(max(at, done))
         try:
             chunk = read_chunk(self.source, at)
             if chunk.length is not None:
@@ -399,12 +401,14 @@ class Walker:
         except FormatError:
             pass
         try:
-            return resynchronize(
-                self.source, max(at + 1, done), self.profile.chunk_bytes, self._spend
-            )
+            limit = self.profile.chunk_bytes
+            found = resynchronize(self.source, max(at + 1, done), limit, self._spend)
         except LimitError as error:
             self._note(error)
             return None
+        if self.clip is not None and found is not None:
+            self.found.doubts |= self.bounds.skip(found)
+        return found
 
     def _spend(self, size: int) -> None:
         """Count what is read in search of the next chunk; what looks like one seldom is none."""
@@ -414,6 +418,3 @@ class Walker:
         self._close_clip()
         if self.salvage and not self.found.feet:
             self.found.damage.append("the file has no valid FOOT")
-        if self.salvage and not self.found.directory.head:
-            self.found.damage.append("no HEAD; the file is read as one of this version")
-            self.found.directory.head = build_head(BASE)

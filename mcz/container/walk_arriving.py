@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from mcz.container.bounds import NOBODY, Bounds
 from mcz.container.chunks import COPY, SIGNATURE, Chunk, check_signature
 from mcz.container.copies import parse_copies
 from mcz.container.directory import SegmentRow
@@ -97,7 +98,7 @@ class ArrivingWalker(Walker):
 
     def __init__(self, stream: Any, name: str = "stream") -> None:
         self.pipe = PipeSource(stream, name)
-        super().__init__(self.pipe, salvage=False, whole=True)
+        super().__init__(self.pipe, False, True, Bounds(NOBODY))
 
     def arrivals(self) -> Iterator[Arrival]:
         """All that comes up to the end of the stream, which is one behind a FOOT.

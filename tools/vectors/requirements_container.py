@@ -147,6 +147,7 @@ ARGUED: dict[str, str] = {
     "SALV-07": _SALVAGE + "test_copies.py::test_a_bad_byte_costs_nothing_that_has_a_copy",
     "SALV-08": _SALVAGE + "test_copies.py::test_what_is_sound_is_kept",
     "SALV-09": _SALVAGE + "test_copies.py::test_a_skeleton_is_made_again_from_its_asf",
+    "SALV-10": _SALVAGE + "test_repair.py::test_no_clip_gets_frames_of_the_next_one",
     "LIMIT-16": "copies of chunks that are there, each once, are shorter than the file: whatever "
     "states more is refused by LIMIT-14, COPY-02 or COPY-03",
     "META-05": _REWRITER + "test_metadata.py::test_it_goes_along",
