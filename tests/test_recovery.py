@@ -24,6 +24,10 @@ from mcz.sample import write_samples
 
 SHARED = [HealthCheck.function_scoped_fixture]
 ELEMENTS = st.integers(0, 65535)
+TINY = (
+    "HIERARCHY\nROOT hips\n{\n  OFFSET 0 0 0\n  CHANNELS 1 Xrotation\n}\nMOTION\nFrames: 2\n"
+    "Frame Time: 0.01\n1.5\n2.25\n"
+)
 
 
 @given(ELEMENTS, ELEMENTS, ELEMENTS)
@@ -382,3 +386,105 @@ def test_the_vectors_are_repaired(damaged: Path, tmp_path: Path) -> None:
 
 def test_there_are_damaged_vectors() -> None:
     assert len(DAMAGED) == 9
+
+
+# What lies behind, and what is not its own -----------------------------------------
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
+    """A small file, protected and as it was."""
+    folder = tmp_path_factory.mktemp("small")
+    (folder / "a.bvh").write_text(TINY)
+    mcz.encode(folder / "a.bvh", folder / "a.mcz")
+    plain = (folder / "a.mcz").read_bytes()
+    mcz.protect(folder / "a.mcz", 0.2)
+    return (folder / "a.mcz").read_bytes(), plain
+
+
+def held(data: bytes) -> set[tuple[str, bytes]]:
+    """What a file gives, by name."""
+    with mcz.open(data) as file:
+        found = {(clip.name, clip.read().tobytes()) for clip in file}
+        return found | {(name, one.read()) for name, one in file.attachments.items()}
+
+
+def test_one_byte_more_is_left_out(small: tuple[bytes, bytes], tmp_path: Path) -> None:
+    report, data = restored(small[0] + b"?", tmp_path)
+    assert (report.restored, report.lost, data) == (True, [], small[0])
+    assert any("1 bytes behind its end" in line for line in report.damage)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=SHARED)
+@given(st.data())
+def test_protection_makes_no_tail_worse(
+    small: tuple[bytes, bytes], archive: bytes, tmp_path: Path, data: st.DataObject
+) -> None:
+    """Junk, zeros, chunks of this and of other files, halves of them: what stays is no less."""
+    pieces = [small[0], small[1], archive[:5000], archive[-9000:]]
+    piece = data.draw(st.sampled_from([b"\0" * 4000, *pieces]))
+    start = data.draw(st.integers(0, len(piece) - 1))
+    tail = (
+        data.draw(st.binary(max_size=50)) + piece[start : start + data.draw(st.integers(1, 4000))]
+    )
+    kept = []
+    for file in small:
+        try:
+            _, found = restored(file + tail, tmp_path)
+        except mcz.FormatError:
+            kept.append(set())
+            continue
+        assert mcz.verify(found) == []
+        kept.append(held(found))
+    assert kept[1] <= kept[0]
+
+
+def test_other_files_have_recovery_data_too(
+    small: tuple[bytes, bytes], archive: bytes, tmp_path: Path
+) -> None:
+    """Of a protected file that is attached, or put behind it, repair makes no file of its own."""
+    takes = tmp_path / "takes"
+    takes.mkdir()
+    (takes / "walk.bvh").write_text(TINY.replace("1.5", "2.5"))
+    (takes / "inner.mcz").write_bytes(small[0])
+    mcz.pack(takes, tmp_path / "outer.mcz", keep_all=True, copies=False)
+    outer = (tmp_path / "outer.mcz").read_bytes()
+    report, data = restored(outer + b"?", tmp_path)
+    assert (report.restored, report.lost, held(data)) == (False, [], held(outer))
+    for first, second in ((small[0], archive), (archive, small[0])):
+        _, data = restored(first + second, tmp_path)
+        assert held(data) >= held(first) | held(second)
+
+
+def test_what_can_be_restored_is_though_more_was_lost(
+    archive: bytes, shapes: list[Shape], tmp_path: Path
+) -> None:
+    """The first part comes back by its recovery data, of the other one what is whole."""
+    first, second = shapes
+    bad = bytearray(archive)
+    bad[200 : 200 + first.burst] = bytes(first.burst)
+    bad[second.start + 20 : second.start + 8000] = bytes(7980)
+    report, data = restored(bytes(bad), tmp_path)
+    assert not report.restored
+    with mcz.open(archive) as file, mcz.open(data) as found:
+        whole = {name for name in file.clips if name != "more"}
+        assert whole <= set(found.clips)
+        for name in whole:
+            np.testing.assert_array_equal(found.clips[name].read(), file.clips[name].read())
+
+
+def test_a_full_disk_of_temporary_files(
+    small: tuple[bytes, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Full(io.BytesIO):
+        def write(self, data: object) -> int:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(making, "IN_MEMORY", 0)
+    monkeypatch.setattr(making.tempfile, "TemporaryFile", Full)
+    path = tmp_path / "a.mcz"
+    path.write_bytes(small[1])
+    with pytest.raises(mcz.AccessError, match="No space left on device; recovery data take"):
+        mcz.protect(path)
+    assert path.read_bytes() == small[1]
+    assert [p.name for p in tmp_path.iterdir()] == ["a.mcz"]

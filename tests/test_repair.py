@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import random
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,14 @@ import pytest
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
+from mcz.container import payloads
 from mcz.container.chunks import HEADER
+from mcz.sample import write_samples
+from mcz.schema import build, parse
+from tests.formats.c3d_files import made
+from tests.formats.test_c3d_recording import integers, reals, with_analog
+from tests.kinds import Values, body_of, chunks_of, kept, values_of
+from tests.repair import flipped, joined, parts_of, replaced
 
 
 @pytest.fixture(scope="module")
@@ -30,37 +36,13 @@ def archive(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> bytes:
     return target.read_bytes()
 
 
-def everything(file: mcz.File) -> dict[str, list[tuple[Any, Any]]]:
-    """Values and masks of all signals of all clips."""
-    return {
-        name: [clip.read_masked(signal=signal.index) for signal in clip.signals]
-        for name, clip in file.clips.items()
-    }
-
-
-def check(repaired: bytes, whole: dict[str, list[tuple[Any, Any]]]) -> int:
-    """Every value of ``repaired`` is as it was; returns how many frames there are."""
+def check(repaired: bytes, whole: Values) -> int:
+    """Every value of ``repaired`` is as it was; returns how many frames of motions there are."""
     assert mcz.verify(repaired) == []
-    total = 0
+    kept(repaired, whole)
     with mcz.open(repaired) as file:
-        for name, signals in everything(file).items():
-            of, start = (name, 0) if name in whole else origin(name)
-            for index, (values, mask) in enumerate(signals):
-                before, mask_before = whole[of][index]
-                rows = slice(start, start + file.clips[name].n_frames)
-                np.testing.assert_array_equal(values, before[rows])
-                valid = True if mask is None else mask
-                np.testing.assert_array_equal(
-                    valid, True if mask_before is None else mask_before[rows]
-                )
-            total += file.clips[name].n_frames
-    return total
-
-
-def origin(name: str) -> tuple[str, int]:
-    """The clip that ``name`` was a run of frames of, and its first frame."""
-    of, _, span = name.rpartition(".")
-    return of, int(span.partition("-")[0])
+        motions = [c for c in file if c.signals[0].name == "motion"]
+    return sum(clip.n_frames for clip in motions)
 
 
 def repaired(damaged: bytes, folder: Path) -> tuple[mcz.Repair, bytes]:
@@ -69,8 +51,8 @@ def repaired(damaged: bytes, folder: Path) -> tuple[mcz.Repair, bytes]:
 
 
 def test_any_byte_costs_a_segment_at_most_and_is_named(archive: bytes, tmp_path: Path) -> None:
+    whole = values_of(archive)
     with mcz.open(archive) as file:
-        whole = everything(file)
         frames = sum(clip.n_frames for clip in file.clips.values())
     chosen = random.Random(7)
     for _ in range(8):
@@ -110,7 +92,7 @@ def test_runs_of_frames_keep_names_numbers_and_sources(
 def test_what_was_lost_with_a_template_is_its_source_alone(archive: bytes, tmp_path: Path) -> None:
     with mcz.open(archive) as file:
         chunks = dict(file.container.directory.shared)
-        whole = everything(file)
+        whole = values_of(archive)
         frames = sum(clip.n_frames for clip in file.clips.values())
     for (kind, _), chunk in chunks.items():
         if kind == b"SRCE":
@@ -123,8 +105,7 @@ def test_what_was_lost_with_a_template_is_its_source_alone(archive: bytes, tmp_p
 
 @pytest.mark.parametrize("cut", [0.7, 0.99])
 def test_a_file_that_was_cut_short(archive: bytes, tmp_path: Path, cut: float) -> None:
-    with mcz.open(archive) as file:
-        whole = everything(file)
+    whole = values_of(archive)
     found, data = repaired(archive[: int(cut * len(archive))], tmp_path)
     assert check(data, whole) > 100
     assert found.lost
@@ -192,3 +173,146 @@ def test_unpack_writes_no_damaged_file(archive: bytes, tmp_path: Path) -> None:
     whole = report.count("restored") + report.count("lossy")
     assert whole == len(report.outcomes) - 1
     assert not (tmp_path / "out" / path).exists()
+
+
+def test_a_lost_template_costs_no_value(tmp_path: Path) -> None:
+    """Not even of words that only the template gave a meaning, which are words then."""
+    data = force(tmp_path)
+    whole = values_of(data)
+    (chunk,) = (row for row in chunks_of(data) if row[0] == "SRCE")
+    found, repaired_data = repaired(flipped(data, body_of(*chunk), 4), tmp_path)
+    assert check(repaired_data, whole) == 60
+    assert found.runs == {"force": [(0, 60)]}
+    assert any("its source file" in line for line in found.lost)
+    with mcz.open(repaired_data) as file:
+        clip = file.clips["force"]
+        assert clip.source is None
+        assert "lost" in clip.metadata["source-note"]
+        assert not any(c.unit for c in clip.signals[-1].channels or ())
+    (tmp_path / "d.mcz").write_bytes(flipped(data, body_of(*chunk), 4))
+    assert run(cli, "mcz", ["repair", str(tmp_path / "d.mcz"), "-o", str(tmp_path / "r.mcz")]) == 4
+    with mcz.open(tmp_path / "d.mcz", salvage=True) as file:
+        assert file.clips["force"].read(signal="analog").shape == (120, 2)
+        assert any("as they were stored" in line for line in file.damage)
+
+
+def force(folder: Path) -> bytes:
+    """Points and two analog channels at twice the rate, whose template has scales and units."""
+    file = made(60, 4, 2, 2, size=2)
+    scales, units = reals(file, [0.5, 2.0]), file.texts([b"N", b"V"])
+    with_analog(file, SCALE=scales, OFFSET=integers(file, [1000, 0]), UNITS=units)
+    (folder / "force.c3d").write_bytes(file.build())
+    mcz.encode(folder / "force.c3d", folder / "force.mcz")
+    return (folder / "force.mcz").read_bytes()
+
+
+def test_a_signal_that_is_lost_takes_no_other_along(samples: Path, tmp_path: Path) -> None:
+    mcz.encode(samples / "walk.c3d", tmp_path / "a.mcz", params={"segment_frames": 60})
+    data = (tmp_path / "a.mcz").read_bytes()
+    whole = values_of(data)
+    with mcz.open(data) as file:
+        motion, residuals = file.clips["walk"].signals
+        places = motion.rows[1].offset + 30, residuals.rows[3].offset + 20
+    bad = bytearray(data)
+    for at in places:
+        bad[at] ^= 1
+    found, repaired_data = repaired(bytes(bad), tmp_path)
+    lost = 60 * (motion.layout.n_channels + residuals.layout.n_channels)
+    assert kept(repaired_data, whole) == sum(v.size for v in whole["walk"].values()) - lost
+    assert found.runs == {"walk": [(0, 60), (60, 120), (120, 180), (180, 240)]}
+    assert found.lost == [
+        "clip 'walk', signal 'motion': 60 of 240 frames",
+        "clip 'walk', signal 'residuals': 60 of 240 frames",
+    ]
+    with mcz.open(repaired_data) as file:
+        names = {clip.name: [signal.name for signal in clip.signals] for clip in file}
+        assert file.clips["walk.120-180"].source is not None
+        assert file.clips["walk.180-240"].source is None
+    assert names == {
+        "walk.0-60": ["motion", "residuals"],
+        "walk.60-120.residuals": ["residuals"],
+        "walk.120-180": ["motion", "residuals"],
+        "walk.180-240": ["motion"],
+    }
+
+
+def test_what_cannot_be_decoded_here_needs_its_end(tmp_path: Path) -> None:
+    """Of an unknown codec: kept as it is, with CEND; without that nobody can make its hashes."""
+    data = with_unknown_codec(tmp_path)
+    found, repaired_data = repaired(data + b"junk", tmp_path)
+    assert (found.clips, found.lost) == (["walk"], [])
+    (end,) = (row for row in chunks_of(data) if row[0] == "CEND")
+    found, repaired_data = repaired(flipped(data, body_of(*end), 1), tmp_path)
+    assert found.clips == []
+    assert found.skeletons
+    assert any("codec 1048576" in line and "CEND" in line for line in found.lost)
+    assert mcz.verify(repaired_data) == []
+
+
+def with_unknown_codec(folder: Path) -> bytes:
+    write_samples(folder)
+    mcz.encode(folder / "walk.bvh", folder / "u.mcz", codec="raw")
+    parts = parts_of((folder / "u.mcz").read_bytes())
+    which = next(i for i, (piece, _) in enumerate(parts) if piece.type == b"CLIP")
+    fields = parse(payloads.CLIP, parts[which][1], "CLIP")
+    signals = [dict(signal) | {"codec": 1 << 20} for signal in fields.signals]
+    payload = build(payloads.CLIP, dict(fields) | {"signals": signals}, "CLIP")
+    return joined(replaced(parts, which, payload))
+
+
+@pytest.mark.parametrize("indexed", [True, False])
+@pytest.mark.parametrize("removed", [True, False])
+def test_no_clip_gets_frames_of_the_next_one(
+    samples: Path, tmp_path: Path, removed: bool, indexed: bool
+) -> None:
+    """Bytes are lost from the middle of one clip to that of the next, which has as many frames."""
+    takes = tmp_path / "takes"
+    takes.mkdir()
+    text = (samples / "walk.bvh").read_bytes()
+    head, line, rows = text.partition(b"Frame Time: 0.00833333\n")
+    backwards = b"\n".join(reversed(rows.splitlines())) + b"\n"
+    (takes / "a.bvh").write_bytes(text)
+    (takes / "b.bvh").write_bytes(head + line + backwards)
+    mcz.pack(takes, tmp_path / "x.mcz", params={"segment_frames": 40}, copies=False)
+    data = (tmp_path / "x.mcz").read_bytes()
+    whole = values_of(data)
+    with mcz.open(data) as file:
+        start = file.clips["a"].signals[0].rows[3].offset - HEADER.size
+        stop = file.clips["b"].signals[0].rows[2].offset - HEADER.size + 5
+    hole = b"" if removed else bytes(stop - start)
+    bad = data[:start] + hole + data[stop:] if indexed else data[:start] + hole + data[stop:-240]
+    found, repaired_data = repaired(bad, tmp_path)
+    assert kept(repaired_data, whole) == 120 * 96
+    assert found.runs == {"a": [(0, 120)]}
+    for name, signals in values_of(bad, salvage=True).items():
+        values = signals["motion"]
+        valid = ~np.isnan(values)
+        assert (values[valid] == whole[name]["motion"][: len(values)][valid]).all()
+
+
+def test_a_lost_head_and_alias_are_in_the_index(archive: bytes, tmp_path: Path) -> None:
+    with mcz.open(archive) as file:
+        aliases = dict(file.aliases)
+    chunks = [row for row in chunks_of(archive) if row[0] in ("HEAD", "ALIA")]
+    assert len(chunks) >= 2
+    bad = bytearray(archive)
+    for row in chunks:
+        bad[body_of(*row)] ^= 6
+    found, repaired_data = repaired(bytes(bad), tmp_path)
+    assert found.lost == []
+    with mcz.open(repaired_data) as file:
+        assert file.aliases == aliases
+
+
+def test_a_lost_skeleton_costs_names_alone(tmp_path: Path) -> None:
+    """Where its source cannot give it back: values whose hash is right, and no source file."""
+    (tmp_path / "t.csv").write_text("a,b\n" + "".join(f"{n},{n / 8}\n" for n in range(90)))
+    mcz.encode(tmp_path / "t.csv", tmp_path / "t.mcz", rate=10)
+    data = (tmp_path / "t.mcz").read_bytes()
+    whole = values_of(data)
+    (skeleton,) = (row for row in chunks_of(data) if row[0] == "SKEL")
+    found, repaired_data = repaired(flipped(data, body_of(*skeleton), 0), tmp_path)
+    assert kept(repaired_data, whole) == 180
+    assert any("its skeleton is lost" in line for line in found.lost)
+    with mcz.open(repaired_data) as file:
+        assert file.clips["t"].source is None

@@ -11,7 +11,6 @@ import click
 from mcz.cli.common import Exit, Failure, about, echo, existing, plural, print_json, say
 from mcz.cli.options import decoded_option, force_option, json_option
 from mcz.cli.progress import Progress
-from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
     from mcz.editing.repair import Repair
@@ -36,7 +35,6 @@ def command(file: str, output: str, max_decoded: int | None, force: bool, as_jso
     if "-" in (file, output):
         raise Failure("repair reads and writes files, not standard streams", Exit.USAGE)
     existing(file)
-    output = file_in(output, file)
     with about(file, output), Progress() as progress:
         found = mcz.repair(file, output, force=force, max_decoded=max_decoded, progress=progress)
     if as_json:
@@ -56,6 +54,8 @@ def _lines(output: str, found: Repair) -> Iterator[str]:
     counts = [plural(len(found.clips), "whole clip"), plural(len(found.attachments), "attachment")]
     if found.runs:
         counts.insert(1, f"parts of {plural(len(found.runs), 'clip')}")
+    if not (found.clips or found.runs):
+        counts.insert(1, plural(len(found.skeletons), "skeleton"))
     yield f"{output}: {', '.join(counts)}, {found.size:,} bytes"
     for name, runs in found.runs.items():
         spans = ", ".join(f"{start}:{stop}" for start, stop in runs)

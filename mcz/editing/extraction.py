@@ -27,9 +27,7 @@ from mcz.editing.anew import (
     OF_JOINTS,
     check_anew,
     joints_alone,
-    settings_of,
     settings_of_joints,
-    sourced,
     write_anew,
 )
 from mcz.editing.carrying import Carrier, said_of
@@ -45,7 +43,7 @@ from mcz.editing.cutting import (
     keep_times,
     plan_cut,
 )
-from mcz.errors import MotionError, OptionError
+from mcz.errors import FormatError, MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion
 from mcz.reading.clip import Clip
@@ -115,9 +113,8 @@ def extract(
     ``salvage``: the file may be damaged, but not in what is taken out.
     ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
     ``copies``: as ``mcz.write`` has it; None: where ``source`` has some.
-    ``recode``: a clip is decoded and coded anew, as it was, where joints are coded in one group
-    with others, which are refused by default, or where frames that are cut off would stay in the
-    file, since those that are left need them.
+    ``recode``: joints that a codec codes in one group with others are decoded and coded anew, as
+    the clip was; by default they are refused.
     Raises OptionError or MotionError for what cannot be cut so, and where the target is the source;
     FormatError for bad bytes; nothing is left under the target's name then.
     """
@@ -133,7 +130,7 @@ def extract(
         cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]
         for cut in cuts:
             if cut.anew:
-                check_anew(cut.clip, whole=cut.joints is None)
+                check_anew(cut.clip)
         with replacing(target, force=force, inputs=(source,)) as stream:
             copier = Copier(file, stream, progress, copies)
             return copier.run(cuts, alone=alone)
@@ -216,7 +213,7 @@ class Copier:
 
     def is_same(self, cut: ClipCut) -> bool:
         """Whether the clip stays what it was."""
-        return cut.is_whole and not cut.anew
+        return cut.is_whole
 
     def clip(self, cut: ClipCut) -> None:
         """Write one clip."""
@@ -224,7 +221,7 @@ class Copier:
             self._anew(cut)
             return
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
-        fields = self.container.clip(row)
+        fields = self.fields_of(cut)
         payload = self.skeleton(clip.skeleton_id)
         skeleton = payload_id(payload)
         if cut.joints is not None:
@@ -252,14 +249,12 @@ class Copier:
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
         self.skeleton(clip.skeleton_id)
         old = clip.quality or {}
-        motion, left_out = sourced(replace(joints_alone(cut), name=self.name_of(cut)), clip)
-        if left_out is not None:
-            self.found.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
+        motion = replace(joints_alone(cut), name=self.name_of(cut))
         record = write_anew(
             self.writer,
             motion,
             clip,
-            settings_of(clip) if cut.joints is None else settings_of_joints(clip),
+            settings_of_joints(clip),
             partial(recoded_quality, cut, old),
             self.progress,
         )
@@ -267,13 +262,17 @@ class Copier:
             if f"param.{name}" in old and f"param.{name}" not in record:
                 said = f"its {name}, which other joints have a part in"
                 self.found.left_out.append(f"clip {clip.name}: {said}")
-        if clip.source is not None and cut.joints is not None:
+        if clip.source is not None:
             self.found.left_out.append(f"clip {clip.name}: its source file, as joints were cut")
         self.inside(row)
         for chunk in row.ancillary:
             if chunk.type != b"QUAL":
                 self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
         self._note(cut)
+
+    def fields_of(self, cut: ClipCut) -> Any:
+        """The fields of the CLIP that is cut."""
+        return self.container.clip(self.container.directory.clips[cut.clip.name])
 
     def name_of(self, cut: ClipCut) -> str:
         """What the clip is called from now on."""
@@ -297,7 +296,7 @@ class Copier:
     def _without_units(self, cut: ClipCut, new: dict[str, Any]) -> None:
         """Words whose meaning only the source told are words, and not in the unit of that."""
         for info, fields in zip(cut.clip.signals, new["signals"], strict=True):
-            if cut.clip.scaling(info.index) is not None:
+            if cut.clip.is_scaled(info.index):
                 fields["channels"] = [dict(own) | {"unit": ""} for own in fields["channels"]]
                 add_note(new["metadata"], "source-note", f"{info.name}: words as they were stored")
                 said = f"what the words of its signal {info.name} mean, as its source file was cut"
@@ -313,6 +312,9 @@ class Copier:
         elif held:
             motion = cut.clip.motion((cut.start, cut.stop), cut.resolution)
             hashes = [value_hash(signal.stored, signal.mask) for signal in motion.signals]
+            if motion.source is None:  # of a damaged file; the template may say why
+                self.container.template(bytes(held[0]["template"]), held[0]["format"])
+                raise FormatError("it cannot be put together")
             motion, held[0] = with_stated_rate(self.writer, motion, held[0], cut.clip)
             assert motion.source is not None
             try:

@@ -6,11 +6,11 @@ were found say that bytes were inserted or cut off before them.
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain as chain_from
+from itertools import takewhile
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -26,10 +26,10 @@ from mcz.recovery.field import Ints
 from mcz.recovery.making import Step, made
 from mcz.recovery.packets import FIELDS, Key, Packet, find_packets, short_hash
 from mcz.recovery.shape import HASH, Shape
-from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
 
 MOST_SHIFTS = 16
+MOST_SETS = 4  # that may protect the same bytes
 FEW = 8  # ranges that are named
 SLACK = BLOCK = 1 << 20
 
@@ -93,9 +93,18 @@ class _Set:
     def shape(self) -> Shape:
         return self.key.shape
 
+    @property
+    def distance(self) -> int:
+        """How far its packets lie from where they belong, the nearest of them."""
+        return min(map(abs, self.shifts), default=0)
 
-def recovery_sets(source: ByteSource) -> list[_Set]:
-    """What is left of the recovery data of a file, in the order of what they protect."""
+
+def recovery_sets(source: ByteSource) -> dict[int, list[_Set]]:
+    """What is left of the recovery data of a file, by where what they protect begins.
+
+    A file may hold some of other files, whole ones that were attached or put behind it: those
+    whose packets lie where they belong come first, and few of the others count.
+    """
     found: dict[Key, _Set] = {}
     places: dict[Key, dict[tuple[int, int], int]] = {}
     for key, packet in find_packets(source):
@@ -104,12 +113,10 @@ def recovery_sets(source: ByteSource) -> list[_Set]:
         one = found.setdefault(key, _Set(key))
         place = places.setdefault(key, {(k, i): at for k, i, at in key.shape.packets()})
         _keep(one, packet, place.get((packet.kind, packet.index)))
-    sets = sorted(found.values(), key=lambda one: (one.shape.start, -len(one.blocks)))
-    chain: list[_Set] = []
-    for one in sets:
-        if one.shape.start == (chain[-1].shape.stop if chain else 0):
-            chain.append(one)
-    return chain
+    starts: dict[int, list[_Set]] = {}
+    for one in sorted(found.values(), key=lambda one: (one.distance, -len(one.blocks))):
+        starts.setdefault(one.shape.start, []).append(one)
+    return {start: sets[:MOST_SETS] for start, sets in starts.items()}
 
 
 def _keep(one: _Set, packet: Packet, place: int | None) -> None:
@@ -124,8 +131,30 @@ def _keep(one: _Set, packet: Packet, place: int | None) -> None:
         one.shifts[shift] = None
 
 
-def examined(source: ByteSource, one: _Set, found: Recovery) -> dict[int, tuple[int, ...]]:
-    """Of each data block that is there, by how much its pieces are shifted; others are bad."""
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """One RECV, and of each data block that is there by how much its pieces are shifted."""
+
+    set: _Set
+    there: dict[int, tuple[int, ...]]
+
+    @property
+    def n_bad(self) -> int:
+        return self.set.shape.n_blocks - len(self.there)
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether what is bad can be computed: no more blocks than there are recovery blocks."""
+        return self.n_bad <= len(self.set.blocks)
+
+    @property
+    def shift(self) -> int:
+        """By how much the end of what is protected is shifted, as far as it is known."""
+        return self.there[max(self.there)][-1] if self.there else 0
+
+
+def _examined(source: ByteSource, one: _Set) -> Examined:
+    """Find the data blocks; those that are not there are bad."""
     shape = one.shape
     table = _table(one)
     there: dict[int, tuple[int, ...]] = {}
@@ -143,15 +172,7 @@ def examined(source: ByteSource, one: _Set, found: Recovery) -> dict[int, tuple[
                 there[block] = tried
                 hint = tried[0]
                 break
-        else:
-            found.bad_blocks += 1
-            found.bad_bytes += [(at, at + size) for at, size in pieces]
-    found.n_blocks += shape.n_blocks
-    found.n_recovery += shape.n_recovery
-    found.bad_recovery += shape.n_recovery - len(one.blocks)
-    if shape.n_blocks - len(there) > len(one.blocks):
-        found.possible = False
-    return there
+    return Examined(one, there)
 
 
 def _tries(hint: int, shifts: list[int], n_pieces: int) -> Iterator[tuple[int, ...]]:
@@ -285,15 +306,32 @@ class Restorer:
         self.out.truncate(last.shape.stop + size)
 
 
-def examine(source: ByteSource) -> tuple[Recovery, list[tuple[_Set, dict[int, tuple[int, ...]]]]]:
+def examine(source: ByteSource) -> tuple[Recovery, list[Examined]]:
     """What is bad in a file, by its recovery data, and what of it is where."""
-    found = Recovery()
-    sets = [(one, examined(source, one, found)) for one in recovery_sets(source)]
-    if sets:
-        last = sets[-1][0]
-        shift = max(last.shifts, default=0)
-        found.behind = max(0, source.size - last.shape.stop - shift)
-    return found, sets
+    starts, chain, at = recovery_sets(source), list[Examined](), 0
+    while at in starts:
+        tried = map(partial(_examined, source), starts[at])
+        fallback = next(tried)
+        every = chain_from((fallback,), tried)
+        chain.append(next((one for one in every if one.is_possible), fallback))
+        at = chain[-1].set.shape.stop
+    found = Recovery(possible=all(one.is_possible for one in chain))
+    for one in chain:
+        shape = one.set.shape
+        found.n_blocks += shape.n_blocks
+        found.n_recovery += shape.n_recovery
+        found.bad_blocks += one.n_bad
+        found.bad_recovery += shape.n_recovery - len(one.set.blocks)
+        bad = (block for block in range(shape.n_blocks) if block not in one.there)
+        found.bad_bytes += [(at, at + size) for block in bad for at, size in shape.pieces(block)]
+    if chain:
+        found.behind = _behind(source, chain[-1])
+    return found, chain
+
+
+def _behind(source: ByteSource, last: Examined) -> int:
+    """Bytes behind what one RECV protects."""
+    return max(0, source.size - last.set.shape.stop - last.shift)
 
 
 def checked(target: Any) -> Recovery | None:
@@ -310,39 +348,34 @@ def checked(target: Any) -> Recovery | None:
 
 
 def recover(
-    source: ByteSource, name: Any, target: Any, force: bool, progress: Progress | None
-) -> Recovery | None:
-    """Write the file as it was protected to ``target``, where that is possible.
+    source: ByteSource, out: BinaryIO, progress: Progress | None
+) -> tuple[Recovery | None, int]:
+    """Write the file as it was protected to ``out``, which can be read again, as far as possible.
 
-    ``name`` is what the damaged file was opened by. Returns None where there are no recovery data,
-    and what they found otherwise; nothing is written where it says that it is not ``possible``.
+    Also returns where that ends; what lies behind is in ``out`` as it was. Zero, and nothing is
+    written, where nothing can be restored; no Recovery where there are no recovery data.
     """
     found, sets = examine(source)
-    if not sets or not found.possible:
-        return found if sets else None
-    step = None if progress is None else _steps(progress)
-    try:
-        with replacing(target, force=force, inputs=(name,)) as stream:
-            own = stream if _is_workable(stream) else tempfile.TemporaryFile()  # noqa: SIM115
-            with own if own is not stream else nullcontext():
-                restorer = Restorer(source, own, step)
-                for one, there in sets:
-                    restorer.restore(one, there)
-                restorer.rest(sets[-1][0], found.behind)
-                if own is not stream:
-                    own.seek(0)
-                    shutil.copyfileobj(own, stream)
-    except NotThatError:
-        found.possible = False
-    return found
+    restorer = Restorer(source, out, None if progress is None else _steps(progress))
+    done: Examined | None = None
+    for one in takewhile(lambda one: one.is_possible, sets):
+        try:
+            restorer.restore(one.set, one.there)
+        except NotThatError:
+            found.possible = False
+            break
+        done = one
+    if done is None:
+        out.seek(0)
+        out.truncate()
+        return (found if sets else None), 0
+    restorer.rest(done.set, _behind(source, done))
+    out.flush()
+    return found, done.set.shape.stop
 
 
 class NotThatError(FormatError):
     """What was put together is not what was protected."""
-
-
-def _is_workable(stream: Any) -> bool:
-    return all(getattr(stream, name, bool)() for name in ("readable", "seekable", "writable"))
 
 
 def _steps(progress: Progress) -> Step:

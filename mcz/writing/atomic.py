@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -43,12 +44,26 @@ def replacing(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterat
     if os.fspath(target)[-1:] in (os.sep, os.altsep):
         raise OptionError(f"{target}: a folder; name the file in it")
     path = Path(target)
-    if path.is_dir():
-        raise OptionError(f"{path}: a folder; name the file in it")
     if not force and os.path.lexists(path):
         raise ExistsError(f"{path} exists; use force to replace it")
     with _in_place(path) if _is_special(path) else _temporary(path, force) as stream:
         yield stream
+
+
+@contextmanager
+def rereadable(stream: BinaryIO) -> Iterator[BinaryIO]:
+    """``stream`` itself, or, where it cannot be read, a temporary file that is copied to it.
+
+    So what was written can be read again before it gets its name; it is copied only when the block
+    ends well.
+    """
+    if all(getattr(stream, name, bool)() for name in ("readable", "seekable", "writable")):
+        yield stream
+        return
+    with tempfile.TemporaryFile() as own:
+        yield own
+        own.seek(0)
+        shutil.copyfileobj(own, stream)
 
 
 @contextmanager

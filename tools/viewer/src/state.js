@@ -5,7 +5,6 @@ export function initial() {
   return {
     files: [],
     shown: null,
-    loading: null,
     compared: null,
     frame: 0,
     playing: false,
@@ -27,7 +26,6 @@ export function initial() {
     theme: null,
     curves: [],
     panels: {},
-    tab: "info",
     errorsShare: null,
     diffs: [],
   };

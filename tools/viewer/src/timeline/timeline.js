@@ -2,7 +2,6 @@
 
 import { Clock, USUAL_RATE, rateOf } from "./clock.js";
 import { SPEEDS, go, listenToKeys } from "./keys.js";
-import { count, frameNumber } from "../ui/text.js";
 import { mountStrips } from "./strips/strips.js";
 
 const PATHS = {
@@ -78,11 +77,12 @@ function showPlace(store, scrub, place) {
 }
 
 /** "12 / 343 · 0.10 s"; frames are numbered as the file does. */
-function placeText({ nFrames, firstFrame, rate }, frame) {
+function placeText({ nFrames, firstFrame = 1, rate }, frame) {
+  const number = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
+  const first = Number.isSafeInteger(firstFrame) ? firstFrame : 1;
   const seconds = frame / rateOf({ rate });
   const approximately = rate ? "" : "≈ ";
-  const number = (n) => count(frameNumber({ firstFrame }, n));
-  return `${number(frame)} / ${number(nFrames - 1)} · ${approximately}${timeText(seconds)}`;
+  return `${number(first + frame)} / ${number(first + nFrames - 1)} · ${approximately}${timeText(seconds)}`;
 }
 
 function timeText(seconds) {

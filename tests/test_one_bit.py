@@ -1,0 +1,107 @@
+"""One bit is wrong, in each chunk of files of ten kinds: what repair makes of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
+from tests.kinds import KINDS, Values, body_of, chunks_of, files, kept, values_of
+from tests.repair import flipped
+
+# What a bit in the payload of a chunk may cost of the values; all else that it costs is said.
+COSTS_VALUES = {"CLIP", "DATA", "MODL"}
+COSTS_NOTHING = {"HEAD", "INDX", "FOOT", "ALIA", "RECV", "REPT", "COPY"}
+OF_A_TYPE = 2  # chunks of each type in a file
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[bytes, Values]]:
+    found = files(tmp_path_factory.mktemp("kinds"))
+    return {name: (data, values_of(data)) for name, data in found.items()}
+
+
+def sizes(values: Values) -> int:
+    return sum(array.size for signals in values.values() for array in signals.values())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bit_in_a_payload(
+    kind: str, made: dict[str, tuple[bytes, Values]], tmp_path: Path
+) -> None:
+    data, whole = made[kind]
+    seen: Counter[str] = Counter()
+    for of, at, size in chunks_of(data):
+        seen[of] += 1
+        if seen[of] > OF_A_TYPE:
+            continue
+        found = mcz.repair(flipped(data, body_of(of, at, size), 3), tmp_path / "o.mcz", force=True)
+        repaired = (tmp_path / "o.mcz").read_bytes()
+        assert not [p for p in mcz.verify(repaired) if p.heading != "Codecs"], of
+        count = kept(repaired, whole)
+        assert found.damage
+        if kind == "protected":
+            assert (found.restored, repaired) == (True, data), of
+            continue
+        assert count == sizes(whole) or (of in COSTS_VALUES and found.lost), of
+        assert not found.lost or of not in COSTS_NOTHING, (of, found.lost)
+        if of == "SRCE":
+            assert any("source" in line for line in found.lost), found.lost
+        if of == "CLIP":
+            lost = {name for name in whole if not any(n.startswith(name) for n in found.clips)}
+            assert len(lost) == 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bit_in_a_header_costs_nothing(
+    kind: str, made: dict[str, tuple[bytes, Values]], tmp_path: Path
+) -> None:
+    data, whole = made[kind]
+    seen: Counter[str] = Counter()
+    for of, at, _ in chunks_of(data):
+        seen[of] += 1
+        if seen[of] == 1:
+            bit = 8 * (at % 16) + at % 8
+            bad = flipped(data, at + bit // 8, bit % 8)
+            found = mcz.repair(bad, tmp_path / "o.mcz", force=True)
+            assert found.lost == [], of
+            assert kept((tmp_path / "o.mcz").read_bytes(), whole) == sizes(whole), of
+
+
+@pytest.mark.parametrize("kind", ["bvh-fast", "acclaim", "c3d-best", "mdtt-archive"])
+def test_salvage_reads_all_that_repair_writes(
+    kind: str, made: dict[str, tuple[bytes, Values]], tmp_path: Path
+) -> None:
+    """With a template or skeleton lost every command gives the values, and says what is lost."""
+    data, whole = made[kind]
+    for of, at, size in chunks_of(data):
+        if of not in ("SRCE", "SKEL", "CEND"):
+            continue
+        path, out = tmp_path / f"{of}{at}.mcz", tmp_path / f"{of}{at}"
+        path.write_bytes(flipped(data, body_of(of, at, size), 3))
+        assert kept_in_salvage(path.read_bytes(), whole) == sizes(whole)
+        name = next(iter(whole))
+        for arguments in (
+            ["decode", str(path), "--clip", name, "--to", "csv", "-o", f"{out}.csv"],
+            ["decode", str(path), "--clip", name, "--to", "npz", "-o", f"{out}.npz"],
+            ["unpack", str(path), str(out)],
+            ["list", str(path)],
+            ["info", str(path)],
+            ["repair", str(path), "-o", f"{out}-sound.mcz"],
+        ):
+            salvage = [] if arguments[0] == "repair" else ["--salvage"]
+            code = run(cli, "mcz", [*arguments, *salvage])
+            assert code == 4 or (arguments[0] == "repair" and of == "SKEL"), arguments
+
+
+def kept_in_salvage(data: bytes, whole: Values) -> int:
+    found = values_of(data, salvage=True)
+    for name, signals in found.items():
+        for signal, values in signals.items():
+            np.testing.assert_array_equal(values, whole[name][signal])
+    return sizes(found)
