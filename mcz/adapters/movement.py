@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import Timeline, numbers_or_rows
 from mcz.errors import OptionError
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
 from mcz.numbers import Grid, GridKind
@@ -29,7 +30,7 @@ def to_movement(motion: Motion, *, unit: str | None = None) -> Any:
 
     ``position`` (time, space, keypoints, individuals) in length units or ``unit``, NaN where
     unknown; ``confidence`` is that of a motion that has it, else 1, and 0 where a point is unknown.
-    Times are seconds since frame number 1, frames from 0 on while the rate is unknown. Points
+    Times are those of ``mcz.times``, frames from 0 on while they are unknown. Points
     called ``individual:keypoint`` are individuals, where all of these have the same keypoints;
     otherwise there is one, called as the motion. Raises as ``mcz.positions`` does.
     """
@@ -41,11 +42,10 @@ def to_movement(motion: Motion, *, unit: str | None = None) -> Any:
     is_flat = bool(names) and all(channel.kind != "tz" for channel in motion.skeleton.channels)
     is_flat &= set(motion.skeleton.parents.tolist()) == {-1}
     places = places[..., :2] if is_flat and not places[..., 2].any() else places
-    number = motion.frame_numbers
-    number = np.arange(1, motion.n_frames + 1) if number is None else number
-    rate = motion.frame_rate
+    numbers, rate = numbers_or_rows(motion.frame_numbers, motion.n_frames), motion.frame_rate
+    timeline = motion.timeline
     facts: dict[str, Any] = {"ds_type": "poses", "source_software": "mcz"}
-    facts["time_unit"] = "frames" if rate is None else "seconds"
+    facts["time_unit"] = "frames" if timeline is None else "seconds"
     facts |= {} if rate is None else {"fps": float(rate)}
     unit_cm = motion.skeleton.unit_cm
     length = unit or next((name for name, cm in UNIT_CM.items() if cm == unit_cm), "")
@@ -60,7 +60,7 @@ def to_movement(motion: Motion, *, unit: str | None = None) -> Any:
             ),
         },
         {
-            "time": (number - 1) if rate is None else (number - 1) / float(rate),
+            "time": numbers - 1 if timeline is None else timeline.times,
             "space": ["x", "y", "z"][: places.shape[3]],
             "keypoints": keypoints,
             "individuals": individuals,
@@ -76,9 +76,9 @@ def from_movement(
 
     Keypoints of several individuals are called ``individual:keypoint``. NaN is a gap; a confidence
     that says anything is a signal ``confidence``. Positions keep their float32 or float64 numbers.
-    Frame numbers are those of the times, from 1 on. Other variables and attributes are left out.
-    ``unit`` and ``up`` say what the dataset does not. Raises OptionError for another layout, and
-    for times that are no frames of its rate.
+    Times are kept, frame numbers are those of the times, from 1 on, or of the frames from the first
+    time on. Other variables and attributes are left out. ``unit`` and ``up`` say what the dataset
+    does not. Raises OptionError for another layout, and for times that are no frames of its rate.
     """
     if not hasattr(dataset, "data_vars") or "position" not in dataset:
         raise OptionError("no poses dataset of movement: it has no variable 'position'")
@@ -100,13 +100,17 @@ def from_movement(
         if np.isfinite(sure).any():
             of_points = tuple(Channel("", each) for each in names)
             signals.append(_signal(sure.reshape(len(sure), -1), CONFIDENCE, of_points))
-    rate, numbers = _frames(dataset, np.asarray(found["time"].values, np.float64), name)
+    times = np.asarray(found["time"].values, np.float64)
+    rate, numbers = _frames(dataset, times, name)
     facts = dataset.attrs
     unit = unit or (facts.get("length_unit") if facts.get("length_unit") in UNIT_CM else None)
     up = up or (facts.get("up_axis") if facts.get("up_axis") in ("x", "y", "z") else None)
     skeleton = Skeleton(joints, angle_unit="")
     motion = Motion(skeleton, tuple(signals), None, name=name, frame_numbers=numbers)
-    return with_facts(replace(motion, frame_rate=rate), None, unit, up)
+    motion = with_facts(replace(motion, frame_rate=rate), None, unit, up)
+    if rate is None or dataset.attrs.get("time_unit", "seconds") != "seconds":
+        return motion
+    return motion.at_times(Timeline(times.copy(), rate))
 
 
 def _grid_of(names: tuple[str, ...], name: str) -> tuple[list[str], list[str]]:
@@ -162,6 +166,9 @@ def _frames(dataset: Any, times: Floats, name: str) -> tuple[Any, NDArray[np.int
         raise OptionError("times in seconds, and no attribute 'fps' that says how many frames")
     counted = times * float(fps) if in_seconds else times
     numbers = np.rint(counted)
+    if not (np.abs(counted - numbers) <= SLACK).all():
+        counted = counted - counted[:1]
+        numbers = np.rint(counted)
     if not (np.abs(counted - numbers) <= SLACK).all():
         raise OptionError(f"times that are no frames of {fps or 1} a second")
     found = numbers.astype(np.int64) + 1

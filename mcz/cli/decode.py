@@ -33,7 +33,7 @@ from mcz.cli.options import (
 )
 from mcz.cli.parts import Filtered, Part, Preview
 from mcz.cli.suffixes import TARGETS, check_kept, suffix_of, target_of, target_of_clip
-from mcz.cli.wanted import Wanted, check_options, check_signal, refuse
+from mcz.cli.wanted import EVENTS, Wanted, check_options, check_signal, refuse
 from mcz.reading.fidelity import CONVERTED, RESTORED
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ if TYPE_CHECKING:
 @click.option(
     "--signal",
     metavar="NAME",
-    help="The numbers of another signal, such as analog or outputs (with --to csv or npz).",
+    help="Another signal, such as analog or outputs, or the events (with --to csv or npz).",
 )
 @click.option(
     "--stored", is_flag=True, help="Its words as they are stored, not in units (with --signal)."
@@ -335,10 +335,15 @@ def _converted(
 
 
 def _export(clip: Clip, target: str, part: Part, wanted: Wanted) -> Output:
+    from mcz.tables.events import EVENT_EXPORTS
     from mcz.tables.files import EXPORTS, channel_names, channel_units
 
     joints = wanted.joints
     chosen = None if joints is None else [joint.strip() for joint in joints.split(",")]
+    if wanted.signal == EVENTS and all(each.name != EVENTS for each in clip.signals):
+        events = () if clip.recording is None else clip.recording.events
+        data = EVENT_EXPORTS[target](part.events(events))
+        return Output(target, f"{_stem(clip)}.{target}", data, CONVERTED)
     signal = 0 if wanted.signal is None else clip.find_signal(wanted.signal)
     channels = clip.signals[signal].channels
     names = channel_names(clip.skeleton, channels)
@@ -363,7 +368,8 @@ def _beside(clip: Clip, wanted: Wanted) -> tuple[str, ...]:
         return ()
     others = [signal.name for signal in clip.signals[1:]]
     signals = [f"left out: signal {', '.join(others)} (--signal)"] if others else []
-    return (*signals, *of_recording(clip.recording))
+    events = " (--signal events)" if clip.recording is not None and clip.recording.events else ""
+    return (*signals, *(f"{text}{events}" for text in of_recording(clip.recording)))
 
 
 def _stem(clip: Clip | Motion) -> str:

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from mcz.reading.fidelity import CUT, FILTERED, LOSSY, SALVAGED, fidelity_of
 
 if TYPE_CHECKING:
+    from mcz.clock import Timeline
     from mcz.motion import Motion
     from mcz.reading.clip import Clip
+    from mcz.reading.recording import Event
     from mcz.tables.files import Table
 
 Masked = tuple[NDArray[Any], NDArray[np.bool_] | None]
@@ -63,6 +65,14 @@ class Part:
                 values = scaling.values(values)
         return self._table(values, mask, signal, names, units)
 
+    def events(self, events: Sequence[Event]) -> list[Event]:
+        """Those of the events that are in the frames, by their times."""
+        timeline, (start, stop) = self._timeline(), self.frames or (0, self.clip.n_frames)
+        if self.frames is None or timeline is None or start == stop:
+            return list(events)
+        first, last = timeline.times[start], timeline.times[stop - 1]
+        return [event for event in events if first <= event.time <= last]
+
     def _table(
         self,
         values: NDArray[Any],
@@ -74,16 +84,39 @@ class Part:
         from mcz.reading.decimation import decimated_rows
         from mcz.tables.files import Table
 
-        clip = self.clip
+        clip, per_frame = self.clip, self.clip.signals[signal].samples_per_frame
         mask = np.ones(values.shape, np.bool_) if mask is None else mask
         start, stop = self.frames or (0, clip.n_frames)
         numbers, rate = clip.frame_numbers[start:stop], self.rate or clip.frame_rate
+        timeline = self._timeline()
+        times = None
+        if timeline is not None:
+            times = timeline.samples(per_frame)[start * per_frame : stop * per_frame]
         if self.decimate:
-            step, per_frame = 2**self.resolution, clip.signals[signal].layout.samples_per_frame
+            step = 2**self.resolution
             values, mask = (decimated_rows(rows, per_frame, step) for rows in (values, mask))
             numbers, rate = numbers[::step], rate and rate / step
-        frames = _repeated(numbers, len(values))
-        return Table(names, _floats(values), mask, frames, rate, units)
+            if times is not None:
+                times = decimated_rows(times[:, None], per_frame, step)[:, 0]
+        return Table(
+            names,
+            _floats(values),
+            mask,
+            _repeated(numbers, len(values)),
+            rate,
+            units,
+            times=times,
+            samples_per_frame=per_frame,
+        )
+
+    def _timeline(self) -> Timeline | None:
+        """When the frames of the clip were, by the rate that it was given if it states none."""
+        from mcz.clock import Counting, timeline_of
+
+        clip = self.clip
+        if clip.timeline is None and self.rate is not None:
+            return timeline_of(Counting(clip.frame_numbers, self.rate), clip.metadata)
+        return clip.timeline
 
     def _rows(self, joints: Sequence[int | str] | None) -> Masked:
         return self.clip.read_masked(self.frames, joints, self.resolution)
@@ -128,12 +161,14 @@ class Preview(Part):
 
         found = self.clip.previewed(joints)
         numbers, rate = self.clip.frame_numbers[found.frames], self.clip.frame_rate
+        timeline = self._timeline()
         return Table(
             names,
             _floats(found.values),
             np.ones(found.values.shape, np.bool_) if found.mask is None else found.mask,
             _repeated(numbers, len(found.values)),
             rate / found.step if rate is not None and found.is_regular else None,
+            times=None if timeline is None else timeline.times[found.frames],
         )
 
 

@@ -137,6 +137,8 @@ def read_values(path: str, clip: Clip, joint: str) -> Any:
         names, values = reading(Path(path))
     except (ValueError, KeyError, OSError, EOFError, csv.Error, zipfile.BadZipFile) as error:
         raise Failure(f"{path}: not a table of numbers: {' '.join(str(error).split())}") from None
+    older = {f"{name}.value": name for name in wanted}  # as tables were called up to 0.9.0
+    names = [older.get(name, name) for name in names]
     missing = [name for name in wanted if name not in names]
     if not missing:
         return values[:, [names.index(name) for name in wanted]]

@@ -14,7 +14,7 @@ from mcz.errors import OptionError, SourceError
 
 MOST_LINE = 2**24  # bytes of a line
 SET = b"# set "
-NUMBER, STATE = "frame", "state"  # columns beside the values, as the decoders print them
+NUMBER, TIME, STATE = "frame", "time", "state"  # columns beside the values, as decoders print them
 COORDINATES = ("x", "y", "z", "tx", "ty", "tz")
 
 Row = NDArray[np.float64] | dict[str, Any]
@@ -32,7 +32,7 @@ class Rows:
     def __init__(self, stream: BinaryIO, *, binary: bool, n_channels: int | None = None) -> None:
         self._stream, self._binary, self._at = stream, binary, 0
         self.names: list[str] | None = None
-        self._drop_first = self._drop_last = False
+        self._drop_first, self._drop_last = 0, False
         if n_channels is None:
             self.names = self._read_names()
         self._width = n_channels
@@ -46,7 +46,9 @@ class Rows:
         except (UnicodeDecodeError, ValueError, csv.Error) as error:
             raise SourceError(f"line {self._at}: not a line of names: {error}") from None
         names = [name.strip() for name in names]
-        self._drop_first = names[:1] == [NUMBER] and _are_coordinates(names[1:3])
+        lead = next((n for n in ([NUMBER, TIME], [NUMBER]) if names[: len(n)] == n), [])
+        if lead and _are_coordinates(names[len(lead) : len(lead) + 2]):
+            self._drop_first = len(lead)
         self._drop_last = names[-1:] == [STATE] and _are_coordinates(names[-3:-1])
         return names[self._drop_first : len(names) - self._drop_last]
 

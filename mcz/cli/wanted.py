@@ -8,6 +8,8 @@ from typing import NamedTuple
 from mcz.cli.common import Exit, Failure
 from mcz.cli.suffixes import CONVERSIONS, SCENES
 
+EVENTS = "events"  # a signal that tables make of a recording
+
 
 class Wanted(NamedTuple):
     """What of a file is wanted, and as what: the options of these names."""
@@ -63,7 +65,7 @@ def check_signal(wanted: Wanted) -> None:
     """Raise Failure for options that do not go with a signal that is not the motion."""
     numbers = wanted.target is not None and not wanted.is_converted
     refuse(wanted.signal is not None and not numbers, "--signal needs --to csv or --to npz")
-    refuse(wanted.stored and wanted.signal is None, "--stored needs --signal")
+    refuse(wanted.stored and wanted.signal in (None, EVENTS), "--stored needs --signal")
     other = wanted.joints is not None or wanted.preview or wanted.filtered
     refuse(
         wanted.signal is not None and other,

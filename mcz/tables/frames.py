@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import OptionError
@@ -12,7 +11,7 @@ from mcz.motion import Motion, Signal
 from mcz.poses import accelerations, point_names, positions, rotations, velocities
 from mcz.skeleton import Joints
 from mcz.tables.files import channel_names
-from mcz.tables.labelled import COMPONENTS, imported
+from mcz.tables.labelled import COMPONENTS, imported, row_times
 
 PLACES = {"positions": positions, "velocities": velocities, "accelerations": accelerations}
 
@@ -28,11 +27,11 @@ def to_pandas(
     """A table of a motion as a ``pandas.DataFrame``; needs pandas (``mcz[pandas]``).
 
     ``what``: "positions", "velocities", "accelerations"; local rotations as "quat", "rotvec", "6d"
-    or "euler" (XYZ); "channels"; or the name of another signal, such as "analog". A row a frame,
-    or a sample, indexed by the seconds from the first frame ("time"), or "frame" while the rate is
-    unknown. Columns are pairs of a joint or point and a component, ``flat``: texts "lfoot.x"; of
-    channels and signals always texts. What is invalid is NaN. Raises OptionError for another
-    ``what``, and as ``mcz.positions``.
+    or "euler" (XYZ); "channels"; or the name of another signal, such as "analog". A row a frame, or
+    a sample, indexed by its time in seconds ("time", see ``mcz.times``), or by rows ("frame") while
+    that is unknown. Columns are pairs of a joint or point and a component, ``flat``: texts
+    "lfoot.x"; of channels and signals always texts. What is invalid is NaN. Raises OptionError for
+    another ``what``, and as ``mcz.positions``.
     """
     pandas = imported("pandas", "pandas")
     signals = {signal.name: signal for signal in motion.signals[1:]}
@@ -73,9 +72,6 @@ def _table(
         columns = pandas.MultiIndex.from_tuples(names, names=["point", "component"])
         if flat:
             columns = [".".join(pair) for pair in names]
-    rows = np.arange(len(array)) / signal.samples_per_frame
-    if motion.frame_rate is None:
-        index = pandas.Index(rows, name="frame")
-    else:
-        index = pandas.Index(rows / float(motion.frame_rate), name="time")
+    times, units = row_times(motion, signal)
+    index = pandas.Index(times, name="time" if units == "s" else "frame")
     return pandas.DataFrame(array.reshape(len(array), -1), index=index, columns=columns)

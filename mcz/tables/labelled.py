@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from mcz.clock import numbers_or_rows
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion, Signal
 from mcz.poses import point_names, positions, rotations
@@ -37,21 +39,21 @@ def to_xarray(
     ``positions`` (time, point, axis) in length units or ``unit``; ``rotations`` (time, joint,
     rotation), local, as ``form``: quat, rotvec, 6d or euler (XYZ); ``channels`` (time, channel),
     the numbers of the file. Each other signal stands under its name (time_NAME, channel_NAME).
-    ``time`` is in seconds from the first frame, in frames while the rate is unknown; ``frame`` has
-    the source's frame numbers. Facts are in ``attrs``; what is invalid is NaN. Without kinematics
-    there are channels alone. Raises OptionError.
+    ``time`` is in seconds (see ``mcz.times``), in frames from 0 on while that is unknown; ``frame``
+    has the source's frame numbers. Facts are in ``attrs``; what is invalid is NaN. Without
+    kinematics there are channels alone. Raises OptionError.
     """
     if form not in COMPONENTS:
         raise OptionError(f"rotations as {form!r}: one of {', '.join(COMPONENTS)}")
     xarray = imported("xarray", "xarray")
     skeleton, main = motion.skeleton, motion.signals[0]
-    numbers = motion.frame_numbers
+    numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
     variables: dict[str, Any] = {
         "channels": (("time", "channel"), np.asarray(main.masked(), dtype), {}),
     }
     coordinates: dict[str, Any] = {
         "time": ("time", *_times(motion, main)),
-        "frame": ("time", _frames(motion) if numbers is None else numbers),
+        "frame": ("time", np.repeat(numbers, main.samples_per_frame)),
         "channel": channel_names(skeleton, main.channels),
     }
     try:
@@ -82,16 +84,20 @@ def _add_signal(
     coordinates[f"unit_{name}"] = (channel, channel_units(motion.skeleton, signal.channels))
 
 
-def _times(motion: Motion, signal: Signal) -> tuple[Any, dict[str, str]]:
-    """When each row was, from the first frame on, and in which unit."""
-    rows = np.arange(signal.n_rows) / signal.samples_per_frame
-    if motion.frame_rate is None:
-        return rows, {"units": "frames"}
-    return rows / float(motion.frame_rate), {"units": "s"}
+def row_times(motion: Motion, signal: Signal) -> tuple[NDArray[np.float64], str]:
+    """When each row was, and in which unit: "s", or "frames", from 0 on, while that is unknown."""
+    timeline = motion.timeline
+    if timeline is None:
+        return np.arange(signal.n_rows) / signal.samples_per_frame, "frames"
+    return timeline.samples(signal.samples_per_frame), "s"
 
 
-def _frames(motion: Motion) -> Any:
-    return np.arange(1, motion.n_frames + 1)
+def _times(motion: Motion, signal: Signal) -> tuple[Any, dict[str, Any]]:
+    times, units = row_times(motion, signal)
+    facts: dict[str, Any] = {"units": units}
+    if units == "s" and motion.frame_rate is not None:
+        facts["sample_rate"] = float(motion.frame_rate * signal.samples_per_frame)
+    return times, facts
 
 
 def _unit(unit_cm: float | None) -> str:
