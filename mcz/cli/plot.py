@@ -47,6 +47,14 @@ MOST_ROWS = 24  # of a table that is printed
     help="Default: channels, of two files the error of FILE2 against FILE.",
 )
 @click.option("--joint", metavar="NAME", help="Whose channels or spectrum. Default: the first.")
+@click.option("--signal", metavar="NAME", help="Another signal than the motion, such as analog.")
+@click.option(
+    "--channel",
+    "channels",
+    metavar="A,B",
+    callback=lambda context, parameter, value: value and tuple(value.split(",")),
+    help="Channels of a signal, by name. Default: the first 8.",
+)
 @click.option(
     "--codecs", metavar="A,B", help="Lossy codecs of rate-distortion. Default: posewave,mrdwt."
 )
@@ -71,9 +79,9 @@ def command(
 ) -> Exit:
     """Draw numbers of FILE (.mcz or of any source format), and print them.
 
-    channels and spectrum of a --joint; error of FILE2 against FILE, the original, as mcz diff has
-    it; bytes of a clip by joint and resolution, as mcz info --layout has them; rate-distortion at a
-    few settings of lossy codecs. It needs pip install 'mcz[plot]'.
+    channels and spectrum of a --joint, or of a --signal; error of FILE2 against FILE, the original,
+    as mcz diff has it; bytes of a clip by joint and resolution, as mcz info --layout has them;
+    rate-distortion at a few settings of lossy codecs. It needs pip install 'mcz[plot]'.
     """
     import mcz
     from mcz.writing.inputs import refuse_inputs

@@ -41,7 +41,7 @@ def motion_of(moving: Moving) -> dict[str, Any] | None:
         return None
     unit = moving.skeleton.unit_cm
     values = [float(speed) * (unit or 1.0) for speed in speeds]
-    length, time = "units" if unit is None else "cm", "s" if moving.frame_rate else "frame"
+    length, time = "units" if unit is None else "cm", "s" if moving.timeline else "frame"
     known = [value if math.isfinite(value) else None for value in values]
     return {"unit": f"{length}/{time}", "mean_speeds": known}
 

@@ -107,7 +107,7 @@ def contacts(
     ``joints`` are the feet, by index or name; None takes those whose names say so, ``LeftFoot``,
     ``ltoes`` and the like. What stands is the first point of the joint. An axis that points up and
     a frame rate that nobody says are guessed, and the result says so. Where a position is unknown,
-    nothing stands.
+    nothing stands. Where frames are missing, each part between two gaps is looked at by itself.
 
     Raises MotionError where there is no such joint, no foot by name or no kinematics, and
     OptionError where the length unit is unknown.
@@ -122,7 +122,8 @@ def contacts(
         rows = block.masked()[:: signal.samples_per_frame].astype(np.float64, copy=False)
         tracks.add(start, positions_of(skeleton, rows))
     rate = None if motion.frame_rate is None else float(motion.frame_rate)
-    return tracks.contacts(rate, skeleton.up_axis, rule)
+    runs = None if motion.timeline is None else motion.timeline.runs
+    return tracks.contacts(rate, skeleton.up_axis, rule, runs)
 
 
 class FootTracks:
@@ -160,17 +161,31 @@ class FootTracks:
         for foot, point in enumerate(self._points):
             self.feet[foot, frames] = points[:, point]
 
-    def contacts(self, rate: float | None, up_axis: str, rule: ContactRule = RULE) -> Contacts:
-        """The contacts; ``rate`` in frames a second, None and "" are unknown."""
+    def contacts(
+        self,
+        rate: float | None,
+        up_axis: str,
+        rule: ContactRule = RULE,
+        runs: Sequence[tuple[int, int]] | None = None,
+    ) -> Contacts:
+        """The contacts; ``rate`` in frames a second, None and "" are unknown.
+
+        ``runs`` are the frames a <= f < b between gaps, None: all.
+        """
         up = up_axis or self.guessed_up()
         frame_rate = rate or USUAL_RATE
+        parts = runs or [(0, self.feet.shape[1])]
         with np.errstate(over="ignore"):  # what overflows is unknown
             places = self.feet * self.unit_cm
         return Contacts(
             runs=tuple(
-                Contact(joint, first, n_frames)
+                Contact(joint, start + first, n_frames)
                 for joint, track in zip(self.joints, places, strict=True)
-                for first, n_frames in runs_of(track, frame_rate, AXES.index(up), rule)
+                for floor in [floor_of(track, AXES.index(up), rule)]
+                for start, stop in parts
+                for first, n_frames in runs_of(
+                    track[start:stop], frame_rate, AXES.index(up), rule, floor
+                )
             ),
             joints=self.joints,
             n_frames=self.feet.shape[1],
@@ -200,20 +215,28 @@ def _means(points: Floats) -> Floats:
     return means
 
 
+def floor_of(track: Floats, up: int, rule: ContactRule = RULE) -> float | None:
+    """How low a point is at its lowest, None where it is never known."""
+    known: Flags = np.asarray(np.isfinite(track).all(axis=1))
+    return float(np.percentile(track[known, up], rule.floor)) if known.any() else None
+
+
 def runs_of(
-    track: Floats, rate: float, up: int, rule: ContactRule = RULE
+    track: Floats, rate: float, up: int, rule: ContactRule = RULE, floor: float | None = None
 ) -> Iterator[tuple[int, int]]:
     """First frame and number of frames of every contact of one point.
 
     ``track`` has its positions in cm, float64 (n_frames, 3), NaN where unknown; ``up`` is the
-    column of the axis that points up, ``rate`` in frames a second.
+    column of the axis that points up, ``rate`` in frames a second, ``floor`` as of ``floor_of``,
+    None: that of this track.
     """
     known: Flags = np.asarray(np.isfinite(track).all(axis=1))
     if not known.any():
         return
     with np.errstate(all="ignore"):  # what overflows does not stand
         speed = speeds(track, rate, rule.window)
-        height = track[:, up] - np.percentile(track[known, up], rule.floor)
+        lowest = np.percentile(track[known, up], rule.floor) if floor is None else floor
+        height = track[:, up] - lowest
         surely = (speed < rule.speed) & (height < rule.height)
         perhaps = (speed < rule.wide_speed) & (height < rule.wide_height)
     for first, stop in _joined(perhaps, known, frames_in(rule.gap, rate)):

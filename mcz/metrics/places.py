@@ -120,7 +120,10 @@ class PlaceErrors:
         if self._contacts is None:
             rate = self._original.frame_rate or self._decoded.frame_rate
             up = self._a.up_axis or self._b.up_axis
-            self._contacts = self._feet[0].contacts(None if rate is None else float(rate), up)
+            timeline = self._original.timeline or self._decoded.timeline
+            runs = None if timeline is None else timeline.runs
+            known_rate = None if rate is None else float(rate)
+            self._contacts = self._feet[0].contacts(known_rate, up, runs=runs)
         return sliding(self._contacts, *self._feet)
 
     def by_joint(self, unit: Number) -> tuple[JointFigures, ...]:

@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 
 from mcz.angles import Unwrapper
-from mcz.brief import printable
-from mcz.errors import MczError, MotionError
+from mcz.brief import among, printable
+from mcz.errors import MczError, MotionError, OptionError
 from mcz.kinematics.chain import Floats
-from mcz.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion
+from mcz.motion import ANGLE_KINDS, POSITION_KINDS, Channel, Motion, Signal
 from mcz.pictures.chart_pages import Sheet
 from mcz.pictures.charts import Chart, legend, line, rows_of, styled
 from mcz.pictures.themes import Theme
 from mcz.poses import velocities
+from mcz.poses.moving import signal_of
 
 WIDTH, PANEL = 1000, 280  # pixels of a chart and the height of a panel
 LONGEST = 1024  # frames of a piece whose spectrum is taken
+MOST_SERIES = 8  # of a signal's channels, unless they are chosen
+MOST_RUNS = 400  # between gaps: of more one line is drawn
 LEAST = 8  # frames that have one
 DEEP = 1e-8  # of the greatest power: what is less is not shown
 LEAST_POWER = 1e-290
@@ -63,14 +66,22 @@ def joint_of(motion: Motion, joint: int | str | None) -> tuple[int, str, tuple[C
     return index, name, channels
 
 
-def times_of(motion: Motion, first: int) -> tuple[Floats, str]:
-    """When every row is, in seconds from the start of the clip, or in frames where that is unknown;
+def times_of(motion: Motion, first: int, signal: int = 0) -> tuple[Floats, str]:
+    """When every row of a signal is, in seconds, or in frames of the clip where that is unknown;
     what to write beside it."""
-    per_frame = motion.signals[0].samples_per_frame
-    frames = first + np.arange(motion.signals[0].n_rows) / per_frame
-    if motion.frame_rate is None:
-        return frames, "frame"
-    return frames / float(motion.frame_rate), "seconds"
+    chosen, timeline = motion.signals[signal], motion.timeline
+    if timeline is None:
+        return first + np.arange(chosen.n_rows) / chosen.samples_per_frame, "frame"
+    return timeline.samples(chosen.samples_per_frame), "seconds"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Whose numbers: a ``joint``, or ``channels`` of a ``signal``, by name; None: the first."""
+
+    joint: int | str | None = None
+    signal: int | str | None = None
+    channels: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,30 +94,101 @@ class _Series:
     numbers: Floats
 
 
-def channel_chart(motion: Motion, joint: int | str | None, first: int = 0) -> Chart:
-    """The channels of a joint; ``first`` is the frame of the clip where the motion begins."""
-    index, name, _ = joint_of(motion, joint)
-    values = np.asarray(motion.signals[0].masked(), np.float64)
-    times, when = times_of(motion, first)
-    series = _series_of(motion, index, times, values)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """The series of a chart, of which ``runs`` of rows have no gap between.
+
+    ``joint`` is theirs, None of a signal's channels. ``when`` names ``at``.
+    """
+
+    name: str
+    joint: int | None
+    series: list[_Series]
+    when: str
+    runs: list[tuple[int, int]]
+    per_frame: int
+    notes: tuple[str, ...] = ()
+
+
+def _shown(motion: Motion, wanted: Wanted, first: int) -> _Shown:
+    index = _signal_of(motion, wanted)
+    signal, timeline = motion.signals[index], motion.timeline
+    at, when = times_of(motion, first, index)
+    values = np.asarray(signal.masked(), np.float64)
+    runs = [(0, motion.n_frames)] if timeline is None else timeline.runs
+    joint: int | None = None
+    notes: tuple[str, ...] = ()
+    if signal.channels is None:
+        joint, name, channels = joint_of(motion, wanted.joint)
+        columns: Sequence[int] = motion.skeleton.columns(joint)
+    else:
+        name, every = signal.name, signal.channels
+        columns, notes = _columns(every, wanted.channels, name)
+        channels = tuple(every[k] for k in columns)
+    series = [
+        _Series(
+            channel.label or f"channel-{k}",
+            channel.unit or unit_name(motion, channel.kind),
+            at,
+            values[:, k],
+        )
+        for channel, k in zip(channels, columns, strict=True)
+    ]
+    per_frame = signal.samples_per_frame
+    rows = [(start * per_frame, stop * per_frame) for start, stop in runs]
+    return _Shown(name, joint, series, when, rows, per_frame, notes)
+
+
+def _signal_of(motion: Motion, wanted: Wanted) -> int:
+    """The index of a signal: that which has the channels, or is asked for; else the motion, or,
+    where that has no channels, the first other signal. Raises OptionError."""
+    if wanted.signal is None and wanted.channels is None:
+        is_empty = not motion.signals[0].n_channels and wanted.joint is None
+        return int(is_empty and len(motion.signals) > 1)
+    if wanted.joint is not None:
+        raise OptionError("a chart is of a joint or of channels of a signal, not of both")
+    if wanted.signal is not None:
+        return motion.signals.index(signal_of(motion, wanted.signal))
+    names = set(wanted.channels or ())
+    having = [k for k, signal in enumerate(motion.signals) if names <= {*_labels(signal.channels)}]
+    if not having:
+        known = [label for signal in motion.signals for label in _labels(signal.channels)]
+        shown = among(known, next(iter(names))) if known else "none"
+        raise OptionError(f"no signal has the channels {', '.join(sorted(names))}: {shown}")
+    return having[0]
+
+
+def _labels(channels: Sequence[Channel] | None) -> list[str]:
+    return [channel.label or f"channel-{k}" for k, channel in enumerate(channels or ())]
+
+
+def _columns(
+    channels: Sequence[Channel], wanted: Sequence[str] | None, signal: str
+) -> tuple[list[int], tuple[str, ...]]:
+    """The columns of these names, None: of the first; and what to say of the others."""
+    labels = _labels(channels)
+    if wanted is None:
+        more = f"{MOST_SERIES} of {len(labels)} channels; choose others by name (--channel)"
+        return list(range(len(labels)))[:MOST_SERIES], (more,) * (len(labels) > MOST_SERIES)
+    for name in wanted:
+        if name not in labels:
+            shown = among(labels, name)
+            raise OptionError(f"signal {signal!r} has no channel {name!r}, but {shown}")
+    return [labels.index(name) for name in wanted], ()
+
+
+def channel_chart(motion: Motion, wanted: Wanted, first: int = 0) -> Chart:
+    """Channels over time; ``first`` is the frame of the clip where the motion begins."""
+    shown = _shown(motion, wanted, first)
     rows: list[list[Any]] = [["channel", "in", "least", "mean", "greatest", "unknown"]]
-    for each in series:
+    for each in shown.series:
         known = each.numbers[np.isfinite(each.numbers)]
         figures = (known.min(), known.mean(), known.max()) if len(known) else (None,) * 3
-        rows.append([each.label, each.unit, *figures, len(values) - len(known)])
+        rows.append([each.label, each.unit, *figures, len(each.numbers) - len(known)])
     table = Sheet("Channels", rows_of(rows), "llrrrr")
-    units = list(dict.fromkeys(each.unit for each in series))
-    size = WIDTH, 60 + PANEL * len(units)
-    draw = partial(_draw_channels, series=series, when=when)
-    return Chart(f"{motion.name}: {name}, channels", size, draw, (table,))
-
-
-def _series_of(motion: Motion, joint: int, at: Floats, values: Floats) -> list[_Series]:
-    columns, channels = motion.skeleton.columns(joint), motion.skeleton.joints[joint].channels
-    return [
-        _Series(c.label, c.unit or unit_name(motion, c.kind), at, values[:, column])
-        for c, column in zip(channels, columns, strict=True)
-    ]
+    size = WIDTH, 60 + PANEL * len({each.unit for each in shown.series})
+    draw = partial(_draw_channels, shown=shown)
+    return Chart(f"{motion.name}: {shown.name}, channels", size, draw, (table,), shown.notes)
 
 
 def _panels(
@@ -122,40 +204,68 @@ def _panels(
         legend(axes, theme, loc="upper right", ncols=len(own))
 
 
-def _draw_channels(figure: Any, theme: Theme, *, series: Sequence[_Series], when: str) -> None:
-    for axes, own in _panels(figure, theme, series, when, "{unit}"):
+def _draw_channels(figure: Any, theme: Theme, *, shown: _Shown) -> None:
+    for axes, own in _panels(figure, theme, shown.series, shown.when, "{unit}"):
         for place, each in enumerate(own):
-            line(axes, each.at, each.numbers, _color(theme, place), each.label)
+            draw_runs(axes, (each.at, each.numbers), shown.runs, _color(theme, place), each.label)
+
+
+def draw_runs(
+    axes: Any,
+    points: tuple[Floats, Floats],
+    runs: Sequence[tuple[int, int]],
+    color: str,
+    label: str,
+    **options: Any,
+) -> None:
+    """A line through the points of each run of rows, none over the gaps between."""
+    for start, stop in runs if len(runs) <= MOST_RUNS else [(0, len(points[0]))]:
+        at, numbers = (each[start:stop] for each in points)
+        line(axes, at, numbers, color, label if start == runs[0][0] else "", **options)
 
 
 def _color(theme: Theme, place: int) -> str:
     return theme.series[place % len(theme.series)]
 
 
-def spectrum_chart(motion: Motion, joint: int | str | None) -> Chart:
-    """The power spectral densities of a joint's channels, and of its speed where it is known.
+def spectrum_chart(motion: Motion, wanted: Wanted) -> Chart:
+    """The power spectral densities of channels, and of a joint's speed where that is known.
 
-    By Welch's method; unknown values are bridged straight, whole turns taken out. Raises
-    MotionError where there are too few frames.
+    By Welch's method; unknown values are bridged straight, whole turns taken out. Where frames are
+    missing, those of the longest part between two gaps. Raises MotionError where there are too few
+    frames.
     """
-    index, name, _ = joint_of(motion, joint)
+    notes: tuple[str, ...] = ()
+    runs = [(0, motion.n_frames)] if motion.timeline is None else motion.timeline.runs
+    if len(runs) > 1:
+        start, stop = max(runs, key=lambda run: run[1] - run[0])
+        notes = (f"frames {start}:{stop} alone, the longest part without a gap",)
+        motion = motion.cut(start, stop)
     if motion.n_frames < LEAST:
         what = f"a spectrum of {motion.n_frames} frames"
         raise MotionError(f"{motion.name!r}: {what}; {LEAST} are needed")
-    rate = float(motion.frame_rate or 1) * motion.signals[0].samples_per_frame
-    values = Unwrapper(motion.skeleton)(np.asarray(motion.signals[0].masked(), np.float64))
-    given = [*_series_of(motion, index, np.empty(0), values), *_speed(motion, index)]
+    period = None if motion.timeline is None else motion.timeline.period
+    turned = motion
+    if motion.signals[0].channels is None and motion.skeleton.n_channels:
+        first = motion.signals[0]
+        values = Unwrapper(motion.skeleton)(np.asarray(first.masked(), np.float64))
+        mended = Signal(values, name=first.name, samples_per_frame=first.samples_per_frame)
+        turned = replace(motion, signals=(mended, *motion.signals[1:]), source=None)
+    shown = _shown(turned, wanted, 0)
+    rate = shown.per_frame / (period or 1.0)
+    given = [*shown.series, *([] if shown.joint is None else _speed(motion, shown.joint))]
     series = [found for each in given if (found := _spectrum(each, rate)) is not None]
     if not series:
-        raise MotionError(f"{motion.name!r}: joint {name!r} has no known value")
-    per = "cycles a frame" if motion.frame_rate is None else "Hz"
+        raise MotionError(f"{motion.name!r}: {shown.name!r} has no known value")
+    per = "cycles a frame" if period is None else "Hz"
     heads = [f"{what}, {per}" for what in ("strongest", "half below", "99 % below")]
     rows: list[list[Any]] = [["of", "in", *heads]]
     rows += [[each.label, each.unit, *_marks(each.at, each.numbers)] for each in series]
     table = Sheet("Frequencies", rows_of(rows), "llrrr", "Half, and 99 %, of the power is below.")
     size = WIDTH, 60 + PANEL * len({each.unit for each in series})
     draw = partial(_draw_spectra, series=series, per=per)
-    return Chart(f"{motion.name}: {name}, spectrum", size, draw, (table,))
+    title = f"{motion.name}: {shown.name}, spectrum"
+    return Chart(title, size, draw, (table,), (*shown.notes, *notes))
 
 
 def _spectrum(series: _Series, rate: float) -> _Series | None:
@@ -198,7 +308,7 @@ def _draw_spectra(figure: Any, theme: Theme, *, series: Sequence[_Series], per: 
 
 def _speed(motion: Motion, index: int) -> list[_Series]:
     """The speed of a joint's point, where there are kinematics and a rate."""
-    if motion.frame_rate is None or motion.signals[0].samples_per_frame > 1:
+    if motion.timeline is None or motion.signals[0].samples_per_frame > 1:
         return []
     try:
         with np.errstate(all="ignore"):

@@ -23,9 +23,10 @@ def is_cheap(clip: Any) -> bool:
 
 
 def motion_energy(moving: Moving, cells: int = CELLS) -> Floats | None:
-    """The mean speed of all points in ``cells`` equal parts of the time, float64 (n,).
+    """The mean speed of all points in ``cells`` equal parts of the frames, float64 (n,).
 
-    In length units a second, or a frame where the rate is unknown; NaN where no position is known;
+    In length units a second, or a frame where times are unknown; NaN where no position is known,
+    and no step is taken over a gap;
     of fewer frames there are fewer parts. Of a clip with more segments than parts one segment a
     part is decoded. None where there are no kinematics, or fewer than two frames.
     """
@@ -37,20 +38,26 @@ def motion_energy(moving: Moving, cells: int = CELLS) -> Floats | None:
     sampled = not isinstance(moving, Motion) and len(signal.rows) > cells
     try:
         with np.errstate(all="ignore"):
-            steps = _sampled(moving, edges) if sampled else _whole(moving, edges)
+            return _sampled(moving, edges) if sampled else _whole(moving, edges)
     except MczError:  # no kinematics, or damaged
         return None
-    return steps * float(moving.frame_rate or 1)
+
+
+def _seconds(moving: Moving) -> Floats:
+    """From each frame to the next, NaN across a gap; 1 where times are unknown."""
+    timeline = moving.timeline
+    return np.ones(moving.n_frames - 1) if timeline is None else timeline.steps
 
 
 def _whole(moving: Moving, edges: Any) -> Floats:
-    """The mean step of each part, from all of its frames."""
+    """The mean speed in each part, from all of its frames."""
     width = max(1, moving.skeleton.n_channels + 12 * moving.skeleton.n_joints)
     size = max(1, BLOCK // width)
     means = np.full(moving.n_frames - 1, np.nan)
     for start in range(0, len(means), size):
         stop = min(start + size, len(means))
         means[start:stop] = _steps(positions(moving, frames=(start, stop + 1)))
+    means /= _seconds(moving)
     known = np.isfinite(means)
     counts = np.add.reduceat(known, edges[:-1])
     sums: Floats = np.add.reduceat(np.where(known, means, 0.0), edges[:-1])
@@ -58,9 +65,11 @@ def _whole(moving: Moving, edges: Any) -> Floats:
 
 
 def _sampled(moving: Moving, edges: Any) -> Floats:
-    """The step in the middle of each part."""
-    middles = ((edges[:-1] + edges[1:]) // 2).tolist()
-    return np.array([_steps(positions(moving, frames=(at, at + 2)))[0] for at in middles])
+    """The speed in the middle of each part."""
+    middles = (edges[:-1] + edges[1:]) // 2
+    found = np.array([_steps(positions(moving, frames=(at, at + 2)))[0] for at in middles.tolist()])
+    speeds: Floats = found / _seconds(moving)[middles]
+    return speeds
 
 
 def _steps(places: Floats) -> Floats:

@@ -11,7 +11,7 @@ from typing import Any
 from mcz.errors import OptionError
 from mcz.motion import Motion
 from mcz.pictures.byte_charts import bytes_chart, rate_chart
-from mcz.pictures.channel_charts import channel_chart, spectrum_chart
+from mcz.pictures.channel_charts import Wanted, channel_chart, spectrum_chart
 from mcz.pictures.charts import Chart, save
 from mcz.pictures.error_charts import error_chart
 from mcz.pictures.rendering import Progress, checked_size
@@ -41,6 +41,8 @@ def plot(
     *,
     other: Moving | None = None,
     joint: int | str | None = None,
+    signal: int | str | None = None,
+    channels: str | Sequence[str] | None = None,
     frames: Frames = None,
     codecs: Sequence[str] = CODECS,
     theme: str = "light",
@@ -53,7 +55,8 @@ def plot(
 ) -> Plotted:
     """Draw numbers of a Motion or a Clip into ``path``: a .png, a .svg, or a .html with its tables.
 
-    ``what``: "channels" of ``joint`` over time (None: of the first that has any), their "spectrum",
+    ``what``: "channels" of ``joint`` over time (None: of the first that has any), or those of
+    another ``signal``, such as "analog", by their names in ``channels``; their "spectrum",
     the "error" of ``other`` against ``moving`` (the default where that is given), the "bytes" of a
     clip by joint and resolution, or "rate-distortion" at a few settings of lossy ``codecs``.
     ``frames`` (a, b) alone; ``rate``, ``unit`` and ``up`` are for motions that do not say theirs. A
@@ -65,12 +68,15 @@ def plot(
     if (other is None) == (what == "error"):
         text = "takes the two that are compared" if what == "error" else "is of one motion"
         raise OptionError(f"a plot of {what} {text}")
-    if joint is not None and what not in ("channels", "spectrum"):
-        raise OptionError(f"a plot of {what} is of all joints, not of {joint!r}")
+    names = (channels,) if isinstance(channels, str) else channels
+    wanted = Wanted(joint, signal, None if names is None else tuple(names))
+    if wanted != Wanted() and what not in ("channels", "spectrum"):
+        one = next(each for each in (joint, signal, names) if each is not None)
+        raise OptionError(f"a plot of {what} is of all joints, not of {one!r}")
     size = checked_size(size)
     cut = frame_range(moving, frames)
     facts = (rate, unit, up)
-    chart = _chart(moving, what, other, joint, cut, codecs, facts, progress or (lambda *_: None))
+    chart = _chart(moving, what, other, wanted, cut, codecs, facts, progress or (lambda *_: None))
     save(chart, path, theme=theme, size=size, force=force)
     tables = tuple(tuple(map(tuple, table.rows)) for table in chart.tables)
     return Plotted(str(path), what, chart.title, tables, chart.notes)
@@ -80,7 +86,7 @@ def _chart(
     moving: Moving,
     what: str,
     other: Moving | None,
-    joint: int | str | None,
+    wanted: Wanted,
     cut: tuple[int, int],
     codecs: Sequence[str],
     facts: Any,
@@ -97,8 +103,8 @@ def _chart(
     if what == "rate-distortion":
         return rate_chart(motion, codecs, progress)
     if what == "spectrum":
-        return spectrum_chart(motion, joint)
-    return channel_chart(motion, joint, cut[0])
+        return spectrum_chart(motion, wanted)
+    return channel_chart(motion, wanted, cut[0])
 
 
 def _motion(moving: Moving, cut: tuple[int, int] | None, facts: Any) -> Motion:
