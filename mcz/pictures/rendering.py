@@ -11,6 +11,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from mcz.clock import Timeline
 from mcz.errors import MotionError, OptionError
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.pictures.bodies import Ints
@@ -105,17 +106,19 @@ def render(
         notes.append(
             f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
         )
-    known_rate = _rate(moving, rate)
+    timeline = _timeline(moving, rate)
     first, stop = frame_range(moving, frames)
     if first == stop:
         raise MotionError(f"{moving.name!r} has no frame there: nothing to draw")
     told = progress or (lambda *_: None)
-    job = _Job(moving, path, look, known_rate, (unit, up), force, told, notes)
+    job = _Job(moving, path, look, timeline, (unit, up), force, told, notes)
     if suffix in FILMS:
         wanted = _fps(fps, FILMS[suffix])
-        if known_rate is None:
+        if timeline is None:
             notes.append(f"its frame rate is unknown: {USUAL_RATE} a second assumed (--rate)")
-        shown = drawn_frames(first, stop, known_rate or USUAL_RATE, wanted, speed)
+            shown = drawn_frames(first, stop, USUAL_RATE, wanted, speed)
+        else:
+            shown = first + _shown_at(timeline.cut(slice(first, stop)), wanted, speed)
         return job.film(shown, wanted, suffix)
     if sheet is not None:
         return job.sheet(np.linspace(first, stop - 1, sheet).round().astype(np.int64))
@@ -164,13 +167,24 @@ def drawn_frames(first: int, stop: int, rate: Fraction, fps: Fraction, speed: fl
     return np.minimum(found, stop - 1)
 
 
-def _rate(moving: Moving, rate: float | Fraction | None) -> Fraction | None:
-    """Frames a second, as the motion or else the caller says; None while unknown."""
-    if moving.frame_rate is not None or rate is None:
-        return moving.frame_rate
+def _shown_at(timeline: Timeline, fps: Fraction, speed: float) -> Ints:
+    """``drawn_frames`` by times: where frames are missing, the one before them stays."""
+    period = timeline.period or 1.0 / USUAL_RATE
+    places = np.rint((timeline.even - timeline.even[0]) / period)
+    rate, known = Fraction(1 / period).limit_denominator(2**20), timeline.rate
+    rate = known if known and abs(float(known) * period - 1) < 1e-6 else rate or Fraction(1, 2**20)
+    shown = drawn_frames(0, int(places[-1]) + 1, rate, fps, speed)
+    return np.asarray(np.searchsorted(places, shown, side="right") - 1, np.int64)
+
+
+def _timeline(moving: Moving, rate: float | Fraction | None) -> Timeline | None:
+    """When frames were, at the motion's or else the caller's rate; None while unknown."""
+    if moving.timeline is not None or rate is None:
+        return moving.timeline
     if not 0 < rate < np.inf:
         raise OptionError(f"frame rate {rate} is not positive")
-    return Fraction(rate).limit_denominator(2**20) or Fraction(1, 2**20)
+    known = Fraction(rate).limit_denominator(2**20) or Fraction(1, 2**20)
+    return Timeline(np.arange(moving.n_frames) / float(known), known)
 
 
 def _fps(fps: float | Fraction | None, usual: Fraction) -> Fraction:
@@ -188,7 +202,7 @@ class _Job:
     moving: Moving
     path: str | os.PathLike[str]
     look: Look
-    rate: Fraction | None  # None while unknown: no time is shown
+    timeline: Timeline | None  # None while unknown: no time is shown
     facts: tuple[str | None, str | None]  # unit and up axis of a motion without
     force: bool
     progress: Progress
@@ -249,9 +263,9 @@ class _Job:
         return stage_of(track, self.look.theme, self.look.view, port, follow, rate, around)
 
     def _when(self, frame: int) -> str:
-        if self.rate is None:
+        if self.timeline is None:
             return f"frame {frame}"
-        return f"frame {frame}  {float(frame / self.rate):.2f} s"
+        return f"frame {frame}  {self.timeline.even[frame]:.2f} s"
 
     def _written(self, canvas: Canvas) -> int:
         """Write a still; its bytes."""
