@@ -17,7 +17,7 @@ LABEL = 4  # bytes
 class Event:
     """Something that happened during a recording.
 
-    ``time`` is in seconds, as the file says it: by the convention of C3D frame number 1 is at 0.
+    ``time`` is in seconds on the clock of the frames, ``mcz.times``: frame number 1 is at 0.
     ``context`` is the side or sort ("Left", "Right", "General"), ``subject`` who did it,
     ``description`` what the label means; each is "" where the file does not say.
     """
