@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import pytest
 import mcz
 from mcz.clock import Timeline
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from tests.formats.c3d_files import Made
 
 MARKER = (Joint("a", channels=tuple(map(Channel, ("tx", "ty", "tz")))),)
 
@@ -294,3 +295,174 @@ def test_windows_do_not_span_gaps(tmp_path: Path) -> None:
             resampled[3]["positions"][:, 0, 0], 3.035 + np.arange(9) / 200, 1e-5
         )
         np.testing.assert_allclose(resampled[3]["velocities"][:, 0, 0], 1, 1e-4)
+
+
+# What every source format says of time, and what every target makes of it.
+
+
+@dataclass(frozen=True)
+class Case:
+    """A file with a first frame and a gap, as its format can; ``times`` are what it states."""
+
+    name: str
+    data: bytes
+    times: list[float]
+    events: tuple[float, ...] = ()
+    samples: int = 0  # of the signal ``analog``, a frame
+    rate: int | None = None  # that the file does not say
+
+
+FIRST = [*range(124, 134), *range(160, 165)]  # frame numbers
+STATED = [(number - 1) / 100 for number in FIRST]
+
+
+def c3d_case() -> Case:
+    made = Made(np.zeros((15, 1, 4), np.uint32), np.ones((15, 4, 1), np.uint32), first=124)
+    seconds = made.real(1.30)[2]
+    made.parameters["EVENT"] = {
+        "USED": made.number(1),
+        "TIMES": (4, (2, 1), made.real(0.0)[2] + seconds),
+        "LABELS": made.texts([b"Foot Strike"]),
+    }
+    made.parameters["ANALOG"] = {"RATE": made.real(400.0)}
+    times = [(123 + k) / 100 for k in range(15)]
+    return Case("a.c3d", made.build(), times, (1.30,), 4)
+
+
+def trc_case() -> Case:
+    rows = "".join(f"{n}\t{(n - 1) / 100:.2f}\t{n}.0\t2.0\t3.0\n" for n in FIRST)
+    return Case("a.trc", TRC.format(rate=100, n=15, rows=rows).encode(), STATED)
+
+
+def storage_case(suffix: str) -> Case:
+    rows = "".join(f"{t:.3f}\t{k}.5\n" for k, t in enumerate(STATED))
+    head = "a\nversion=1\nnRows=15\nnColumns=2\ninDegrees=no\nendheader\ntime\tpelvis_tilt\n"
+    return Case(f"a.{suffix}", (head + rows).encode(), STATED)
+
+
+def motive_case() -> Case:
+    head = (
+        "Format Version,1.23,Take Name,a,Capture Frame Rate,100.000000,Export Frame Rate,100.000000"
+        ",Total Exported Frames,15,Rotation Type,Quaternion,Length Units,Meters"
+        ",Coordinate Space,Global\n\n,Type,Marker,Marker,Marker\n,Name,a,a,a\n,ID,1,1,1\n"
+        ",,Position,Position,Position\nFrame,Time (Seconds),X,Y,Z\n"
+    )
+    rows = "".join(f"{n},{n / 100:.6f},{n}.000000,1.000000,2.000000\n" for n in FIRST)
+    return Case("a.csv", (head + rows).encode(), [n / 100 for n in FIRST])
+
+
+def vicon_case() -> Case:
+    rows = "".join(f"{n},0,{n}.5,0.5,1.5\n" for n in FIRST)
+    head = "Trajectories\n100\n,,s:A,,\nFrame,Sub Frame,X,Y,Z\n,,mm,mm,mm\n"
+    return Case("a.csv", (head + rows).encode(), STATED)
+
+
+def csv_case(unit: str, per_second: int) -> Case:
+    digits = 2 if per_second == 1 else 0
+    rows = "".join(f"{n},{(n - 1) / 100 * per_second:.{digits}f},{n}.5\n" for n in FIRST)
+    return Case("a.csv", f"frame,time ({unit}),a\n{rows}".encode(), STATED)
+
+
+def npz_case() -> Case:
+    out = io.BytesIO()
+    np.savez(out, positions=np.zeros((15, 2, 3)), time=np.array(STATED))
+    return Case("a.npz", out.getvalue(), STATED)
+
+
+def bvh_case() -> Case:
+    head = (
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
+        "End Site\n{\nOFFSET 0 1 0\n}\n}\nMOTION\nFrames: 15\nFrame Time: 0.01\n"
+    )
+    data = head + "".join(f"{k}.0 0.0 0.0\n" for k in range(15))
+    return Case("a.bvh", data.encode(), [k / 100 for k in range(15)])
+
+
+def amc_case() -> Case:
+    rows = "".join(f"{n}\nroot {n}.5 0 0 0 0 0\n" for n in FIRST)
+    return Case("a.amc", f":FULLY-SPECIFIED\n:DEGREES\n{rows}".encode(), STATED, rate=100)
+
+
+CASES = {
+    "c3d": c3d_case(),
+    "trc": trc_case(),
+    "mot": storage_case("mot"),
+    "sto": storage_case("sto"),
+    "motive": motive_case(),
+    "vicon": vicon_case(),
+    "csv s": csv_case("s", 1),
+    "csv ms": csv_case("ms", 1000),
+    "csv us": csv_case("us", 10**6),
+    "csv ns": csv_case("ns", 10**9),
+    "npz": npz_case(),
+    "bvh": bvh_case(),
+    "amc": amc_case(),
+}
+
+
+def in_pandas(motion: Motion, folder: Path) -> object:
+    return mcz.to_pandas(motion, "channels").index.to_numpy()
+
+
+def in_xarray(motion: Motion, folder: Path) -> object:
+    return mcz.to_xarray(motion).time.values
+
+
+def in_npz(motion: Motion, folder: Path) -> object:
+    mcz.to_npz(motion, folder / "out.npz")
+    return np.load(folder / "out.npz")["times"]
+
+
+def in_mcz(motion: Motion, folder: Path) -> object:
+    return stored(motion).times
+
+
+def in_csv(motion: Motion, folder: Path) -> object:
+    mcz.write(motion, folder / "out.mcz")
+    mcz.export(folder / "out.mcz", folder / "out", "csv")
+    (path,) = (folder / "out").iterdir()
+    return mcz.to_pandas(mcz.read(path), "channels").index.to_numpy()
+
+
+TARGETS = {"pandas": in_pandas, "xarray": in_xarray, "npz": in_npz, "mcz": in_mcz, "csv": in_csv}
+
+
+def read_case(case: Case, folder: Path) -> Motion:
+    path = folder / case.name
+    path.write_bytes(case.data)
+    return mcz.read(path, skeleton="none" if path.suffix == ".amc" else None, rate=case.rate)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("source", CASES)
+def test_every_target_has_the_times_of_every_source(
+    tmp_path: Path, source: str, target: str
+) -> None:
+    case = CASES[source]
+    motion = read_case(case, tmp_path)
+    near(motion.times, case.times)
+    assert motion.frame_rate == 100
+    near(TARGETS[target](motion, tmp_path), case.times)
+
+
+@pytest.mark.parametrize("source", CASES)
+def test_every_source_keeps_its_times_in_a_file_and_in_parts(tmp_path: Path, source: str) -> None:
+    case = CASES[source]
+    motion = read_case(case, tmp_path)
+    mcz.write(motion, tmp_path / "a.mcz")
+    mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(3, 13))
+    with mcz.open(tmp_path / "a.mcz") as file, mcz.open(tmp_path / "b.mcz") as part:
+        clip, cut = file.only_clip(), part.only_clip()
+        near(clip.times, case.times)
+        for found in (cut, cut.motion(), motion[3:13], clip.motion((3, 13))):
+            near(found.times, case.times[3:13])
+        near(motion.without_source().times, case.times)
+        near(clip.to_pandas("channels").index, case.times)
+        if case.events:
+            assert clip.recording is not None
+            near([event.time for event in clip.recording.events], np.float32(case.events))
+        if case.samples:
+            wanted = np.add.outer(case.times, np.arange(case.samples) / (100 * case.samples))
+            near(mcz.times(clip, signal="analog"), wanted.ravel())
+            near(clip.to_pandas("analog").index, wanted.ravel())
+            near(clip.to_xarray().time_analog, wanted.ravel())

@@ -44,7 +44,7 @@ def read_times(
     tokens = scan(data, rows.start[present, column], rows.stop[present, column])
     whole = len(tokens) == rows.n_rows and not tokens.bad().any()
     numbers = rows.numbers if rows.numbers is not None else np.arange(1, rows.n_rows + 1)
-    clock = find_clock(tokens, numbers, [rate * unit for rate in stated]) if whole else None
+    clock = find_clock(tokens, numbers, stated, unit) if whole else None
     used = any(
         run.column <= column < run.column + run.n_columns
         for pattern in rows.patterns
@@ -57,11 +57,10 @@ def read_times(
     rate, exact = None, True
     if whole:
         digits = half_digits_of(data, rows.stop[present, column], tokens)
-        in_unit = [rate * unit for rate in stated]
-        rate, exact = rate_of_times(tokens.values(), digits, in_unit, rows.numbers)
-    if rate is not None:
-        rate /= unit
-    elif stated and (rows.n_rows < 2 or not len(tokens)):
+        seconds = tokens.values() * float(unit)
+        in_seconds = [digit * float(unit) for digit in digits]
+        rate, exact = rate_of_times(seconds, in_seconds, stated, rows.numbers)
+    if rate is None and stated and (rows.n_rows < 2 or not len(tokens)):
         rate = stated[0]
     return Times(clock, signals, rate, exact)
 

@@ -32,10 +32,13 @@ def stated_rate(text: str) -> Fraction | None:
     return rate if max(rate.numerator, rate.denominator) <= MAX_TERM else None
 
 
-def find_clock(tokens: Tokens, numbers: Ints, stated: Sequence[Fraction]) -> Clock | None:
+def find_clock(
+    tokens: Tokens, numbers: Ints, stated: Sequence[Fraction], seconds: Fraction = Fraction(1)
+) -> Clock | None:
     """How the times follow from the frame numbers, None where they do not.
 
     ``stated``: rates that the file states. Tried are these and round ones near the mean.
+    ``seconds``: what a unit of the times is.
     """
     if len(tokens) < 2:
         return None
@@ -49,10 +52,10 @@ def find_clock(tokens: Tokens, numbers: Ints, stated: Sequence[Fraction]) -> Clo
     distance = int(numbers[-1] - numbers[0])
     if distance <= 0 or ordinals[-1] <= ordinals[0]:
         return None
-    unit = 10**grid.digits
+    unit = 10**grid.digits / seconds
     mean = Fraction(distance * unit, int(ordinals[-1] - ordinals[0]))
     for rate in dict.fromkeys((*stated, *_round(mean))):
-        step = unit / rate
+        step = unit / rate  # in units of the last digit
         offset = _offset(ordinals, numbers, step.numerator, step.denominator)
         if offset is not None:
             return Clock(grid, step.numerator, step.denominator, offset)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clock import numbers_or_rows
+from mcz.clock import is_time, numbers_or_rows
 from mcz.errors import MotionError, OptionError
 from mcz.motion import Motion, Signal
 from mcz.poses import point_names, positions, rotations
@@ -70,14 +70,18 @@ def to_xarray(
     except MotionError:
         variables.pop("positions", None)
     for signal in motion.signals[1:]:
-        _add_signal(motion, signal, variables, coordinates)
+        if not is_time(signal):  # that is the coordinate
+            _add_signal(motion, signal, variables, coordinates)
     return xarray.Dataset(variables, coordinates, _facts(motion))
 
 
 def _add_signal(
     motion: Motion, signal: Signal, variables: dict[str, Any], coordinates: dict[str, Any]
 ) -> None:
-    name, axis, channel = signal.name, f"time_{signal.name}", f"channel_{signal.name}"
+    name = signal.name
+    while {name, f"time_{name}", f"channel_{name}"} & {*variables, *coordinates}:
+        name = f"signal_{name}"  # of another, or one of ours
+    axis, channel = f"time_{name}", f"channel_{name}"
     variables[name] = ((axis, channel), signal.masked(), {})
     coordinates[axis] = (axis, *_times(motion, signal))
     coordinates[channel] = channel_names(motion.skeleton, signal.channels)
