@@ -53,6 +53,8 @@ def check_tables(motion: Motion) -> None:
 
     table = table_of(motion)
     found = pandas.read_csv(io.BytesIO(EXPORTS["csv"](table)), index_col="frame")
+    if motion.timeline is not None:
+        np.testing.assert_allclose(found.pop("time"), motion.times, rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.to_numpy(np.float64), motion.values, rtol=3e-16)
     assert len(found.columns) == len(table.names)
     np.testing.assert_array_equal(found.index, table.frame_numbers)

@@ -69,17 +69,35 @@ def test_other_signals_as_csv(folder: Path, capsys: pytest.CaptureFixture[str]) 
     to = ("--to", "csv", "--force", "-o", folder / "x.csv")
     assert call(capsys, "decode", folder / "gait.mcz", "--signal", "analog", *to)[0] == 0
     head, rows = rows_of(folder / "x.csv")
-    assert head == ["frame", "Fx [N]", r"EMG\x1b[2J"]  # escaped
+    assert head == ["frame", "time", "Fx [N]", r"EMG\x1b[2J"]  # escaped
     assert rows[:, 0].tolist() == [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6]
-    assert np.array_equal(rows[:, 1:], (analog.stored - [1000, 0]) * [0.5, 2.0])
+    np.testing.assert_allclose(rows[:, 1], mcz.times(motion, signal="analog"), atol=1e-9)
+    assert np.array_equal(rows[:, 2:], (analog.stored - [1000, 0]) * [0.5, 2.0])
     part = ("--signal", "analog", "--stored", "--frames", "2:4")
     assert call(capsys, "decode", folder / "gait.mcz", *part, *to)[0] == 0
     head, rows = rows_of(folder / "x.csv")
-    assert head[1] == "Fx" and np.array_equal(rows[:, 1:], analog.stored[4:8])
+    assert head[2] == "Fx" and np.array_equal(rows[:, 2:], analog.stored[4:8])
     assert call(capsys, "decode", folder / "gait.mcz", "--signal", "outputs", *to)[0] == 0
     head, rows = rows_of(folder / "x.csv")
-    assert head == ["frame", "p1 x [deg]", "p1 y [deg]", "p1 z [deg]"]
-    assert np.array_equal(rows[:, 1:], outputs.masked(), equal_nan=True)
+    assert head == ["frame", "time", "p1 x [deg]", "p1 y [deg]", "p1 z [deg]"]
+    assert np.array_equal(rows[:, 2:], outputs.masked(), equal_nan=True)
+
+
+def test_events_as_tables(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    clip = folder / "gait.mcz"
+    with mcz.open(clip) as file:
+        found = file.only_clip().recording
+    assert found is not None
+    to = ("--signal", "events", "--force", "-o")
+    assert call(capsys, "decode", clip, *to, folder / "x.csv")[0] == 0
+    head, *rows = csv.reader((folder / "x.csv").read_text().splitlines())
+    assert head == ["time", "label", "context", "subject", "description"]
+    assert [float(row[0]) for row in rows] == [event.time for event in found.events]
+    assert call(capsys, "decode", clip, *to, folder / "x.npz")[0] == 0
+    with np.load(folder / "x.npz") as arrays:
+        assert arrays["times"].tolist() == [event.time for event in found.events]
+        assert arrays["label"].tolist() == [event.label for event in found.events]
+    assert call(capsys, "decode", clip, "--stored", *to, folder / "x.csv")[0] == 2
 
 
 def test_other_signals_as_npz(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

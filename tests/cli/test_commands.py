@@ -199,14 +199,16 @@ def test_csv(walk: Path, call: Call) -> None:
     rows = list(csv.reader(out.read_text("utf-8").splitlines()))
     assert rows[0] == [
         "frame",
+        "time",
         *(f"Head.r{a}" for a in "zyx"),
         *(f"Hips.t{a}" for a in "xyz"),
         *(f"Hips.r{a}" for a in "zyx"),
     ]
     assert [row[0] for row in rows[1:]] == ["11", "12", "13"]
+    assert [float(row[1]) for row in rows[1:]] == pytest.approx([10 / 120, 11 / 120, 0.1])
     with mcz.open(walk) as file:
         expected = file.clips["walk"].read(frames=(10, 13), joints=["Head", "Hips"])
-    assert (np.array([[float(c) for c in row[1:]] for row in rows[1:]]) == expected).all()
+    assert (np.array([[float(c) for c in row[2:]] for row in rows[1:]]) == expected).all()
 
 
 def test_npz(walk: Path, call: Call) -> None:
@@ -263,7 +265,7 @@ def test_damage_and_salvage(folder: Path, call: Call) -> None:
     assert result.code == 4
     assert "salvage" in result.err
     rows = list(csv.reader(walk.with_name("x.csv").read_text().splitlines()))
-    assert 0 < sum(row[1] == "" for row in rows[1:]) < 240
+    assert 0 < sum(row[2] == "" for row in rows[1:]) < 240
 
 
 def test_info(walk: Path, call: Call) -> None:
