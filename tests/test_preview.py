@@ -217,7 +217,8 @@ def test_command_numbers(walk: Path, tmp_path: Path) -> None:
     assert run("decode", walk, "--preview", "--to", "csv", "--joints", joint) == 0
     rows = list(csv.reader(io.StringIO((tmp_path / "walk.csv").read_text("utf-8"))))
     assert [int(row[0]) for row in rows[1:]] == (frames + 1).tolist()
-    assert [[float(cell) for cell in row[1:]] for row in rows[1:]] == values.tolist()
+    np.testing.assert_allclose([float(row[1]) for row in rows[1:]], frames / 120, atol=1e-9)
+    assert [[float(cell) for cell in row[2:]] for row in rows[1:]] == values.tolist()
     assert run("decode", walk, "--preview", "--to", "npz", "-o", tmp_path / "a.npz") == 0
     with np.load(tmp_path / "a.npz") as held:
         assert held["frame_numbers"].tolist() == (frames + 1).tolist()
