@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import accumulate
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz import brief
+from mcz.checks import (
+    DATA,
+    INTEGER,
+    NUMBER,
+    TEXT,
+    TRUTH,
+    VECTOR,
+    check_fields,
+    of_type,
+    optional,
+    several,
+)
 from mcz.errors import MotionError
 from mcz.source import Source
 
@@ -48,12 +57,27 @@ class Channel:
     unit: str = ""
 
     def __post_init__(self) -> None:
+        check_fields(self, CHANNEL)
         if self.kind and self.kind not in CHANNEL_KINDS:
             raise MotionError(f"channel kind {self.kind!r} is not in the registry; use kind ''")
 
     @property
     def label(self) -> str:
         return self.name or self.kind
+
+
+CHANNEL = {"kind": TEXT, "name": TEXT, "unit": TEXT}
+CHANNELS = several(of_type(Channel, "a Channel"), "Channels")
+JOINT = {
+    "name": TEXT,
+    "parent": INTEGER,
+    "offset": VECTOR,
+    "tails": several(VECTOR, "vectors of three finite numbers"),
+    "axis": VECTOR,
+    "axis_order": TEXT,
+    "channels": CHANNELS,
+    "adds_to_offset": TRUTH,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,17 +101,21 @@ class Joint:
     adds_to_offset: bool = True
 
     def __post_init__(self) -> None:
-        vectors = (self.offset, self.axis, *self.tails)
-        if not all(map(_is_vector, vectors)):
-            raise MotionError(f"joint {self.name!r}: not three finite numbers among {vectors}")
+        check_fields(self, JOINT)
         if sorted(self.axis_order) != ["X", "Y", "Z"]:
             raise MotionError(f"joint {self.name!r}: axis order {self.axis_order!r}")
 
 
-def _is_vector(vector: Any) -> bool:
-    with suppress(TypeError):
-        return len(vector) == 3 and all(map(math.isfinite, vector))  # SKEL-08
-    return False
+SKELETON = {
+    "joints": several(of_type(Joint, "a joint"), "joints"),
+    "name": TEXT,
+    "unit_cm": optional(NUMBER),
+    "angle_unit": TEXT,
+    "up_axis": TEXT,
+    "intrinsic": TRUTH,
+    "base": optional(DATA),
+    "source": optional(of_type(Source, "a Source")),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +141,13 @@ class Skeleton:
     __repr__ = brief.skeleton_text
 
     def __post_init__(self) -> None:
+        check_fields(self, SKELETON)
         for index, joint in enumerate(self.joints):
             if not -1 <= joint.parent < index:  # SKEL-05
                 raise MotionError(
                     f"joint {index} ({joint.name!r}): parent {joint.parent} is not before it"
                 )
-        if self.unit_cm is not None and not 0 < self.unit_cm < math.inf:  # SKEL-01
+        if self.unit_cm is not None and self.unit_cm <= 0:  # SKEL-01
             raise MotionError(f"unit of {self.unit_cm} cm")
         if self.angle_unit not in ("deg", "rad", ""):
             raise MotionError(f"angle unit {self.angle_unit!r}")

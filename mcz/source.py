@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz import brief
+from mcz.checks import DATA, HASH, INTEGER, TEXT, Rule, check_fields
+from mcz.errors import MotionError
 
 
 class FrameNotes(Protocol):
@@ -34,6 +36,18 @@ class SourceClock(Protocol):
         """The most seconds by which a printed time is off."""
 
 
+SOURCE = {
+    "format": TEXT,
+    "template": DATA,
+    "detail": DATA,
+    "notes": Rule("notes of frames or None", lambda notes: notes and notes.cut and notes),
+    "path": TEXT,
+    "size": INTEGER,
+    "sha256": HASH,
+    "clock": Rule("a clock or None", lambda clock: clock and clock.times and clock),
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
     """What is needed, beside the values, to restore a source file byte for byte.
@@ -53,6 +67,11 @@ class Source:
     clock: SourceClock | None = field(default=None, repr=False)
 
     __repr__ = brief.source_text
+
+    def __post_init__(self) -> None:
+        check_fields(self, SOURCE)
+        if self.size < 0:
+            raise MotionError(f"source: size is {self.size}")
 
     def of_no_file(self) -> Source:
         """The same for other values or frames than its file had: without size and hash."""

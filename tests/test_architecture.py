@@ -19,7 +19,17 @@ PACKAGE = Path(mcz.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 # What a part may import; a part is the first name after ``mcz.``. Each may import itself.
-GROUND = {"arguments", "brief", "displays", "errors", "indexing", "schema", "numbers", "threads"}
+GROUND = {
+    "arguments",
+    "brief",
+    "checks",
+    "displays",
+    "errors",
+    "indexing",
+    "schema",
+    "numbers",
+    "threads",
+}
 MODEL = GROUND | {"clock", "motion", "skeleton", "source"}
 # Where motion, codec and container meet: what each of the doors below needs of the layers.
 JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
@@ -31,13 +41,15 @@ ALLOWED = {
     "displays": set(),
     "errors": set(),
     "arguments": {"errors"},
+    "checks": {"errors"},
     "indexing": {"errors"},
     "schema": {"errors"},
-    "numbers": {"brief", "errors", "schema"},
+    "numbers": {"brief", "checks", "errors", "schema"},
     "source": GROUND,
     "skeleton": GROUND | {"source"},
+    "signal": GROUND | {"skeleton", "source"},
     "clock": GROUND | {"skeleton", "source"},
-    "motion": GROUND | {"clock", "skeleton", "source"},
+    "motion": GROUND | {"clock", "signal", "skeleton", "source"},
     "kinematics": MODEL,
     "angles": MODEL | {"whole_turns"},
     "whole_turns": MODEL,

@@ -257,7 +257,10 @@ def public_things(folder: Path) -> Iterator[object]:
     n_channels = skeleton.n_channels
     exceptions = Exceptions(np.arange(600), np.zeros(600, np.int64), (b"1e5" * 30,) * 600)
     signal = mcz.Signal(
-        np.zeros((600, n_channels)), mask=np.zeros((600, n_channels), bool), exceptions=exceptions
+        np.zeros((600, n_channels)),
+        (Grid(GridKind.FIXED, 4),) * n_channels,
+        mask=np.zeros((600, n_channels), bool),
+        exceptions=exceptions,
     )
     source = mcz.Source("bvh", b"t" * 9000, b"d" * 9000, path=long)
     big = mcz.Motion(skeleton, (signal,) * 3, name=long, metadata={"x-a": long}, source=source)

@@ -171,6 +171,81 @@ def test_what_cannot_be_coded_anew() -> None:
     assert copied.getvalue() == plain.getvalue()  # nothing had to be coded anew
 
 
+def stored(data: bytes) -> list[int]:
+    """The frames that each signal of a clip stores."""
+    return [sum(row.header.n_frames for row in info.rows) for info in clip(data).signals]
+
+
+@pytest.mark.parametrize("codec", [*CODECS, "mrdwt", "lossless", "fast", "best", "raw"])
+@pytest.mark.parametrize("frames", [(5, 30), (0, 7), (39, 40), (12, None), (8, 8)])
+def test_frames_that_are_cut_off_are_gone(codec: str, frames: tuple[int, int | None]) -> None:
+    whole, out, kept = io.BytesIO(), io.BytesIO(), io.BytesIO()
+    mcz.write(motion(), whole, codec=codec, **CODECS.get(codec, {}))
+    data = whole.getvalue()
+    found = mcz.extract(data, out, frames=frames, recode=True)
+    start, stop = frames[0], 40 if frames[1] is None else frames[1]
+    before, after = clip(data), clip(out.getvalue())
+    assert (after.n_frames, after.codec) == (stop - start, codec)
+    assert stored(out.getvalue()) == [stop - start]
+    assert found.clips[0].stored_frames == stop - start
+    off = np.abs(after.values[:] - before.values[start:stop])
+    assert off.max(initial=0.0) <= (0.0 if by_name(codec).lossless else 1.0)
+    assert after.frame_numbers.tolist() == before.frame_numbers[start:stop].tolist()
+    assert mcz.verify(out.getvalue()) == []
+    if found.clips[0].recoded and after.quality:
+        assert after.quality["cut-recoded"] == "yes"
+        assert after.quality["cut-frames"] == f"{start}:{stop}"
+    # What an earlier cut left stored goes, too.
+    mcz.extract(data, kept, frames=frames)
+    again = io.BytesIO()
+    mcz.extract(kept.getvalue(), again, clip="one", recode=True)
+    assert stored(again.getvalue()) == [stop - start]
+    assert mcz.verify(again.getvalue()) == []
+
+
+def test_what_is_cut_off_is_not_in_the_bytes() -> None:
+    """Two clips that differ in the frames alone that are cut off make the same file."""
+    values = motion().values.copy()
+    values[20:] += 7
+    found = []
+    for one in (motion(), motion().with_values(values)):
+        whole, out = io.BytesIO(), io.BytesIO()
+        mcz.write(one, whole, codec="raw")
+        mcz.extract(whole.getvalue(), out, frames=(0, 20), recode=True)
+        found.append(out.getvalue())
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("suffix", ["amc", "bvh", "c3d"])
+@pytest.mark.parametrize("codec", ["lossless", "lossy"])
+def test_the_source_of_frames_that_are_coded_anew_follows(
+    samples: Path, tmp_path: Path, suffix: str, codec: str
+) -> None:
+    whole, part = tmp_path / "a.mcz", tmp_path / "b.mcz"
+    params = {"step": 0.05} if codec == "lossy" else {}
+    mcz.encode(samples / f"walk.{suffix}", whole, codec=codec, params=params)
+    mcz.extract(whole, part, frames=(37, 101), recode=True)
+    with mcz.open(whole) as old, mcz.open(part) as new:
+        held = new.clips["walk"]
+        assert held.source is not None and held.n_frames == 64
+        (tmp_path / f"b.{suffix}").write_bytes(held.source_bytes())
+        if codec == "lossless":
+            assert held.source_bytes() == old.clips["walk"].source_bytes((37, 101))
+    skeleton = {"skeleton": samples / "walk.asf"} if suffix == "amc" else {}
+    assert mcz.read(tmp_path / f"b.{suffix}", **skeleton).n_frames == 64
+    assert mcz.verify(part) == []
+
+
+def test_exact_joints_stay_exact_where_frames_are_cut() -> None:
+    out, part = io.BytesIO(), io.BytesIO()
+    mcz.write(motion(), out, codec="posewave", step=0.01, lossless="knee")
+    mcz.extract(out.getvalue(), part, frames=(5, 30), recode=True)
+    knee = columns(clip(out.getvalue()), "knee")
+    wanted = clip(out.getvalue()).values[5:30][:, knee]
+    assert clip(part.getvalue()).values[:][:, knee].tobytes() == wanted.tobytes()
+    assert stored(part.getvalue()) == [25]
+
+
 def test_settings_are_read_as_they_are_recorded() -> None:
     given = {"contacts": "knee:5+10,hips", "quality": "knee=0.5mm", "step": 0.01}
     out = io.BytesIO()

@@ -18,8 +18,8 @@ import mcz
 import mcz.formats.restore as restore_module
 from mcz.cli.common import run
 from mcz.cli.figures import figure_lines
-from mcz.cli.info import _tree
 from mcz.cli.main import cli
+from mcz.cli.skeleton_lines import _tree
 from mcz.codecs import CODECS, by_name
 from mcz.container import payloads, strict
 from mcz.container.chunks import build_header

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import numbers_or_rows
 from mcz.errors import MotionError
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.points import listed_points, point_set
@@ -37,8 +38,8 @@ def to_rerun(moving: Moving, recording: Any = None, *, entity: str | None = None
     ``mcz.point_names``, ``bones/left``, ``right`` and ``middle`` as lines, and every plain scalar
     and every channel of another signal as a time series ``SIGNAL/NAME``; events as texts. Lengths
     are in meters where the unit is known. The timeline ``frame`` has the source's frame numbers,
-    ``time`` the seconds since frame number 1, where the rate is known. What is missing is absent.
-    Positions are binary32, scalars binary64.
+    ``time`` the times of ``mcz.times``, where they are known. What is missing is absent. Positions
+    are binary32, scalars binary64.
 
     Without ``recording`` a new one is made, which holds all until it has a sink; with one that has
     (``save``, ``spawn``) memory is bounded. Returns the recording. Raises MotionError where there
@@ -75,10 +76,11 @@ class _Log:
     def __init__(self, rerun: Any, recording: Any, moving: Moving, entity: str) -> None:
         self.rerun, self.recording, self.moving = rerun, recording, moving
         self.parts = [part for part in entity.split("/") if part] or ["motion"]
-        self.rate = moving.frame_rate
+        self.timeline = moving.timeline
         self.figure = _figure_of(moving)
         self.series = list(_series_of(moving))
         self.numbers = _numbers(moving)
+        self.seconds: dict[int, Floats] = {}  # of samples, by how many a frame has
         if self.figure is None and not self.series:
             raise MotionError(f"{moving.name!r}: neither positions nor scalars, nothing to log")
 
@@ -93,11 +95,14 @@ class _Log:
     def path(self, *parts: str) -> Any:
         return self.rerun.new_entity_path([*self.parts, *parts])
 
-    def _send(self, path: Any, numbers: Floats, columns: Any) -> None:
-        """Columns at frames of these numbers, fractions of which are samples within a frame."""
-        times = [self.rerun.TimeColumn("frame", sequence=np.floor(numbers).astype(np.int64))]
-        if self.rate is not None:
-            seconds = (numbers - 1) / float(self.rate)
+    def _send(self, path: Any, start: int, stop: int, per_frame: int, columns: Any) -> None:
+        """Columns of ``per_frame`` rows each at frames start <= f < stop."""
+        numbers = np.repeat(self.numbers[start:stop], per_frame)
+        times = [self.rerun.TimeColumn("frame", sequence=numbers)]
+        if self.timeline is not None:
+            if per_frame not in self.seconds:
+                self.seconds[per_frame] = self.timeline.samples(per_frame)
+            seconds = self.seconds[per_frame][start * per_frame : stop * per_frame]
             times.append(self.rerun.TimeColumn("time", duration=seconds))
         self.rerun.send_columns(str(path), times, columns, recording=self.recording)
 
@@ -135,32 +140,31 @@ class _Log:
         self.rerun.send_columns(str(self.path("events")), times, columns, recording=self.recording)
 
     def _frames(self, start: int, stop: int) -> None:
-        numbers = self.numbers[start:stop]
         if self.figure is not None:
-            self._places(numbers, self.figure.places(self.moving, start, stop))
+            self._places(start, stop, self.figure.places(self.moving, start, stop))
         for signal, index, columns, per_frame in self.series:
             values = _samples(self.moving, index, start, stop)
-            at = (numbers[:, None] + np.arange(per_frame) / per_frame).ravel()
             for name, _, column in columns:
                 known = np.isfinite(values[:, column])
                 scalars = self.rerun.Scalars.columns(scalars=values[known, column])
-                self._send(self.path(signal, name), at, scalars.partition(known.astype(np.int64)))
+                parts = scalars.partition(known.astype(np.int64))
+                self._send(self.path(signal, name), start, stop, per_frame, parts)
 
-    def _places(self, numbers: Floats, nodes: Floats) -> None:
+    def _places(self, start: int, stop: int, nodes: Floats) -> None:
         """Points and bones of some frames; ``nodes`` (n_frames, n_nodes, 3), NaN where unknown."""
         figure, rerun = self.figure, self.rerun
         assert figure is not None
         for name, node in zip(figure.names, figure.points, strict=True):
             known = np.isfinite(nodes[:, node]).all(axis=1)
             points = rerun.Points3D.columns(positions=nodes[known, node].astype(np.float32))
-            self._send(self.path("points", name), numbers, points.partition(known.astype(np.int64)))
+            parts = points.partition(known.astype(np.int64))
+            self._send(self.path("points", name), start, stop, 1, parts)
         for side, bones in figure.bones.items():
             ends = nodes[:, bones]  # (n_frames, n_bones, 2, 3)
             known = np.isfinite(ends).all(axis=(2, 3))
             strips = rerun.LineStrips3D.columns(strips=ends[known].astype(np.float32))
-            self._send(
-                self.path("bones", SIDES[side][0]), numbers, strips.partition(known.sum(axis=1))
-            )
+            parts = strips.partition(known.sum(axis=1))
+            self._send(self.path("bones", SIDES[side][0]), start, stop, 1, parts)
 
 
 class _Figure:
@@ -227,11 +231,10 @@ def _samples(moving: Moving, index: int, start: int, stop: int) -> NDArray[np.fl
     return np.asarray(_motion(moving).signals[index].cut(start, stop).masked(), np.float64)
 
 
-def _numbers(moving: Moving) -> NDArray[np.float64]:
+def _numbers(moving: Moving) -> NDArray[np.int64]:
     """The source's numbers of all frames."""
     numbers = moving.frame_numbers if isinstance(moving, Clip) else _motion(moving).frame_numbers
-    found = np.arange(1, moving.n_frames + 1) if numbers is None else numbers
-    return np.asarray(found, np.float64)
+    return numbers_or_rows(numbers, moving.n_frames)
 
 
 def _motion(moving: Moving) -> Motion:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import Exit, echo, plural, print_json, say
+from mcz.cli.common import Exit, echo, existing, plural, print_json, say
+from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
     from mcz.editing.outcomes import Report
@@ -18,13 +20,19 @@ Function = Callable[..., Any]
 
 def output_option(function: Function) -> Function:
     """``-o``, without which a file is rewritten in its own place."""
+
+    @wraps(function)
+    def command(*, file: str, output: str | None, **options: Any) -> Any:
+        existing(file)
+        return function(file=file, output=output and file_in(output, file), **options)
+
     return click.option(
         "-o",
         "--output",
         metavar="OUT.mcz",
         help="Write OUT.mcz and leave FILE.mcz as it is. Default: FILE.mcz is replaced once the "
         "new one is whole.",
-    )(function)
+    )(command)
 
 
 def conclude(report: Report, target: str, as_json: bool, told: tuple[str, ...]) -> Exit:

@@ -257,10 +257,10 @@ def about(path: str, *others: str) -> Iterator[None]:
         raise Failure(f"{path}: {OUT_OF_MEMORY}", path=path, kind="MemoryError") from error
 
 
-def existing(path: str) -> None:
-    """Raise Failure where a local ``path`` is no file."""
+def existing(path: str, of_folders: str = "") -> None:
+    """Raise Failure where a local ``path`` is no file; ``of_folders``: what takes a folder."""
     if path != "-" and "://" not in path and not Path(path).is_file():
-        is_there = "a folder" if Path(path).is_dir() else "not a file"
+        is_there = f"is a folder{of_folders}" if Path(path).is_dir() else "not a file"
         what = is_there if Path(path).exists() else "no such file"
         raise Failure(f"{path or repr(path)}: {what}", path=path, kind="AccessError")
 
@@ -272,7 +272,10 @@ def given(path: str) -> str | bytes:
         return path
     if sys.stdin is None:
         raise Failure("standard input is closed")
-    return sys.stdin.buffer.read()
+    data = sys.stdin.buffer.read()
+    if not data:
+        raise Failure("standard input is empty")
+    return data
 
 
 @contextmanager

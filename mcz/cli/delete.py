@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from mcz.cli.arranged import conclude, output_option
-from mcz.cli.common import Exit, Failure, about, existing
+from mcz.cli.common import Exit, Failure, about
 from mcz.cli.options import force_option, json_option, where_option
 from mcz.cli.progress import Progress
 
@@ -37,7 +37,6 @@ def command(
     """
     import mcz
 
-    existing(file)
     if not names and where is None:
         raise Failure("name what to delete, or say --where", Exit.USAGE)
     with about(file), Progress() as progress:

@@ -20,6 +20,7 @@ def lines_of(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
     yield f"{a} ({names[0]}) and {b} ({names[1]})"
     joints, feet = entries.pop("joints"), entries.pop("feet")
     equal = entries.pop("equal_joints")
+    beside = entries.pop("differences", ())
     by_joint, contacts = entries.pop("by_joint", []), entries.pop("contact_list", [])
     is_same = entries.get("mse_raw") == 0.0
     yield from (f"  {line}" for line in figure_lines(entries))
@@ -35,9 +36,27 @@ def lines_of(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
         if known:
             shown = ", ".join(f"{key} {value:.4g}" for key, value in known.items())
             yield f"  {path}: {shown}"
+    yield from (f"  {_difference_line(found)}" for found in beside)
     yield from (f"  note: {note}" for note in notes)
     for rows in (_table_by_joint(by_joint), _table_of_contacts(contacts)):
         yield from (f"  {line}".rstrip() for line in rows)
+
+
+def _difference_line(found: Mapping[str, Any]) -> str:
+    """Something beside the numbers that A and B do not say alike."""
+    if found["a"] is None and found["b"] is None:
+        return f"{found['what']}: not the same"
+    text = f"{found['what']}: {_said(found['a'])} in A, {_said(found['b'])} in B"
+    for key in ("only_in_a", "only_in_b", "changed"):
+        if names := found[key]:
+            more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
+            words = key.replace("_", " ").replace(" a", " A").replace(" b", " B")
+            text += f"; {words}: {', '.join(names[:FEW])}{more}"
+    return text
+
+
+def _said(value: object) -> str:
+    return "unknown" if value is None else f"{value:g}" if isinstance(value, float) else f"{value}"
 
 
 def _joint_lines(a: str, b: str, found: dict[str, Any]) -> Iterator[str]:

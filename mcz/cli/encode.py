@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,6 +33,7 @@ from mcz.cli.options import (
     threads_option,
 )
 from mcz.cli.progress import Progress
+from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
     from mcz.writing.written import Written
@@ -43,7 +45,7 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     metavar="OUT.mcz",
-    help="Default: SRC with the suffix .mcz; - is standard output.",
+    help="A file, a folder, or - for standard output. Default: SRC with the suffix .mcz.",
 )
 @click.option(
     "--skeleton",
@@ -85,7 +87,9 @@ def command(
         return _encode_piped(output, skeleton, force, as_json, format_name, **options)
     if format_name is not None:
         raise Failure("--format says what standard input is; SRC has a suffix", Exit.USAGE)
-    existing(source)
+    existing(source, f": mcz pack {shlex.quote(source)} OUT.mcz")
+    if source.lower().endswith(".mcz"):
+        raise Failure(f"{source}: is an .mcz already; mcz append adds it to another")
     return _encode_file(source, output, skeleton, force, as_json, **options)
 
 
@@ -109,6 +113,7 @@ def _encode_piped(
         return Exit.FINE
     if output is None:
         raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)
+    output = file_in(output, "-")
     with stored(format_name) as path:
         return _encode_file(path, output, skeleton, force, as_json, **options)
 
@@ -127,7 +132,7 @@ def _encode_file(
 
     if output == "-":
         refuse_inputs(sys.stdout, (source, skeleton))
-    target = output or str(Path(source).with_suffix(".mcz"))
+    target = file_in(output or str(Path(source).with_suffix(".mcz")), source, ".mcz")
     unread = output == "-" or _is_special(target)
     if unread and as_json:
         raise Failure(f"-o {target} leaves no room for --json", Exit.USAGE)

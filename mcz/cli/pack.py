@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,6 +23,7 @@ from mcz.cli.options import (
 )
 from mcz.cli.outcomes import conclude
 from mcz.cli.progress import Progress
+from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
     from mcz.editing.outcomes import Report
@@ -64,6 +67,10 @@ def command(
     """
     if scheduler is not None and mtimes:
         raise Failure("--mtimes are not kept with --scheduler", Exit.USAGE)
+    if "://" not in folder:
+        if Path(folder).is_file():
+            raise Failure(f"{folder}: is a file: mcz encode {shlex.quote(folder)}", Exit.USAGE)
+        target = file_in(target, str(Path(folder).resolve()) + ".mcz")
     if mtimes:
         options["mtimes"] = True
     with about(folder, target), Progress() as progress:

@@ -87,6 +87,8 @@ def stored(format_name: str | None) -> Iterator[str]:
     from mcz.live.text_writer import suffix_of
 
     data = standard_input().read()
+    if not data:
+        raise Failure(f"{NAME} is empty", path="-")
     with about(NAME):
         suffix = suffix_of(data, format_name)
     with TemporaryDirectory() as folder:

@@ -24,6 +24,7 @@ from mcz.cli.moving import cut_of, moving_of, moving_options
 from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
 from mcz.cli.render import to_size
+from mcz.cli.suffixes import file_in
 
 WHAT = ("channels", "spectrum", "error", "bytes", "rate-distortion")  # as in mcz.pictures
 MOST_ROWS = 24  # of a table that is printed
@@ -90,7 +91,7 @@ def command(
         raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)
     if file == other == "-":
         raise Failure("only one of FILE and FILE2 can be standard input", Exit.USAGE)
-    target = output or str(Path(file).with_suffix(".png"))
+    target = file_in(output or str(Path(file).with_suffix(".png")), file, ".png")
     refuse_inputs(target, (file, other, skeleton))
     check_new(Path(target), force)
     facts = {key: options[key] for key in ("rate", "up", "unit")}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from mcz.cli.arranged import conclude, output_option
-from mcz.cli.common import Exit, Failure, about, existing
+from mcz.cli.common import Exit, Failure, about
 from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
 
@@ -26,7 +26,6 @@ def command(
     """
     import mcz
 
-    existing(file)
     if len(names) % 2:
         raise Failure("give pairs: the old name and the new one", Exit.USAGE)
     pairs = dict(zip(names[::2], names[1::2], strict=True))

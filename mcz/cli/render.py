@@ -23,6 +23,7 @@ from mcz.cli.common import (
 from mcz.cli.moving import cut_of, moving_of, moving_options
 from mcz.cli.options import force_option, json_option
 from mcz.cli.progress import Progress
+from mcz.cli.suffixes import file_in
 
 VIEWS = ("front", "side", "top", "three-quarter")  # as in mcz.pictures, which takes longer
 
@@ -93,7 +94,8 @@ def command(
 
     if file == "-" and output is None:
         raise Failure("standard input has no name; say where to write with -o", Exit.USAGE)
-    target = output or str(Path(file).with_suffix(".gif" if options["sheet"] is None else ".png"))
+    suffix = ".gif" if options["sheet"] is None else ".png"
+    target = file_in(output or str(Path(file).with_suffix(suffix)), file, suffix)
     refuse_inputs(target, (file, skeleton))
     if "://" not in target:
         check_new(Path(target), force)

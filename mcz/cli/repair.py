@@ -11,6 +11,7 @@ import click
 from mcz.cli.common import Exit, Failure, about, echo, existing, plural, print_json, say
 from mcz.cli.options import decoded_option, force_option, json_option
 from mcz.cli.progress import Progress
+from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
     from mcz.editing.repair import Repair
@@ -35,6 +36,7 @@ def command(file: str, output: str, max_decoded: int | None, force: bool, as_jso
     if "-" in (file, output):
         raise Failure("repair reads and writes files, not standard streams", Exit.USAGE)
     existing(file)
+    output = file_in(output, file)
     with about(file, output), Progress() as progress:
         found = mcz.repair(file, output, force=force, max_decoded=max_decoded, progress=progress)
     if as_json:

@@ -25,6 +25,7 @@ from mcz.cli.common import (
 )
 from mcz.cli.options import copies_option, force_option, json_option
 from mcz.cli.progress import Progress
+from mcz.cli.suffixes import file_in
 
 if TYPE_CHECKING:
     from mcz.reading.clip import Clip
@@ -79,11 +80,12 @@ def command(
 
     if in_place == (output is not None):
         raise Failure("name OUT.mcz, or say --in-place to change IN.mcz itself", Exit.USAGE)
-    shown = output or file
     if "-" in (file, output, table):
         raise Failure("replace reads and writes files, not standard streams", Exit.USAGE)
     existing(file)
     existing(table)
+    output = output and file_in(output, file)
+    shown = output or file
     with about(file, shown, table):
         if output is not None and Path(output).exists() and Path(output).samefile(file):
             raise Failure(f"{output}: it is IN.mcz itself; --in-place changes that", Exit.USAGE)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import TYPE_CHECKING
 
-from mcz.cli.common import Exit, Failure
+from mcz.cli.common import Exit, Failure, about
 
 if TYPE_CHECKING:
     from mcz.reading.clip import Clip
@@ -35,6 +35,23 @@ def suffix_of(output: str | None) -> str:
 def is_folder(output: str) -> bool:
     """Whether an output is, or is to be, a folder."""
     return output[-1:] in (os.sep, os.altsep) or Path(output).is_dir()
+
+
+def file_in(output: str, source: str, suffix: str = "") -> str:
+    """``output``, or where that is a folder the file in it that is called as ``source`` is.
+
+    ``suffix``: in place of that of ``source``. A folder with a slash at the end is made. Raises
+    Failure where standard input, which has no name, would give one.
+    """
+    if output == "-" or not is_folder(output):
+        return output
+    if source == "-":
+        text = f"{output} is a folder; standard input has no name, so name a file in it"
+        raise Failure(text, Exit.USAGE)
+    with about(output):
+        Path(output).mkdir(parents=True, exist_ok=True)
+    name = PurePath(source).name
+    return str(Path(output, PurePath(name).with_suffix(suffix) if suffix else name))
 
 
 def target_of(suffix: str) -> str | None:

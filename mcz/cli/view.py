@@ -35,6 +35,7 @@ from mcz.cli.options import (
     up_option,
     where_option,
 )
+from mcz.cli.suffixes import file_in
 from mcz.cli.terminal import say_json
 from mcz.cli.view_rerun import is_rerun, show_in_rerun
 
@@ -115,6 +116,8 @@ def command(files: tuple[str, ...], output: str | None, as_json: bool, **options
     With --rerun, or -o OUT.rrd, every clip is logged for rerun: its points and bones, other signals
     as time series.
     """
+    if output is not None:
+        output = file_in(output, files[0], ".rrd" if options["rerun"] else ".html")
     in_rerun = is_rerun(options.pop("rerun"), output)
     _check_use(output, options, in_rerun)
     from mcz.viewing.shelf import Shelf, put

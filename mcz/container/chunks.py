@@ -208,6 +208,8 @@ def parse_foot(data: bytes, offset: int) -> Foot | None:
 
 def check_signature(source: ByteSource) -> None:
     data = source.read(0, min(len(SIGNATURE), source.size))
+    if not data:
+        raise TruncatedError("the file is empty")
     if data != SIGNATURE[: len(data)]:  # CHUNK-01
         raise FormatError(f"not an MCZ file: it begins with {data!r}")
     if len(data) < len(SIGNATURE):

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from mcz.clock import is_time
+from mcz.conversion.counted import COUNTING, first_number, lost_times
 from mcz.kinematics import point_set
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion
@@ -32,7 +34,7 @@ def left_out(motion: Motion, to: str) -> tuple[str, ...]:
 def _left_out(motion: Motion, to: str) -> Iterator[str]:
     if to in SHAPED and has_no_lengths(motion.skeleton):
         yield f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
-    others = [signal.name for signal in motion.signals[1:]]
+    others = [signal.name for signal in motion.signals[1:] if not is_time(signal)]
     if others and to not in ANY_SIGNAL:
         yield f"left out: signal {', '.join(others)}"
     names = [channel.label for channel in motion.skeleton.channels if not channel.kind]
@@ -41,6 +43,8 @@ def _left_out(motion: Motion, to: str) -> Iterator[str]:
         yield f"left out: {', '.join(names[:MOST_NAMES])}{more}, which move nothing"
     yield from of_recording(recording(motion))
     yield from _numbers(motion, to)
+    if to in COUNTING:
+        yield from lost_times(motion, to)
     if to == "amc":
         yield from _acclaim_names(motion)
 
@@ -84,5 +88,8 @@ def _numbers(motion: Motion, to: str) -> Iterator[str]:
         return
     if to in UNNUMBERED and (numbers != np.arange(1, len(numbers) + 1)).any():
         yield f"left out: frame numbers, which begin with {numbers[0]}"
+    elif to == "c3d" and first_number(motion) != numbers[0]:
+        first = f"they begin with {first_number(motion)}, as the times say"
+        yield f"left out: frame numbers, which begin with {numbers[0]}: {first}"
     elif to == "c3d" and (np.diff(numbers) != 1).any():
         yield f"left out: frame numbers but the first, {numbers[0]}: C3D counts on"

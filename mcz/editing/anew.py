@@ -1,4 +1,4 @@
-"""Clips of which no joint can be taken alone, decoded and coded anew where a caller allows it.
+"""Clips that cannot be cut as they are stored, decoded and coded anew where a caller allows it.
 
 ``extraction.py`` and ``replacing.py`` ask for it; SPEC.md, "Cutting without re-encoding" and
 "Replacing a joint", says what they note of it.
@@ -12,22 +12,25 @@ from typing import Any
 
 import numpy as np
 
+from mcz.clock import usual_step
 from mcz.container.writer import Writer
 from mcz.editing.cutting import WITHOUT_CHANNELS, ClipCut, add_note, joint_of_column
 from mcz.editing.recoding import recorded_options
-from mcz.errors import OptionError
+from mcz.errors import MotionError, OptionError
+from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal
 from mcz.reading.clip import Clip
+from mcz.reading.source_rates import stating_rate
 from mcz.writing.clip_writer import Amend, Progress
 from mcz.writing.tuning import write_tuned
 
 OF_JOINTS = ("contacts", "quality")  # settings that name joints, which may not be there
 
 
-def check_anew(clip: Clip) -> None:
-    """Raise OptionError for a clip that cannot be coded anew as it was."""
+def check_anew(clip: Clip, *, whole: bool = False) -> None:
+    """Raise OptionError for a clip that cannot be coded anew as it was; ``whole``: all joints."""
     info = clip.signals[0]
-    if info.exact:
+    if info.exact and not (whole and "param.lossless" in (clip.quality or {})):
         raise OptionError(
             f"clip {clip.name!r}: some of its joints are coded exactly, and would not be any more"
         )
@@ -46,6 +49,44 @@ def settings_of(clip: Clip) -> dict[str, Any]:
     if codec.promise:
         found.pop("preset", None)  # the setting of the dial is what came of it
     return {name: value for name, value in found.items() if value != usual[name]}
+
+
+def source_file(motion: Motion) -> bytes:
+    """The source file of a motion whose values are not those of the file that it came from."""
+    assert motion.source is not None
+    source = motion.source.of_no_file()
+    data: bytes = FORMATS[source.format].write(replace(motion, source=source))
+    return data
+
+
+def sourced(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
+    """What is left of ``clip`` with a source of its own values, or none, and why there is none."""
+    motion = stating_rate(motion, usual_step(clip.frame_numbers))
+    if motion.source is None:
+        return motion, None
+    try:
+        source_file(motion)
+    except MotionError as error:
+        metadata = dict(motion.metadata)
+        add_note(metadata, "source-note", f"the source file was left out: {error}")
+        left = replace(motion, metadata=metadata).without_source()
+        return left.at_times(motion.timeline), str(error)
+    signals = tuple(map(_on_binary_grids, motion.signals))
+    return replace(motion, signals=signals, source=motion.source.of_no_file()), None
+
+
+def _on_binary_grids(signal: Signal) -> Signal:
+    """The signal with values that a source of binary numbers holds, the nearest to its own."""
+    if all(grid.is_text for _, _, grid in signal.grid_blocks()):
+        return signal
+    ordinals, exact = signal.to_ordinals()
+    values = signal.values.copy()
+    for rows, columns, grid in signal.grid_blocks():
+        nearest = grid.values(ordinals[rows][:, columns])
+        stray = ~exact[rows][:, columns] & np.isfinite(nearest)
+        if not grid.is_text:
+            values[rows, columns] = np.where(stray, nearest, values[rows, columns])
+    return replace(signal, values=values)
 
 
 def joints_alone(cut: ClipCut) -> Motion:

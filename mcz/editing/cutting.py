@@ -99,7 +99,8 @@ def plan_cut(
 ) -> ClipCut:
     """What is left of ``clip``; raises OptionError or MotionError where it cannot be cut so.
 
-    With ``anew`` joints may be chosen that are coded in one group with others.
+    With ``anew`` joints may be chosen that are coded in one group with others, and no frame is
+    stored that is not shown.
     """
     start, stop = frames if frames is not None else (0, None)
     stop = clip.n_frames if stop is None else stop
@@ -121,6 +122,8 @@ def plan_cut(
         if kept is not None and info.index == 0:
             groups = _kept_groups(clip, info, kept)
         signals.append(_plan_signal(cut, info, groups))
+    if anew and any(part.skip or part.spare for part in signals):
+        return replace(cut, anew=True)
     return replace(cut, signals=tuple(signals))
 
 

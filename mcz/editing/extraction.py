@@ -27,7 +27,9 @@ from mcz.editing.anew import (
     OF_JOINTS,
     check_anew,
     joints_alone,
+    settings_of,
     settings_of_joints,
+    sourced,
     write_anew,
 )
 from mcz.editing.carrying import Carrier, said_of
@@ -113,8 +115,9 @@ def extract(
     ``salvage``: the file may be damaged, but not in what is taken out.
     ``max_decoded``: as ``mcz.open`` has it, for what is left is decoded once.
     ``copies``: as ``mcz.write`` has it; None: where ``source`` has some.
-    ``recode``: joints that a codec codes in one group with others are decoded and coded anew, as
-    the clip was; by default they are refused.
+    ``recode``: a clip is decoded and coded anew, as it was, where joints are coded in one group
+    with others, which are refused by default, or where frames that are cut off would stay in the
+    file, since those that are left need them.
     Raises OptionError or MotionError for what cannot be cut so, and where the target is the source;
     FormatError for bad bytes; nothing is left under the target's name then.
     """
@@ -130,7 +133,7 @@ def extract(
         cuts = [plan_cut(one, frames, joints, resolution, recode) for one in clips]
         for cut in cuts:
             if cut.anew:
-                check_anew(cut.clip)
+                check_anew(cut.clip, whole=cut.joints is None)
         with replacing(target, force=force, inputs=(source,)) as stream:
             copier = Copier(file, stream, progress, copies)
             return copier.run(cuts, alone=alone)
@@ -213,7 +216,7 @@ class Copier:
 
     def is_same(self, cut: ClipCut) -> bool:
         """Whether the clip stays what it was."""
-        return cut.is_whole
+        return cut.is_whole and not cut.anew
 
     def clip(self, cut: ClipCut) -> None:
         """Write one clip."""
@@ -249,12 +252,14 @@ class Copier:
         clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
         self.skeleton(clip.skeleton_id)
         old = clip.quality or {}
-        motion = replace(joints_alone(cut), name=self.name_of(cut))
+        motion, left_out = sourced(replace(joints_alone(cut), name=self.name_of(cut)), clip)
+        if left_out is not None:
+            self.found.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
         record = write_anew(
             self.writer,
             motion,
             clip,
-            settings_of_joints(clip),
+            settings_of(clip) if cut.joints is None else settings_of_joints(clip),
             partial(recoded_quality, cut, old),
             self.progress,
         )
@@ -262,7 +267,7 @@ class Copier:
             if f"param.{name}" in old and f"param.{name}" not in record:
                 said = f"its {name}, which other joints have a part in"
                 self.found.left_out.append(f"clip {clip.name}: {said}")
-        if clip.source is not None:
+        if clip.source is not None and cut.joints is not None:
             self.found.left_out.append(f"clip {clip.name}: its source file, as joints were cut")
         self.inside(row)
         for chunk in row.ancillary:

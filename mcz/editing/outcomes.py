@@ -13,8 +13,8 @@ class Outcome:
     """What became of one file, and why where that is not plain.
 
     ``result`` is "parsed", "skeleton", "alias" (the same bytes under another name), "verbatim",
-    "present" (the target has it already), "restored", or "cut", "lossy" or "edited" of a clip that
-    is no longer what its source was, "written", "skipped", "exists" (it may not be replaced) or
+    "present" (the target has it already), "restored", or "cut" or "lossy" of a clip that is no
+    longer what its source was, "written", "skipped", "exists" (it may not be replaced) or
     "failed"; of a file that was cut short also "salvaged" or "dropped", in salvage "damaged"; of
     what is carried over "copied", "renamed", "moved" or "deleted".
     ``notes`` are what was noticed about one that was taken: its reader's, and whose skeleton it

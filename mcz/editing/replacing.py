@@ -20,23 +20,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.brief import brief
-from mcz.clock import usual_step
 from mcz.container import payloads
 from mcz.container.chunks import read_chunk
 from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.locks import lock
 from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
-from mcz.editing.anew import check_anew, settings_of, write_anew
+from mcz.editing.anew import check_anew, settings_of, source_file, sourced, write_anew
 from mcz.editing.cutting import ClipCut, add_note, cut_segment, plan_cut
 from mcz.editing.extraction import Copier, with_stated_rate
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
 from mcz.errors import AccessError, MotionError, OptionError
-from mcz.formats import FORMATS
-from mcz.motion import Motion
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
-from mcz.reading.source_rates import stating_rate
 from mcz.schema import build, parse
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
@@ -214,7 +210,7 @@ class _Editor(Copier):
         clip = self.file.clips[self.name]
         motion, held[0] = with_stated_rate(self.writer, motion, held[0], clip)
         try:
-            data = _source_file(motion)
+            data = source_file(motion)
         except MotionError as error:
             metadata = {pair.key: pair.value for pair in fields["metadata"]}
             add_note(metadata, "source-note", f"the source file was left out: {error}")
@@ -323,27 +319,15 @@ class _AnewEditor(Copier):
             return
         row = self.container.directory.clips[cut.clip.name]
         self.skeleton(cut.clip.skeleton_id)
-        motion = self._sourced(self.edited.motion)
+        motion, left_out = sourced(self.edited.motion, cut.clip)
+        if left_out is not None:
+            self.found.left_out.append(f"clip {motion.name}: its source file, as {left_out}")
         settings = settings_of(cut.clip)
         write_anew(self.writer, motion, cut.clip, settings, self._record, self.progress)
         self.inside(row)
         for chunk in row.ancillary:
             if chunk.type != CHUNK:
                 self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
-
-    def _sourced(self, motion: Motion) -> Motion:
-        """The motion with a source of its own values, or none where there can be none."""
-        motion = stating_rate(motion, usual_step(self.edited_clip.frame_numbers))
-        if motion.source is None:
-            return motion
-        try:
-            _source_file(motion)
-        except MotionError as error:
-            metadata = dict(motion.metadata)
-            add_note(metadata, "source-note", f"the source file was left out: {error}")
-            self.found.left_out.append(f"clip {motion.name}: its source file, as {error}")
-            return dataclasses.replace(motion, metadata=metadata).without_source()
-        return dataclasses.replace(motion, source=motion.source.of_no_file())
 
     def _record(self, now: dict[str, str], decoded: Sequence[NDArray[Any]]) -> dict[str, str]:
         wanted = self.edited.motion.signals[0].masked()
@@ -382,14 +366,6 @@ def _write_anew(clip: Clip, writer: _AnewEditor) -> Replacement:
         anew=True,
         others_error=writer.others_error,
     )
-
-
-def _source_file(motion: Motion) -> bytes:
-    """The source file of a motion whose values are not those of the file that it came from."""
-    assert motion.source is not None
-    source = motion.source.of_no_file()
-    data: bytes = FORMATS[source.format].write(dataclasses.replace(motion, source=source))
-    return data
 
 
 def edited_quality(

@@ -50,6 +50,7 @@ class Format:
     template that states another one, see ``stated_rates``. ``is_table``: its header names every
     column, which is much of what is written. ``recording(name, template, detail)`` is what the
     source says beside all numbers, None where it says nothing; see ``mcz.Recording``.
+    ``arrays(source, signals)`` lists what became of the arrays of a file that has some.
     ``is_motion(data)`` says of a suffix that others use, too, whether a file that begins so seems
     to be of this format.
     ``clock(template)`` gives the times that the template states, None where frame numbers and the
@@ -70,6 +71,7 @@ class Format:
     recording: Callable[[str, bytes, bytes], Any] | None = None
     has_more_joints: Callable[..., bool] | None = None
     bones: Callable[..., dict[str, int]] | None = None
+    arrays: Callable[..., list[dict[str, Any]]] | None = None
     restate: Callable[[bytes, Fraction], Any] | None = None
     is_motion: Callable[[bytes], bool] | None = None
     clock: Callable[[bytes], SourceClock | None] | None = None
@@ -179,6 +181,7 @@ FORMATS: dict[str, Format] = {
             (".npy",),
             _of("arrays.read", "read_npy"),
             _of("arrays.read", "write_arrays"),
+            arrays=_of("arrays.listing", "arrays_listed"),
             is_motion=_of("arrays.sniffing", "is_motion"),
         ),
         Format(
@@ -187,6 +190,7 @@ FORMATS: dict[str, Format] = {
             (".npz",),
             _of("arrays.read", "read_npz"),
             _of("arrays.read", "write_arrays"),
+            arrays=_of("arrays.listing", "arrays_listed"),
             states_rate=True,
             is_motion=_of("arrays.sniffing", "is_motion"),
         ),
@@ -272,10 +276,8 @@ def arrays_of(source: Source | None, signals: Sequence[str]) -> list[dict[str, A
 
     ``signals`` are the names of the clip's signals. Raises FormatError on bad bytes.
     """
-    if source is None or source.format not in ("npy", "npz"):
-        return None
-    found: list[dict[str, Any]] = _of("arrays.listing", "arrays_listed")(source, signals)
-    return found
+    listed = FORMATS[source.format].arrays if source is not None else None
+    return None if listed is None else listed(source, signals)
 
 
 def format_by_id(format_id: int, *, of_skeleton: bool = False) -> Format:

@@ -124,12 +124,16 @@ class Parameters:
             parameter = self.get(group, name if count == 1 else f"{name}{count}")
             if parameter is None or parameter.type == TEXT:
                 return numbers
-            if parameter.type == FLOAT:
-                numbers += self.order.reals(parameter.data).tolist()
-            else:
-                kind = f"{self.order.prefix}i2" if parameter.type == INTEGER else "u1"
-                numbers += map(float, np.frombuffer(parameter.data, kind))
+            numbers += self.numbers_of(parameter)
             count += 1
+
+    def numbers_of(self, parameter: Parameter) -> list[float]:
+        """The numbers of one parameter that is no text, integers with a sign."""
+        if parameter.type == FLOAT:
+            numbers: list[float] = self.order.reals(parameter.data).tolist()
+            return numbers
+        kind = f"{self.order.prefix}i2" if parameter.type == INTEGER else "u1"
+        return list(map(float, np.frombuffer(parameter.data, kind)))
 
     @cached_property
     def first_frame(self) -> int | None:

@@ -21,7 +21,7 @@ from mcz.formats.c3d_parameters import BLOCK, INTEL, Order
 from mcz.formats.c3d_restore import field_bytes, valid_points
 from mcz.formats.c3d_section import Said, section_of
 from mcz.formats.c3d_shape import COUNTED, WORD_OF_FIRST, WORD_OF_LAST
-from mcz.motion import POSITION_KINDS, Motion, Signal, Source
+from mcz.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.scaling import Scaling
 
@@ -109,7 +109,9 @@ def _residuals(placed: Sequence[Signal], n_frames: int) -> Signal:
             words[~valid] = -1.0
         parts.append(words)
     words = np.concatenate(parts, axis=1)
-    return Signal(words, (FLOATS,) * words.shape[1], "residuals")
+    n_points = words.shape[1]
+    channels = (Channel("", "residual"),) * n_points
+    return Signal(words, (FLOATS,) * n_points, "residuals", channels=channels)
 
 
 def _scale(placed: Sequence[Signal], others: Iterable[Signal]) -> float | None:

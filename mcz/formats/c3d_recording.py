@@ -123,6 +123,11 @@ def recording(source_format: str, template: bytes, detail: bytes) -> Recording:
     return recording_of(parse_layout(source_format, template, detail))
 
 
+def parameters_of(source_format: str, template: bytes, detail: bytes) -> Parameters:
+    """The parameters of a clip's source; raises FormatError on bad bytes."""
+    return _parameters(parse_layout(source_format, template, detail))
+
+
 def recording_of(layout: Layout) -> Recording:
     """The recording in the header and the parameter section of a file."""
     parameters = _parameters(layout)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from mcz.errors import SourceError
 from mcz.formats.limits import MOST_CHANNELS, check
 from mcz.formats.text_source import BOM
 
@@ -202,6 +203,16 @@ def is_row(cells: Sequence[bytes]) -> bool:
         elif cell not in NOT_THERE:
             return False
     return found
+
+
+def check_points(cells: Sequence[bytes], line: int) -> None:
+    """Raise SourceError for a number with a decimal comma among the cells of a line."""
+    for cell in cells:
+        if DECIMAL_COMMA.fullmatch(cell):
+            raise SourceError(
+                f"line {line}: {cell[:40]!r} has a decimal comma, which no grid prints; "
+                f"save the table with points"
+            )
 
 
 def has_decimal_commas(lines: Sequence[tuple[int, bytes]]) -> bool:

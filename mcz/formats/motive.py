@@ -33,7 +33,7 @@ LOCAL = ("local", "parent")  # coordinate spaces in which a bone is seen from it
 QUATERNION = {"qx", "qy", "qz", "qw"}
 MAX_HEAD = 32  # lines above the rows
 
-HEAD = re.compile(rb'[ \t]*"?Format Version"?([,;\t])')
+HEAD = re.compile(rb'(?:sep=[,;\t]\r?\n)?[ \t]*"?Format Version"?([,;\t])')
 _AXIS = re.compile(rb'[ \t]*"?Frame"?[,;\t]"?Time')
 _ORDER = re.compile(r"(?i)(?=.*x)(?=.*y)(?=.*z)[xyz]{3}")
 _COUNT = re.compile(rb'(?i)[,;\t]"?Total Exported Frames"?[,;\t]"?([0-9]+)')
@@ -131,6 +131,8 @@ def _head(data: bytes, encoding: str) -> _Head:
     lines = [entry for entry in lines_from(data, 0)[:MAX_HEAD] if not is_blank(entry[1])]
     match = HEAD.match(data.removeprefix(BOM))
     separator = match[1] if match else b","
+    if lines and lines[0][1].removeprefix(BOM).startswith(b"sep="):
+        lines.pop(0)  # of a spreadsheet
     axis = next((k for k, (_, line) in enumerate(lines) if _AXIS.match(line)), None)
     if axis is None or axis < 3:
         raise SourceError(f"line {len(lines)}: no line Frame,Time below names; no Motive file")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from mcz.errors import SourceError
+from mcz.formats.csv_text import check_points
 from mcz.formats.rows import line_of
 from mcz.formats.table_plain import plain_storage
 from mcz.formats.table_restore import beside, restore_table
@@ -134,6 +135,7 @@ def _columns(
     while names and not names[-1] and len(names) > len(cells):
         names.pop()
     names += [f"column {k + 1}" for k in range(len(names), len(cells))]
+    check_points(cells[:1], line_of(data, header.rows))
     sizes = [cell.count(b",") + 1 for cell in cells]
     if max(sizes) > MAX_PARTS or sizes[0] != 1:
         raise SourceError(

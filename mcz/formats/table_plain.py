@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from mcz.clock import has_times
+import numpy as np
+
+from mcz.clock import EXACT, Timeline, has_times
 from mcz.errors import MotionError
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
 from mcz.formats.restore import numbers_of
 from mcz.formats.table_layout import Clock, Section, build_table
-from mcz.motion import POSITION_KINDS, Motion, Source
+from mcz.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.numbers import Grid, GridKind
 
 UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m"}
-DECIMALS = 6  # of times
+DECIMALS = 6  # of times that are whole microseconds
+MORE_DECIMALS = 9
 MISSING = b"NaN"  # as OpenSim writes it, to which blank cells at the end of a row are none
-TIMES = Grid(GridKind.FIXED, DECIMALS)
+SECONDS = Channel("", "time", "s")
 
 
 def plain_trc(motion: Motion) -> Motion:
@@ -75,26 +79,51 @@ def _with_source(
     *,
     timed: bool = False,
 ) -> Motion:
-    """``motion`` as its first signal alone, with the source; ``timed``: the times are in it.
+    """``motion`` as its first signal and its times, with the source.
 
-    Else they begin with 0.
+    The times are a clock, or a signal where frame numbers do not give them; ``timed``: they are in
+    the first signal.
     """
-    clock = None if timed else _clock(motion)
+    clock, signals = None, motion.signals[:1]
+    if not timed:
+        clock, times = _times(motion)
+        signals = (*signals, *times)
     rows = Layout((), (Pattern(runs_of(items), b"\n"),))
-    template, detail = build_table([Section((0,), header.encode(), True, missing, clock, rows)])
+    numbers = tuple(range(len(signals)))
+    template, detail = build_table([Section(numbers, header.encode(), True, missing, clock, rows)])
     source = Source(format_name, template, detail, clock=clock)
-    return replace(motion, signals=motion.signals[:1], source=source)
+    return replace(motion, signals=signals, source=source)
 
 
-def _clock(motion: Motion) -> Clock:
-    step = 10**DECIMALS / _rate(motion)
-    first = int(numbers_of(motion, motion.n_frames)[0]) if motion.n_frames else 1
-    offset = step.denominator // 2 - first * step.numerator
-    if max(abs(offset), step.numerator, step.denominator) >= 2**52:
-        raise MotionError(
-            f"motion {motion.name!r}: its frame rate or numbers are too large for TRC"
-        )
-    return Clock(TIMES, step.numerator, step.denominator, offset)
+def _times(motion: Motion) -> tuple[Clock | None, tuple[Signal, ...]]:
+    """The clock that prints the times of ``motion``, or a signal of them."""
+    timeline = motion.timeline
+    if timeline is None:
+        raise MotionError(f"motion {motion.name!r}: its frame rate is unknown; a table has times")
+    times = timeline.times
+    exact = (np.abs(np.round(times, DECIMALS) - times) < EXACT).all()
+    grid = Grid(GridKind.FIXED, DECIMALS if exact else MORE_DECIMALS)
+    clock = _clock(motion, timeline, grid)
+    if clock is not None:
+        return clock, ()
+    column = Signal(np.round(times, grid.digits)[:, None], (grid,), "time", channels=(SECONDS,))
+    return None, (column,)
+
+
+def _clock(motion: Motion, timeline: Timeline, grid: Grid) -> Clock | None:
+    """A clock that counts frame numbers; None where there is none that gives the times."""
+    if motion.frame_rate is None:
+        return None
+    numbers = numbers_of(motion, motion.n_frames)
+    step = 10**grid.digits / motion.frame_rate / motion.number_step
+    start = Fraction(float(timeline.times[0])).limit_denominator(10**12) * 10**grid.digits
+    offset = start * step.denominator - int(numbers[0]) * step.numerator + step.denominator // 2
+    clock = Clock(grid, step.numerator, step.denominator, math.floor(offset))
+    most = max(abs(clock.offset), step.numerator, step.denominator)
+    if most >= 2**52 or int(numbers.max()) * step.numerator >= 2**62:
+        return None
+    off = np.abs(grid.values(np.array(clock.ordinals(numbers.tolist()))) - timeline.times)
+    return clock if off.max() <= 0.5 * 10.0**-grid.digits + timeline.rounding + EXACT else None
 
 
 def _rate(motion: Motion) -> Fraction:

@@ -18,7 +18,7 @@ from mcz.errors import SourceError
 from mcz.formats.csv_text import BLANK_CELLS, cell_spans
 from mcz.formats.layout import BLANKS, FRAME_NUMBER, FREE, FULL, MAX_WIDTH, Pattern, runs_of
 from mcz.formats.rows import DENSE, Rows, Token, line_of, read_rows
-from mcz.formats.text_columns import TextColumn, check_points, odd_cells, split_text
+from mcz.formats.text_columns import TextColumn, odd_cells, refuse_commas, split_text
 from mcz.numbers import scan
 
 Bools = NDArray[np.bool_]
@@ -171,7 +171,7 @@ def read_table(
     blank = (rows.stop > 0) & (rows.start == rows.stop)
     odd = odd_cells(data, rows)
     texts = odd.text_columns() if numbers_at is not None else []
-    check_points(data, odd, rows.start, texts)
+    refuse_commas(data, odd, rows.start, texts)
     blank[:, texts] = False
     missing, n_missing = odd.missing(texts)
     if n_missing <= np.count_nonzero(blank):

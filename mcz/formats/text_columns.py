@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import SourceError
-from mcz.formats.csv_text import DECIMAL_COMMA, NO_NUMBER
+from mcz.formats.csv_text import DECIMAL_COMMA, NO_NUMBER, check_points
 from mcz.formats.layout import MAX_PATTERNS, Pattern, runs_of
 from mcz.formats.notes import RowNotes
 from mcz.formats.padding import padding
@@ -29,6 +29,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 FEW_TEXTS = 16  # of a column, which are laid out whole where
+FEW_CHANGES = 64  # they change as seldom, or
 ROWS_A_TEXT = 8  # so many rows have the same, on average
 _DIGITS = re.compile(rb"[0-9]+")
 _PLAIN = re.compile(rb"0|[1-9][0-9]{0,14}")
@@ -94,14 +95,11 @@ def odd_cells(data: bytes, rows: Rows) -> OddCells:
     return OddCells(*places, texts, is_missing, np.count_nonzero(present, axis=0))
 
 
-def check_points(data: bytes, odd: OddCells, start: Ints, text_columns: Sequence[int]) -> None:
+def refuse_commas(data: bytes, odd: OddCells, start: Ints, text_columns: Sequence[int]) -> None:
     """Raise SourceError for numbers with decimal commas outside of ``text_columns``."""
-    for row, column, text in zip(odd.rows, odd.columns, odd.texts, strict=True):
-        if column not in text_columns and DECIMAL_COMMA.fullmatch(text):
-            raise SourceError(
-                f"line {line_of(data, int(start[row, column]))}: {text[:40]!r} has a decimal "
-                f"comma, which no grid prints; save the table with points"
-            )
+    for k in np.flatnonzero(~np.isin(odd.columns, text_columns)).tolist():
+        if DECIMAL_COMMA.fullmatch(odd.texts[k]):
+            check_points([odd.texts[k]], line_of(data, int(start[odd.rows[k], odd.columns[k]])))
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +210,8 @@ def _split(
     texts = [data[a:b] for a, b in zip(start.tolist(), stop.tolist(), strict=True)]
     counts = Counter(texts)
     n_changes = sum(text != after for text, after in pairwise(texts))
-    whole = len(counts) <= FEW_TEXTS and ROWS_A_TEXT * n_changes <= len(texts)
+    seldom = n_changes <= max(FEW_CHANGES, len(texts) // ROWS_A_TEXT)
+    whole = len(counts) <= FEW_TEXTS and seldom
     widths = [] if whole else _widths(counts)
     if len(start) * sum(widths) > DENSE * len(data) + FEW_CELLS:
         widths = []  # more cells than bytes: a few texts of many digits

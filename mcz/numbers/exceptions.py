@@ -8,7 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz import brief
+from mcz.checks import DATA_ITEMS, array_of, check_fields
 from mcz.errors import MotionError
+
+_NUMBERS = array_of("i8", 1, "int64 of one dimension")
+EXCEPTIONS = {"rows": _NUMBERS, "channels": _NUMBERS, "texts": DATA_ITEMS}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,6 +26,7 @@ class Exceptions:
     __repr__ = brief.exceptions_text
 
     def __post_init__(self) -> None:
+        check_fields(self, EXCEPTIONS)
         if not len(self.rows) == len(self.channels) == len(self.texts):
             raise MotionError("exceptions: rows, channels and texts differ in number")
 

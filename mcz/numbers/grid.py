@@ -45,9 +45,12 @@ class Grid:
     _hash: int = field(init=False, repr=False, compare=False)  # many grids are looked up at once
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "kind", GridKind(self.kind))
-        object.__setattr__(self, "flags", int(self.flags))
-        fault = rules.fault(self.kind, self.digits, self.flags, self.scale, self.style)
+        try:
+            object.__setattr__(self, "kind", GridKind(self.kind))
+            object.__setattr__(self, "flags", int(self.flags))
+            fault = rules.fault(self.kind, self.digits, self.flags, self.scale, self.style)
+        except (TypeError, ValueError) as error:
+            raise OptionError(f"a grid of {self.kind!r}: {error}") from None
         if fault:
             raise OptionError(f"a {self.kind.name} grid cannot have {fault}")
         known = hash((int(self.kind), self.digits, self.flags, self.scale, self.style))
@@ -248,7 +251,7 @@ def _grid_of(fields: Fields) -> Grid:
         # GRID-01
         scale = 1.0 if fields.scale is None else fields.scale
         return Grid(fields.kind, fields.digits, fields.flags, scale, fields.style or 0)
-    except (ValueError, OptionError) as error:
+    except OptionError as error:
         raise FormatError(f"{error}") from None
 
 

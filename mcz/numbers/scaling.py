@@ -8,8 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.checks import Rule, array_of, check_fields
+from mcz.errors import MotionError
+
 Floats = NDArray[np.float64]
 MAX_INTEGER = 2.0**53  # what a binary64 holds exactly
+
+
+_FLOATS = array_of("f8", 1, "float64 of one dimension")
+SCALING = {"offsets": _FLOATS, "scales": _FLOATS, "general": Rule("a number", float)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,6 +30,13 @@ class Scaling:
     offsets: Floats
     scales: Floats
     general: float = 1.0
+
+    def check(self, n_channels: int) -> None:
+        """Raise MotionError where this is no scaling of so many channels."""
+        check_fields(self, SCALING)
+        shapes = {self.offsets.shape, self.scales.shape}
+        if shapes != {(n_channels,)}:
+            raise MotionError(f"scaling: offsets and scales do not match {n_channels} channels")
 
     def says(self, other: Scaling | None) -> bool:
         """Whether both say the same."""

@@ -11,14 +11,13 @@ from mcz.errors import FormatError
 if TYPE_CHECKING:
     from mcz.reading.clip import Clip
 
-RESTORED = "restored"  # the source file, byte for byte
+RESTORED = "restored"  # the file whose SHA-256 the archive states, byte for byte
 CUT = "cut"  # some of its frames, every number as it was
 LOSSY = "lossy"  # near numbers, printed as those of the source were
-EDITED = "edited"  # numbers that were replaced since
 FILTERED = "filtered"  # numbers of a post filter
 SALVAGED = "salvaged"  # what is whole of it
 CONVERTED = "converted"  # a file of another format, or numbers
-GIVEN_BACK = (RESTORED, CUT, LOSSY, EDITED)  # words for all of a clip
+GIVEN_BACK = (RESTORED, CUT, LOSSY)  # words for all of a clip
 
 
 def fidelity_of(clip: Clip) -> str:
@@ -28,6 +27,4 @@ def fidelity_of(clip: Clip) -> str:
         record = clip.quality or {}
     if "cut-resolution" in record or not all(info.codec.lossless for info in clip.signals):
         return LOSSY
-    if "edit-joints" in record:
-        return EDITED
     return CUT if "cut-frames" in record else RESTORED

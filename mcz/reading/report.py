@@ -15,7 +15,7 @@ from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.segments import GROUP_NOTES
 from mcz.errors import ChecksumError, FormatError, MczError, OptionError, UnsupportedError
-from mcz.formats import arrays_of
+from mcz.formats import FORMATS, arrays_of
 from mcz.jobs import limited
 from mcz.kinematics.rest import figure_height
 from mcz.motion import Skeleton
@@ -182,7 +182,7 @@ def _recording(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
 
 def _arrays(clip: Clip, unread: list[str]) -> list[dict[str, Any]] | None:
     """What became of the arrays of the source, None where it has none; ``unread`` as above."""
-    if clip.source is None or clip.source.format not in ("npy", "npz"):
+    if clip.source is None or FORMATS[clip.source.format].arrays is None:
         return None
     try:
         source = clip.motion((0, 0)).source

@@ -60,6 +60,8 @@ def read_source(
 
 def _named(path: Path, reader: Any, data: bytes, *arguments: Any) -> Any:
     """What ``reader`` makes of ``data``; its errors say which file."""
+    if not data:
+        raise SourceError(f"{path}: the file is empty")
     try:
         return reader(data, *arguments)
     except MczError as error:

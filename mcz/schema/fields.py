@@ -294,13 +294,20 @@ def _text(data: bytes) -> str:
         raise FormatError(f"not UTF-8: {error}") from None
 
 
+def _encoded(text: str) -> bytes:
+    try:
+        return text.encode("utf-8")
+    except UnicodeEncodeError as error:  # half of a surrogate pair
+        raise FormatError(f"{ascii(text)[:80]} is not UTF-8: {error.reason}") from None
+
+
 Pass = Nothing()
 GreedyBytes = Rest()
 Int8ul, Float32l, Float64l = Number("<B"), Number("<f"), Number("<d")
 UVARINT = Varint()
 SVARINT = Adapter(UVARINT, lambda n: n >> 1 ^ -(n & 1), lambda n: 2 * n if n >= 0 else -2 * n - 1)
 SIZED = Sized()
-TEXT = Adapter(SIZED, _text, str.encode)
+TEXT = Adapter(SIZED, _text, _encoded)
 # CONV-10
 EXTENSION = GreedyBytes  # the end of an open structure: ignored by readers, kept on rewriting
 FINITE = ExprValidator(Float64l, lambda obj, ctx: obj - obj == 0)  # SKEL-08

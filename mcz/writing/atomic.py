@@ -44,6 +44,8 @@ def replacing(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterat
     if os.fspath(target)[-1:] in (os.sep, os.altsep):
         raise OptionError(f"{target}: a folder; name the file in it")
     path = Path(target)
+    if path.is_dir():
+        raise OptionError(f"{path}: a folder; name the file in it")
     if not force and os.path.lexists(path):
         raise ExistsError(f"{path} exists; use force to replace it")
     with _in_place(path) if _is_special(path) else _temporary(path, force) as stream:

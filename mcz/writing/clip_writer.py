@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -26,10 +25,10 @@ from mcz.container.writer import Writer
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Skeleton, Source
-from mcz.reading.source_rates import stating_rate
 from mcz.schema import MAX_COUNT, build
 from mcz.writing.quality import CHUNK, quality_payload, quality_record
-from mcz.writing.signal_source import MemorySource, as_stored, settle
+from mcz.writing.signal_source import MemorySource, as_stored
+from mcz.writing.sources import with_source_hash
 
 BESIDE = "lossless"  # the codec of all signals but the motion, where that one is lossy
 Progress = Callable[[int, int, str], None]
@@ -95,7 +94,8 @@ def write_clip(
     options = codec.options(params, inner=True)
     if codec.dial and asked(options) and options[codec.dial.parameter] is None:
         raise OptionError(f"{', '.join(asked(options))}: {codec.dial.parameter} is not yet found")
-    motion = _with_source_hash(as_stored(motion.counted_by_ones()))
+    counted = motion.counted_by_ones()
+    motion = as_stored(with_source_hash(counted, lossless=codec.lossless))
     for signal in motion.signals:
         check(f"signal {signal.name!r}: channels", signal.n_channels, writer.profile.channels)
     coded = [
@@ -184,19 +184,6 @@ def _write_signal(
         if progress is not None:
             progress(segment.first + segment.n_frames, motion.n_frames, motion.name)
     return coded.source.signal.values if coded.codec.lossless else _decoded(coded, kept)
-
-
-def _with_source_hash(motion: Motion) -> Motion:
-    """The motion with size and hash of its source file, which was changed or cut since."""
-    if motion.source is None or motion.source.sha256:
-        return motion
-    motion = stating_rate(motion)
-    source = motion.source
-    assert source is not None
-    signals = tuple(settle(signal)[1] for signal in motion.signals)  # as a reader will have them
-    data = FORMATS[source.format].write(replace(motion, signals=signals))
-    digest = hashlib.sha256(data).digest()
-    return replace(motion, source=replace(source, size=len(data), sha256=digest))
 
 
 def _clip_fields(writer: Writer, motion: Motion, coded: Sequence[_Coded]) -> dict[str, Any]:

@@ -26,6 +26,7 @@ from mcz.writing.draft import Draft
 from mcz.writing.entry import Entry, Terms
 from mcz.writing.inputs import refuse_inputs
 from mcz.writing.names import check_metadata, name_skeleton
+from mcz.writing.sources import with_true_sources
 from mcz.writing.tuning import write_tuned
 from mcz.writing.written import Written, written
 
@@ -59,10 +60,12 @@ def write(
     if not isinstance(motion, Motion):
         raise OptionError(f"a motion is written to a target, not {type(motion).__name__}")
     check_metadata(motion.metadata, motion.name)
+    named = by_name(chosen(codec, effort))
+    motion = with_true_sources(motion, lossless=named.lossless)
     with limited(threads), replacing(target, force=force, inputs=params.values()) as stream:
         writer = Writer(stream, profile=profile_of(archive), copies=copies)
         name_skeleton(writer, motion.skeleton)
-        quality = write_tuned(writer, motion, by_name(chosen(codec, effort)), params, progress)
+        quality = write_tuned(writer, motion, named, params, progress)
         writer.finish()
     return written(writer.directory, writer.offset, quality)
 

@@ -216,7 +216,7 @@ def _with_strays(signal: Signal, stray: NDArray[np.bool_]) -> Exceptions:
         if not signal.grids[channel].is_text:
             raise MotionError(
                 f"signal {signal.name!r}: row {row} of a segment, channel {channel} is "
-                f"{signal.values[row, channel]!r}, which its grid "
+                f"{float(signal.values[row, channel])!r}, which its grid "
                 f"{signal.grids[channel].kind.name} does not hold"
             )
     old = signal.exceptions

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -248,3 +249,84 @@ def test_up_of_what_is_converted(
         to = ("--to", "c3d", "-o", target, "--force", *options)
         assert call(capsys, "decode", tmp_path / "walk.mcz", *to)[0] == 0
         assert c3d.read(target.read_bytes(), "points").skeleton.up_axis == up
+
+
+def lines_in(text: str) -> list[str]:
+    return [
+        line.strip() for line in text.splitlines() if " in A, " in line or "not the same" in line
+    ]
+
+
+def test_diff_names_what_is_beside_the_numbers(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A plain C3D of the same numbers has lost events, platforms and groups, which is said."""
+    gait, plain = folder / "gait.c3d", folder / "plain.c3d"
+    assert call(capsys, "decode", folder / "gait.mcz", "--to", "c3d", "-o", plain)[0] == 0
+    code, text, _ = call(capsys, "diff", gait, plain)
+    assert code == 0
+    shown = lines_in(text)
+    assert shown[:2] == [
+        "events: 1 in A, 0 in B; only in A: Left Foot Strike at 0.25 s",
+        "force platforms: 1 in A, 0 in B; only in A: platform 1",
+    ]
+    assert shown[2].startswith("groups of parameters: ") and "EVENT" in shown[2]
+    code, text, _ = call(capsys, "diff", gait, plain, "--json")
+    found = {each["what"]: each for each in json.loads(text)["clips"][0]["differences"]}
+    assert found["events"] == {
+        "what": "events",
+        "a": 1,
+        "b": 0,
+        "only_in_a": ["Left Foot Strike at 0.25 s"],
+        "only_in_b": [],
+        "changed": [],
+    }
+    assert "EVENT" in found["groups of parameters"]["only_in_a"]
+    code, text, _ = call(capsys, "diff", plain, gait)
+    assert lines_in(text)[0].endswith("only in B: Left Foot Strike at 0.25 s")
+
+
+def test_diff_of_the_same_names_nothing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copy(folder / "gait.c3d", folder / "copy.c3d")
+    for other in ("copy.c3d", "gait.mcz"):
+        code, text, _ = call(capsys, "diff", folder / "gait.c3d", folder / other)
+        assert code == 0 and lines_in(text) == []
+    cut = ["--frames", "2:5"]
+    assert call(capsys, "decode", folder / "gait.mcz", *cut, "-o", folder / "cut.c3d")[0] == 0
+    mcz.encode(folder / "cut.c3d", folder / "cut.mcz")
+    assert lines_in(call(capsys, "diff", folder / "cut.c3d", folder / "cut.mcz")[1]) == []
+
+
+def test_diff_names_what_has_changed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Bytes of a text of the parameters, and of the header: numbers alike, named all the same."""
+    data = (folder / "gait.c3d").read_bytes()
+    (folder / "right.c3d").write_bytes(data.replace(b"force to the right", b"force to the wrong"))
+    shown = lines_in(call(capsys, "diff", folder / "gait.c3d", folder / "right.c3d")[1])
+    n = shown[0].split()[1]
+    assert shown == [f"parameters: {n} in A, {n} in B; changed: ANALOG:DESCRIPTIONS"]
+    header = bytearray(data)
+    header[200] ^= 1  # which nobody reads
+    (folder / "header.c3d").write_bytes(header)
+    shown = lines_in(call(capsys, "diff", folder / "gait.c3d", folder / "header.c3d")[1])
+    assert shown == ["header or layout of the files: not the same"]
+
+
+def test_diff_of_other_formats(
+    folder: Path, samples: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Rate, unit, axis, first frame, signals and metadata are compared in every format."""
+    motion = mcz.read(samples / "walk.bvh", unit="cm", up="y")
+    mcz.write(motion, folder / "a.mcz")
+    changed = replace(
+        motion,
+        frame_rate=motion.frame_rate * 2,
+        frame_numbers=np.arange(7, 247),
+        metadata={"subject": "05"},
+        source=None,
+    )
+    mcz.write(changed, folder / "b.mcz")
+    assert lines_in(call(capsys, "diff", folder / "a.mcz", folder / "b.mcz")[1]) == [
+        "first frame: 1 in A, 7 in B",
+        "frame rate: 120 in A, 240 in B",
+        "metadata: 0 in A, 1 in B; only in B: subject",
+    ]

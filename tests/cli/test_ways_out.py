@@ -186,7 +186,7 @@ def words_of(document: Any) -> set[str]:
 
 
 def test_other_words(samples: Path, tmp_path: Path, call: Call) -> None:
-    """Values that were replaced, smoothed or salvaged are not those of the source."""
+    """Values that were smoothed, coarsened or salvaged are not those of the source."""
     mcz.encode(samples / "walk.bvh", tmp_path / "walk.mcz")
     mcz.encode(samples / "walk.c3d", tmp_path / "m.mcz", codec="mrdwt")
     filtered = ["decode", tmp_path / "m.mcz", "--post-filter", "-o", f"{tmp_path}/f/", "--json"]

@@ -160,6 +160,107 @@ def test_blanks_of_a_head_end_where_the_numbers_begin() -> None:
             FORMATS["npy"].read(odd[:8] + size + odd[10:] + b"    ")
 
 
+def with_head(text: bytes, version: bytes = b"\1\0", n_bytes: int = 48) -> bytes:
+    """An NPY file whose head has this text, and so many bytes of numbers."""
+    size = len(text).to_bytes(2 if version[0] == 1 else 4, "little")
+    return b"\x93NUMPY" + version + size + text + np.arange(n_bytes / 8).tobytes()
+
+
+ORDER = b"'fortran_order': False"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"{'descr': '<f8', %b, 'shape': (3, 2), 'shape': (2, 3)}" % ORDER,
+        b"{'descr': '<i8', 'descr': '<f8', %b, 'shape': (3, 2)}" % ORDER,
+        b"{'descr': '<f8', 'fortran_order': True, %b, 'shape': (3, 2)}" % ORDER,
+        b"{'descr': '<f8', %b, 'shape': (3, 2), # 'shape': (2, 3)\n}" % ORDER,
+        b"{# 'shape': (2, 3)\n'descr': '<f8', %b, 'shape': (3, 2)}" % ORDER,
+        b"{'descr': '<f8', %b, 'shape': (3, 2), 'zz': \"'shape': (2, 3)\"}" % ORDER,
+        b"{'descr': '<f8', %b, 'shape': (3, 2), 'sh\\x61pe': (2, 3)}" % ORDER,
+        b"{'descr': '<f8', %b, 'shape': (6)}" % ORDER,
+        b"{'descr': '<f8', %b, 'shape': (3, 2)} + {}" % ORDER,
+        b"{'descr': '<f8' 'x', %b, 'shape': (3, 2)}" % ORDER,
+        b"{'descr': '<f8', %b, 'shape': (3, 2),, }" % ORDER,
+        b"{'descr\": '<f8', %b, 'shape': (3, 2)}" % ORDER,
+        b"\n{'descr': '<f8', %b, 'shape': (3, 2)}" % ORDER,
+        b"{'descr': '<f8', %b}" % ORDER,
+        b"{'descr': '<f8', %b, 'shape': (3, 2)}%b" % (ORDER, b" " * 10_000),
+    ],
+)
+def test_heads_that_might_mean_something_else_to_numpy_are_refused(text: bytes) -> None:
+    with pytest.raises(SourceError, match="offset"):
+        FORMATS["npy"].read(with_head(text))
+
+
+def test_versions_of_heads() -> None:
+    text = b"{'descr': '<f8', %b, 'shape': (3, 2)}\n" % ORDER
+    for version in (b"\1\0", b"\2\0", b"\3\0"):
+        np.testing.assert_array_equal(
+            FORMATS["npy"].read(with_head(text, version)).values, [[0, 1], [2, 3], [4, 5]]
+        )
+    for version in (b"\0\0", b"\1\1", b"\2\1", b"\4\0"):
+        with pytest.raises(SourceError, match="version"):
+            FORMATS["npy"].read(with_head(text, version))
+
+
+PARTS = [
+    *(
+        b"{",
+        b"}",
+        b",",
+        b":",
+        b"(",
+        b")",
+        b"'",
+        b'"',
+        b"\n",
+        b" ",
+        b"#",
+        b"\\x61",
+        b"u",
+        b"b",
+        b"L",
+    ),
+    *(b"'shape': (2, 3)", b"'descr': '>f8'", b"'fortran_order': True", b"'zz': 1", b"\v", b"\f"),
+    *(b"(6,)", b"(1, 6,)", b"0", b"_", b"1", b"-", b"+0", b"()", b"True", b"\0", b"\r", b"[", b"]"),
+]
+ITEMS = [b"'descr': '<f8'", ORDER, b"'shape': (3, 2)"]
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 80), st.integers(0, 24), st.sampled_from(PARTS))), st.data()
+)
+def test_heads_mean_what_they_mean_to_numpy_or_are_refused(
+    edits: list[tuple[int, int, bytes]], data: st.DataObject
+) -> None:
+    items = data.draw(st.permutations(ITEMS))
+    text = b"{" + b", ".join(items) + data.draw(st.sampled_from([b", }", b"}", b",}  \n"]))
+    for at, length, part in edits[:4]:
+        text = text[:at] + part + text[at + length :]
+    raw = with_head(text)
+    try:
+        motion = FORMATS["npy"].read(raw)
+    except MczError:
+        return
+    found = np.load(io.BytesIO(raw))
+    assert len(found.tobytes()) == 48
+    np.testing.assert_array_equal(motion.values, found.reshape(len(found), -1))
+
+
+@pytest.mark.parametrize("other", ["a.npy", "a", "a.npy\0x"])
+def test_a_member_that_is_there_twice_is_refused(other: str) -> None:
+    """NumPy reads the last, others the first."""
+    members = [
+        Member(name, npy(np.full((3, 2), value)))
+        for value, name in enumerate(("a.npy", "b.npy", other))
+    ]
+    with pytest.raises(SourceError, match="'a' is there twice"):
+        FORMATS["npz"].read(npz(members))
+    FORMATS["npz"].read(npz(members[:2]))
+
+
 def test_a_zip_that_was_written_forward() -> None:
     stream = Forward()
     with zipfile.ZipFile(stream, "w") as archive:
@@ -196,8 +297,7 @@ def test_nothing_is_unpickled_nor_inflated(monkeypatch: pytest.MonkeyPatch) -> N
     pickled = np.array([None], object)
     buffer = io.BytesIO()
     np.save(buffer, pickled, allow_pickle=True)
-    head = buffer.getvalue()[: -len(pickle.dumps(pickled, protocol=3))] or buffer.getvalue()[:128]
-    evil = head[:128] + pickle.dumps(Bomb())
+    evil = buffer.getvalue()[:128] + pickle.dumps(Bomb())
     members = (Member("evil.npy", evil), Member("a.npy", npy(floats(3, 2))))
     motion = back(npz(members))
     assert motion.metadata["source-note"] == "evil is pickled, and not unpickled"

@@ -164,7 +164,7 @@ def test_exceptions_out_of_place_are_refused(exceptions: Exceptions) -> None:
 def test_bad_exceptions_are_refused(exceptions: Exceptions) -> None:
     template, detail = GOOD.build()
     motion = _clip(template, detail)
-    signal = Signal(np.zeros((3, 2)), exceptions=exceptions)
+    signal = Signal(np.zeros((3, 2)), (Grid(GridKind.FIXED, 1),) * 2, exceptions=exceptions)
     with pytest.raises(FormatError):
         restore(Motion(motion.skeleton, (signal,)), Source("bvh", template, detail))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import tracemalloc
 
 import numpy as np
@@ -321,6 +322,40 @@ def test_tables_are_refused_by_name(data: bytes) -> None:
     with pytest.raises(SourceError) as caught:
         FORMATS["csv"].read(data, "table")
     assert REFUSED[data] in str(caught.value)
+
+
+TRC = (
+    "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tNumFrames\tNumMarkers\tUnits\n100\t2\t2\tmm\n"
+    "Frame#\tTime\tA B\t\t\tC\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n"
+    "1\t0.00\t1.5\t2\t3\t4\t5\t6\n2\t0.01\t1.5\t2\t3\t\t\t\n"
+)
+STO = (
+    "walk\nversion=1\nnRows=2\nnColumns=3\ninDegrees=yes\nendheader\n"
+    "time\thip\tknee\n0.0\t1.5\t2\n0.1\t1.5\t2.5\n"
+)
+
+
+@pytest.mark.parametrize(("text", "name"), [(TRC, "trc"), (STO, "sto"), (STO, "mot")])
+def test_tables_of_tabs_that_a_spreadsheet_fills_up(text: str, name: str) -> None:
+    form = FORMATS[name]
+    usual = meaning(form.read(text.encode(), "table"))
+    rows = [line.split("\t") for line in text.splitlines()]
+    for width, eol, mark in itertools.product((8, 11), ("\n", "\r\n"), ("", "\ufeff")):
+        filled = ["\t".join([*row, *[""] * (width - len(row))]) for row in rows]
+        data = (mark + "".join(line + eol for line in filled)).encode()
+        motion = form.read(data, "table")
+        assert meaning(motion) == usual and form.write(motion) == data
+    with pytest.raises(SourceError, match="has a decimal comma"):
+        form.read(text.replace("1.", "1,").replace("0.", "0,").encode(), "table")
+
+
+def test_a_spreadsheet_may_name_its_separator() -> None:
+    take_of_motive = MOTIVE.removeprefix(b"\xef\xbb\xbf")
+    usual = meaning(back(take_of_motive.replace(b", ", b"; ")))
+    for mark in (b"", b"\xef\xbb\xbf"):
+        assert meaning(back(mark + b"sep=;\r\n" + take_of_motive.replace(b",", b";"))) == usual
+    assert meaning(back(b"sep=,\r\n" + VICON)) == meaning(back(VICON))
+    assert meaning(back(b"sep=;\r\n" + COLUMNS)) == meaning(back(COLUMNS))
 
 
 @pytest.mark.parametrize("data", [MOTIVE, VICON])

@@ -13,7 +13,7 @@ import { guardedLater } from "./memory.js";
 import { supplied } from "./missing.js";
 import { readQuality } from "./qual.js";
 import { c3dRecording } from "./recording.js";
-import { sourceFormatLabel } from "./registry.js";
+import { isC3d, sourceFormatLabel } from "./registry.js";
 import { salvageSignal } from "./salvaged-signal.js";
 import { decodeSegments, openSignal, segmentsOf, takeColumns } from "./signals.js";
 import { restoreClip } from "./sources.js";
@@ -207,7 +207,7 @@ export class RangedClip {
    */
   async recording() {
     const { source } = this.clip;
-    if (!this.origin?.format.startsWith("c3d")) return null;
+    if (!source || !isC3d(source.format)) return null;
     await this.file.shared.loadTemplate(source, "clip");
     return c3dRecording(source);
   }

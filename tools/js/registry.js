@@ -2,21 +2,21 @@
 
 import { Refused, Unsupported } from "./errors.js";
 
-/** Source formats: what each is a source of. */
+/** Source formats: what each is a source of, and the kind of its template. */
 const SOURCE_FORMATS = new Map([
-  [1, { name: "asf", of: "skeleton" }],
-  [2, { name: "amc", of: "clip" }],
-  [3, { name: "bvh", of: "clip" }],
-  [4, { name: "c3d", of: "clip" }],
-  [5, { name: "c3d-outputs", of: "clip" }],
-  [6, { name: "trc", of: "clip" }],
-  [7, { name: "mot", of: "clip" }],
-  [8, { name: "sto", of: "clip" }],
-  [9, { name: "motive", of: "clip" }],
-  [10, { name: "vicon", of: "clip" }],
-  [11, { name: "csv", of: "clip" }],
-  [12, { name: "npy", of: "clip" }],
-  [13, { name: "npz", of: "clip" }],
+  [1, { name: "asf", of: "skeleton", kind: "text" }],
+  [2, { name: "amc", of: "clip", kind: "text" }],
+  [3, { name: "bvh", of: "clip", kind: "text" }],
+  [4, { name: "c3d", of: "clip", kind: "c3d" }],
+  [5, { name: "c3d-outputs", of: "clip", kind: "c3d" }],
+  [6, { name: "trc", of: "clip", kind: "table" }],
+  [7, { name: "mot", of: "clip", kind: "table" }],
+  [8, { name: "sto", of: "clip", kind: "table" }],
+  [9, { name: "motive", of: "clip", kind: "table" }],
+  [10, { name: "vicon", of: "clip", kind: "table" }],
+  [11, { name: "csv", of: "clip", kind: "table" }],
+  [12, { name: "npy", of: "clip", kind: "arrays" }],
+  [13, { name: "npz", of: "clip", kind: "arrays" }],
 ]);
 
 /** Names of the source formats that this decoder restores. */
@@ -48,12 +48,15 @@ export function sourceFormatLabel(format) {
   return SOURCE_FORMATS.get(format)?.name ?? `format ${format}`;
 }
 
+/** Whether a source format, given by its id, is one of C3D files. */
+export const isC3d = (format) => SOURCE_FORMATS.get(format)?.kind === "c3d";
+
 /**
  * @param {number} format id of a source format
- * @returns {string} its name
+ * @returns {"text" | "c3d" | "table" | "arrays"} the kind of its template
  * @throws {Unsupported} where it is not known
  */
-export function sourceFormatName(format) {
+export function sourceKind(format) {
   if (!SOURCE_FORMATS.has(format)) throw new Unsupported(`source format ${format}`);
-  return SOURCE_FORMATS.get(format).name;
+  return SOURCE_FORMATS.get(format).kind;
 }

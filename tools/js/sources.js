@@ -3,17 +3,13 @@
 import { sameBytes } from "./bytes.js";
 import { Refused } from "./errors.js";
 import { within } from "./limits.js";
-import { sourceFormatName } from "./registry.js";
+import { sourceKind } from "./registry.js";
 import { sha256 } from "./sha256.js";
 import { restoreArrays } from "./source-arrays.js";
 import { checkAsf } from "./source-asf.js";
 import { restoreC3d } from "./source-c3d.js";
 import { restoreTable } from "./source-table.js";
 import { restoreText } from "./source-text.js";
-
-const C3D_FORMATS = ["c3d", "c3d-outputs"];
-const TABLES = ["trc", "mot", "sto", "motive", "vicon", "csv"];
-const ARRAYS = ["npy", "npz"];
 
 /**
  * The source file of a clip. Of a clip whose codecs are lossless it is told by size and hash.
@@ -31,21 +27,21 @@ const ARRAYS = ["npy", "npz"];
  */
 export function restoreClip({ clip, signals, numbers, sourceSha256, maxBytes }) {
   const { source } = clip;
-  const format = sourceFormatName(source.format);
-  const bytes = restored(format, { clip, signals, numbers, maxBytes });
+  const kind = sourceKind(source.format);
+  const bytes = restored(kind, { clip, signals, numbers, maxBytes });
   if (signals.every(({ ordinals }) => ordinals !== null)) {
     checkFile(bytes, source.size, sourceSha256, `the source of clip ${clip.name}`);
   }
   return bytes;
 }
 
-function restored(format, { clip, signals, numbers, maxBytes }) {
+function restored(kind, { clip, signals, numbers, maxBytes }) {
   const { source } = clip;
-  if (C3D_FORMATS.includes(format)) {
+  if (kind === "c3d") {
     return restoreC3d(source, signals, clip.nFrames, numbers[0].number, maxBytes);
   }
-  if (ARRAYS.includes(format)) return restoreArrays(source, signals, maxBytes);
-  if (TABLES.includes(format)) {
+  if (kind === "arrays") return restoreArrays(source, signals, maxBytes);
+  if (kind === "table") {
     const names = clip.skeleton.joints.map(({ name }) => name);
     return restoreTable(source, signals, numbers, names, maxBytes);
   }
@@ -62,7 +58,7 @@ function restored(format, { clip, signals, numbers, maxBytes }) {
  */
 export function restoreSkeleton(skeleton, maxBytes) {
   const { source } = skeleton;
-  sourceFormatName(source.format);
+  sourceKind(source.format);
   const { data } = source.template;
   within(data.length, maxBytes, "bytes of the source of a skeleton");
   checkFile(data, source.size, source.sha256, "the source of a skeleton");

@@ -63,7 +63,7 @@ def to_scene(
     if to not in WRITERS:
         raise OptionError(f"no scene as {to!r}, but as {', '.join(WRITERS)}")
     motion = with_facts(motion, rate, unit, up)
-    if motion.frame_rate is None:
+    if motion.timeline is None:
         raise OptionError(
             f"motion {motion.name!r}: its frame rate is unknown, and {to.upper()} states times; "
             "give the rate"
@@ -80,6 +80,7 @@ def to_scene(
         "source": motion.source.path if motion.source else motion.name,
         "frameRate": float(scene.rate),
         "frames": motion.n_frames,
+        "startTime": scene.start,
         "lengthUnitKnown": scene.has_unit,
         "upAxisKnown": bool(motion.skeleton.up_axis),
         "keyError": bound,

@@ -15,6 +15,7 @@ from itertools import accumulate
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import Timeline
 from mcz.conversion.hierarchy import loose_tails, moves, stretches
 from mcz.conversion.losses import first_gap, left_out
 from mcz.errors import MotionError
@@ -26,6 +27,7 @@ from mcz.poses.conversions import from_matrices
 from mcz.retargeting.sides import sides_of
 
 CM_PER_M = 100.0
+NEAR = 1e-6  # frames: a time code that is off by less is a whole number
 SAMPLED_FRAMES = 500  # by which the size of a set of markers is judged
 UNSIZED = 1.0  # m, the size of a scene that has none
 
@@ -59,13 +61,17 @@ class Node:
 class Scene:
     """The nodes, parents before children; lengths in meters, or units where these are unknown.
 
-    ``up_axis`` is "x", "y" or "z"; ``size`` that of the figure; ``times`` (n_frames,) in seconds,
-    float32 numbers as float64. ``notes`` say in words what is unknown and what was left out.
+    ``up_axis`` is "x", "y" or "z"; ``size`` that of the figure; ``times`` (n_frames,) in seconds
+    from the first frame on, float32 numbers as float64; ``start``: the time of the first frame;
+    ``codes`` (n_frames,): the times on the clock of the recording, in frames of ``rate``. ``notes``
+    say in words what is unknown and what was left out.
     """
 
     name: str
     nodes: tuple[Node, ...]
     times: Floats
+    start: float
+    codes: Floats
     rate: Fraction
     up_axis: str
     size: float
@@ -94,13 +100,14 @@ class Scene:
 
 
 def scene_of(motion: Motion) -> Scene:
-    """The scene of ``motion``, whose frame rate is known.
+    """The scene of ``motion``, whose times are known.
 
     Raises MotionError where its skeleton has no kinematics, where a joint of a skeleton is missing
     in a frame, and where frames are so many that float32 cannot tell their times apart.
     """
-    skeleton, rate = motion.skeleton, motion.frame_rate
-    assert rate is not None
+    skeleton, timeline = motion.skeleton, motion.timeline
+    assert timeline is not None
+    rate = _rate(motion, timeline)
     if motion.signals[0].channels is not None:
         raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
     if not skeleton.joints:
@@ -111,7 +118,9 @@ def scene_of(motion: Motion) -> Scene:
     return Scene(
         motion.name,
         nodes,
-        _times(motion, rate),
+        _times(motion.name, timeline, rate),
+        float(timeline.even[0]) if motion.n_frames else 0.0,
+        _codes(timeline, rate),
         rate,
         skeleton.up_axis or "y",
         _marker_size(nodes) if is_markers else _size(nodes),
@@ -121,15 +130,29 @@ def scene_of(motion: Motion) -> Scene:
     )
 
 
-def _times(motion: Motion, rate: Fraction) -> Floats:
-    frames = np.arange(motion.n_frames, dtype=np.float64)
-    seconds = (frames * rate.denominator / rate.numerator).astype(np.float32).astype(np.float64)
+def _rate(motion: Motion, timeline: Timeline) -> Fraction:
+    """The frame rate, or the usual one of irregular times."""
+    if motion.frame_rate is not None:
+        return motion.frame_rate
+    usual = 1.0 / timeline.period if timeline.period else 1.0
+    return Fraction(usual).limit_denominator(1000) or Fraction(1)
+
+
+def _times(name: str, timeline: Timeline, rate: Fraction) -> Floats:
+    even = timeline.even
+    seconds = (even - even[:1]).astype(np.float32).astype(np.float64)
     if (np.diff(seconds) <= 0).any() or not np.isfinite(seconds).all():
         raise MotionError(
-            f"motion {motion.name!r}: {motion.n_frames} frames at {float(rate):g} a second have "
+            f"motion {name!r}: {len(seconds)} frames at {float(rate):g} a second have "
             "times that float32 cannot tell apart; write a part of them (--frames)"
         )
     return seconds
+
+
+def _codes(timeline: Timeline, rate: Fraction) -> Floats:
+    found = timeline.even * float(rate)
+    near = np.rint(found)
+    return np.where(np.abs(found - near) < NEAR, near, found)
 
 
 def _notes(motion: Motion) -> Iterator[str]:

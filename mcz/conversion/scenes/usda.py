@@ -51,10 +51,11 @@ def _layer(scene: Scene, name: str, generator: str, facts: dict[str, Any]) -> It
             text = value if isinstance(value, str) else "; ".join(value)
             yield f"        string {key} = {quoted(text)}"
     yield "    }"
-    yield f"    endTimeCode = {max(0, len(scene.times) - 1)}"
+    codes = scene.codes if len(scene.codes) else np.zeros(1)
+    yield f"    endTimeCode = {_number(codes[-1])}"
     yield f"    framesPerSecond = {rate}"
     yield "    metersPerUnit = 1"
-    yield "    startTimeCode = 0"
+    yield f"    startTimeCode = {_number(codes[0])}"
     yield f"    timeCodesPerSecond = {rate}"
     yield f'    upAxis = "{"Z" if scene.up_axis == "z" else "Y"}"'
     yield ")"
@@ -84,19 +85,19 @@ def _markers(scene: Scene, keys: Keyed) -> Iterator[str]:
         yield f"    double3 xformOp:translate = {_tuple(_float32(node.rest))}"
         if shifts is not None:
             rows = (_tuple(row) for row in shifts.values)
-            yield from _indented(_samples("double3 xformOp:translate", shifts.frames, rows))
+            yield from _indented(_samples("double3 xformOp:translate", scene, shifts.frames, rows))
         yield '    uniform token[] xformOpOrder = ["xformOp:translate"]'
-        yield from _indented(_visibility(node))
+        yield from _indented(_visibility(scene, node))
         yield "}"
 
 
-def _visibility(node: Node) -> Iterator[str]:
+def _visibility(scene: Scene, node: Node) -> Iterator[str]:
     seen = node.seen
     if seen.all():
         return
     frames = np.flatnonzero(np.diff(seen, prepend=~seen[:1]))
     words = ('"inherited"' if seen[frame] else '"invisible"' for frame in frames)
-    yield from _samples("token visibility", frames, words)
+    yield from _samples("token visibility", scene, frames, words)
 
 
 def _skeleton(scene: Scene, keys: Keyed, name: str) -> Iterator[str]:
@@ -142,7 +143,7 @@ def _animation(
         if still:
             yield f"    {label} = {next(rows)}"
         else:
-            yield from _indented(_samples(label, frames, rows))
+            yield from _indented(_samples(label, scene, frames, rows))
     yield "}"
 
 
@@ -226,10 +227,12 @@ def quoted(text: str) -> str:
     return '"' + re.sub(r"[\x00-\x1f\x7f]", lambda match: f"\\x{ord(match[0]):02x}", made) + '"'
 
 
-def _samples(label: str, frames: NDArray[np.int64], values: Iterable[str]) -> Iterator[str]:
+def _samples(
+    label: str, scene: Scene, frames: NDArray[np.int64], values: Iterable[str]
+) -> Iterator[str]:
     yield f"{label}.timeSamples = {{"
-    for frame, value in zip(frames.tolist(), values, strict=True):
-        yield f"    {frame}: {value},"
+    for code, value in zip(scene.codes[frames].tolist(), values, strict=True):
+        yield f"    {_number(code)}: {value},"
     yield "}"
 
 

@@ -74,6 +74,7 @@ def read_archive(data: bytes) -> Archive:
     for _ in range(n_members):
         member, at = _entry(data, at, end)
         entries.append(member)
+    _check_names(entries)
     members = tuple(sorted(entries, key=lambda member: member.at))
     for one, other in pairwise(members):
         if one.stop > other.at:
@@ -149,6 +150,16 @@ def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
         )
     _check_local(data, member, raw)
     return member, behind
+
+
+def _check_names(members: list[Member]) -> None:
+    """Raise SourceError for names of which NumPy and zipfile make one array."""
+    seen = set()
+    for member in members:
+        name = member.name.partition("\0")[0].removesuffix(".npy")
+        if name in seen:
+            raise SourceError(f"offset {member.entry}: member {name!r} is there twice")
+        seen.add(name)
 
 
 def _check_local(data: bytes, member: Member, raw: bytes) -> None:

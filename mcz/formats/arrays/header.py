@@ -10,12 +10,24 @@ from mcz.errors import SourceError
 from mcz.formats.arrays.layout import TYPES
 
 MAGIC = b"\x93NUMPY"
-MAX_HEAD = 2**16  # bytes; NumPy itself takes no more than 10,000 that nobody vouches for
+VERSIONS = ((1, 0), (2, 0), (3, 0))
+MAX_HEAD = 10_000  # bytes; NumPy takes no more of a file that nobody vouches for
 MAX_AXES = 64  # those of NumPy
+_NUMBER = re.compile(rb"\d+")
 _PLAIN = re.compile(rb"0|[1-9]\d{0,17}")
-_DESCR = re.compile(rb"""["']descr["']\s*:\s*["']([<>|=]?)([A-Za-z])(\d*)["']""")
-_ORDER = re.compile(rb"""["']fortran_order["']\s*:\s*(True|False)\b""")
-_SHAPE = re.compile(rb"""["']shape["']\s*:\s*\(\s*((?:\d+\s*,\s*)*(?:\d+\s*)?)\)""")
+_BLANKS = rb"[ \t\r\n]*"
+_VALUES = {
+    b"descr": rb"""(?:'([<>|=]?)([A-Za-z])(\d*)'|"([<>|=]?)([A-Za-z])(\d*)")""",
+    b"fortran_order": rb"(True|False)",
+    b"shape": rb"\( ((?:\d+ , )*(?:\d+ , \d+ )?)\)",
+}
+_ITEM = rb"""(?:'%s'|"%s") : %s """
+_ITEMS = {
+    key: re.compile((_ITEM % (key, key, value)).replace(b" ", _BLANKS))
+    for key, value in _VALUES.items()
+}
+_OPEN, _COMMA = re.compile(rb"[ \t]*\{" + _BLANKS), re.compile(b"," + _BLANKS)
+_CLOSE = re.compile(rb"\}" + _BLANKS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +63,10 @@ def read_head(data: bytes, at: int, stop: int) -> Head:
     """The head of the NPY file in data[at:stop]; see ``Head.odd``."""
     if data[at : at + 6] != MAGIC or stop < at + 10:
         return Head(odd=f"offset {at}: no NPY file, which begins with \\x93NUMPY")
-    version = data[at + 6]
-    wide = 2 if version == 1 else 4
-    if version not in (1, 2, 3):
-        return Head(odd=f"offset {at + 6}: version {version} of NPY is not known")
+    version = data[at + 6], data[at + 7]
+    wide = 2 if version == (1, 0) else 4
+    if version not in VERSIONS:
+        return Head(odd=f"offset {at + 6}: version {version[0]}.{version[1]} of NPY is not known")
     text_at = at + 8 + wide
     size = int.from_bytes(data[at + 8 : text_at], "little")
     if size > MAX_HEAD or text_at + size > stop:
@@ -64,17 +76,19 @@ def read_head(data: bytes, at: int, stop: int) -> Head:
 
 def _parsed(text: bytes, at: int, stop: int) -> Head:
     """What the text of a head, which lies at offset ``at``, says."""
-    found = [pattern.search(text) for pattern in (_DESCR, _ORDER, _SHAPE)]
-    descr, order, shape = found
-    if descr is None or order is None or shape is None:
-        return Head(odd=f"offset {at}: a head without a plain descr, fortran_order and shape")
-    numbers = re.findall(rb"\d+", shape[1])
+    found = _items(text)
+    if found is None:
+        return Head(
+            odd=f"offset {at}: the head is no plain dictionary of descr, fortran_order and shape"
+        )
+    descr, order, shape = found[b"descr"], found[b"fortran_order"], found[b"shape"]
+    numbers = _NUMBER.findall(shape[1])
     if len(numbers) > MAX_AXES or not all(map(_PLAIN.fullmatch, numbers)):
         return Head(
             odd=f"offset {at + shape.start(1)}: the shape {shape[1][:60]!r} is no plain one"
         )
     lengths = tuple(map(int, numbers))
-    code = (descr[2] + descr[3]).decode()
+    byte_order, code = _type_of(descr)
     first = re.match(rb"\d+", shape[1])
     rows_at = (0, 0)
     if first is not None:
@@ -84,7 +98,7 @@ def _parsed(text: bytes, at: int, stop: int) -> Head:
         at + len(text),
         lengths,
         code,
-        descr[1] == b">",
+        byte_order == b">",
         order[1] == b"True",
         rows_at,
         end,
@@ -97,14 +111,42 @@ def _parsed(text: bytes, at: int, stop: int) -> Head:
     return head
 
 
+def _items(text: bytes) -> dict[bytes, re.Match[bytes]] | None:
+    """The three values of a head, a dictionary in Python's words; None where it is not so plain.
+
+    A key that is there twice, another key, a comment or an escape might mean something else to
+    NumPy, which evaluates the text.
+    """
+    at, found = 0, dict[bytes, re.Match[bytes]]()
+    last = _OPEN.match(text)
+    while last is not None:
+        at = last.end()
+        item = next(filter(None, (pattern.match(text, at) for pattern in _ITEMS.values())), None)
+        if item is None:
+            break
+        key = next(key for key, pattern in _ITEMS.items() if pattern is item.re)
+        if key in found:
+            return None
+        found[key], at = item, item.end()
+        last = _COMMA.match(text, at)
+    end = _CLOSE.fullmatch(text, at)
+    return found if end is not None and len(found) == len(_ITEMS) else None
+
+
+def _type_of(descr: re.Match[bytes]) -> tuple[bytes, str]:
+    """The byte order of a type and its code without one."""
+    order, kind, size = descr.groups()[:3] if descr[2] else descr.groups()[3:]
+    return order, (kind + size).decode()
+
+
 def has_rows(data: bytes) -> bool:
     """Whether the head that ``data`` begins with is one of numbers with two axes or more."""
     size = int.from_bytes(data[8 : 10 if data[6:7] == b"\1" else 12], "little")
-    text = data[: 12 + min(size, MAX_HEAD)]
-    descr, shape = _DESCR.search(text), _SHAPE.search(text)
-    if descr is None or shape is None:
+    begin = 10 if data[6:7] == b"\1" else 12
+    found = _items(data[begin : begin + min(size, MAX_HEAD)])
+    if found is None:
         return False
-    return (descr[2] + descr[3]).decode() in TYPES and len(re.findall(rb"\d+", shape[1])) > 1
+    return _type_of(found[b"descr"])[1] in TYPES and len(_NUMBER.findall(found[b"shape"][1])) > 1
 
 
 def refuse_odd(head: Head) -> None:

@@ -1,5 +1,7 @@
 // What is shown, and what the user is told. What was asked for last counts.
 
+import { lostText } from "./ui/text.js";
+
 /** Tells the user something; `isFault` where it did not go well. */
 export const tell = (store, text, isFault = false) => store.set({ message: { text, isFault } });
 
@@ -24,11 +26,12 @@ export async function showClip(page, fileId, index, { turn = ask(), isNew = fals
   const { store, engine } = page;
   if (turn !== nAsked) return null;
   try {
-    const clip = await engine.clip(fileId, index);
+    const clip = await wholeOrSalvaged(page, fileId, index);
     if (turn !== nAsked) return null;
     const compared = isNew ? null : await partnerOf(page, clip).catch(() => null);
     if (turn !== nAsked) return null;
     const more = isNew ? { playing: false, message: messageThatStays(store) } : {};
+    if (clip.lost?.length) more.message = { text: damageText(store, clip), isFault: true };
     store.set({ shown: clip, compared, errors: null, selection: [], frame: 0, ...more });
     return clip;
   } catch (error) {
@@ -36,6 +39,19 @@ export async function showClip(page, fileId, index, { turn = ask(), isNew = fals
     throw error;
   }
 }
+
+/** A clip; where its file turns out to be damaged, what is whole of it. */
+async function wholeOrSalvaged({ engine, salvage }, fileId, index) {
+  try {
+    return await engine.clip(fileId, index);
+  } catch (error) {
+    const id = error.name === "Refused" ? await salvage(fileId, error) : null;
+    if (id === null) throw error;
+    return engine.clip(id, index);
+  }
+}
+
+const damageText = (store, clip) => `${nameOf(store, clip)} is damaged: ${lostText(clip)}. What is whole is shown.`;
 
 /** What is wrong with the first file that is opened stays. */
 function messageThatStays(store) {
@@ -71,3 +87,14 @@ export async function compareClip({ store, engine }, fileId, index) {
 }
 
 const colorsWithoutErrors = (store) => (store.get("colors") === "error" ? { colors: "sides" } : {});
+
+/** The file that a clip is of. */
+export const fileOf = (store, clip) =>
+  clip ? store.get("files").find(({ id }) => id === clip.fileId) : undefined;
+
+/** The file of a clip, with the clip's name where the file has several; the codec of one just coded. */
+export function nameOf(store, clip) {
+  const file = fileOf(store, clip);
+  if (!file) return clip.label ?? clip.name;
+  return file.nClips === 1 ? file.name : `${file.name}: ${clip.name}`;
+}

@@ -3,6 +3,7 @@
 import { ask, compareClip, showClip, tell } from "./asked.js";
 import { embeddedAnnex, fromBase64 } from "./engine/annex.js";
 import { accepted, droppedFiles, gathered } from "./inputs/files.js";
+import { lostText } from "./ui/text.js";
 
 const places = new Map(); // of opened files, to open them again
 const isMcz = (name) => /\.mcz$/i.test(name);
@@ -10,6 +11,7 @@ const isMcz = (name) => /\.mcz$/i.test(name);
 /** Opens what the page was made for, and takes what is dropped on it. */
 export async function openFirst(page) {
   takeDrops(page);
+  page.salvage = (id, fault) => salvage(page, id, fault);
   page.engine.onDamage = (clip, error) => salvage(page, clip.fileId, error);
   const text = document.getElementById("embedded")?.textContent;
   try {
@@ -57,13 +59,18 @@ const formatsText = (page) => {
  * @throws {Error} with the name and message of the decoder's
  */
 async function addFile({ store, engine }, where, { name, url = null, ...options }) {
-  const opened = options.salvage
-    ? await engine.open(where, { name, ...options })
-    : await openedStrictlyOrNot({ store, engine }, where, { name, ...options });
-  const file = { ...opened, name, url };
-  places.set(file.id, where);
-  store.set({ files: [...store.get("files"), file] });
-  return file;
+  store.set({ loading: name });
+  try {
+    const opened = options.salvage
+      ? await engine.open(where, { name, ...options })
+      : await openedStrictlyOrNot({ store, engine }, where, { name, ...options });
+    const file = { ...opened, name, url };
+    places.set(file.id, where);
+    store.set({ files: [...store.get("files"), file] });
+    return file;
+  } finally {
+    if (store.get("loading") === name) store.set({ loading: null });
+  }
 }
 
 async function openedStrictlyOrNot(page, where, options) {
@@ -84,13 +91,17 @@ async function openedStrictlyOrNot(page, where, options) {
   }
 }
 
-/** Opens a file again whose damage was not seen at first; what is shown of it is shown anew. */
+/**
+ * Opens a file again whose damage was not seen at first; what is shown of it is shown anew.
+ *
+ * @returns {Promise<number | null>} its new id; null where nothing of it can be read
+ */
 async function salvage(page, id, fault) {
   const { store, engine } = page;
   const where = places.get(id);
   const file = store.get("files").find((one) => one.id === id);
   places.delete(id);
-  if (where === undefined || file === undefined || file.damage.length > 0) return;
+  if (where === undefined || file === undefined || file.damage.length > 0) return null;
   try {
     const opened = await engine.open(where, { name: file.name, salvage: true });
     const files = store.get("files").map((one) => (one.id === id ? { ...one, ...opened } : one));
@@ -101,9 +112,12 @@ async function salvage(page, id, fault) {
       const anew = await engine.clip(opened.id, clip.index);
       if (store.get(key) === clip) store.set({ [key]: anew, errors: null });
     }
-    tell(page.store, `${file.name} is damaged: ${fault.message}. What is whole is shown.`, true);
+    const lost = store.get("shown")?.fileId === opened.id ? lostText(store.get("shown")) : "";
+    tell(page.store, `${file.name} is damaged: ${lost || fault.message}. What is whole is shown.`, true);
+    return opened.id;
   } catch {
     tell(page.store, `${file.name}: ${faultText(fault)}`, true);
+    return null;
   }
 }
 
@@ -204,7 +218,9 @@ async function showFirst(page, [first], turn) {
 /** The first clips of two files are compared. */
 async function compareSecond(page, [first, second]) {
   if (!(first?.nClips > 0 && second?.nClips > 0)) return;
-  if (page.store.get("shown")?.fileId === first.id) await compareClip(page, second.id, 0);
+  if (page.store.get("shown")?.fileId !== first.id) return;
+  page.store.set({ tab: "compare" });
+  await compareClip(page, second.id, 0);
 }
 
 async function serverFacts() {

@@ -5,6 +5,7 @@ export function initial() {
   return {
     files: [],
     shown: null,
+    loading: null,
     compared: null,
     frame: 0,
     playing: false,
@@ -26,6 +27,7 @@ export function initial() {
     theme: null,
     curves: [],
     panels: {},
+    tab: "info",
     errorsShare: null,
     diffs: [],
   };

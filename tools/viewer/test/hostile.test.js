@@ -79,9 +79,11 @@ for (const name of ["cut.mcz", "none.mcz"]) {
     }));
 }
 
-test("a damaged segment: it is said, and the page goes on", () =>
-  served([fixture("damaged.mcz"), fixture("walk.mcz")], { isEmpty: true }, async (page) => {
+test("a damaged segment: its frames are named, the others shown, and the page goes on", () =>
+  served([fixture("damaged.mcz"), fixture("walk.mcz")], {}, async (page) => {
     await page.waitForSelector("#message.fault", { timeout: 20_000 });
+    assert.match(await page.textContent("#message"), /damaged\.mcz is damaged: frames \d+ to \d+ are lost/);
+    assert.match(await page.title(), /damaged\.mcz/);
     await page.locator("#clips .tree-row", { hasText: "walk.mcz" }).click();
     await page.waitForFunction(() => /walk\.mcz/.test(document.title));
     await curved(page);

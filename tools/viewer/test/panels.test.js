@@ -226,3 +226,34 @@ test("the keyboard alone reaches everything that can be pressed", async () => {
   assert.deepEqual(missed, []);
   await page.context().close();
 });
+
+test("a clip whose first frames are empty begins where its points are", async () => {
+  const own = await serve({ files: [fixture("late.mcz")] });
+  const page = await open(browser, own.url);
+  await page.waitForFunction(() => /^21 \/ 240/.test(document.querySelector("output.place").textContent));
+  await page.context().close();
+  await own.close();
+});
+
+test("lines between markers whose names say nothing are offered on the picture", async () => {
+  const own = await serve({ files: [fixture("numbered.mcz")] });
+  const page = await open(browser, own.url);
+  await page.click(".stage-guess");
+  await page.waitForFunction(() => globalThis.mczViewer.stage.shown.neighbors?.length > 10);
+  assert.equal(await page.locator(".stage-guess").isVisible(), false);
+  await page.context().close();
+  await own.close();
+});
+
+test("two files open on Compare, each named below its figure", async () => {
+  const files = [fixture("walk.mcz"), fixture("walk-small.mcz")];
+  const own = await serve({ files, api: { diff: true } });
+  const page = await open(browser, own.url);
+  await page.waitForSelector("#tab-compare[aria-selected='true']");
+  await page.waitForSelector("text=Greatest");
+  const below = await page.$$eval(".stage-file", (all) => all.map((one) => one.textContent));
+  assert.deepEqual(below, ["walk.mcz", "walk-small.mcz"]);
+  assert.deepEqual(await axe(page), []);
+  await page.context().close();
+  await own.close();
+});

@@ -59,9 +59,11 @@ test("a BVH: shown, coded anew as the slider moves, compared, exported", async (
     }
     const rows = await page.$$eval("#panel-quality tbody tr", (all) => all.map((one) => one.textContent));
     assert.equal(rows.length, 2);
+    assert.equal(await page.evaluate(() => globalThis.mczViewer.store.get("colors")), "error");
     assert.match(await page.textContent(".result"), /mm/);
     await page.click("#tab-compare");
     await page.waitForSelector("text=Figures of mcz diff");
+    assert.match(await page.locator("#compare-file option:checked").textContent(), /^posewave, /);
     await page.waitForFunction(() =>
       /Mean position error[\d.]+ cm/.test(document.querySelector("#panel-compare").textContent),
     );

@@ -2,7 +2,7 @@
 
 import { showClip as showAsked, tellError } from "../asked.js";
 
-export { compareClip, tell, tellError } from "../asked.js";
+export { compareClip, fileOf, nameOf, tell, tellError } from "../asked.js";
 
 /** Shows a clip; tells what is wrong. */
 export const showClip = (page, fileId, index) =>
@@ -27,7 +27,3 @@ export function watchErrors({ store, engine }) {
     }
   });
 }
-
-/** The file that a clip is of. */
-export const fileOf = (store, clip) =>
-  clip ? store.get("files").find(({ id }) => id === clip.fileId) : undefined;

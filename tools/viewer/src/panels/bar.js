@@ -21,7 +21,7 @@ const DRAWN = [
   ["trails", "Trails of selected points"],
   ["contacts", "Foot contacts"],
   ["names", "Names"],
-  ["neighbors", "Lines between markers that keep their distance"],
+  ["neighbors", "Guess lines between markers"],
   ["follow", "Follow the figure"],
 ];
 
@@ -45,7 +45,7 @@ export function mountBar(element, page, { openFiles, layout, theme, help }) {
     ),
   );
   layout.place();
-  page.store.watch(["shown", "files"], () => fillNames(names, page.store));
+  page.store.watch(["shown", "files", "loading"], () => fillNames(names, page.store));
 }
 
 function fillNames(element, store) {
@@ -53,7 +53,9 @@ function fillNames(element, store) {
   const shown = store.get("shown");
   const file = fileOf(store, shown);
   if (!shown) {
-    fill(element, files.length ? files.map(({ name }) => name).join(", ") : "No file is open");
+    const loading = store.get("loading");
+    const text = files.map(({ name }) => name).join(", ") || "No file is open";
+    fill(element, loading ? `Loading ${loading} …` : text);
     document.title = "MCZ";
     return;
   }

@@ -1,6 +1,6 @@
 // A second clip beside the one shown: which, how it is drawn, and how far it is away.
 
-import { compareClip, fileOf } from "./actions.js";
+import { compareClip, fileOf, nameOf } from "./actions.js";
 import { chooseFiles } from "../inputs.js";
 import { button, choice, facts, fill, later, make, put, toggle } from "../ui/dom.js";
 import { count, distance, figure, frameNumber, size, summary } from "../ui/text.js";
@@ -8,6 +8,7 @@ import { post, served } from "./server.js";
 
 const MOST_OPTIONS = 400;
 const MOST_POINTS = 12;
+const CODED = "coded"; // in place of a file's id: what the quality panel coded
 
 export function mountCompare(panel, page) {
   const { store } = page;
@@ -47,6 +48,7 @@ function mountChooser(section, page) {
     clipField.hidden = !file || file.nClips > MOST_OPTIONS;
     note.textContent =
       file && file.nClips > MOST_OPTIONS ? "Choose it in the list of clips: its button, or Shift C." : "";
+    if (files.value === CODED) note.textContent = "Coded from the clip that is shown.";
     if (clipField.hidden) return;
     const rows = await engine.rows(file.id, 0, file.nClips).catch(() => []);
     if (mine !== asked) return;
@@ -65,6 +67,7 @@ function mountChooser(section, page) {
   };
   clips.addEventListener("change", choose);
   files.addEventListener("change", async () => {
+    if (files.value === CODED) return;
     await fillClips();
     const file = store.get("files").find(({ id }) => String(id) === files.value);
     if (file?.nClips !== 1 || clips.options.length < 2) return;
@@ -75,10 +78,15 @@ function mountChooser(section, page) {
     const all = store.get("files");
     const compared = store.get("compared");
     const { value } = files;
-    fill(files, all.map(({ id, name }) => make("option", { value: id }, name)));
+    const isCoded = compared !== null && !fileOf(store, compared);
+    fill(
+      files,
+      isCoded && make("option", { value: CODED }, nameOf(store, compared)),
+      all.map(({ id, name }) => make("option", { value: id }, name)),
+    );
     const other = all.find(({ id }) => id !== store.get("shown")?.fileId);
-    const wanted = compared && fileOf(store, compared) ? compared.fileId : value || other?.id;
-    if (all.some(({ id }) => String(id) === String(wanted))) files.value = String(wanted);
+    const wanted = isCoded ? CODED : compared ? compared.fileId : value || other?.id;
+    if (isCoded || all.some(({ id }) => String(id) === String(wanted))) files.value = String(wanted);
     swap.disabled = stop.disabled = !compared;
     fillClips();
   };
@@ -125,7 +133,7 @@ function fillNumbers(section, store) {
   if (!compared) return;
   const shown = store.get("shown");
   fill(section, make("h2", {}, "Distance of points"));
-  put(section, facts([["Clip", compared.name], ["", summary(compared)], ["Size", sizes(shown, compared)]]));
+  put(section, facts([["Clip", nameOf(store, compared)], ["", summary(compared)], ["Size", sizes(shown, compared)]]));
   if (!errors) {
     const share = store.get("errorsShare");
     put(section, make("progress", { max: 1, value: share ?? 0, "aria-label": "Points are being compared" }));

@@ -2,7 +2,7 @@
 
 import { fileOf } from "./actions.js";
 import { choice, facts, fill, make, put } from "../ui/dom.js";
-import { count, counted, duration, figure, frameNumber, secondsOf, size } from "../ui/text.js";
+import { count, counted, duration, figure, lostText, secondsOf, size } from "../ui/text.js";
 
 const AXES = ["x", "y", "z"];
 const MOST_ROWS = 200;
@@ -96,12 +96,10 @@ function signalFacts({ signals }) {
 }
 
 function damageFacts(clip, file) {
-  const number = (frame) => count(frameNumber(clip, frame));
-  const lost = (clip.lost ?? []).map(([from, to]) => `${number(from)} to ${number(to - 1)}`);
   const damage = file?.damage;
   const lines = Array.isArray(damage) ? damage : damage ? [damage] : [];
   return [
-    ["Lost frames", lost.length ? lost.slice(0, MOST_ROWS).join(", ") : null],
+    ["Clip", lostText(clip, MOST_ROWS) || null],
     ...lines
       .slice(0, MOST_ROWS)
       .map((line) => ["File", typeof line === "object" ? facts(rowsOf(line)) : String(line)]),

@@ -162,7 +162,8 @@ class Quality {
     const bytes = made.payload ?? made.size;
     const label = `${dial.name} ${figure(value, 3)}`;
     this.#waiting = { codec: this.codec.value, label, bytes, size: made.size, seconds: made.seconds, key: coded.key, clip };
-    this.store.set({ compared: { ...coded, servedUrl: made.url }, errors: null });
+    const compared = { ...coded, servedUrl: made.url, label: `${this.codec.value}, ${label}` };
+    this.store.set({ compared, errors: null, colors: "error" });
     if (before) engine.close(before.id).catch((error) => tellError(this.store, error));
   }
 

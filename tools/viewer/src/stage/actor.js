@@ -10,6 +10,7 @@ import { boundsOf, facing, measured, quantile, scaleOf } from "./framing.js";
 
 const SMALL = 3000; // frames of a clip that is looked at as a whole before it is shown
 const SAMPLES = 24;
+const PIECE = 256; // frames that are asked for at a time
 const FIRST_SAMPLES = 16; // of the first frames
 
 export class Actor {
@@ -60,6 +61,23 @@ export class Actor {
         return; // what is wrong is told when the frame is to be shown
       }
     }
+  }
+
+  /**
+   * The first frame in which a point is seen.
+   *
+   * @param {() => boolean} isOver ends the search
+   * @returns {Promise<number>} 0 where there is none
+   */
+  async firstSeen(isOver) {
+    const { nFrames } = this.clip;
+    const size = 3 * this.clip.points.length;
+    for (let from = 0; from < nFrames && !isOver(); from += PIECE) {
+      const places = await this.engine.positions(this.clip, from, Math.min(nFrames, from + PIECE));
+      const at = places.findIndex((x) => !Number.isNaN(x));
+      if (at >= 0) return from + Math.floor(at / size);
+    }
+    return 0;
   }
 
   /** Decides about axes and size; `scale` of another clip that this one is compared with. */

@@ -2,6 +2,7 @@
 // of colors. All of them are text.
 
 import { Vector3 } from "three";
+import { printable } from "../ui/text.js";
 import { scaleGradient } from "./colors.js";
 
 const NEAR = 16; // pixels from the pointer
@@ -11,13 +12,40 @@ export class Labels {
     this.point = add(element, "div", "point-label");
     this.note = add(element, "div", "stage-note");
     this.scale = add(element, "div", "stage-scale");
+    this.files = [add(element, "div", "stage-file"), add(element, "div", "stage-file")];
+    this.loading = add(element, "p", "stage-loading");
+    this.loading.setAttribute("role", "status");
     this.names = add(element, "canvas", "stage-names");
     this.names.setAttribute("aria-hidden", "true");
     const bar = document.createElement("i");
     bar.style.background = scaleGradient();
     this.ends = document.createElement("span");
     this.scale.append(bar, this.ends);
-    for (const one of [this.point, this.note, this.scale]) one.hidden = true;
+    const hidden = [this.point, this.note, this.scale, this.loading, ...this.files];
+    for (const one of hidden) one.hidden = true;
+  }
+
+  /** @param {string | null} name of the file that is being opened */
+  setLoading(name) {
+    this.loading.hidden = name === null;
+    this.loading.textContent = name === null ? "" : `Loading ${printable(name, 80)} …`;
+  }
+
+  /**
+   * The names below the figures.
+   *
+   * @param {{text: string, color: string, x: number, y: number}[]} figures none, or two
+   */
+  setFiles(figures) {
+    this.files.forEach((label, k) => {
+      const figure = figures[k];
+      label.hidden = figure === undefined;
+      if (figure === undefined) return;
+      const text = printable(figure.text, 60);
+      if (label.textContent !== text) label.textContent = text;
+      label.style.borderColor = figure.color;
+      label.style.transform = `translate(${Math.round(figure.x)}px, ${Math.round(figure.y)}px) translateX(-50%)`;
+    });
   }
 
   setNote(text) {

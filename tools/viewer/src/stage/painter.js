@@ -1,6 +1,7 @@
 // Colors of the figures on the stage, and the scale beside them where colors are numbers.
 
-import { alike, byNumber, bySide, figureText, palette } from "./painting.js";
+import { figure } from "../ui/text.js";
+import { alike, byNumber, bySide, palette } from "./painting.js";
 
 export class Painter {
   #stage;
@@ -46,7 +47,7 @@ export class Painter {
     const chosen = page.store.get("selection");
     shown.body.paint(byNumber(speeds, usualSpeed, this.colors.gone), this.theme, chosen);
     compared?.body?.paint(alike(this.colors.ghost), this.theme, this.#stage.chosenOther());
-    labels.setScale(["0", `${usualSpeed} ${shown.clip.unitCm === null ? "units/s" : "m/s"}`]);
+    labels.setScale(["0", `${figure(usualSpeed)} ${shown.clip.unitCm === null ? "units/s" : "m/s"}`]);
   }
 
   #paintErrors() {
@@ -59,6 +60,6 @@ export class Painter {
     shown.body.paint(byNumber(ofShown, most, this.colors.center), this.theme, chosen);
     const others = this.#stage.chosenOther();
     compared.body.paint(byNumber(ofCompared, most, this.colors.center), this.theme, others);
-    labels.setScale(["0", figureText(most / 2), `${most} ${unit}`]);
+    labels.setScale(["0", figure(most / 2, 3), `${figure(most)} ${unit}`]);
   }
 }

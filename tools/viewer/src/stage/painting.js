@@ -25,9 +25,6 @@ export function byNumber(numbers, most, nothing) {
   return (point) => out[point];
 }
 
-/** A number with three digits. */
-export const figureText = (value) => String(Number(value.toPrecision(3)));
-
 /** Distances of the points of two actors in one frame. */
 export class PointErrors {
   constructor(shown, compared) {

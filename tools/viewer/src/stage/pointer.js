@@ -1,7 +1,7 @@
 // The pointer on the picture: names of points under it, points that are chosen by a click.
 
+import { figure } from "../ui/text.js";
 import { nearest } from "./labels.js";
-import { figureText } from "./painting.js";
 
 const CLICK = 5; // pixels that a pointer may move in a click
 const TOUCH = 28; // pixels from a finger
@@ -42,7 +42,7 @@ function nameOf({ shown, page, pointErrors }, point) {
   const { name } = shown.clip.points[point];
   if (page.store.get("colors") !== "error" || pointErrors === null) return name;
   const error = pointErrors.ofShown[point];
-  return Number.isFinite(error) ? `${name}: ${figureText(error)} ${pointErrors.unit}` : name;
+  return Number.isFinite(error) ? `${name}: ${figure(error, 3)} ${pointErrors.unit}` : name;
 }
 
 function choose(stage, event) {

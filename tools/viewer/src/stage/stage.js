@@ -1,5 +1,7 @@
 // The three-dimensional picture: watches the store, and draws what it says.
 
+import { nameOf } from "../asked.js";
+import { button } from "../ui/dom.js";
 import { Actor } from "./actor.js";
 import { Labels, project } from "./labels.js";
 import { gridOf } from "./framing.js";
@@ -11,12 +13,14 @@ import { PointErrors } from "./painting.js";
 import { listenToPointer } from "./pointer.js";
 import { View } from "./view.js";
 
-const GHOST = 0.5; // opacity of a figure that is laid over another
+const GHOST = 0.4; // opacity of a figure that is laid over another
 const FAR = 1.2; // a clip goes farther than so many figures: the camera follows
 const ASIDE = 1.15; // units of the picture between figures side by side, at least
 const BETWEEN = 0.35; // radians: they stand side by side as seen from the front and a little beside
 const PREFETCH = 3; // blocks, while playing
 const SOFT = 0.14; // part of its way that the camera follows in a picture
+const BELOW = 10; // pixels from the floor to the name of a figure
+const LINE = 22; // pixels from one name to the next
 
 let stage = null;
 
@@ -53,6 +57,14 @@ class Stage {
       return;
     }
     this.labels = new Labels(element);
+    this.guess = button({
+      label: "Guess lines between markers that keep their distance",
+      shown: "Guess lines",
+      class: "stage-guess",
+      onClick: () => page.store.set({ neighbors: true }),
+    });
+    this.guess.hidden = true;
+    element.append(this.guess);
     this.painter = new Painter(this);
     this.trails = new Trails();
     this.contacts = new Contacts();
@@ -109,7 +121,11 @@ class Stage {
       if (this.compared?.body) this.#look("fit");
     });
     store.watch(["colors", "errors", "selection"], () => this.painter.paint());
-    store.watch(["neighbors"], () => this.#guessLines([this.shown, this.compared]));
+    store.watch(["neighbors"], () => {
+      this.#guessLines([this.shown, this.compared]);
+      this.#offerLines();
+    });
+    store.watch(["loading"], () => this.labels.setLoading(store.get("loading")));
     store.watch(["view"], () => this.#look(store.get("view").name));
     const drawn = [
       "frame",
@@ -150,13 +166,16 @@ class Stage {
       return;
     }
     const actor = new Actor(this.page.engine, clip, () => this.view.ask());
-    if (!(await this.#prepared(actor)) || this.page.store.get("shown") !== clip) {
-      actor.close();
-      return;
-    }
+    this.labels.setLoading(clip.name);
+    const isPrepared = await this.#prepared(actor);
+    if (this.page.store.get("shown") !== clip) return void actor.close();
+    this.labels.setLoading(this.page.store.get("loading"));
+    if (!isPrepared) return void actor.close();
     this.shown = actor;
     this.#describe();
+    this.#offerLines();
     if (actor.hasFigure) {
+      this.#goToFirstSeen(actor);
       this.#settle({ reframes: true, atOnce: true });
       if (actor.samples.length < actor.clip.nFrames) this.#refine(actor);
       this.#guessLines([actor]);
@@ -165,6 +184,20 @@ class Stage {
     if (compared !== null) this.#compare(compared);
     this.view.draw();
     this.firstPicture ??= performance.now(); // ms since the page was asked for
+  }
+
+  /** Goes to the first frame with points where the very first has none. */
+  async #goToFirstSeen(actor) {
+    const { store } = this.page;
+    const isOver = () => this.shown !== actor || store.get("frame") !== 0;
+    if (!actor.poses.held(0)?.every(Number.isNaN)) return;
+    const frame = await actor.firstSeen(isOver).catch(() => 0);
+    if (!isOver() && frame > 0) store.set({ frame, view: { name: store.get("view").name } });
+  }
+
+  /** Offers lines where the names of markers say nothing of them. */
+  #offerLines() {
+    this.guess.hidden = !this.shown?.hasNoLines || this.page.store.get("neighbors");
   }
 
   async #prepared(actor) {
@@ -387,7 +420,8 @@ class Stage {
   }
 
   #afterDrawing() {
-    const { shown, view } = this;
+    const { shown } = this;
+    this.labels.setFiles(shown?.body && this.compared?.body ? this.#fileLabels() : []);
     if (!shown?.body) return;
     const isOn = this.page.store.get("names");
     const { clientWidth: width, clientHeight: height } = this.element;
@@ -403,6 +437,30 @@ class Stage {
         halo: skyLow,
       });
     }
+  }
+
+  /** The names of both files, each below its figure; the second below the first where they overlap. */
+  #fileLabels() {
+    const { store } = this.page;
+    const { clientWidth: width, clientHeight: height } = this.element;
+    const isOver = store.get("layout") === "overlay";
+    const aside = this.#aside();
+    const numbers = ["error", "speed"].includes(store.get("colors"));
+    return [this.shown, this.compared].map((actor, k) => {
+      const { least, most } = actor.bounds(actor.body.places);
+      const x = (least[0] + most[0]) / 2;
+      const z = (least[2] + most[2]) / 2;
+      const offset = k === 0 ? aside : aside.map((side) => -side);
+      const foot = [x, this.shown.floor, z];
+      const size = { width, height, offset };
+      const [left, top] = project(foot, this.view.eye.camera, size, new Float32Array(3));
+      return {
+        text: nameOf(store, actor.clip),
+        color: k === 1 && isOver && !numbers ? this.theme.ghost : this.theme.center,
+        x: left,
+        y: Math.min(top + BELOW, height - 2 * LINE) + (k === 1 && isOver ? LINE : 0),
+      };
+    });
   }
 
   /** Where the points are on the canvas, in pixels; the third number is their depth. */

@@ -2,6 +2,7 @@
 
 import { Clock, USUAL_RATE, rateOf } from "./clock.js";
 import { SPEEDS, go, listenToKeys } from "./keys.js";
+import { count, frameNumber } from "../ui/text.js";
 import { mountStrips } from "./strips/strips.js";
 
 const PATHS = {
@@ -77,12 +78,11 @@ function showPlace(store, scrub, place) {
 }
 
 /** "12 / 343 · 0.10 s"; frames are numbered as the file does. */
-function placeText({ nFrames, firstFrame = 1, rate }, frame) {
-  const number = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
-  const first = Number.isSafeInteger(firstFrame) ? firstFrame : 1;
+function placeText({ nFrames, firstFrame, rate }, frame) {
   const seconds = frame / rateOf({ rate });
   const approximately = rate ? "" : "≈ ";
-  return `${number(first + frame)} / ${number(first + nFrames - 1)} · ${approximately}${timeText(seconds)}`;
+  const number = (n) => count(frameNumber({ firstFrame }, n));
+  return `${number(frame)} / ${number(nFrames - 1)} · ${approximately}${timeText(seconds)}`;
 }
 
 function timeText(seconds) {

@@ -63,6 +63,20 @@ export function duration(seconds) {
 export const frameNumber = ({ firstFrame }, frame) =>
   (Number.isSafeInteger(firstFrame) ? firstFrame : 1) + Math.floor(frame);
 
+/** "frames 120 to 240 are lost", of all runs of a damaged clip, as the file counts frames. */
+export function lostText(clip, most = 20) {
+  if (!clip.lost?.length) return "";
+  const number = (frame) => count(frameNumber(clip, frame));
+  const runs = clip.lost.slice(0, most).map(([from, to]) => {
+    return to - from === 1 ? number(from) : `${number(from)} to ${number(to - 1)}`;
+  });
+  const more = clip.lost.length > most ? [`${count(clip.lost.length - most)} more runs`] : [];
+  const isOne = clip.lost.length === 1 && clip.lost[0][1] - clip.lost[0][0] === 1;
+  const all = [...runs, ...more];
+  const text = [all.slice(0, -1).join(", "), all.at(-1)].filter(Boolean).join(" and ");
+  return isOne ? `frame ${text} is lost` : `frames ${text} are lost`;
+}
+
 /** Seconds of a clip, or null where nothing says how long a frame is. */
 export const secondsOf = ({ nFrames, rate }) => (rate ? nFrames / rate : null);
 

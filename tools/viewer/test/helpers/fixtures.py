@@ -65,6 +65,11 @@ def main(folder: Path, is_all: bool) -> None:
     markers = mcz.read(folder / "walk.c3d")
     numbered = with_names(markers, [f"M{k:03}" for k in range(len(markers.skeleton.joints))])
     mcz.write(replace(numbered, source=None), folder / "numbered.mcz")
+    (first, *others) = markers.signals
+    mask = np.ones(first.values.shape, np.bool_)
+    mask[:20] = False
+    late = replace(markers, signals=(replace(first, mask=mask), *others), source=None)
+    mcz.write(late, folder / "late.mcz")
     mcz.encode(folder / "walk.bvh", folder / "bvh.mcz")
     mcz.encode(folder / "walk.bvh", folder / "bvh-small.mcz", codec="mrdwt", params={"T_g": 2.0})
     mcz.write(replace(motion, frame_rate=Fraction(60)), folder / "steps.mcz")

@@ -8,6 +8,7 @@ import { search } from "./search.js";
 import { Section } from "./section.js";
 
 const ROW_HEIGHT = 44;
+const LONG = 30; // letters of a name that takes two lines, so that the statistics go
 
 export function mountClips(element, page) {
   new Clips(element, page);
@@ -210,13 +211,14 @@ class Clips {
     }
     const own = item.row.nFrames === undefined ? "…" : summary(item.row);
     const facts = item.alias ? `also named ${printable(item.alias, 200)}` : own;
+    const isLong = !item.alias && item.label.length > LONG;
     fill(
       row,
       make(
         "span",
         { class: "two-lines" },
-        make("span", { class: "name", title: item.label }, item.label || "(no name)"),
-        make("small", { class: "quiet" }, facts),
+        make("span", { class: isLong ? "name long" : "name", title: `${item.label}\n${facts}` }, item.label || "(no name)"),
+        !isLong && make("small", { class: "quiet" }, facts),
       ),
       !item.isCurrent &&
         button({

@@ -2,7 +2,7 @@
 
 import { later, make } from "../../ui/dom.js";
 import { figure } from "../../ui/text.js";
-import { paintCourse, paintGround, paintScale, scaleOf } from "./paint.js";
+import { paintCourse, paintGround, paintZero, scaleOf } from "./paint.js";
 import { extentOf } from "./ranges.js";
 import { whole } from "./window.js";
 
@@ -51,10 +51,15 @@ export class CurveStrip {
     if (!this.#courses) return;
     const extent = this.extent();
     const y = scaleOf(extent, view.height);
+    paintZero(view, extent, y);
     this.#courses.forEach((course, k) => {
       paintCourse(view, course, y, { color: this.color(k, view.colors) });
     });
-    paintScale(view, extent, y);
+  }
+
+  /** The ends of its scale, which stand beside the curves; null while nothing was read. */
+  scale() {
+    return this.#courses && this.extent();
   }
 
   color(k, colors) {

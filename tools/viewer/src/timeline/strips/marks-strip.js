@@ -1,7 +1,7 @@
 // Marks in time: events with their labels, feet that stand, frames that are lost.
 
 import { later } from "../../ui/dom.js";
-import { count, counted, frameNumber, printable } from "../../ui/text.js";
+import { count, counted, frameNumber, lostText, printable } from "../../ui/text.js";
 import { label, paintGround } from "./paint.js";
 import { whole } from "./window.js";
 
@@ -120,7 +120,6 @@ export class MarksStrip {
   }
 
   describe() {
-    const { lost = [] } = this.clip;
     const number = (frame) => count(frameNumber(this.clip, frame));
     const events = this.events
       .slice(0, 20)
@@ -128,9 +127,7 @@ export class MarksStrip {
     const { feet, why } = this.#seen;
     const standing = feet.map(({ name, runs }) => `${name} ${counted(runs.length, "contact")}`);
     const unknown = why ? [`no contacts of feet: ${why}`] : [];
-    const gone = lost
-      .slice(0, 20)
-      .map(([from, to]) => `frames ${number(from)} to ${number(to - 1)} are lost`);
+    const gone = [lostText(this.clip)].filter(Boolean);
     const text = [...events, ...standing, ...unknown, ...gone].join("; ");
     return printable(`${text || "Nothing is marked."} n and p go to events.`, 2000);
   }

@@ -73,20 +73,14 @@ export function paintCourse({ context, x }, course, y, { color, width = 1.25, al
   context.restore();
 }
 
-/** Least and greatest value at the left edge, and a line at zero. */
-export function paintScale({ context, width, height, colors }, [least, most], y) {
-  context.font = "10px system-ui, sans-serif";
-  if (least < 0 && most > 0) {
-    context.strokeStyle = colors.line;
-    context.beginPath();
-    context.moveTo(0, Math.round(y(0)) + 0.5);
-    context.lineTo(width, Math.round(y(0)) + 0.5);
-    context.stroke();
-  }
-  context.textBaseline = "top";
-  label(context, figure(most, 3), 4, 2, colors);
-  context.textBaseline = "bottom";
-  label(context, figure(least, 3), 4, height - 2, colors);
+/** A line at zero. */
+export function paintZero({ context, width, colors }, [least, most], y) {
+  if (least >= 0 || most <= 0) return;
+  context.strokeStyle = colors.line;
+  context.beginPath();
+  context.moveTo(0, Math.round(y(0)) + 0.5);
+  context.lineTo(width, Math.round(y(0)) + 0.5);
+  context.stroke();
 }
 
 /** Text on a shade of the ground, so that curves do not cross it. */
@@ -99,28 +93,43 @@ export function label(context, text, x, y, colors, color = colors.quiet) {
   context.fillText(text, x, y);
 }
 
-/** Frames, and seconds where the rate is known, along the top. */
-export function paintRuler({ context, width, height, from, to, x, colors }, clip) {
-  const { rate } = clip;
+/** Round seconds along the top, with their frames; frames alone where the rate is unknown. */
+export function paintRuler(view, clip) {
+  const { context, width, height, x, colors } = view;
   context.font = "10px system-ui, sans-serif";
   context.textBaseline = "middle";
   context.strokeStyle = colors.line;
-  const step = Math.max(1, niceStep(to - from, width / 90));
   context.beginPath();
-  const first = frameNumber(clip, 0);
-  for (let frame = Math.ceil((from + first) / step) * step - first; frame < to; frame += step) {
-    if (frame < from) continue;
+  for (const { frame, text } of rulerMarks(view, clip)) {
     const at = Math.round(x(frame)) + 0.5;
     context.moveTo(at, height - 5);
     context.lineTo(at, height);
-    const seconds = rate ? ` · ${figure(frame / rate, 3)} s` : "";
-    const text = `${count(frameNumber(clip, frame))}${seconds}`;
     if (at + 4 + context.measureText(text).width > width) continue;
     label(context, text, at + 4, height / 2, colors);
   }
   context.lineWidth = 1;
   context.strokeStyle = colors.quiet;
   context.stroke();
+}
+
+const APART = 90; // pixels between two marks, about
+
+/** The marks of the ruler: `{ frame, text }`, frames from <= frame < to. */
+export function rulerMarks({ from, to, width }, clip) {
+  const { rate } = clip;
+  const unit = rate ? 1 / rate : 1; // of a frame, in seconds or frames
+  const first = rate ? 0 : frameNumber(clip, 0);
+  const length = niceStep((to - from) * unit, width / APART);
+  const step = rate ? length : Math.max(1, length);
+  const marks = [];
+  for (let k = Math.ceil((from * unit + first) / step); ; k++) {
+    const frame = (k * step - first) / unit;
+    if (!(frame < to)) return marks;
+    const isWhole = Math.abs(frame - Math.round(frame)) < 1e-6;
+    const number = isWhole ? count(frameNumber(clip, Math.round(frame))) : "";
+    const seconds = rate ? `${figure(k * step)} s` : "";
+    marks.push({ frame, text: [seconds, number].filter(Boolean).join(" · ") });
+  }
 }
 
 /** From a value to pixels from the top. */

@@ -1,8 +1,8 @@
 // What all strips have: a name with the value of a frame, a canvas, keys, and time below the pointer.
 
-import { inNextPicture, make } from "../../ui/dom.js";
+import { fill, inNextPicture, make } from "../../ui/dom.js";
 import { sized } from "../../ui/canvas.js";
-import { count, frameNumber } from "../../ui/text.js";
+import { count, figure, frameNumber } from "../../ui/text.js";
 import { moved, zoomed } from "./window.js";
 
 const CLICK = 4; // pixels that a pointer may move and still have clicked
@@ -12,6 +12,7 @@ export class Row {
   constructor(shared, { name, className, painter, close }) {
     Object.assign(this, { shared, painter });
     this.value = make("output", { class: "value" });
+    this.scale = make("div", { class: "scale", "aria-hidden": "true" });
     this.canvas = make("canvas", {
       role: "slider",
       tabindex: "0",
@@ -22,6 +23,7 @@ export class Row {
       "div",
       { class: `strip ${className}` },
       make("div", { class: "strip-head" }, make("span", { class: "name", title: name }, name), close, this.value),
+      this.scale,
       this.canvas,
     );
     this.name = name;
@@ -42,6 +44,8 @@ export class Row {
     const { context, width, height } = sized(this.canvas);
     const x = (frame) => ((frame - from) / Math.max(1e-9, to - from)) * width;
     this.painter.paint({ context, width, height, from, to, x, colors: this.shared.colors() });
+    const ends = this.painter.scale?.();
+    if (ends) fill(this.scale, ends.toReversed().map((end) => make("span", {}, figure(end, 3))));
     this.say();
   }
 

@@ -1,0 +1,163 @@
+"""Fields of the data model, checked and put in their usual form when a part of it is made."""
+
+from __future__ import annotations
+
+import math
+import operator
+import reprlib
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcz.errors import MotionError
+
+
+class Rule(NamedTuple):
+    """A form of a field in words, and the function that gives it; TypeError or ValueError."""
+
+    words: str
+    form: Callable[[Any], Any]
+
+
+def check_fields(thing: Any, rules: Mapping[str, Rule]) -> None:
+    """Give fields of a frozen dataclass the form of their rules; MotionError names the field."""
+    for name, rule in rules.items():
+        value = getattr(thing, name)
+        try:
+            found = rule.form(value)
+        except (TypeError, ValueError, OverflowError, AttributeError):
+            kind = type(thing).__name__.lower()
+            said = f"{kind}: {name} is {reprlib.repr(value)}, not {rule.words}"
+            raise MotionError(said) from None
+        if found is not value:
+            object.__setattr__(thing, name, found)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError
+    return str(value)
+
+
+def _integer(value: Any) -> int:
+    if isinstance(value, (bool, np.bool_)):
+        raise TypeError
+    return operator.index(value)
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError
+    return bool(value)
+
+
+def _data(value: Any) -> bytes:
+    if not isinstance(value, (bytes, bytearray, memoryview)):
+        raise TypeError
+    return bytes(value)
+
+
+def _hash(value: Any) -> bytes:
+    data = _data(value)
+    if len(data) not in (0, 32):
+        raise ValueError
+    return data
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, (str, bytes, bool, np.bool_, np.ndarray)):
+        raise TypeError
+    number = float(value)
+    if not math.isfinite(number):  # SKEL-08
+        raise ValueError
+    return number
+
+
+def _vector(value: Any) -> tuple[float, float, float]:
+    x, y, z = map(_number, value)
+    return x, y, z
+
+
+def _texts(value: Any) -> tuple[bytes, ...]:
+    return tuple(map(_data, _items(value)))
+
+
+def _text_map(value: Any) -> Mapping[str, str]:
+    if not isinstance(value, Mapping):
+        raise TypeError
+    for pair in value.items():
+        list(map(_text, pair))
+    return value
+
+
+def _items(value: Any) -> tuple[Any, ...]:
+    if isinstance(value, tuple):
+        return value
+    if not isinstance(value, list):
+        raise TypeError
+    return tuple(value)
+
+
+def of_type(kind: type, words: str) -> Rule:
+    """The rule of a field that is a ``kind``."""
+
+    def form(value: Any) -> Any:
+        if not isinstance(value, kind):
+            raise TypeError
+        return value
+
+    return Rule(words, form)
+
+
+def several(rule: Rule, words: str) -> Rule:
+    """The rule of a tuple, or a list, of what another rule is of."""
+
+    def form(value: Any) -> tuple[Any, ...]:
+        items = _items(value)
+        formed = tuple(map(rule.form, items))
+        same = items is value and all(map(operator.is_, formed, items))
+        return items if same else formed
+
+    return Rule(words, form)
+
+
+def optional(rule: Rule) -> Rule:
+    """The rule of a field that may be None as well."""
+    return Rule(f"{rule.words} or None", lambda value: None if value is None else rule.form(value))
+
+
+def array_of(kinds: str, n_dimensions: int, words: str) -> Rule:
+    """The rule of an array of types such as "f8", in the byte order and memory layout of C.
+
+    A masked array counts as one only where nothing is masked.
+    """
+
+    def form(value: Any) -> NDArray[Any]:
+        if np.ma.is_masked(value):
+            raise ValueError
+        array = np.asarray(value)
+        if f"{array.dtype.kind}{array.dtype.itemsize}" not in kinds.split():
+            raise TypeError
+        if array.ndim != n_dimensions:
+            raise ValueError
+        return plain(array)
+
+    return Rule(words, form)
+
+
+def plain(array: NDArray[Any]) -> NDArray[Any]:
+    """``array`` in the byte order of the machine, aligned and in C order; itself if it is."""
+    flags = array.flags
+    if array.dtype.isnative and flags.c_contiguous and flags.aligned:
+        return array
+    return np.array(array, array.dtype.newbyteorder("="), order="C")
+
+
+TEXT, INTEGER, TRUTH = Rule("text", _text), Rule("an integer", _integer), Rule("a bool", _truth)
+DATA, HASH = Rule("bytes", _data), Rule("32 bytes or none", _hash)
+NUMBER = Rule("a finite number", _number)
+VECTOR = Rule("three finite numbers", _vector)
+TEXT_MAP = Rule("text to text", _text_map)
+DATA_ITEMS = Rule("several bytes", _texts)

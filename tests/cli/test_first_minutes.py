@@ -1,0 +1,179 @@
+"""What people type in their first minutes: folders, empty files, units, sizes of figures."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
+from mcz.codecs.posewave.choices import PRESETS
+from mcz.formats import FORMATS
+
+Call = Callable[..., tuple[int, str, str]]
+SUFFIXES = sorted({suffix for found in FORMATS.values() for suffix in found.suffixes} | {".mcz"})
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Call:
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = run(cli, "mcz", [str(a) for a in arguments])
+        captured = capsys.readouterr()
+        return int(code), captured.out, captured.err
+
+    return call
+
+
+@pytest.fixture
+def folder(samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The samples in the current folder, and two files of them."""
+    for path in samples.iterdir():
+        shutil.copy(path, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    mcz.encode("walk.bvh", "walk.mcz", unit="cm")
+    mcz.pack(samples, "all.mcz")
+    return tmp_path
+
+
+# Folders and empty files -----------------------------------------------------------
+
+
+def test_a_folder_is_packed_and_a_file_encoded(folder: Path, call: Call) -> None:
+    (folder / "my takes").mkdir()
+    code, _, errors = call("encode", "my takes")
+    assert (code, errors) == (1, "mcz: my takes: is a folder: mcz pack 'my takes' OUT.mcz\n")
+    code, _, errors = call("pack", "walk.bvh", "x.mcz")
+    assert (code, errors) == (2, "mcz: walk.bvh: is a file: mcz encode walk.bvh\n")
+
+
+INTO = [
+    ("walk.mcz", "encode", "walk.bvh", "-o", "OUT"),
+    ("walk.bvh", "decode", "walk.mcz", "-o", "OUT"),
+    ("walk.mcz", "extract", "walk.mcz", "OUT", "--frames", "2:9"),
+    ("all.mcz", "reorder", "all.mcz", "walk.c3d", "-o", "OUT"),
+    ("all.mcz", "rename", "all.mcz", "walk.c3d", "other", "-o", "OUT"),
+    ("all.mcz", "delete", "all.mcz", "walk.c3d", "-o", "OUT"),
+    ("walk.mcz", "repair", "walk.mcz", "-o", "OUT"),
+    ("walk.png", "plot", "walk.mcz", "-o", "OUT"),
+    ("walk.gif", "render", "walk.mcz", "-o", "OUT", "--frames", "0:2"),
+    ("motions.mcz", "pack", "motions", "OUT"),
+]
+
+
+@pytest.mark.parametrize("slash", ["", "/"])
+@pytest.mark.parametrize("words", INTO, ids=[words[1] for words in INTO])
+def test_an_output_may_be_a_folder(
+    words: tuple[str, ...], slash: str, folder: Path, call: Call
+) -> None:
+    (folder / "motions").mkdir()
+    shutil.copy("walk.bvh", "motions")
+    if not slash:
+        (folder / "out").mkdir()
+    name, *arguments = words
+    code, _, errors = call(*(f"out{slash}" if word == "OUT" else word for word in arguments))
+    assert code == 0, errors
+    assert [path.name for path in (folder / "out").iterdir()] == [name]
+
+
+def test_a_folder_that_cannot_stand_for_a_file_is_refused(folder: Path, call: Call) -> None:
+    (folder / "out").mkdir()
+    for words in (("merge", "walk.mcz", "all.mcz", "--rename"), ("train", "walk.amc")):
+        for more in ((), ("--force",)):
+            code, _, errors = call(*words, "-o", "out", *more)
+            assert code == 2 and "out" in errors and "exists" not in errors
+    assert not list((folder / "out").iterdir())
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_empty_files_are_called_empty(suffix: str, folder: Path, call: Call) -> None:
+    empty = folder / f"none{suffix}"
+    empty.touch()
+    commands = [("info", empty), ("append", empty, "all.mcz")]
+    if suffix != ".asf":  # of which no motion is read, whatever it holds
+        commands += [("diff", empty, "walk.bvh")]
+    if suffix == ".mcz":
+        commands += [(word, empty) for word in ("verify", "list", "meta", "decode")]
+        commands += [("unpack", empty, "out"), ("extract", empty, "x.mcz", "--frames", "0:1")]
+    else:
+        commands += [("encode", empty)]
+    for words in commands:
+        code, out, errors = call(*words)
+        assert code in (1, 3) and "is empty\n" in errors, (words, errors)
+        assert not out
+    (folder / "many").mkdir()
+    empty.rename(folder / "many" / empty.name)
+    _, _, errors = call("pack", "many", "y.mcz")
+    assert "is empty" in errors or "no motion file" in errors
+
+
+# Units and heights -----------------------------------------------------------------
+
+
+def test_a_unit_may_be_a_length(folder: Path, call: Call) -> None:
+    for unit, centimeters in {"5.6444cm": 5.6444, "0.1 in": 0.254, "2m": 200.0, "dm": 10.0}.items():
+        assert call("encode", "walk.bvh", "--unit", unit, "-o", "u.mcz", "--force")[0] == 0
+        with mcz.open("u.mcz") as file:
+            assert file.clips["walk"].skeleton.unit_cm == centimeters
+            assert file.clips["walk"].source_bytes() == Path("walk.bvh").read_bytes()
+    assert mcz.read("walk.bvh", unit="5.6444cm").skeleton.unit_cm == 5.6444
+
+
+@pytest.mark.parametrize("unit", ["5.6", "cm5", "0cm", "-1cm", "1e400cm", ".cm", "feet", "", "١cm"])
+def test_a_unit_that_is_none_is_refused(unit: str, folder: Path, call: Call) -> None:
+    code, _, errors = call("encode", "walk.bvh", "--unit", unit, "-o", "u.mcz")
+    assert code == 2 and "'--unit'" in errors and not Path("u.mcz").exists()
+    with pytest.raises(mcz.OptionError, match="unit"):
+        mcz.read("walk.bvh", unit=unit)
+
+
+def test_a_height_that_is_no_persons_is_remarked_upon(folder: Path, call: Call) -> None:
+    code, _, errors = call("encode", "walk.bvh", "--unit", "mm", "-o", "u.mcz")
+    note = "height 166 units = 16.6 cm, which is no person's; is 1 unit = 0.1 cm right?"
+    assert (code, errors) == (0, f"mcz: walk.bvh: {note}\n")
+    assert note in call("info", "u.mcz")[1]
+    assert call("encode", "walk.bvh", "--unit", "cm", "-o", "v.mcz")[2] == ""
+    assert "height 166 cm\n" in call("info", "v.mcz")[1]
+    assert "height 166 units\n" in call("info", "walk.bvh")[1]
+
+
+def test_what_is_no_figure_has_no_height(folder: Path, call: Call) -> None:
+    """Hands, faces, props and markers are of any size."""
+    text = Path("walk.bvh").read_text().replace("Foot", "Spoke").replace("Toe", "Rim")
+    Path("wheel.bvh").write_text(text)
+    assert call("encode", "wheel.bvh", "--unit", "mm")[2] == ""
+    assert call("encode", "walk.c3d", "-o", "c.mcz")[2] == ""
+    assert "height" not in call("info", "wheel.mcz")[1] + call("info", "c.mcz")[1]
+
+
+# Quality -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("quality", "most"), [("0.5mm", 0.05), *PRESETS.items()])
+def test_quality_is_the_greatest_error(quality: str, most: float, folder: Path, call: Call) -> None:
+    assert call("encode", "walk.bvh", "--unit", "cm", "--quality", quality, "-o", "q.mcz")[0] == 0
+    whole = mcz.read("walk.bvh", unit="cm")
+    with mcz.open("q.mcz") as file:
+        assert file.clips["walk"].codec == "posewave"
+        found = mcz.compare(whole, file.clips["walk"].motion()).entries()
+    assert most / 3 < float(found["max_position_error_cm"]) <= most
+
+
+def test_quality_is_said_once_and_of_a_length(folder: Path, call: Call) -> None:
+    for words in (
+        ("--quality", "high"),
+        ("--quality", "5"),
+        ("--quality", "1mm", "--param", "max_error_cm=2"),
+        ("--quality", "1mm", "--param", "preset=mm"),
+        ("--quality", "1mm", "--effort", "best"),
+        ("--quality", "1mm", "--codec", "best"),
+    ):
+        code, _, errors = call("encode", "walk.bvh", "--unit", "cm", *words, "-o", "q.mcz")
+        assert code == 2 and errors.count("\n") == 1, errors
+    words = ("--unit", "cm", "--quality", "1cm", "--codec", "qbc", "-o", "q.mcz")
+    assert call("encode", "walk.bvh", *words)[0] == 0
+    with mcz.open("q.mcz") as file:
+        assert file.clips["walk"].codec == "qbc"

@@ -1,0 +1,187 @@
+"""One clock in every format that motions go to: the times of the source, or a word of the loss."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mcz
+from mcz.conversion import left_out
+from mcz.formats import FORMATS
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.sample import bvh_walk
+from tests.glb import Glb
+
+MARKER = (Joint("a", channels=tuple(map(Channel, ("tx", "ty", "tz")))),)
+GAP = np.array([*range(124, 127), *range(130, 136)])
+
+
+def markers(n: int, rate: Fraction | None = Fraction(100), **facts: object) -> Motion:
+    values = np.random.default_rng(5).normal(size=(n, 3))
+    skeleton = Skeleton(MARKER, unit_cm=0.1, up_axis="z", angle_unit="")
+    return Motion(skeleton, (Signal(values),), rate, name="a", **facts)  # type: ignore[arg-type]
+
+
+def irregular() -> Motion:
+    times = np.array([0.5, 0.511, 0.519, 0.531, 1.25])[:, None]
+    signal = Signal(times, name="time", channels=(Channel("", "time", "s"),))
+    motion = markers(5)
+    return replace(motion, signals=(*motion.signals, signal))
+
+
+SOURCES: dict[str, Callable[[], Motion]] = {
+    "first frame": lambda: markers(9, frame_numbers=np.arange(101, 110)),
+    "gap": lambda: markers(9, frame_numbers=GAP),
+    "gap at 120": lambda: markers(9, Fraction(120), frame_numbers=GAP),
+    "gap at 59.94": lambda: markers(9, Fraction(60000, 1001), frame_numbers=GAP),
+    "start": lambda: markers(9, metadata={"start-time": "1.2345"}),
+    "start and gap": lambda: markers(9, metadata={"start-time": "1.2"}, frame_numbers=GAP),
+    "decimated": lambda: markers(
+        5, Fraction(50), frame_numbers=np.arange(101, 111, 2), number_step=2
+    ),
+    "before 0": lambda: markers(9, metadata={"start-time": "-0.25"}),
+    "late": lambda: markers(9, frame_numbers=GAP + 10**6),
+    "irregular": irregular,
+}
+
+
+def again(motion: Motion, to: str, tmp_path: Path) -> Motion:
+    path = tmp_path / f"b.{to}"
+    path.write_bytes(FORMATS[to].write(mcz.convert(motion, to)))
+    return mcz.read(path)
+
+
+@pytest.mark.parametrize("to", ["trc", "sto", "mot"])
+@pytest.mark.parametrize("source", SOURCES)
+def test_tables_have_the_times(source: str, to: str, tmp_path: Path) -> None:
+    motion = SOURCES[source]()
+    made = again(motion, to, tmp_path)
+    assert np.abs(made.times - motion.times).max() < 1e-9
+    if motion.frame_rate is not None and source != "irregular":
+        assert made.frame_rate is not None
+        assert abs(made.frame_rate / motion.frame_rate - 1) < 1e-8  # TRC prints 6 decimals of it
+    assert not [text for text in left_out(motion, to) if "time" in text]
+
+
+def test_numbers_of_a_trc_are_the_source_s(tmp_path: Path) -> None:
+    made = again(SOURCES["gap"](), "trc", tmp_path)
+    assert made.frame_numbers is not None and made.frame_numbers.tolist() == GAP.tolist()
+    text = (tmp_path / "b.trc").read_text()
+    assert "\n124\t1.230000\t" in text and "\n130\t1.290000\t" in text
+
+
+C3D = {
+    "first frame": [],
+    "gap": ["left out: a gap in time of 0.04 s: C3D has frame after frame"],
+    "start": ["left out: the time of the first frame, 1.2345 s: C3D begins at 1.23 s"],
+    "before 0": ["left out: the time of the first frame, -0.25 s: C3D begins at 0 s"],
+    "irregular": ["left out: a gap in time of 0.719 s: C3D has frame after frame"],
+}
+
+
+@pytest.mark.parametrize("source", C3D)
+def test_a_c3d_has_the_time_of_its_first_frame(source: str, tmp_path: Path) -> None:
+    motion = SOURCES[source]()
+    made = again(motion, "c3d", tmp_path)
+    said = [text for text in left_out(motion, "c3d") if "time" in text and "numbers" not in text]
+    assert said == C3D[source]
+    if not any("first frame" in text for text in said):
+        assert abs(made.times[0] - motion.times[0]) < 1e-9
+    if not said:
+        assert np.abs(made.times - motion.times).max() < 1e-9
+
+
+def test_numbers_that_count_from_0_begin_a_c3d_at_their_time(tmp_path: Path) -> None:
+    rows = "".join(f"{n},{n / 100:g},{n}.5,1,2\n" for n in range(100, 110))
+    (tmp_path / "a.csv").write_text(
+        "Format Version,1.23,Take Name,a,Capture Frame Rate,100.000000,Export Frame Rate,"
+        "100.000000,Length Units,Meters\n\n,Type,Marker,Marker,Marker\n,Name,m,m,m\n,ID,1,1,1\n"
+        f",,Position,Position,Position\nFrame,Time (Seconds),X,Y,Z\n{rows}"
+    )
+    motion = mcz.read(tmp_path / "a.csv")
+    made = again(motion, "c3d", tmp_path)
+    assert made.frame_numbers is not None
+    assert (motion.times[0], made.times[0], made.frame_numbers[0]) == (1.0, 1.0, 101)
+    assert any("they begin with 101, as the times say" in text for text in left_out(motion, "c3d"))
+
+
+@pytest.mark.parametrize(("to", "first"), [("bvh", "0"), ("amc", "0.01")])
+def test_skeletons_say_what_they_lose(to: str, first: str) -> None:
+    motion = bvh_walk().cut(0, 9)
+    motion = replace(motion, source=None, frame_rate=Fraction(100), metadata={"start-time": "1.23"})
+    motion = replace(motion, frame_numbers=np.arange(2, 11))
+    said = [text for text in left_out(motion, to) if "first frame" in text]
+    assert said == [
+        f"left out: the time of the first frame, 1.23 s: {to.upper()} begins at {first} s"
+    ]
+    gap = replace(motion, frame_numbers=GAP, metadata={})
+    lost = [text for text in left_out(gap, to) if "gap" in text]
+    assert lost == (
+        ["left out: a gap in time of 0.04 s: BVH has frame after frame"] if to == "bvh" else []
+    )
+    if to == "amc":
+        assert "left out: the frame rate, 100 a second" in left_out(gap, to)
+    plain = replace(motion, frame_numbers=None, metadata={})
+    assert not [text for text in left_out(plain, to) if " time" in text]
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_a_glb_keeps_gaps_and_states_its_start(source: str) -> None:
+    motion = SOURCES[source]()
+    found = Glb(mcz.to_glb(motion, key_error_mm=0).data)
+    animation = found.document["animations"][0]
+    inputs = {s["input"] for s in animation["samplers"]}
+    keys = max((found.accessor(number).ravel() for number in inputs), key=len)
+    start = found.document["asset"]["extras"]["startTime"]
+    assert start == pytest.approx(motion.times[0], abs=1e-12)
+    wanted = (motion.times - motion.times[0]).astype(np.float32)
+    assert np.abs(keys - wanted).max() <= np.spacing(wanted).max()
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_usd_has_the_times_as_codes(source: str) -> None:
+    motion = SOURCES[source]()
+    text = mcz.to_usda(motion).data.decode()
+    rate = float(re.search(r"timeCodesPerSecond = (\S+)", text)[1])  # type: ignore[index]
+    samples = text[text.index("timeSamples") :]
+    codes = [float(code) for code in re.findall(r"^ +(\S+): \(", samples, re.M)]
+    assert np.abs(np.array(codes) / rate - motion.times).max() < 1e-8
+    first, last = (re.search(rf"{end}TimeCode = (\S+)", text) for end in ("start", "end"))
+    assert first is not None and last is not None
+    assert (float(first[1]), float(last[1])) == (codes[0], codes[-1])
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("source", SOURCES)
+def test_rerun_has_the_times(source: str, tmp_path: Path) -> None:
+    rerun = pytest.importorskip("rerun")
+    from rerun.chunk import RrdReader
+
+    analog = Signal(
+        np.arange(72.0).reshape(-1, 1),
+        name="analog",
+        samples_per_frame=8,
+        channels=(Channel("", "f", "N"),),
+    )
+    motion = SOURCES[source]()
+    analog = replace(analog, values=analog.values[: 8 * motion.n_frames], stored=None)
+    motion = replace(motion, signals=(*motion.signals, analog))
+    recording = rerun.RecordingStream("test", recording_id="a")
+    recording.save(tmp_path / "a.rrd")
+    mcz.to_rerun(motion, recording)
+    recording.disconnect()
+    times: dict[str, list[float]] = {}
+    for chunk in RrdReader(tmp_path / "a.rrd").stream():
+        rows = chunk.to_record_batch().to_pydict()
+        times.setdefault(str(chunk.entity_path), []).extend(
+            time.total_seconds() for time in rows.get("time", ())
+        )
+    assert np.abs(np.sort(times["/a/points/a"]) - motion.times).max() < 1e-6
+    samples = mcz.times(motion, signal="analog")
+    assert np.abs(np.sort(times["/a/analog/f"]) - np.sort(samples)).max() < 1e-6
