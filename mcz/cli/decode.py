@@ -170,7 +170,7 @@ def decode(
         check_signal(wanted)
     outputs: list[Output] = []
     made: dict[str, Made] = {}
-    with given.opened() as held:
+    with given.opened() as (held, inputs):
         for clip in _chosen(held, output, names, where):
             found, made[clip.name] = _of_clip(held, clip, _as_named(clip, output, wanted, salvage))
             outputs += [part for part in found if part not in outputs]  # an ASF that clips share
@@ -179,7 +179,7 @@ def decode(
             outputs = [_other(held, names)]
             check_kept(output, outputs[0].name)
         facts: dict[str, Any] = {"damage": held.damage, "unverified_segments": held.unverified}
-    deliver(file, output, outputs, force, as_json, facts | facts_of(made))
+    deliver(inputs, output, outputs, force, as_json, facts | facts_of(made))
     if facts["unverified_segments"]:
         say(f"{file}: {plural(facts['unverified_segments'], 'segment')} read in part, not verified")
     for line in told(made):

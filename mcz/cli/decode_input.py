@@ -42,12 +42,12 @@ class Input:
         return given, wanted._replace(unit=None, up=None, rate=None)
 
     @contextmanager
-    def opened(self) -> Iterator[File]:
-        """The open .mcz; of a source file one in memory, of which every byte is as in a file."""
+    def opened(self) -> Iterator[tuple[File, tuple[str, ...]]]:
+        """The open .mcz, of a source file one in memory; and the files that were read for it."""
         if not self.is_source:
             options = {"salvage": self.salvage, "unverified": self.unverified}
             with opened(self.file, max_decoded=self.max_decoded, **options) as file:
-                yield file
+                yield file, (self.file,)
             return
         import mcz
 
@@ -58,4 +58,4 @@ class Input:
             for note in written.notes:
                 say(f"{self.file}: {note}")
             with mcz.open(coded.getvalue(), max_decoded=NO_LIMIT) as file:
-                yield file
+                yield file, written.inputs

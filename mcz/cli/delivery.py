@@ -38,20 +38,21 @@ def check_count(output: str | None, count: int) -> None:
 
 
 def deliver(
-    file: str,
+    given: Sequence[str],
     output: str | None,
     outputs: Sequence[Output],
     force: bool,
     as_json: bool,
     facts: dict[str, Any],
 ) -> None:
-    """Write the outputs where they belong and say so.
+    """Write the outputs of the files that were ``given``, the first above all, and say so.
 
     What stands in the way of one of them is found before the first is written.
     """
     from mcz.writing.inputs import refuse_inputs
 
-    inputs = (sys.stdin if file == "-" else file,)
+    file = given[0]
+    inputs = [sys.stdin if path == "-" else path for path in given]
     if output == "-":
         refuse_inputs(sys.stdout, inputs)
         data = outputs[0].data

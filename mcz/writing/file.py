@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -120,4 +121,5 @@ def encode(
     if entry.remark:
         warnings.warn(f"{path}: {entry.remark}", SkeletonWarning, stacklevel=2)
     directory, size = draft.writer.directory, draft.writer.offset
-    return written(directory, size, entry.quality, entry.notes, entry.source_bytes)
+    found = written(directory, size, entry.quality, entry.notes, entry.source_bytes)
+    return replace(found, inputs=tuple(map(str, entry.inputs)))

@@ -27,7 +27,8 @@ class Written:
 
     ``decoded_bytes``: what ``max_decoded`` must be at least to read every signal. ``notes``: what
     is odd about the source file. ``source_bytes``: what the file gives back, of ``encode`` the
-    source and the ASF that it was read with; 0 where there is no source.
+    source and the ASF that it was read with; 0 where there is no source. ``inputs``: of ``encode``
+    these files.
     """
 
     size: int
@@ -37,6 +38,7 @@ class Written:
     decoded_bytes: int
     notes: tuple[str, ...] = ()
     source_bytes: int = 0
+    inputs: tuple[str, ...] = ()
 
     __repr__ = brief
 

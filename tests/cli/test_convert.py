@@ -72,6 +72,16 @@ def test_nothing_is_overwritten(folder: Path, call: Call) -> None:  # noqa: F811
     assert code == 2 and "the input itself" in err and (folder / "walk.bvh").read_bytes() == data
 
 
+def test_the_skeleton_is_an_input(folder: Path, call: Call) -> None:  # noqa: F811
+    """What was read for a source, the ASF beside it too, is no output, whoever forces it."""
+    data = (folder / "walk.asf").read_bytes()
+    words = ["--to", "amc", "--with-skeleton", "--rate", "120", "--force"]
+    for given in ([], ["--skeleton", folder / "walk.asf"]):
+        code, _, err = call("convert", folder / "walk.amc", folder / "x.amc", *words, *given)
+        assert code == 2 and "walk.asf: it is the input itself" in err
+    assert (folder / "walk.asf").read_bytes() == data and not (folder / "x.amc").exists()
+
+
 def test_to_and_from_mcz(folder: Path, call: Call) -> None:  # noqa: F811
     assert call("convert", folder / "walk.bvh", folder / "w.mcz", *UNITS)[0] == 0
     assert mcz.read(folder / "w.mcz").skeleton.unit_cm == 1

@@ -288,6 +288,7 @@ TWICE = [
     ("encode", "a.bvh", "-o", "x.mcz", "--output", "y.mcz"),
     ("decode", "a.mcz", "--to", "csv", "--to", "bvh"),
     ("decode", "a.mcz", "--joints", "a", "--joints=b"),
+    ("convert", "a.bvh", "a.trc", "--unit", "m", "--unit", "cm"),
     ("info", "a.mcz", "--json", "--json"),
     ("replace", "a.mcz", "b.mcz", "--joint", "a", "--joint", "b", "--values", "v.csv"),
     ("bench", "--cache", "--no-cache"),
