@@ -229,10 +229,16 @@ def test_pack_names_each(tmp_path: Path, call: Said) -> None:
     put(folder / "alone", "riddle", a="fits", b="fits")
     code, out, _ = call("pack", folder, tmp_path / "a.mcz", "--json")
     rows = {row["path"]: row for row in json.loads(out)["files"]}
-    assert code == 1
+    assert code == 0
     assert rows["walk_1.amc"]["notes"] == []
     assert "walk.asf, the only one around" in rows["zombie.amc"]["notes"][0]
-    assert "2 have its bones" in rows["alone/riddle.amc"]["message"]
+    note = "kept without a skeleton: no skeleton has its name, and 2 have its bones: a.asf b.asf"
+    note += "; no ASF: a flat list of bones with plain scalar channels, without kinematics"
+    assert rows["alone/riddle.amc"]["notes"] == [note]
+    with mcz.open(tmp_path / "a.mcz") as file:
+        clip = file.clips["alone/riddle"]
+        assert clip.metadata["skeleton-note"] == note
+        assert clip.source_bytes() == (folder / "alone/riddle.amc").read_bytes()
     _, _, errors = call("pack", folder, tmp_path / "a.mcz", "--force")
     assert "mcz: zombie.amc: its skeleton is" in errors
 

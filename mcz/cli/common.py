@@ -81,6 +81,7 @@ class Failure(Exception):
         self.kind = kind or ("UsageError" if code == Exit.USAGE else "InputError")
 
 
+WIDEST_CELL = 48  # characters that the columns of a table are aligned to
 OUT_OF_MEMORY = "out of memory: this takes more than the process may have"
 
 
@@ -346,12 +347,17 @@ def plural(count: int, word: str) -> str:
 def table(rows: Sequence[Sequence[str]], right: str = "") -> str:
     """Rows as aligned columns, the first row a heading; ``right`` marks right-aligned ones by "r".
 
+    A cell of more than ``WIDEST_CELL`` characters shifts the rest of its own row alone.
+
     >>> print(table([["name", "n"], ["walk", "240"]], "lr"))
     name    n
     walk  240
     """
     rows = [[printable(cell) for cell in row] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    widths = [
+        max((len(cell) for cell in column if len(cell) <= WIDEST_CELL), default=0)
+        for column in zip(*rows, strict=True)
+    ]
     sides = right.ljust(len(widths), "l")
     lines = (
         "  ".join(

@@ -93,6 +93,7 @@ KEYS = {
     "doi": "DOI",
     "mtime": "time",
 }
+SPELLINGS = {"license": "licence"}  # of keys as users may type them
 INTERPRETED = tuple(KEYS)[:4]
 SAID = tuple(KEYS)[4:]  # what users set
 

@@ -69,6 +69,7 @@ def pack(
         up=up,
         arrays=arrays,
         model=model,
+        flat=True,
     )
     paths = [os.path.join(root, one.name) for one in taken] if "://" not in root else []  # noqa: PTH118
     inputs = (*paths, *(params or {}).values())

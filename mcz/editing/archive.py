@@ -90,6 +90,7 @@ def pack(
         up=up,
         arrays=arrays,
         model=model,
+        flat=True,
     )
     entries = [Entry(path, path.relative_to(root).as_posix(), terms) for path in paths]
     inputs = (*paths, *(params or {}).values())

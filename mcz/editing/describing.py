@@ -10,7 +10,7 @@ from typing import Any
 
 from mcz.brief import shown
 from mcz.container.metadata import Record, applied
-from mcz.container.metadata_keys import check_said
+from mcz.container.metadata_keys import SPELLINGS, check_said
 from mcz.container.writer import Writer
 from mcz.editing.appending import growing
 from mcz.editing.carrying import Change
@@ -38,6 +38,7 @@ def set_metadata(
     written where nothing changes. Raises OptionError for a name, a key or a value that cannot be,
     and AccessError while another process is appending; ``force`` is that of ``mcz.append``.
     """
+    changes = {name: _respelled(said) for name, said in changes.items()}
     for said in changes.values():
         for key, value in said.items():
             check_said(key, value)
@@ -63,6 +64,20 @@ def set_metadata(
     still_protect(target, redundancy)
     report.size = Path(target).stat().st_size
     return report
+
+
+def spelled(key: str) -> str:
+    """A key as it is registered: ``license`` is ``licence``."""
+    return SPELLINGS.get(key, key)
+
+
+def _respelled(said: Said) -> Said:
+    """``said`` under registered keys; raises OptionError where two of them are one."""
+    found = {spelled(key): value for key, value in said.items()}
+    if len(found) < len(said):
+        twice = next(key for key in SPELLINGS if key in said)
+        raise OptionError(f"{twice!r} and {SPELLINGS[twice]!r} are one key")
+    return found
 
 
 def _record(file: File, name: str, said: Said) -> Record:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from mcz.brief import among
-from mcz.container.metadata_keys import INTERPRETED, KEYS, PRIVATE
+from mcz.container.metadata_keys import INTERPRETED, KEYS, PRIVATE, SPELLINGS
 from mcz.errors import OptionError
 from mcz.reading.file import File
 from mcz.reading.names import listed, names_of
@@ -45,11 +45,14 @@ def from_table(
     known = names_of(file.clips)
     said: dict[str, dict[str, str]] = {}
     unknown: list[str] = []
-    for row in rows:
+    for number, row in enumerate(rows, 2):
         name = name_of(row)
         found = known.get(name, ())
         if len(found) > 1:
-            raise OptionError(f"{path}: {name!r} may be {listed(sorted(found))}")
+            raise OptionError(
+                f"{path}: row {number}: {name!r} may be {listed(sorted(found))}; write one of "
+                "these, or make it of more columns with match, such as {folder}/{trial}"
+            )
         if not found:
             unknown.append(name)
             continue
@@ -153,4 +156,5 @@ def _taken(path: object, head: Sequence[str], text: str) -> tuple[str, str]:
 
 
 def _is_key(name: str) -> bool:
-    return (name in KEYS and name not in INTERPRETED) or name.startswith(PRIVATE)
+    is_said = SPELLINGS.get(name, name) in KEYS and name not in INTERPRETED
+    return is_said or name.startswith(PRIVATE)

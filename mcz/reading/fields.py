@@ -14,7 +14,7 @@ from mcz.codecs import by_id
 from mcz.container.chunks import FRAMING
 from mcz.container.directory import ClipRow
 from mcz.container.metadata import Record
-from mcz.container.metadata_keys import SAID
+from mcz.container.metadata_keys import SAID, SPELLINGS
 from mcz.errors import OptionError, UnsupportedError
 from mcz.formats import format_by_id
 from mcz.queries import Query, Value
@@ -23,6 +23,17 @@ from mcz.reading.sizes import packet_framing
 
 Where = str | Query | Callable[[Clip], bool]
 Getter = Callable[[Clip], Value]
+# Short names of fields, among them those that listings have as headings.
+SHORT = {
+    "clip": "name",
+    "frames": "n_frames",
+    "channels": "n_channels",
+    "joints": "n_joints",
+    "rate": "frame_rate",
+    "fps": "frame_rate",
+    "unit": "unit_cm",
+    "up": "up_axis",
+}
 METADATA = "metadata."  # before a key, where a field has the same name
 
 
@@ -73,9 +84,12 @@ def _known(name: str, clips: Collection[Clip]) -> Getter | None:
     if name in FIELDS:
         return FIELDS[name]
     key = name.removeprefix(METADATA)
+    key = SPELLINGS.get(key, key)
     is_key = key in SAID or any(_last_said(key, clip) for clip in clips)
     is_key = is_key or any(key in clip.metadata for clip in clips)
-    return partial(_metadata, key) if is_key else None
+    if is_key:
+        return partial(_metadata, key)
+    return FIELDS[SHORT[name]] if name in SHORT else None
 
 
 def _names(name: str, clips: Collection[Clip]) -> list[str]:

@@ -63,17 +63,26 @@ def take(
     given: Given = None,
     unit: str | None = None,
     data: bytes | None = None,
+    *,
+    flat: bool = False,
 ) -> Taken:
     """Read the motion file ``path``, whose bytes are ``data`` if they were read already.
 
     ``given`` is the skeleton of a format that wants one: an object, the path of a file, "none" for
     none, or None to look around. The metadata say how it was found. Raises SourceError where no
-    skeleton can be taken, and as ``read_source`` does.
+    skeleton can be taken, and as ``read_source`` does; with ``flat`` a file for which several of
+    those around may be meant is read without one, and the metadata say so.
     """
     source_format, data = load(path) if data is None else (format_of(path, data), data)
     if not source_format.wants_skeleton:
         return Taken(read_source(path, source_format, None, data), None)
-    chosen = choose(path, source_format, data, given)
+    try:
+        chosen = choose(path, source_format, data, given)
+    except AmbiguousError as error:
+        if not flat:
+            raise
+        motion = read_source(path, source_format, None, data)
+        return Taken(with_note(motion, f"kept without a skeleton: {error.reason}"), None)
     if chosen is not None:
         chosen = replace(chosen, skeleton=in_unit(chosen.skeleton, unit))
     if chosen is None:
@@ -188,9 +197,9 @@ def _only(path: Path, fitting: list[_Tried], all_: list[_Tried]) -> Chosen:
     first = fitting[0]
     if len(fitting) > 1:
         if first.candidate.name_of:
-            raise _riddle(path, fitting, f"{len(fitting)} skeletons are equally near")
+            raise _ambiguous(path, fitting, f"{len(fitting)} skeletons are equally near")
         text = f"no skeleton has its name, and {len(fitting)} have its bones"
-        raise _riddle(path, all_, text)
+        raise _ambiguous(path, all_, text)
     assert first.skeleton is not None
     asf, name_of = first.candidate.path, first.candidate.name_of
     label = _text(asf.name)
@@ -218,6 +227,18 @@ def _with_misfits(
         text = f"the dofs of {_listed(match.differing)} are not those of the file"
         remark = f"its skeleton is {label}; {text}"
     return replace(chosen, remark=remark)
+
+
+class AmbiguousError(SourceError):
+    """Several skeletons may be meant; ``reason`` says which, without their folders."""
+
+    reason = ""
+
+
+def _ambiguous(path: Path, tried: Sequence[_Tried], text: str) -> AmbiguousError:
+    error = AmbiguousError(str(_riddle(path, tried, text)))
+    error.reason = f"{text}: {_listed([_text(one.candidate.path.name) for one in tried])}"
+    return error
 
 
 def _riddle(path: Path, tried: Sequence[_Tried], text: str) -> SourceError:

@@ -41,10 +41,11 @@ class Terms:
 
     ``skeleton`` is the ASF of an AMC, "none" for none. ``rate`` in frames a second, ``unit`` and
     ``up``, the axis that points up, say what the file does not; ``force_rate``: the rate holds also
-    where the file states one. ``verbatim``: one that cannot be
-    parsed is kept as an attachment. ``keep_skeleton``: an ASF is restored as well, under its own
-    name. ``arrays`` says what plain arrays are, ``model`` how long the bones of bodies are. Raises
-    OptionError for an unknown codec, unit, axis or kind of arrays.
+    where the file states one. ``verbatim``: one that cannot be parsed is kept as an attachment.
+    ``keep_skeleton``: an ASF is restored as well, under its own name. ``flat``: a file for which
+    several skeletons around may be meant is kept without one. ``arrays`` says what plain arrays
+    are, ``model`` how long the bones of bodies are. Raises OptionError for an unknown codec, unit,
+    axis or kind of arrays.
     """
 
     codec: str = DEFAULT
@@ -58,6 +59,7 @@ class Terms:
     up: str | None = None
     arrays: str | None = None
     model: str | os.PathLike[str] | None = None
+    flat: bool = False
 
     def __post_init__(self) -> None:
         by_name(self.codec)
@@ -128,7 +130,7 @@ class Entry:
             alias_once(writer, self.name, id_)
             return "skeleton"
         _refuse_early(source_format, data, writer.profile)
-        taken = take(self.path, given, self.terms.unit, data)
+        taken = take(self.path, given, self.terms.unit, data, flat=self.terms.flat)
         self._note(taken)
         terms = self.terms
         stated = taken.motion.frame_rate

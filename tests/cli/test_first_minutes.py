@@ -177,3 +177,58 @@ def test_quality_is_said_once_and_of_a_length(folder: Path, call: Call) -> None:
     assert call("encode", "walk.bvh", *words)[0] == 0
     with mcz.open("q.mcz") as file:
         assert file.clips["walk"].codec == "qbc"
+
+
+# Lists and metadata ------------------------------------------------------------------
+
+
+def test_one_long_name_widens_its_own_row_alone(folder: Path, call: Call) -> None:
+    assert call("rename", "all.mcz", "walk", "w" * 200)[0] == 0
+    for words in (("list", "all.mcz"), ("info", "all.mcz", "--no-preview")):
+        code, out, _ = call(*words)
+        assert code == 0 and "w" * 200 in out
+        lengths = sorted(len(line) for line in out.splitlines())
+        assert lengths[-2] < 110 or words[0] == "info"
+    head, *rows = call("list", "all.mcz")[1].splitlines()
+    columns = [row.index("fast") for row in rows if "fast" in row]
+    assert columns == [202, head.index("codec"), head.index("codec")]
+
+
+def test_columns_have_the_names_of_headings(folder: Path, call: Call) -> None:
+    code, out, _ = call("list", "all.mcz", "--columns", "clip,frames,channels,rate,fps", "--csv")
+    assert code == 0
+    assert out.splitlines()[2] == "walk.bvh,240,96,120.0,120.0"
+    by_field = call("list", "all.mcz", "--where", "frame_rate > 1", "--sort", "-n_channels")[1]
+    assert call("list", "all.mcz", "--where", "fps > 1", "--sort", "-channels")[1] == by_field
+
+
+def test_license_is_licence(folder: Path, call: Call) -> None:
+    assert call("meta", "walk.mcz", "--set", "license=CC-BY-4.0")[0] == 0
+    assert call("meta", "walk.mcz")[1] == "walk:\n  licence: CC-BY-4.0\n"
+    assert "CC-BY-4.0" in call("list", "walk.mcz", "--columns", "license")[1]
+    assert "walk" in call("list", "walk.mcz", "--where", "license == 'CC-BY-4.0'")[1]
+    Path("t.csv").write_text("clip,license\nwalk,MIT\n")
+    assert call("meta", "walk.mcz", "--from", "t.csv")[0] == 0
+    assert call("meta", "walk.mcz")[1] == "walk:\n  licence: MIT\n"
+    assert call("meta", "walk.mcz", "--set", "license=a", "--set", "licence=b")[0] == 2
+    with pytest.raises(mcz.OptionError, match="one key"):
+        mcz.set_metadata("walk.mcz", {"walk": {"license": "MIT", "licence": "MIT"}})
+    assert call("meta", "walk.mcz", "--remove", "license")[0] == 0
+    assert "MIT" not in call("meta", "walk.mcz")[1]
+
+
+def test_a_row_that_may_mean_two_clips_says_how_to_be_exact(folder: Path, call: Call) -> None:
+    for day in ("1", "2"):
+        (folder / "days" / day).mkdir(parents=True)
+        text = Path("walk.bvh").read_bytes()
+        (folder / "days" / day / "run.bvh").write_bytes(
+            text.replace(b"0.0", b"0.%s" % day.encode(), 1)
+        )
+    mcz.pack("days", "days.mcz")
+    Path("t.csv").write_text("clip,x-day,subject\nrun,1,05\n")
+    code, _, errors = call("meta", "days.mcz", "--from", "t.csv")
+    assert code == 2
+    assert "t.csv: row 2: 'run' may be 1/run, 2/run; write one of these" in errors
+    words = ("--match", "{x-day}/{clip}", "--take", "subject")
+    assert call("meta", "days.mcz", "--from", "t.csv", *words)[0] == 0
+    assert call("meta", "days.mcz", "--clip", "1/run")[1] == "1/run:\n  subject: 05\n"
