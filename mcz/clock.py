@@ -141,6 +141,15 @@ class Timeline:
         return Timeline(self.times[frames], rate, self.rounding, self.note)
 
 
+def time_facts(timeline: Timeline | None) -> dict[str, float | int | str | None] | None:
+    """First and last time, the number of gaps and what is odd, for documents; None: unknown."""
+    if timeline is None or not len(timeline.times):
+        return None
+    first, last = float(timeline.times[0]), float(timeline.times[-1])
+    gaps = len(timeline.runs) - 1
+    return {"first": first, "last": last, "gaps": gaps, "note": timeline.note or None}
+
+
 class Column(NamedTuple):
     """Times as a file has them, in seconds, and how far rounding may have moved each."""
 

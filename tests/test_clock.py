@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -11,6 +12,8 @@ import numpy as np
 import pytest
 
 import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
 from mcz.clock import Timeline
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from tests.formats.c3d_files import Made
@@ -466,3 +469,119 @@ def test_every_source_keeps_its_times_in_a_file_and_in_parts(tmp_path: Path, sou
             near(mcz.times(clip, signal="analog"), wanted.ravel())
             near(clip.to_pandas("analog").index, wanted.ravel())
             near(clip.to_xarray().time_analog, wanted.ravel())
+
+
+def test_info_says_first_last_and_gaps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    case = CASES["trc"]
+    motion = read_case(case, tmp_path)
+    mcz.write(motion, tmp_path / "a.mcz")
+    for name in ("a.trc", "a.mcz"):
+        assert run(cli, "mcz", ["info", str(tmp_path / name)]) == 0
+        shown = capsys.readouterr().out
+        assert "15 frames at 100 Hz (0.41 s)" in shown
+        assert "time       1.23 s to 1.63 s, 1 gap" in shown
+        assert run(cli, "mcz", ["info", "--json", str(tmp_path / name)]) == 0
+        (clip,) = json.loads(capsys.readouterr().out)["clips"]
+        assert clip["times"] == {"first": 1.23, "last": 1.63, "gaps": 1, "note": None}
+
+
+def test_movement_has_the_times_there_and_back() -> None:
+    motion = moving(GAPPED, metadata={"start-time": "0.1234"})
+    data = mcz.to_movement(motion)
+    near(data.time, motion.times)
+    near(mcz.from_movement(data).times, motion.times)
+
+
+def test_a_signal_of_times_is_the_axis_of_xarray() -> None:
+    motion = markers(3)
+    other = Signal(np.zeros((3, 1)), name="frame", channels=(Channel("", "f"),))
+    motion = replace(motion, signals=(*motion.signals, times_signal([1.0, 1.5, 1.7]), other))
+    data = mcz.to_xarray(motion)
+    near(data.time, [1, 1.5, 1.7])
+    assert data.signal_frame.shape == (3, 1) and data.frame.values.tolist() == [1, 2, 3]
+
+
+def test_a_foot_stands_in_each_part_by_itself() -> None:
+    """It stands from 1.00 to 1.29 s and, elsewhere, from 3.00 to 3.29 s."""
+    numbers = np.array([*range(101, 131), *range(301, 331)])
+    values = np.zeros((60, 3))
+    values[30:, 0] = 1000.0
+    foot = (Joint("LeftFoot", channels=MARKER[0].channels),)
+    skeleton = Skeleton(foot, unit_cm=0.1, angle_unit="", up_axis="y")
+    motion = Motion(skeleton, (Signal(values),), Fraction(100), frame_numbers=numbers)
+    found = mcz.contacts(motion)
+    assert [(run.first, run.n_frames) for run in found.runs] == [(0, 30), (30, 30)]
+
+
+def test_films_last_as_long_as_the_motion(tmp_path: Path) -> None:
+    pytest.importorskip("PIL")
+    pytest.importorskip("matplotlib")
+    made = mcz.render(moving(GAPPED), tmp_path / "a.gif", fps=10, size=(64, 64), unit="cm", up="y")
+    assert made.n_pictures == 41  # 4.0 s
+
+
+def test_charts_of_signals_by_channel(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    motion = read_case(CASES["c3d"], tmp_path)
+    (rows,) = mcz.plot(motion, tmp_path / "a.svg", signal="analog").tables
+    label = rows[1][0]
+    (again,) = mcz.plot(motion, tmp_path / "b.svg", channels=label).tables
+    assert again[1] == rows[1]
+    mcz.write(motion, tmp_path / "a.mcz")
+    arguments = ["plot", str(tmp_path / "a.mcz"), "-o", str(tmp_path / "c.svg")]
+    assert run(cli, "mcz", [*arguments, "--signal", "analog", "--channel", label]) == 0
+    for options in (
+        ["--signal", "forces"],
+        ["--channel", "Fz9"],
+        ["--signal", "0", "--joint", "a"],
+    ):
+        assert run(cli, "mcz", [*arguments, "--force", *options]) == 2
+    with pytest.raises(mcz.OptionError, match="of all joints, not of 'analog'"):
+        mcz.plot(motion, tmp_path / "d.svg", "rate-distortion", signal="analog")
+
+
+def test_charts_without_a_joint_are_of_the_first_signal(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    channels = tuple(Channel("", f"f{k}", "N") for k in range(12))
+    analog = Signal(np.zeros((60, 12)), name="analog", samples_per_frame=2, channels=channels)
+    motion = Motion(Skeleton(()), (Signal(np.zeros((30, 0))), analog), Fraction(50))
+    plotted = mcz.plot(motion, tmp_path / "a.svg")
+    assert plotted.title.endswith("analog, channels") and len(plotted.tables[0]) == 9
+    assert plotted.notes == ("8 of 12 channels; choose others by name (--channel)",)
+
+
+WALK = [*range(51, 91), *range(131, 171)]
+
+
+def walk(samples: Path, numbers: list[int]) -> Motion:
+    motion = mcz.read(samples / "walk.bvh", unit="cm", up="y")
+    signals = (motion.signals[0].cut(0, len(numbers)),)
+    return replace(motion, signals=signals, source=None, frame_numbers=np.array(numbers))
+
+
+def made_of(motion: Motion) -> dict[str, Motion]:
+    names = list(motion.skeleton.joint_names)
+    return {
+        "select": mcz.select(motion, names[:1]),
+        "rename": mcz.rename(motion, {names[-1]: "last"}),
+        "mirror": mcz.mirror(motion),
+        "with_offsets": mcz.with_offsets(motion, motion.skeleton.offsets * 2),
+        "retarget": mcz.retarget(motion, motion.skeleton),
+        "in_positions": mcz.in_positions(motion),
+        "amc": mcz.convert(motion, "amc"),
+        "c3d": mcz.convert(motion, "c3d"),
+        "trc": mcz.convert(motion, "trc"),
+        "sto": mcz.convert(motion, "sto"),
+        "cut": motion[0 : motion.n_frames],
+    }
+
+
+@pytest.mark.parametrize("start", ["", "12.345"])
+def test_whatever_is_made_of_a_motion_keeps_its_times(samples: Path, start: str) -> None:
+    motion = walk(samples, WALK)
+    if start:
+        motion = replace(motion, metadata={"start-time": start})
+    for name, made in made_of(motion).items():
+        near(made.times, motion.times)
+        near(stored(made).times, motion.times)
+        assert made.frame_rate == motion.frame_rate, name

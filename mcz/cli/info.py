@@ -36,7 +36,7 @@ from mcz.cli.options import (
 from mcz.cli.previews import preview_lines
 from mcz.cli.recording import array_lines, recording_lines
 from mcz.cli.repeats import Once
-from mcz.cli.skeleton_lines import rate_text, skeleton_lines
+from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
 from mcz.cli.terminal import is_terminal
 from mcz.cli.verify import is_unsound
 from mcz.errors import MczError
@@ -246,6 +246,7 @@ def _clip(clip: dict[str, Any], alone: bool) -> Iterator[str]:
         f"clip {clip['name']}: {plural(clip['n_frames'], 'frame')} {rate_text(clip)}, "
         f"{plural(clip['n_channels'], 'channel')}, {plural(clip['n_joints'], 'joint')}"
     )
+    yield from time_lines(clip["times"])
     yield f"  skeleton   {clip['skeleton'][:8]}"
     for signal in clip["codecs"]:
         yield _codec(clip["codec"], signal)

@@ -74,4 +74,18 @@ def rate_text(clip: dict[str, Any]) -> str:
     if rate is None:
         return "at an unknown rate"
     about = "" if clip["frame_rate_exact"] else "about "
-    return f"at {about}{rate:g} Hz ({clip['n_frames'] / rate:.2f} s)"
+    seconds, times = clip["n_frames"] / rate, clip["times"]
+    if times is not None and times["gaps"]:
+        seconds = times["last"] - times["first"] + 1 / rate
+    return f"at {about}{rate:g} Hz ({seconds:.2f} s)"
+
+
+def time_lines(times: dict[str, Any] | None) -> Iterator[str]:
+    """When the frames were, where that is not from 0 s on without a gap."""
+    if times is None:
+        return
+    if times["first"] or times["gaps"]:
+        gaps = f", {plural(times['gaps'], 'gap')}" if times["gaps"] else ""
+        yield f"  time       {times['first']:.6g} s to {times['last']:.6g} s{gaps}"
+    if times["note"]:
+        yield f"  time       {times['note']}"

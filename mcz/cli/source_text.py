@@ -8,7 +8,7 @@ from typing import Any
 from mcz.cli.common import plural
 from mcz.cli.previews import preview_lines
 from mcz.cli.recording import array_lines, recording_lines
-from mcz.cli.skeleton_lines import rate_text, skeleton_lines
+from mcz.cli.skeleton_lines import rate_text, skeleton_lines, time_lines
 
 
 def source_lines(file: str, document: dict[str, Any]) -> Iterator[str]:
@@ -23,6 +23,7 @@ def source_lines(file: str, document: dict[str, Any]) -> Iterator[str]:
             f"clip {clip['name']}: {plural(clip['n_frames'], 'frame')} {rate_text(clip)}, "
             f"{plural(clip['n_channels'], 'channel')}, {plural(clip['n_joints'], 'joint')}"
         )
+        yield from time_lines(clip["times"])
         if clip["skeleton_file"]:
             yield f"  skeleton   {clip['skeleton_file']}"
         for signal in clip["signals"][1:]:

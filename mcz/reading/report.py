@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from mcz.clock import time_facts
 from mcz.codecs.basis_models import name_of
 from mcz.container import payloads
 from mcz.container.directory import ClipRow
@@ -135,6 +136,7 @@ def _clip_info(file: File, clip: Clip, sizes: Sizes) -> dict[str, Any]:
         "n_joints": clip.skeleton.n_joints,
         "frame_rate": float(rate) if rate is not None else None,
         "frame_rate_exact": clip.frame_rate_exact,
+        "times": _times(clip, unread),
         "metadata": dict(clip.metadata),
         "payload_bytes": sizes.payload,
         "overhead_bytes": sizes.overhead,
@@ -177,6 +179,17 @@ def _recording(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
         return document_of(clip.recording)
     except FormatError as error:
         unread.append(f"recording: {error}")
+        return None
+
+
+def _times(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
+    """When its frames were; ``unread`` as above."""
+    try:
+        return time_facts(clip.timeline)
+    except UnsupportedError:
+        return None
+    except FormatError as error:
+        unread.append(f"times: {error}")
         return None
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 from typing import Any
 
 from mcz.container import payloads
 from mcz.container.reader import Container
-from mcz.errors import UnsupportedError
+from mcz.errors import FormatError, UnsupportedError
 from mcz.formats import FORMATS, Format, format_by_id
 from mcz.motion import FrameNotes, Skeleton, Source
 from mcz.reading.decimation import picked_notes
@@ -64,10 +65,15 @@ def read_source(
 
 
 def clock_of(source_format: Format, template: bytes, signal: SignalInfo) -> SourceClock | None:
-    """The times that a template gives to the frames of ``signal``, the motion; FormatError."""
+    """The times that a template gives to the frames of ``signal``, the motion.
+
+    None also where the template is at fault, which who restores the source is told.
+    """
     if source_format.clock is None or signal.layout.samples_per_frame > 1:
         return None
-    found: SourceClock | None = source_format.clock(template)
+    found: SourceClock | None = None
+    with suppress(FormatError):
+        found = source_format.clock(template)
     return found
 
 

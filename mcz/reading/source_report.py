@@ -8,6 +8,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from mcz.clock import time_facts
 from mcz.errors import SkeletonWarning
 from mcz.formats import FORMATS, Format, arrays_of
 from mcz.motion import Motion, Skeleton
@@ -71,6 +72,7 @@ def _clip_facts(motion: Motion, source_format: Format, name: str, data: bytes) -
         "n_joints": motion.skeleton.n_joints,
         "frame_rate": None if rate is None else float(rate),
         "frame_rate_exact": motion.frame_rate_exact,
+        "times": time_facts(motion.timeline),
         "metadata": dict(motion.metadata),
         "signals": [
             {"name": s.name, "n_channels": s.n_channels, "samples_per_frame": s.samples_per_frame}
