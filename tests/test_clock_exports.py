@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
+import shutil
+import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -185,3 +188,55 @@ def test_rerun_has_the_times(source: str, tmp_path: Path) -> None:
     assert np.abs(np.sort(times["/a/points/a"]) - motion.times).max() < 1e-6
     samples = mcz.times(motion, signal="analog")
     assert np.abs(np.sort(times["/a/analog/f"]) - np.sort(samples)).max() < 1e-6
+
+
+PROGRAM = """
+import { readFileSync } from "node:fs";
+import { readAnnex } from "./tools/js/annex-node.js";
+import { fromBytes, open, setAnnex } from "./tools/js/mcz.js";
+import { openMcz } from "./tools/viewer/src/engine/mcz-file.js";
+import { timeOf } from "./tools/viewer/src/ui/times.js";
+
+setAnnex(readAnnex);
+const all = [];
+for (const path of process.argv.slice(1)) {
+  const file = await open(fromBytes(new Uint8Array(readFileSync(path))));
+  const clip = await file.clip(0);
+  const shown = await openMcz({ bytes: new Uint8Array(readFileSync(path)) });
+  const facts = await shown.clip(0);
+  const told = { ...facts, ...facts.clock };
+  const seen = Array.from({ length: facts.nFrames }, (_, f) => timeOf(told, f));
+  all.push([[...await clip.times()], seen]);
+}
+console.log(JSON.stringify(all));
+"""
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
+def test_the_second_decoder_and_the_viewer_have_the_times(tmp_path: Path) -> None:
+    paths, wanted = [], []
+    for number, make in enumerate(SOURCES.values()):
+        motion = make()
+        mcz.write(motion, tmp_path / f"{number}.mcz")
+        for to in ("trc", "sto"):
+            path = tmp_path / f"{number}.{to}"
+            path.write_bytes(FORMATS[to].write(mcz.convert(motion, to)))
+            for rate in (None, 75):
+                options = {} if rate is None else {"rate": rate}
+                mcz.encode(path, tmp_path / f"{number}-{to}-{rate}.mcz", **options)
+    for path in sorted(tmp_path.glob("*.mcz")):
+        with mcz.open(path) as file:
+            wanted.append(file.only_clip().times)
+            paths.append(path)
+    root = Path(mcz.__file__).parent.parent
+    done = subprocess.run(
+        ["node", "--input-type=module", "-e", PROGRAM, *map(str, paths)],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    for path, found, ours in zip(paths, json.loads(done.stdout), wanted, strict=True):
+        for times in found:
+            assert np.abs(np.array(times) - ours).max() < 1e-9, path.name

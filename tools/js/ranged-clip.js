@@ -17,6 +17,7 @@ import { isC3d, sourceFormatLabel } from "./registry.js";
 import { salvageSignal } from "./salvaged-signal.js";
 import { decodeSegments, openSignal, segmentsOf, takeColumns } from "./signals.js";
 import { restoreClip } from "./sources.js";
+import { timesOf } from "./times.js";
 
 const AHEAD = 64 * 1024; // bytes of segments that come with CLIP where requests cost
 const UP_AXES = [null, "x", "y", "z"];
@@ -210,6 +211,16 @@ export class RangedClip {
     if (!source || !isC3d(source.format)) return null;
     await this.file.shared.loadTemplate(source, "clip");
     return c3dRecording(source);
+  }
+
+  /**
+   * The times of all frames, in seconds on the clock of the recording (SPEC.md, "Time").
+   *
+   * @returns {Promise<Float64Array | null>} null where neither times nor a rate are known
+   * @throws {import("./errors.js").MczError}
+   */
+  async times() {
+    return guardedLater(() => timesOf(this));
   }
 
   /**

@@ -6,6 +6,7 @@ import { figureOf } from "./figure.js";
 import { Lru } from "./lru.js";
 import { Places } from "./places.js";
 import { guessedUp } from "./up.js";
+import { clockFacts } from "../ui/times.js";
 
 const LEAST_BLOCK = 64; // frames
 const MOST_BLOCK = 512; // frames, where a segment has more and its codec can decode a part
@@ -183,6 +184,8 @@ function factsOf(reader, drawn, ids) {
     quality: reader.quality,
     lost: reader.lost,
     firstFrame: reader.firstFrame,
+    numbers: reader.numbers?.length > 1 ? reader.numbers : null,
+    ...(reader.clock ?? clockFacts(null, reader.rate)),
     events: reader.events,
     segments: motion?.segments ?? [],
   };

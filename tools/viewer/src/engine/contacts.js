@@ -1,5 +1,6 @@
 // In which frames a foot stands: the rule of SPEC.md, "Contacts", as mcz/kinematics/contacts.py has it.
 
+import { runsBetweenGaps } from "../ui/times.js";
 import { nextTurn } from "./turns.js";
 
 const MOST = 2 ** 18; // frames times feet that are looked at together; of more, a window
@@ -66,8 +67,9 @@ async function found(clip, { from, to, up = null }) {
     await nextTurn();
   }
   const axis = known ?? looked.guessedUp();
+  const parts = runsBetweenGaps(facts, ...range).map((run) => run.map((f) => f - range[0]));
   const runs = looked.tracks.map((track) =>
-    runsOf(track.map((x) => x * facts.unitCm), facts.rate ?? USUAL_RATE, axis),
+    contactsIn(track.map((x) => x * facts.unitCm), facts.rate ?? USUAL_RATE, axis, parts),
   );
   return {
     from: range[0],
@@ -130,18 +132,25 @@ function middle(row) {
   return n === 0 ? null : sum.map((x) => x / n);
 }
 
+/** The contacts of one foot, in each part between two gaps by itself, with the floor of the whole. */
+export function contactsIn(track, rate, up, parts) {
+  const floor = floorOf(track, up);
+  return parts.flatMap(([start, end]) =>
+    runsOf(track.subarray(3 * start, 3 * end), rate, up, floor).map((run) => run.map((f) => f + start)),
+  );
+}
+
 /**
- * The contacts of one foot.
+ * The contacts of one foot in frames without a gap.
  *
  * @param {Float64Array} track x, y, z of each frame in cm, not finite where unknown
  * @param {number} rate frames a second
  * @param {number} up 0 x, 1 y, 2 z
  * @returns {number[][]} pairs of frames a <= f < b
  */
-export function runsOf(track, rate, up) {
+export function runsOf(track, rate, up, floor = floorOf(track, up)) {
   const nFrames = track.length / 3;
-  const isKnown = (f) => Number.isFinite(track[3 * f] + track[3 * f + 1] + track[3 * f + 2]);
-  const floor = floorOf(track, up, isKnown);
+  const isKnown = isKnownIn(track);
   const half = Math.max(1, framesIn(WINDOW / 2, rate));
   const below = (f, limit) => {
     const [a, b] = [Math.max(0, f - half), Math.min(nFrames - 1, f + half)];
@@ -162,10 +171,14 @@ export function runsOf(track, rate, up) {
   );
 }
 
+const isKnownIn = (track) => (f) =>
+  Number.isFinite(track[3 * f] + track[3 * f + 1] + track[3 * f + 2]);
+
 const framesIn = (seconds, rate) => Math.floor(seconds * rate + 0.5);
 
 /** The height below which are 5 % of the known ones, on a line between two of them. */
-function floorOf(track, up, isKnown) {
+function floorOf(track, up) {
+  const isKnown = isKnownIn(track);
   const heights = [];
   for (let f = 0; 3 * f < track.length; f++) if (isKnown(f)) heights.push(track[3 * f + up]);
   const sorted = Float64Array.from(heights).sort();

@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { contactsOf, isFoot, runsOf } from "./contacts.js";
+import { contactsIn, contactsOf, isFoot, runsOf } from "./contacts.js";
 
 /** Numbers that are the same every time, in any language: Lehmer's generator. */
 function numbers(seed) {
@@ -101,4 +101,12 @@ test("contacts of a clip: up is guessed; units; a window of a long one; what can
   assert.deepEqual([none.feet, /unit/.test(none.why)], [[], true]);
   const points = [{ name: "head", joint: 0 }];
   assert.match((await contactsOf(clipOf(track, { points, joints: points }), all)).why, /no joint/);
+});
+
+test("parts between gaps are looked at by themselves, on one floor", () => {
+  const track = foot(1, 400, 120);
+  assert.deepEqual(contactsIn(track, 120, 1, [[0, 400]]), runsOf(track, 120, 1));
+  const found = contactsIn(track, 120, 1, [[0, 180], [180, 400]]);
+  assert.ok(found.every(([a, b]) => b <= 180 || a >= 180));
+  assert.deepEqual(found.map(([a]) => a).includes(180), true);
 });

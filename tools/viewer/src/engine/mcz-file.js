@@ -1,6 +1,7 @@
 // An .mcz, opened: what its clips are, and their values. Of a file that is served or on a disk only
 // what is needed is read.
 
+import { clockFacts, nearestFrame } from "../ui/times.js";
 import { analogValues, fromBlob, fromBytes, fromUrl, open } from "../../../js/mcz.js";
 
 const ANALOG = "analog"; // the signal whose values are words, which the source says the meaning of
@@ -29,6 +30,7 @@ async function clipOf(file, clip) {
   const { name, nFrames, skeleton, rate, origin, firstFrame } = clip;
   const segments = clip.signals.map((_, signal) => segmentsOf(clip.segments(signal), nFrames));
   const recording = await known(() => clip.recording());
+  const clock = clockFacts(await known(() => clip.times()), rate);
   const channels = (signal) =>
     signal.channels.map((channel, i) => ({ ...channel, ...unitOf(signal, recording, i) }));
   return {
@@ -38,11 +40,13 @@ async function clipOf(file, clip) {
     skeleton,
     rate,
     firstFrame,
+    numbers: clip.frameNumbers.map(({ frame, number }) => ({ frame, number: Number(number) })),
+    clock,
     source: origin,
     metadata: [...((await known(() => file.metadata(clip.index))) ?? clip.metadata)],
     quality: (await known(() => clip.quality())) ?? [],
     lost: lostFrames(file.damage, clip, segments[0] ?? []),
-    events: eventsOf(recording, { rate, firstFrame }),
+    events: eventsOf(recording, { rate, nFrames, ...clock }),
     signals: clip.signals.map((signal, i) => ({
       ...signal,
       channels: channels(signal),
@@ -114,11 +118,11 @@ export function gapsIn(segments, nFrames) {
   return gaps;
 }
 
-/** Events at their frames; time 0 is that of frame number 1. */
-function eventsOf(recording, { rate, firstFrame }) {
-  if (!recording || !rate) return [];
+/** Events at the frames that are nearest to their times. */
+function eventsOf(recording, clip) {
+  if (!recording || !clip.rate) return [];
   return recording.events.map(({ label, time, context, subject, description }) => ({
-    frame: Math.round(time * rate) + 1 - firstFrame,
+    frame: nearestFrame(clip, time),
     label,
     context,
     subject,

@@ -44,7 +44,8 @@ export function readC3d(bytes, name) {
     format: "c3d",
     path: name,
   });
-  return { ...clip, firstFrame: file.first };
+  const firstTime = file.rate ? (file.first - 1) / file.rate : 0;
+  return { ...clip, firstFrame: file.first, clock: { firstTime, times: null } };
 }
 
 function headOf(bytes) {

@@ -2,6 +2,7 @@
 
 import { fileOf } from "./actions.js";
 import { choice, facts, fill, make, put } from "../ui/dom.js";
+import { runsBetweenGaps, timeOf } from "../ui/times.js";
 import { count, counted, duration, figure, lostText, secondsOf, size } from "../ui/text.js";
 
 const AXES = ["x", "y", "z"];
@@ -58,11 +59,21 @@ function clipFacts(clip) {
     ["Duration", seconds === null ? "not known: no frame rate" : duration(seconds)],
     ["Frame rate", clip.rate ? `${figure(clip.rate, 6)} frames/s` : "none"],
     ["First frame", clip.firstFrame ? count(clip.firstFrame) : null],
+    ["Time", timeFacts(clip)],
     ["Codec", clip.codec],
     ["Bytes", clip.bytes && size(clip.bytes)],
     ["Segments", clip.segments?.length ? count(clip.segments.length) : null],
     ["Events", clip.events?.length ? count(clip.events.length) : null],
   ];
+}
+
+/** "1 s to 3.09 s, 1 gap", where that is more than the duration tells. */
+function timeFacts(clip) {
+  const first = timeOf(clip, 0);
+  if (clip.nFrames === 0 || first === null || (first === 0 && !clip.times)) return null;
+  const gaps = runsBetweenGaps(clip, 0, clip.nFrames).length - 1;
+  const range = `${figure(first, 6)} s to ${figure(timeOf(clip, clip.nFrames - 1), 6)} s`;
+  return gaps ? `${range}, ${counted(gaps, "gap")}` : range;
 }
 
 /** Paths of files that are copies of the clip's source. */

@@ -4,6 +4,7 @@ import { Clock, USUAL_RATE, rateOf } from "./clock.js";
 import { SPEEDS, go, listenToKeys } from "./keys.js";
 import { count, frameNumber } from "../ui/text.js";
 import { mountStrips } from "./strips/strips.js";
+import { timeOf } from "../ui/times.js";
 
 const PATHS = {
   play: "M4 2.5v11l9-5.5z",
@@ -78,14 +79,15 @@ function showPlace(store, scrub, place) {
 }
 
 /** "12 / 343 · 0.10 s"; frames are numbered as the file does. */
-function placeText({ nFrames, firstFrame, rate }, frame) {
-  const seconds = frame / rateOf({ rate });
-  const approximately = rate ? "" : "≈ ";
-  const number = (n) => count(frameNumber({ firstFrame }, n));
-  return `${number(frame)} / ${number(nFrames - 1)} · ${approximately}${timeText(seconds)}`;
+function placeText(clip, frame) {
+  const time = timeOf(clip, frame);
+  const seconds = time === null ? `≈ ${timeText(frame / rateOf(clip))}` : timeText(time);
+  const number = (n) => count(frameNumber(clip, n));
+  return `${number(frame)} / ${number(clip.nFrames - 1)} · ${seconds}`;
 }
 
 function timeText(seconds) {
+  if (seconds < 0) return `−${timeText(-seconds)}`;
   if (seconds < 60) return `${seconds.toFixed(2)} s`;
   const minutes = Math.floor(seconds / 60);
   return `${minutes}:${(seconds - 60 * minutes).toFixed(2).padStart(5, "0")}`;

@@ -60,8 +60,12 @@ export function duration(seconds) {
 }
 
 /** The number of a frame as the file counts them: many begin at 1. */
-export const frameNumber = ({ firstFrame }, frame) =>
-  (Number.isSafeInteger(firstFrame) ? firstFrame : 1) + Math.floor(frame);
+export function frameNumber({ firstFrame, numbers }, frame) {
+  const row = Math.floor(frame);
+  const run = numbers?.findLast((one) => one.frame <= row);
+  if (run) return run.number + row - run.frame;
+  return (Number.isSafeInteger(firstFrame) ? firstFrame : 1) + row;
+}
 
 /** "frames 120 to 240 are lost", of all runs of a damaged clip, as the file counts frames. */
 export function lostText(clip, most = 20) {

@@ -1,6 +1,7 @@
 // The curves that are shown, as a table: a row a frame.
 
 import { frameNumber } from "../../ui/text.js";
+import { timeOf } from "../../ui/times.js";
 import { errorSource } from "./sources.js";
 
 const PIECE = 4096; // frames that are asked for at a time
@@ -12,7 +13,8 @@ const PIECE = 4096; // frames that are asked for at a time
 export async function csvOf(engine, clip, sources, errors) {
   const all = errors ? [...sources, errorSource(errors)] : sources;
   if (!all.length) throw new Error("No curve is shown.");
-  const head = ["frame", ...(clip.rate ? ["seconds"] : [])];
+  const isTimed = timeOf(clip, 0) !== null;
+  const head = ["frame", ...(isTimed ? ["seconds"] : [])];
   for (const { name, unit, series } of all) {
     for (const { label } of series) head.push(quoted(`${name}${series.length > 1 ? ` ${label}` : ""}${unit ? ` [${unit}]` : ""}`));
   }
@@ -22,7 +24,7 @@ export async function csvOf(engine, clip, sources, errors) {
     const columns = [];
     for (const source of all) columns.push(...(await rows(source, from, to)));
     for (let f = from; f < to; f++) {
-      const line = [frameNumber(clip, f), ...(clip.rate ? [Number((f / clip.rate).toFixed(6))] : [])];
+      const line = [frameNumber(clip, f), ...(isTimed ? [Number(timeOf(clip, f).toFixed(9))] : [])];
       for (const { most } of columns) line.push(Number.isNaN(most[f - from]) ? "" : plain(most[f - from]));
       lines.push(line.join(","));
     }

@@ -1,6 +1,7 @@
 // What strips draw on their canvases.
 
 import { count, figure, frameNumber } from "../../ui/text.js";
+import { frameAtTime, runsBetweenGaps, timeOf } from "../../ui/times.js";
 import { niceStep } from "./window.js";
 
 /** Boundaries of segments, lightly, and frames that are lost, hatched. */
@@ -114,22 +115,43 @@ export function paintRuler(view, clip) {
 
 const APART = 90; // pixels between two marks, about
 
-/** The marks of the ruler: `{ frame, text }`, frames from <= frame < to. */
-export function rulerMarks({ from, to, width }, clip) {
-  const { rate } = clip;
-  const unit = rate ? 1 / rate : 1; // of a frame, in seconds or frames
-  const first = rate ? 0 : frameNumber(clip, 0);
-  const length = niceStep((to - from) * unit, width / APART);
-  const step = rate ? length : Math.max(1, length);
+/** The marks of the ruler: `{ frame, text }`, frames from <= frame < to; none where frames are missing. */
+export function rulerMarks(view, clip) {
+  return timeOf(clip, 0) === null ? numberMarks(view, clip) : timeMarks(view, clip);
+}
+
+function numberMarks({ from, to, width }, clip) {
+  const first = frameNumber(clip, 0);
+  const step = Math.max(1, niceStep(to - from, width / APART));
   const marks = [];
-  for (let k = Math.ceil((from * unit + first) / step); ; k++) {
-    const frame = (k * step - first) / unit;
-    if (!(frame < to)) return marks;
-    const isWhole = Math.abs(frame - Math.round(frame)) < 1e-6;
-    const number = isWhole ? count(frameNumber(clip, Math.round(frame))) : "";
-    const seconds = rate ? `${figure(k * step)} s` : "";
-    marks.push({ frame, text: [seconds, number].filter(Boolean).join(" · ") });
+  for (let k = Math.ceil((from + first) / step); k * step - first < to; k++) {
+    const frame = k * step - first;
+    marks.push({ frame, text: numberText(clip, frame) });
   }
+  return marks;
+}
+
+/** Round seconds, run after run of frames without a gap. */
+function timeMarks({ from, to, width }, clip) {
+  const usual = clip.times ? clip.step : 1 / clip.rate;
+  const step = niceStep((to - from) * usual, width / APART);
+  const marks = [];
+  for (const [start, end] of runsBetweenGaps(clip, from, to)) {
+    const stop = clip.times ? timeOf(clip, end - 1) + usual : timeOf(clip, to);
+    for (let k = Math.ceil(timeOf(clip, start) / step - 1e-9); k * step < stop; k++) {
+      const frame = frameAtTime(clip, k * step);
+      if (frame === null || frame < Math.max(from, start) || !(frame < Math.min(to, end))) continue;
+      const text = [`${figure(k * step)} s`, numberText(clip, frame)].filter(Boolean).join(" · ");
+      marks.push({ frame, text });
+    }
+  }
+  return marks;
+}
+
+/** The number of a frame, "" between two of them. */
+function numberText(clip, frame) {
+  const isWhole = Math.abs(frame - Math.round(frame)) < 1e-6;
+  return isWhole ? count(frameNumber(clip, Math.round(frame))) : "";
 }
 
 /** From a value to pixels from the top. */

@@ -17,3 +17,11 @@ test("the ruler has round seconds, with the frame where one begins there", () =>
 test("without a rate the ruler has round frames", () => {
   assert.deepEqual(texts({ from: 0, to: 1000 }, { rate: null, firstFrame: 101 }).slice(0, 2), ["200", "300"]);
 });
+
+test("the ruler shows the times of frames, and none where frames are missing", () => {
+  const times = Float64Array.from([...Array(10).keys(), ...Array(10).keys()], (k, at) => (at < 10 ? 1 : 3) + k / 100);
+  const clip = { rate: 100, firstFrame: 101, nFrames: 20, times, step: 0.01, firstTime: 1 };
+  const marks = rulerMarks({ from: 0, to: 20, width: 900 }, clip);
+  assert.deepEqual(marks.map(({ frame }) => Math.round(frame)), [0, 2, 4, 6, 8, 10, 12, 14, 16, 18]);
+  assert.deepEqual([marks[0].text, marks[5].text.split(" · ")[0]], ["1 s · 101", "3 s"]);
+});

@@ -1,5 +1,7 @@
 // Where a few points are in frames of a clip: fetched in pieces, and kept.
 
+import { isGapAfter, timeOf } from "../../ui/times.js";
+
 const PIECE = 1024; // frames
 const MOST_PIECES = 512;
 
@@ -19,10 +21,18 @@ export class Tracks {
     return out;
   }
 
-  /** Units a second of the k-th point, of a frame and the one before; a frame lasts 1 without a rate. */
+  /**
+   * Units a second of the k-th point, of a frame and the one before, or behind where frames are missing
+   * before it; a frame lasts 1 where no time is known.
+   */
   speed(k, frame) {
-    const [a, b] = [this.at(k, frame, A), this.at(k, frame === 0 ? 1 : frame - 1, B)];
-    return Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) * (this.clip.rate ?? 1);
+    const { clip } = this;
+    const isFirst = frame === 0 || isGapAfter(clip, frame - 1);
+    if (isFirst && isGapAfter(clip, frame)) return NaN;
+    const other = isFirst ? frame + 1 : frame - 1;
+    const [a, b] = [this.at(k, frame, A), this.at(k, other, B)];
+    const seconds = clip.times ? Math.abs(timeOf(clip, frame) - timeOf(clip, other)) : 1 / (clip.rate ?? 1);
+    return Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) / seconds;
   }
 
   /**
