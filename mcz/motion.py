@@ -44,6 +44,7 @@ from mcz.indexing import row_numbers
 from mcz.numbers.blocks import grid_blocks as grid_blocks
 from mcz.numbers.exceptions import Exceptions as Exceptions
 from mcz.signal import Signal as Signal
+from mcz.signal import check_poses as check_poses
 from mcz.skeleton import ANGLE_KINDS as ANGLE_KINDS
 from mcz.skeleton import CHANNEL_KINDS as CHANNEL_KINDS
 from mcz.skeleton import CHANNELS as CHANNELS

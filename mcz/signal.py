@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,25 @@ from mcz.numbers.blocks import grid_blocks
 from mcz.numbers.exceptions import Exceptions
 from mcz.numbers.scaling import Scaling
 from mcz.skeleton import CHANNELS, Channel
+
+
+class Sampled(Protocol):
+    """The facts of a signal, in memory or in a file, that say whether its rows are poses."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...] | None: ...
+    @property
+    def samples_per_frame(self) -> int: ...
+
+
+def check_poses(name: str, signal: Sampled) -> None:
+    """Raise MotionError where the rows of the motion signal of ``name`` are no poses of frames."""
+    if signal.channels is not None:
+        raise MotionError(f"motion {name!r}: its channels are not those of its skeleton")
+    if signal.samples_per_frame != 1:
+        raise MotionError(
+            f"motion {name!r}: {signal.samples_per_frame} samples a frame are not one pose a frame"
+        )
 
 
 def _grid_change(value: Any) -> tuple[int, int, Grid]:

@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from mcz.conversion.hierarchy import is_bvh, to_bvh
 from mcz.errors import MotionError, OptionError
 from mcz.formats.rates import frame_rate
-from mcz.motion import POSITION_KINDS, ROTATION_KINDS, Channel, Joint, Motion, Signal, Skeleton
+from mcz.motion import (
+    POSITION_KINDS,
+    ROTATION_KINDS,
+    Channel,
+    Joint,
+    Motion,
+    Signal,
+    Skeleton,
+    check_poses,
+)
 from mcz.reading.source_files import with_facts
 from mcz.tables.labelled import imported
 
@@ -62,6 +71,7 @@ def to_pybvh(motion: Motion) -> Any:
     gaps, several roots, joints that change their place, markers, signals beside the motion.
     """
     pybvh = imported("pybvh", "pybvh")
+    check_poses(motion.name, motion.signals[0])
     tree = _Tree(motion)
     order = list(tree.depth_first())
     nodes: list[Any] = []

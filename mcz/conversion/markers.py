@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from mcz.errors import MotionError
 from mcz.kinematics.marker_motion import in_positions
 from mcz.motion import Motion
 
@@ -20,7 +23,10 @@ def to_c3d(motion: Motion) -> Motion:
     unit_cm = motion.skeleton.unit_cm
     if made is motion or unit_cm is None:
         return replace(made, metadata=motion.metadata)
-    values = made.signals[0].values * (unit_cm * MM_PER_CM)
+    with np.errstate(over="ignore"):
+        values = made.signals[0].values * (unit_cm * MM_PER_CM)
+    if np.isinf(values).any():
+        raise MotionError(f"motion {motion.name!r}: a position in mm is beyond float64")
     signal = replace(made.signals[0], values=values)
     return replace(
         made,

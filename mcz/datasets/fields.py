@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mcz.brief import nearest
-from mcz.errors import OptionError
+from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.frames import FramePoses
 from mcz.motion import Skeleton
@@ -218,5 +218,11 @@ def features_of(
         stop = len(values) - high
         made = field.make(subject, Rows(values[low:stop], steps[low : max(low, stop - 1)]))
         stop = len(made) - (last - high)
-        found[field.name] = np.ascontiguousarray(made[first - low : stop], dtype)
+        part = made[first - low : stop]
+        with np.errstate(over="ignore"):
+            found[field.name] = np.ascontiguousarray(part, dtype)
+        if np.isinf(found[field.name]).any() and not np.isinf(part).any():
+            raise MotionError(
+                f"{field.name}: a value is beyond {np.dtype(dtype)}; give another dtype"
+            )
     return found

@@ -183,7 +183,8 @@ def channel_chart(motion: Motion, wanted: Wanted, first: int = 0) -> Chart:
     rows: list[list[Any]] = [["channel", "in", "least", "mean", "greatest", "unknown"]]
     for each in shown.series:
         known = each.numbers[np.isfinite(each.numbers)]
-        figures = (known.min(), known.mean(), known.max()) if len(known) else (None,) * 3
+        with np.errstate(over="ignore"):
+            figures = (known.min(), known.mean(), known.max()) if len(known) else (None,) * 3
         rows.append([each.label, each.unit, *figures, len(each.numbers) - len(known)])
     table = Sheet("Channels", rows_of(rows), "llrrrr")
     size = WIDTH, 60 + PANEL * len({each.unit for each in shown.series})

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from mcz.brief import printable
-from mcz.errors import OptionError
+from mcz.errors import MotionError, OptionError
 from mcz.kinematics.chain import Floats
 from mcz.pictures.chart_pages import ChartPage, Sheet, data_uri
 from mcz.pictures.libraries import new_figure, quietly
@@ -69,9 +69,12 @@ def drawn(
         if titled:
             heading = {"color": theme.ink, "fontsize": 11, "fontweight": "bold", "ha": "left"}
             figure.suptitle(printable(chart.title), parse_math=False, x=0.012, **heading)
-        chart.draw(figure, theme)
         about = {"Date": None, "Title": printable(chart.title)} if kind == "svg" else {}
-        figure.savefig(out, format=kind, metadata=about, dpi=100 if kind == "svg" else 150)
+        try:
+            chart.draw(figure, theme)
+            figure.savefig(out, format=kind, metadata=about, dpi=100 if kind == "svg" else 150)
+        except (ValueError, OverflowError) as error:  # of numbers near the end of float64
+            raise MotionError(f"{chart.title}: its numbers cannot be drawn: {error}") from None
     return out.getvalue()
 
 

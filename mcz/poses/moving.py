@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.clock import Timeline, known_timeline
-from mcz.errors import MotionError, OptionError
+from mcz.errors import OptionError
 from mcz.kinematics.chain import Floats
-from mcz.motion import Motion, Skeleton
+from mcz.motion import Motion, Skeleton, check_poses
 from mcz.skeleton import Joints, joint_columns, joint_list
 from mcz.units import unit_cm_of
 
@@ -67,12 +67,11 @@ def joint_numbers(skeleton: Skeleton, joints: Joints) -> list[int]:
 def values_of(moving: Moving, frames: tuple[int, int], joints: Sequence[int]) -> Floats:
     """The channels of these joints, float64 (n_frames, n_channels), NaN where invalid.
 
-    Columns of other joints may hold anything. Raises MotionError where the motion's channels are
-    not those of its skeleton.
+    Columns of other joints may hold anything. Raises MotionError where the rows of the motion are
+    no poses, see ``check_poses``.
     """
     skeleton = moving.skeleton
-    if moving.signals[0].channels is not None:
-        raise MotionError(f"{moving.name!r}: its channels are not those of its skeleton")
+    check_poses(moving.name, moving.signals[0])
     if isinstance(moving, Motion):
         return np.asarray(moving.signals[0].cut(*frames).masked(), np.float64)
     columns = joint_columns(skeleton, joints)

@@ -74,4 +74,4 @@ def _table(
             columns = [".".join(pair) for pair in names]
     times, units = row_times(motion, signal)
     index = pandas.Index(times, name="time" if units == "s" else "frame")
-    return pandas.DataFrame(array.reshape(len(array), -1), index=index, columns=columns)
+    return pandas.DataFrame(array.reshape(len(array), len(columns)), index=index, columns=columns)

@@ -22,7 +22,7 @@ from mcz.errors import MotionError
 from mcz.kinematics import point_set
 from mcz.kinematics.chain import Chain, Floats, times
 from mcz.kinematics.frames import frame_poses_of
-from mcz.motion import TURNING_KINDS, Motion
+from mcz.motion import TURNING_KINDS, Motion, check_poses
 from mcz.poses.conversions import from_matrices
 from mcz.retargeting.sides import sides_of
 
@@ -108,8 +108,7 @@ def scene_of(motion: Motion) -> Scene:
     skeleton, timeline = motion.skeleton, motion.timeline
     assert timeline is not None
     rate = _rate(motion, timeline)
-    if motion.signals[0].channels is not None:
-        raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
+    check_poses(motion.name, motion.signals[0])
     if not skeleton.joints:
         raise MotionError(f"motion {motion.name!r}: a skeleton without joints is no scene")
     scale = 1.0 if skeleton.unit_cm is None else skeleton.unit_cm / CM_PER_M
