@@ -136,7 +136,7 @@ def _shown(motion: Motion, wanted: Wanted, first: int) -> _Shown:
     ]
     per_frame = signal.samples_per_frame
     rows = [(start * per_frame, stop * per_frame) for start, stop in runs]
-    return _Shown(name, joint, series, when, rows, per_frame, notes)
+    return _Shown(name, joint, series, when, rows or [(0, 0)], per_frame, notes)
 
 
 def _signal_of(motion: Motion, wanted: Wanted) -> int:
