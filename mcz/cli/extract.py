@@ -12,6 +12,7 @@ from mcz.cli.common import (
     Exit,
     Failure,
     about,
+    damage_of,
     echo,
     existing,
     plural,
@@ -111,12 +112,11 @@ def command(
         )
     if as_json:
         print_json({"output": output, **asdict(found)})
-        return Exit.FINE
-    for line in _lines(output, found):
-        echo(line)
-    for text in found.left_out:
+    else:
+        echo(*_lines(output, found))
+    for text in () if as_json else found.left_out:
         say(f"left out: {text}")
-    return Exit.FINE
+    return damage_of(file, found.damage)
 
 
 def _lines(output: str, found: Extraction) -> Iterator[str]:

@@ -114,5 +114,8 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
         return Exit.USAGE
     for line in report.damage:
         say(f"salvage: {line}")
-    lost = report.damage or report.count("salvaged") or report.count("damaged")
+    damaged = report.count("damaged")
+    if damaged and damaged == len(report.outcomes):  # nothing is whole
+        return Exit.BAD_INPUT
+    lost = report.damage or report.count("salvaged") or damaged
     return Exit.SALVAGED if lost else Exit.FINE

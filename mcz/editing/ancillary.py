@@ -9,11 +9,13 @@ from mcz.container.directory import ClipRow
 from mcz.container.packets import read_packets
 from mcz.container.reader import Container
 from mcz.container.source import Forward
+from mcz.errors import FormatError
 
 
 def inside(container: Container, row: ClipRow) -> Iterator[Chunk]:
     """The ancillary chunks between CLIP and CEND."""
-    assert row.cend is not None
+    if row.cend is None:  # of a damaged file
+        raise FormatError(f"clip {row.name!r} has no CEND")
     source, at = container.source, row.clip.offset + row.clip.size
     ends = {
         segment.chunk().offset: segment.stop + CRC.size

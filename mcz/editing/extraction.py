@@ -55,7 +55,7 @@ from mcz.reading.signal_reader import SignalReader
 from mcz.reading.source_rates import stating_rate
 from mcz.schema import build, parse
 from mcz.skeleton import Joints
-from mcz.writing.atomic import replacing
+from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Progress
 
 
@@ -81,10 +81,14 @@ class ExtractedClip:
 
 @dataclass(slots=True)
 class Extraction:
-    """What ``extract`` wrote, and what of the source file it left out beside what was cut."""
+    """What ``extract`` wrote, and what of the source file it left out beside what was cut.
+
+    ``damage`` is what salvage found wrong.
+    """
 
     clips: list[ExtractedClip] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
     size: int = 0
 
     __repr__ = brief
@@ -134,8 +138,9 @@ def extract(
         for cut in cuts:
             if cut.anew:
                 check_anew(cut.clip, whole=cut.joints is None)
-        with replacing(target, force=force, inputs=(source,)) as stream:
+        with replacing_file(target, force=force, inputs=(source,)) as stream:
             copier = Copier(file, stream, progress, copies)
+            copier.found.damage += opened.damage
             return copier.run(cuts, alone=alone)
 
 
@@ -287,6 +292,8 @@ class Copier:
         """Source and metadata of the new CLIP; return the hashes of the source and the signals."""
         if cut.is_whole:
             cend = self.container.cend(self.container.directory.clips[cut.clip.name])
+            if cend is None:  # of a damaged file
+                raise FormatError(f"clip {cut.clip.name!r} has no CEND")
             source, hashes = b"".join(map(bytes, cend.source_sha256)), list(cend.value_sha256)
         else:
             source, hashes = self._decoded(cut, new)

@@ -23,7 +23,6 @@ from mcz.editing.protecting import protect_written, redundancy_of
 from mcz.editing.rewriting import (
     Plan,
     carry,
-    check_written,
     source_path,
     whole,
     writer_like,
@@ -33,7 +32,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.reading.names import listed
 from mcz.schema import parse
-from mcz.writing.atomic import replacing
+from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Progress
 from mcz.writing.draft import Draft
 
@@ -70,17 +69,15 @@ def merge(
             for file in files
         ]
         _refuse_double(held)
-        with replacing(target, force=force, inputs=sources) as stream:
+        with replacing_file(target, force=force, inputs=sources) as stream:
             writer = writer_like(stream, files)
             report.left_out += carried(list(zip(files, plans, strict=True)), writer, progress)
             writer.finish()
             report.size = writer.offset
-            if getattr(stream, "readable", bool)():
-                check_written(stream, writer.offset)
-                if share := _share_of_all(files):
-                    protect_written(stream, share)
-                    report.size = stream.tell()
-                    report.left_out = [t for t in report.left_out if not t.endswith(UNPROTECTED)]
+            if share := _share_of_all(files):
+                protect_written(stream, share)
+                report.size = stream.tell()
+                report.left_out = [t for t in report.left_out if not t.endswith(UNPROTECTED)]
     return report
 
 

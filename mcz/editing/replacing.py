@@ -34,7 +34,7 @@ from mcz.errors import AccessError, MotionError, OptionError
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.schema import build, parse
-from mcz.writing.atomic import replacing
+from mcz.writing.atomic import replacing_file
 from mcz.writing.clip_writer import Progress
 from mcz.writing.quality import CHUNK, figures, texts_of
 
@@ -102,7 +102,7 @@ def replace(
         inputs = [source.name if isinstance(source, File) else source]
         if target is None:
             target, force, inputs = _locked(source, stack), True, []
-        stream = stack.enter_context(replacing(target, force=force, inputs=inputs))
+        stream = stack.enter_context(replacing_file(target, force=force, inputs=inputs))
         file = source if isinstance(source, File) else stack.enter_context(open(source))
         chosen = file.only_clip(clip)
         if recode and is_coded_with_others(chosen, joint):

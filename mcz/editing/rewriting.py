@@ -19,8 +19,6 @@ from mcz.container.clip_head import clip_head
 from mcz.container.limits import BASE, Profile
 from mcz.container.locks import lock
 from mcz.container.reader import Container
-from mcz.container.scan import scan
-from mcz.container.source import ByteSource
 from mcz.container.writer import Writer
 from mcz.editing.carrying import SAME, UNPROTECTED, Carrier, Change, said_of
 from mcz.editing.protecting import (
@@ -34,7 +32,7 @@ from mcz.errors import AccessError, FormatError, OptionError
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
 from mcz.schema import parse
-from mcz.writing.atomic import replacing
+from mcz.writing.atomic import replacing_file
 
 Shared = tuple[bytes, bytes]  # type and id of a SKEL, MODL or SRCE
 Step = Callable[[str], None]  # is told the name of each clip that was carried over
@@ -143,12 +141,6 @@ def writer_like(stream: Any, files: Iterable[File]) -> Writer:
     )
 
 
-def check_written(stream: Any, size: int) -> None:
-    """Walk the new file, whose every rule must hold; raises FormatError."""
-    stream.flush()
-    scan(ByteSource(stream, size=size), whole=True)
-
-
 @contextmanager
 def source_of(target: Any, output: Any) -> Iterator[File]:
     """The file to be rewritten; where it is to take its own place, nobody appends meanwhile.
@@ -178,7 +170,7 @@ def rewrite(target: Any, output: Any, force: bool, file: File, plan: Plan, step:
     """Write what ``plan`` says of ``file`` in its own place, or to ``output``."""
     inputs = () if output is None else (target,)
     path = Path(target) if output is None else output
-    with replacing(path, force=force or output is None, inputs=inputs) as stream:
+    with replacing_file(path, force=force or output is None, inputs=inputs) as stream:
         size, left_out = _written(stream, file, plan, step)
         if output is None and UNPROTECTED in left_out:
             left_out = [text for text in left_out if text != UNPROTECTED]
@@ -188,12 +180,10 @@ def rewrite(target: Any, output: Any, force: bool, file: File, plan: Plan, step:
 
 
 def _written(stream: Any, file: File, plan: Plan, step: Step) -> tuple[int, list[str]]:
-    """Write what ``plan`` says of ``file``, and walk it; the size, and what was left out."""
+    """Write what ``plan`` says of ``file``; the size, and what was left out."""
     writer = writer_like(stream, [file])
     left_out = carry(file, writer, plan, step)
     writer.finish()
-    if getattr(stream, "readable", bool)():
-        check_written(stream, writer.offset)
     return writer.offset, left_out
 
 
@@ -208,7 +198,7 @@ def protected_anew(
     with source_of(target, None) as file:
         if redundancy_of(file.container) is None:
             return None
-        with replacing(Path(target), force=True) as stream:
+        with replacing_file(Path(target), force=True) as stream:
             _, left_out = _written(stream, file, whole(file), lambda name: None)
             if lost := [text for text in left_out if text != UNPROTECTED]:
                 raise FormatError(f"{file.name}: rewriting it would lose {lost[0]}")

@@ -76,7 +76,7 @@ def unpack(
                     if mtimes and one.kind == "clip":
                         set_time(writing.place, file.clips[one.name].metadata.get("mtime"))
                     outcome = replace(outcome, result=_fidelity(file, one), notes=_notes(file, one))
-                if salvage and isinstance(writing.error, FormatError):
+                if salvage and writing.is_damaged:
                     outcome = replace(outcome, result="damaged")
                 report.outcomes.append(outcome)
                 if progress is not None:
@@ -168,7 +168,10 @@ def _fidelity(file: File, one: Stored) -> str:
 
 
 class _Writing:
-    """Writes files below a folder, no two to one place; ``error`` is that of the last one."""
+    """Writes files below a folder, no two to one place.
+
+    ``is_damaged``: the last one could not be restored, or may not be called what it is.
+    """
 
     def __init__(
         self, target: Any, folder: Folder, force: bool, names: str, notes: Mapping[str, str]
@@ -176,18 +179,18 @@ class _Writing:
         self._target, self._folder, self._force = target, folder, force
         self._names, self._notes = names, notes
         self._renamed, self._written = PortableNames(), set[str]()
-        self.error: Exception | None = None
+        self.is_damaged = False
         self.place = Path()  # of the file that was written last
 
     def outcome(self, path: str, restore: Callable[[], bytes]) -> Outcome:
         """Write what ``restore`` gives to its place; what became of it."""
+        self.is_damaged = False
         try:
             size, as_path = self._write(path, restore)
         except (MczError, OSError) as error:
-            self.error = error
+            self.is_damaged |= isinstance(error, FormatError)
             result = "exists" if isinstance(error, ExistsError) else "failed"
             return Outcome(path, result, 0, f"{path}: {error}")
-        self.error = None
         return Outcome(path, RESTORED, size, "" if as_path == path else f"as {as_path}")
 
     def _write(self, path: str, restore: Callable[[], bytes]) -> tuple[int, str]:
@@ -198,7 +201,9 @@ class _Writing:
             raise FormatError(self._notes[path])
         if path in self._written:
             raise FormatError("another file in the archive has the same path")  # PATH-06
+        self.is_damaged = True
         data = restore()
+        self.is_damaged = False
         self._written.add(path)
         place = self._folder.place(as_path, force=self._force)
         with replacing(place, force=self._force, inputs=(self._target,)) as stream:

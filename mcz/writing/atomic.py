@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from mcz.container.locks import is_abandoned, lock
+from mcz.container.scan import scan
+from mcz.container.source import ByteSource
 from mcz.errors import AccessError, ExistsError, OptionError
 from mcz.writing.inputs import refuse_inputs
 
@@ -50,6 +52,19 @@ def replacing(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterat
         raise ExistsError(f"{path} exists; use force to replace it")
     with _in_place(path) if _is_special(path) else _temporary(path, force) as stream:
         yield stream
+
+
+@contextmanager
+def replacing_file(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterator[BinaryIO]:
+    """As ``replacing``, for an MCZ file: it is read again, strictly, before it gets its name.
+
+    The stream can be read. Also raises FormatError where the new file breaks a rule.
+    """
+    with replacing(target, force=force, inputs=inputs) as stream, rereadable(stream) as own:
+        yield own
+        own.flush()
+        scan(ByteSource(own), whole=True)
+        own.seek(0, os.SEEK_END)
 
 
 @contextmanager
