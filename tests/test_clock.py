@@ -569,7 +569,6 @@ def made_of(motion: Motion) -> dict[str, Motion]:
         "retarget": mcz.retarget(motion, motion.skeleton),
         "in_positions": mcz.in_positions(motion),
         "amc": mcz.convert(motion, "amc"),
-        "c3d": mcz.convert(motion, "c3d"),
         "trc": mcz.convert(motion, "trc"),
         "sto": mcz.convert(motion, "sto"),
         "cut": motion[0 : motion.n_frames],
