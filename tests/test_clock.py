@@ -584,3 +584,15 @@ def test_whatever_is_made_of_a_motion_keeps_its_times(samples: Path, start: str)
         near(made.times, motion.times)
         near(stored(made).times, motion.times)
         assert made.frame_rate == motion.frame_rate, name
+
+
+def test_a_start_time_that_changes_nothing_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for source, told in (("trc", True), ("bvh", False)):
+        path = tmp_path / f"{source}.mcz"
+        mcz.write(read_case(CASES[source], tmp_path), path)
+        assert run(cli, "mcz", ["meta", str(path), "--set", "start-time=5"]) == 0
+        assert ("start-time does not change" in capsys.readouterr().err) == told
+        with mcz.open(path) as file:
+            assert (file.only_clip().times[0] == 5) == (not told)

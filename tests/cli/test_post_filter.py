@@ -54,7 +54,7 @@ def test_tables(markers: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str
     arguments = ("--frames", "5:9", "--joints", "1", "--to", "csv", "-o", tmp_path / "w.csv")
     assert call(capsys, "decode", markers, "--post-filter", *arguments)[0] == 0
     rows = list(csv.reader(io.StringIO((tmp_path / "w.csv").read_text())))
-    found = np.array([[float(cell) for cell in row[1:]] for row in rows[1:]])
+    found = np.array([[float(cell) for cell in row[2:]] for row in rows[1:]])
     assert np.array_equal(found, whole.values[5:9, 3:6])
 
 
