@@ -47,6 +47,12 @@ def arguments_of(name: str, file: Path) -> list[list[str]]:
     calls = {
         "sample": [[str(out)]],
         "encode": [[odd], [str(file.parent / f"note{STEERING}.bvh")]],
+        "convert": [
+            [str(file), f"{out}c.csv"],
+            [str(file), f"{out}{STEERING}.x{STEERING}"],
+            [str(file.parent / f"note{STEERING}.bvh"), f"{out}c.trc"],
+            [odd, f"{out}c.bvh", "--joints", STEERING],
+        ],
         "decode": [
             [str(file), "--to", "csv", "-o", "-"],
             [str(file), "--to", "csv", "-o", f"{out}.csv"],
