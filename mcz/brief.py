@@ -12,6 +12,8 @@ from typing import Any
 WIDEST = 60  # characters of a name
 MOST_LISTED = 40  # names in a message
 ODD = re.compile(r"[^ -~]")  # what is looked at more closely; all else is plain
+_FORMULA = re.compile(r"'*\s*[=+\-@\uff1d\uff0b\uff0d\uff20]|'*[\t\r\n]")
+_NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?", re.ASCII)
 NEAR = 0.6  # of 1, how alike a suggested name is
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, WIDEST, 160
@@ -42,6 +44,20 @@ def printable(text: str, kept: str = "") -> str:
         return letter if letter.isprintable() or letter in kept else ascii(letter)[1:-1]
 
     return ODD.sub(escaped, text)
+
+
+def spreadsheet_cell(text: str) -> str:
+    """``text`` as a cell of CSV that no spreadsheet takes for a formula; see ``cell_text``.
+
+    >>> [spreadsheet_cell(text) for text in ("=1+2", "'@a", "-5", "a=b")]
+    ["'=1+2", "''@a", '-5', 'a=b']
+    """
+    return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
+
+
+def cell_text(cell: str) -> str:
+    """What ``spreadsheet_cell`` made a cell of."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 def counted(number: int, word: str) -> str:

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import unicodedata
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
 from mcz.editing import safe_names, unpacking
-from mcz.editing.safe_names import PortableNames, fault_of, folded, notes_on
+from mcz.editing.safe_names import HIDDEN, PortableNames, fault_of, folded, notes_on
 from mcz.editing.unpacking import NAMES
 from mcz.errors import OptionError
+from tests.motions import smooth
 
 
 def packed(folder: Path, *names: str) -> Path:
@@ -78,14 +84,58 @@ def test_unpack_into_a_folder_that_is_itself_a_link(tmp_path: Path) -> None:
     "part",
     [
         *("CON", "con.bvh", "Nul", "COM1.amc", "lpt9", "walk.", "walk ", "a:b", "a\x01"),
-        *('a"b', "a<b", "a|b", "a?", "a*b", "x" * 256, "ä" * 128),
+        *('a"b', "a<b", "a|b", "a?", "a*b", "x" * 256, "ä" * 128, "Icon\r", "a\x1bb", "a\x85b"),
+        *("a\u202eb", "a\u2066b", "a\u2028b", "a\u200fb", "a\ufeffb"),
     ],
 )
-def test_names_that_windows_cannot_hold(part: str) -> None:
+def test_names_that_not_every_system_can_hold(part: str) -> None:
     assert fault_of(part)
     assert not fault_of(PortableNames()(part))
     (note,) = notes_on([f"walks/{part}", "walks/fine.bvh"]).values()
-    assert "Windows cannot hold" in note
+    is_hidden = HIDDEN.search(part) is not None
+    assert ("does not write" if is_hidden else "Windows cannot hold") in note
+
+
+HOSTILE = (
+    "a\u202egpj.txt",
+    "a\x1b]0;x\x07.txt",
+    "Icon\r",
+    "d\x01/x.txt",
+    "d\x02/x.txt",
+    "a_gpj.txt",
+)
+
+
+@pytest.mark.parametrize("names", NAMES)
+def test_unpack_writes_no_name_with_a_hidden_character(tmp_path: Path, names: str) -> None:
+    archive, out = packed(tmp_path, *HOSTILE), tmp_path / "out"
+    report = mcz.unpack(archive, out, names=names)
+    assert not any(HIDDEN.search(str(path.relative_to(out))) for path in out.rglob("*"))
+    if names == "strict":
+        assert len(report.failures) == 5
+        return
+    assert not report.failures
+    texts = {path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert texts == {path.read_bytes() for path in (tmp_path / "in").rglob("*") if path.is_file()}
+    if names == "stored":
+        assert sum(outcome.message.startswith("as ") for outcome in report.outcomes) == 5
+        assert (out / "a_gpj.txt").read_bytes().endswith(b" a_gpj.txt")
+
+
+@pytest.mark.parametrize(
+    "name", ["a\u202eb", "a\x85b", 'x"\x1b]0;pwn\x07', "con", "walk. ", "day\u2028/con", "a\r\n=b"]
+)
+def test_exported_files_have_names_that_every_system_can_hold(tmp_path: Path, name: str) -> None:
+    mcz.write(replace(smooth(4), name=name), tmp_path / "a.mcz")
+    report = mcz.export(tmp_path / "a.mcz", tmp_path / "out", "csv")
+    assert not report.failures
+    (tmp_path / "own").mkdir()
+    for target in ("csv", "npz", "bvh"):
+        arguments = ["decode", str(tmp_path / "a.mcz"), "--to", target, "-o", str(tmp_path / "own")]
+        assert run(cli, "mcz", arguments) == 0
+    paths = [*(tmp_path / "out").rglob("*"), *(tmp_path / "own").iterdir()]
+    assert len(paths) >= 4
+    assert not any(fault_of(path.name) for path in paths)
 
 
 @pytest.mark.parametrize(
@@ -155,3 +205,40 @@ def test_a_disk_that_folds_names_loses_nothing(
     assert [o.path for o in report.failures] == ["notes.txt"]
     assert "--names portable keeps both" in report.failures[0].message
     assert (out / "NOTES.TXT").read_bytes() == b"0 NOTES.TXT"
+
+
+@pytest.mark.parametrize("sign", ["=", "+", "-", "@", "'=", " =", "\t=", "\r@", "\uff1d", "''-"])
+def test_no_cell_of_csv_is_a_formula(
+    tmp_path: Path, sign: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Tables, lists and streams; what is read again is what it was."""
+    name, path = f"{sign}cmd|' /C calc'!A0", tmp_path / "a.mcz"
+    motion = smooth(4)
+    joints = (replace(motion.skeleton.joints[0], name=name), *motion.skeleton.joints[1:])
+    motion = replace(motion, skeleton=replace(motion.skeleton, joints=joints), name=name)
+    mcz.write(replace(motion, metadata={"title": name}), path)
+    table = tmp_path / "t.csv"
+    assert run(cli, "mcz", ["decode", str(path), "--to", "csv", "-o", str(table)]) == 0
+    listed = tmp_path / "l.csv"
+    capsys.readouterr()
+    columns = ["--csv", "--columns", "name,title"]
+    assert run(cli, "mcz", ["list", str(path), *columns]) == 0
+    listed.write_text(capsys.readouterr().out, newline="")
+    for file in (table, listed):
+        rows = list(csv.reader(io.StringIO(file.read_text(), newline="")))
+        cells = [cell for row in rows for cell in row if not _is_number(cell)]
+        assert any("calc" in cell for cell in cells)
+        assert not any(cell.lstrip().startswith(tuple("=+-@\t\r\uff1d")) for cell in cells)
+    if sign == sign.strip():  # blanks around a name of a table are not part of it
+        assert run(cli, "mcz", ["meta", str(path), "--from", str(listed)]) == 0
+    with mcz.open(path) as file_:
+        assert file_.only_clip().metadata["title"] == name
+    given = tmp_path / "j.csv"
+    chosen = ["--joints", "0", "--to", "csv", "-o", str(given)]
+    assert run(cli, "mcz", ["decode", str(path), *chosen]) == 0
+    arguments = ["--in-place", "--joint", "0", "--values", str(given)]
+    assert run(cli, "mcz", ["replace", str(path), *arguments]) == 0
+
+
+def _is_number(cell: str) -> bool:
+    return cell.replace(".", "").replace("-", "").replace("e", "").isdigit()

@@ -326,16 +326,6 @@ def write_output(path: Path, data: bytes, force: bool) -> None:
         raise
 
 
-def plain_name(name: str) -> str:
-    r"""A name from a file as one that can be written below any folder.
-
-    >>> plain_name("walk.bvh"), plain_name(".."), plain_name("a\0b")
-    ('walk.bvh', '_', 'a_b')
-    """
-    name = re.sub(r"[\0/\\]", "_", name)
-    return "_" if name in ("", ".", "..") else name
-
-
 def plural(count: int, word: str) -> str:
     """
     >>> plural(1, "clip"), plural(2400, "frame")

@@ -14,7 +14,6 @@ from mcz.cli.common import (
     binary_output,
     check_new,
     echo,
-    plain_name,
     print_json,
     text_output,
     write_output,
@@ -88,3 +87,14 @@ def _paths(file: str, output: str | None, outputs: Sequence[Output]) -> list[Pat
         folder = Path(output).parent if named else Path(output)
     paths = [folder / plain_name(made.name) for made in outputs]
     return [Path(str(output)), *paths[1:]] if named else paths
+
+
+def plain_name(name: str) -> str:
+    r"""A name from a file as one that every system can hold, below any folder.
+
+    >>> plain_name("walk.bvh"), plain_name(".."), plain_name("a\0b"), plain_name("con.bvh")
+    ('walk.bvh', '__', 'a_b', 'con_.bvh')
+    """
+    from mcz.editing.safe_names import PortableNames
+
+    return PortableNames()(name.replace("/", "_")) or "_"

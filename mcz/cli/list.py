@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.brief import spreadsheet_cell
 from mcz.cli.common import (
     Exit,
     Failure,
@@ -158,9 +159,10 @@ def _print_others(
 
 
 def _as_csv(rows: list[dict[str, Any]], names: Sequence[str]) -> str:
-    """RFC 4180 but for its line ends: a head, then the values as they are."""
+    """RFC 4180 but for its line ends: a head, then the values, none of them a formula."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([["" if row[n] is None else row[n] for n in names] for row in rows])
+    for row in ([*names], *([row[name] for name in names] for row in rows)):
+        cells = ("" if value is None else value for value in row)
+        writer.writerow(spreadsheet_cell(v) if isinstance(v, str) else v for v in cells)
     return out.getvalue().rstrip("\n")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from mcz.brief import cell_text
 from mcz.cli.common import (
     Exit,
     Failure,
@@ -165,7 +166,7 @@ def _read_csv(path: Path) -> tuple[list[str], Any]:
     values = [[float(cell) if cell.strip() else np.nan for cell in row] for row in rows if row]
     if len({len(row) for row in values}) > 1:
         raise ValueError("rows of different lengths")
-    return names, np.array(values, np.float64).reshape(len(values), -1)
+    return [*map(cell_text, names)], np.array(values, np.float64).reshape(len(values), -1)
 
 
 def _is_number(text: str) -> bool:

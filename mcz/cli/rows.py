@@ -9,6 +9,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.brief import cell_text
 from mcz.cli.common import literal
 from mcz.errors import OptionError, SourceError
 
@@ -45,7 +46,7 @@ class Rows:
             (names,) = csv.reader([line.decode("utf-8-sig")], strict=True)
         except (UnicodeDecodeError, ValueError, csv.Error) as error:
             raise SourceError(f"line {self._at}: not a line of names: {error}") from None
-        names = [name.strip() for name in names]
+        names = [cell_text(name.strip()) for name in names]
         lead = next((n for n in ([NUMBER, TIME], [NUMBER]) if names[: len(n)] == n), [])
         if lead and _are_coordinates(names[len(lead) : len(lead) + 2]):
             self._drop_first = len(lead)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import click
 import numpy as np
 
+from mcz.brief import spreadsheet_cell
 from mcz.cli.common import (
     Exit,
     Failure,
@@ -173,7 +174,9 @@ class _Binary:
 
 def _csv(cells: list[str]) -> bytes:
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(map(printable, cells))
+    csv.writer(text, lineterminator="\n").writerow(
+        spreadsheet_cell(printable(cell)) for cell in cells
+    )
     return text.getvalue().encode("utf-8", "surrogateescape")
 
 

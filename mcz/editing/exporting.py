@@ -11,7 +11,7 @@ from typing import Any
 from mcz.conversion import TARGETS, converted_files, left_out, suffixes_of
 from mcz.conversion.scenes import WRITERS, to_scene
 from mcz.editing.outcomes import Outcome, Report
-from mcz.editing.safe_names import Folder
+from mcz.editing.safe_names import Folder, PortableNames
 from mcz.editing.unpacking import safe_path
 from mcz.errors import ExistsError, FormatError, MczError, OptionError
 from mcz.jobs import limited
@@ -58,13 +58,15 @@ def export(
     if to not in FORMS:
         raise OptionError(f"to {to!r}: one of {', '.join(FORMS)}")
     folder, report, written = Folder(Path(directory)), Report(), set[str]()
+    portable = PortableNames()
     with limited(jobs), open(target, max_decoded=max_decoded, threads=threads) as file:
         chosen = file.chosen(clips, where)
         called = [clip.name for clip in chosen]
         with shared_out(_converted, file, called, (to, rate, unit, key_error_mm)) as converting:
             for done, (name, converted) in enumerate(zip(called, converting, strict=True)):
                 try:
-                    for path, data, notes in converted():
+                    for own, data, notes in converted():
+                        path = portable(str(safe_path(own)))
                         _write(path, data, folder, written, target, force)
                         size = len(data)
                         report.outcomes.append(Outcome(path, "written", size, notes=notes))
@@ -81,7 +83,7 @@ def _write(
 ) -> None:
     if name in written:
         raise FormatError(f"another clip becomes {name}, too")
-    path = folder.place(str(safe_path(name)), force=force)
+    path = folder.place(name, force=force)
     with replacing(path, force=force, inputs=(target,)) as stream:
         stream.write(data)
     written.add(name)

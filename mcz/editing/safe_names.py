@@ -6,20 +6,26 @@ import os
 import re
 import stat
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 
 from mcz.errors import AccessError, ExistsError
 
-ODD = re.compile(r'[<>:"|?*\\\x00-\x1f\x7f]')
+ODD = re.compile(r'[<>:"|?*\\]')
+# Controls, what turns the direction of text, line ends and other characters that are not seen; but
+# not the joiners that some scripts and emoji are spelled with.
+HIDDEN = re.compile(
+    "[\x00-\x1f\x7f-\x9f\xad\u061c\u180e\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff"
+    "\ufff9-\ufffb\U000e0001-\U000e007f]"
+)
 DEVICES = re.compile(r"(?i)(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])[ ]*(\..*)?")
 LONGEST = 255  # bytes of UTF-8 that a part of a path may have
 
 
 def fault_of(part: str) -> str:
     """Why not every system can hold a part of a path; "" where all can."""
-    if odd := ODD.search(part):
-        return f"it has {odd[0]!r}"
+    if odd := HIDDEN.search(part) or ODD.search(part):
+        return f"it has {odd[0]!a}"
     if DEVICES.fullmatch(part):
         return "it names a device"
     if part != part.rstrip(" ."):
@@ -41,7 +47,8 @@ def notes_on(names: Iterable[str]) -> dict[str, str]:
     for name in names:
         for part in PurePosixPath(name).parts:
             if fault := fault_of(part):
-                notes.setdefault(name, f"Windows cannot hold the name {part!r}: {fault}")
+                who = "unpack does not write" if HIDDEN.search(part) else "Windows cannot hold"
+                notes.setdefault(name, f"{who} the name {part!r}: {fault}")
         for path in (name, *map(str, PurePosixPath(name).parents)):
             other = seen.setdefault(folded(path), path)
             if other != path:
@@ -52,18 +59,24 @@ def notes_on(names: Iterable[str]) -> dict[str, str]:
 
 
 class PortableNames:
-    """Gives paths names that every system can hold, one beside the other."""
+    """Gives paths names that every system can hold, one beside the other.
 
-    def __init__(self) -> None:
+    ``change`` makes such a name of a part of a path; those ``taken`` are given to nobody.
+    """
+
+    def __init__(
+        self, change: Callable[[str], str] | None = None, taken: Iterable[str] = ()
+    ) -> None:
+        self._change = _portable if change is None else change
         self._given: dict[str, str] = {}  # the parts of a path that was given, "/" between -> its
-        self._taken: set[str] = set()
+        self._taken = set(map(folded, taken))
 
     def __call__(self, path: str) -> str:
         """The path, or one like it: the same for the same folder, another for another file."""
         above, _, part = path.rpartition("/")
         if path not in self._given:
             folder = f"{self(above)}/" if above else ""
-            self._given[path] = self._free(folder, _portable(part))
+            self._given[path] = self._free(folder, self._change(part))
         return self._given[path]
 
     def _free(self, folder: str, part: str) -> str:
@@ -76,12 +89,20 @@ class PortableNames:
         return folder + name
 
 
+def visible(part: str) -> str:
+    """
+    >>> visible("a:b\u202egpj.c3d"), visible("Icon\r")
+    ('a:b_gpj.c3d', 'Icon_')
+    """
+    return HIDDEN.sub("_", part)
+
+
 def _portable(part: str) -> str:
     """
     >>> [_portable(name) for name in ("a:b", "CON", "nul.bvh", "walk. ", "walk.bvh")]
     ['a_b', 'CON_', 'nul_.bvh', 'walk__', 'walk.bvh']
     """
-    part = ODD.sub("_", part)
+    part = ODD.sub("_", visible(part))
     bare = part.rstrip(" .")
     part = bare + "_" * (len(part) - len(bare))
     if DEVICES.fullmatch(part):

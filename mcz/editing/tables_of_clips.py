@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from mcz.brief import among
+from mcz.brief import among, cell_text
 from mcz.container.metadata_keys import INTERPRETED, KEYS, PRIVATE, SPELLINGS
 from mcz.errors import OptionError
 from mcz.reading.file import File
@@ -88,7 +88,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
     for number, row in enumerate(rows, 2):
         if None in row or None in row.values():
             raise OptionError(f"{path}: row {number} has not the {len(head)} columns of the head")
-    return rows
+    return [{cell_text(key): cell_text(value) for key, value in row.items()} for row in rows]
 
 
 def _fields(match: str) -> list[str]:

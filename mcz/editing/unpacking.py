@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,7 +14,7 @@ from mcz.container import payloads
 from mcz.container.strict import check_path
 from mcz.editing.mtimes import set_time
 from mcz.editing.outcomes import Outcome, Report
-from mcz.editing.safe_names import Folder, PortableNames, notes_on
+from mcz.editing.safe_names import HIDDEN, Folder, PortableNames, notes_on, visible
 from mcz.errors import ExistsError, FormatError, MczError, OptionError
 from mcz.jobs import limited
 from mcz.reading.clip import Clip
@@ -54,7 +54,8 @@ def unpack(
     restore at once, by default one.
 
     ``names`` decides about names that some system cannot hold, or not beside another: "stored"
-    writes them as they are, and refuses what this system or disk cannot hold; "portable" gives
+    writes them as they are, but for control characters and those that turn the direction of text,
+    of which the outcomes tell, and refuses what this system or disk cannot hold; "portable" gives
     them others, which the outcomes tell; "strict" refuses them. One file never replaces another of
     the same archive. ``mtimes``: files get the time of their last change that the metadata of
     their clip has, where it has one (``mcz.pack(..., mtimes=True)``).
@@ -68,7 +69,7 @@ def unpack(
         report.damage += opened.damage
         wanted, whole = file.chosen(clips, where), clips is None and where is None
         stored = list(files_of(file, None if whole else wanted))
-        writing = _Writing(target, folder, force, names, notes_on(one.path for one in stored))
+        writing = _Writing(target, folder, force, names, [one.path for one in stored])
         with shared_out(_restored, file, stored) as restoring:
             for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
                 outcome = writing.outcome(one.path, restore)
@@ -174,11 +175,13 @@ class _Writing:
     """
 
     def __init__(
-        self, target: Any, folder: Folder, force: bool, names: str, notes: Mapping[str, str]
+        self, target: Any, folder: Folder, force: bool, names: str, paths: Sequence[str]
     ) -> None:
         self._target, self._folder, self._force = target, folder, force
-        self._names, self._notes = names, notes
-        self._renamed, self._written = PortableNames(), set[str]()
+        self._names, self._notes, self._written = names, notes_on(paths), set[str]()
+        plain = (path for path in paths if not HIDDEN.search(path))
+        is_portable = names == "portable"
+        self._renamed = PortableNames() if is_portable else PortableNames(visible, plain)
         self.is_damaged = False
         self.place = Path()  # of the file that was written last
 
@@ -195,7 +198,7 @@ class _Writing:
 
     def _write(self, path: str, restore: Callable[[], bytes]) -> tuple[int, str]:
         as_path = str(safe_path(path))
-        if self._names == "portable":
+        if self._names == "portable" or HIDDEN.search(as_path):
             as_path = self._renamed(as_path)
         if self._names == "strict" and path in self._notes:
             raise FormatError(self._notes[path])

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.brief import printable
+from mcz.brief import printable, spreadsheet_cell
 from mcz.clock import numbers_or_rows
 from mcz.motion import Channel, Joint, Motion, Skeleton
 from mcz.tables.arrays import pose_arrays
@@ -91,7 +91,8 @@ def to_csv(table: Table) -> bytes:
 
     Columns ``frame`` and, in seconds and where times are known, ``time`` come first. Units follow
     the names, in brackets. What would steer a terminal is escaped in both, as text it is often
-    printed on one. Values are the shortest decimals that read back as the same binary64.
+    printed on one, and an apostrophe stands before what a spreadsheet would run. Values are the
+    shortest decimals that read back as the same binary64.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -100,7 +101,9 @@ def to_csv(table: Table) -> bytes:
     first: list[list[Any]] = [table.frame_numbers.tolist()]
     if table.times is not None and table.names[:1] != ["time"]:
         first.append(list(map(repr, table.times.round(DECIMALS).tolist())))
-    writer.writerow([*("frame", "time")[: len(first)], *map(printable, heads)])
+    writer.writerow(
+        [*("frame", "time")[: len(first)], *map(spreadsheet_cell, map(printable, heads))]
+    )
     for *lead, values, valid in zip(
         *first, table.values.tolist(), table.mask.tolist(), strict=True
     ):
