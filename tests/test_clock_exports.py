@@ -100,6 +100,12 @@ def test_a_c3d_has_the_time_of_its_first_frame(source: str, tmp_path: Path) -> N
         assert np.abs(made.times - motion.times).max() < 1e-9
 
 
+def test_times_without_a_rate_are_lost_in_a_c3d() -> None:
+    motion = replace(irregular(), frame_rate=None)
+    assert "left out: times, which C3D cannot state without a frame rate" in left_out(motion, "c3d")
+    assert mcz.convert(motion, "c3d").frame_rate is None
+
+
 def test_numbers_that_count_from_0_begin_a_c3d_at_their_time(tmp_path: Path) -> None:
     rows = "".join(f"{n},{n / 100:g},{n}.5,1,2\n" for n in range(100, 110))
     (tmp_path / "a.csv").write_text(

@@ -46,7 +46,10 @@ def first_number(motion: Motion) -> int:
 def lost_times(motion: Motion, to: str) -> Iterator[str]:
     """What of the times such a file cannot say, in words: where they begin, and gaps."""
     line, rate, name = motion.timeline, motion.frame_rate, to.upper()
-    if line is None or rate is None or not len(line.times):
+    if line is None or not len(line.times):
+        return
+    if rate is None:
+        yield f"left out: times, which {name} cannot state without a frame rate"
         return
     numbers, step = numbers_or_rows(motion.frame_numbers, motion.n_frames), 1
     frames = np.arange(len(numbers))

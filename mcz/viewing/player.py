@@ -19,6 +19,7 @@ from mcz.viewing.drawn import RATE, Drawn, Figure, Moving, drawn, figure, frames
 
 MOST_BYTES = 300_000
 SPARE = 500  # bytes that numbers may have more than they had in the first try
+TIME_BYTES = 12  # of the time of a frame, as text
 HEIGHT = 420  # pixels
 UNKNOWN_RATE = 30.0  # frames a second of a motion that does not say
 PLACE = "/*data*/null"
@@ -42,7 +43,7 @@ def _player(moving: Moving) -> str:
     nothing = np.empty((0, n_points, 3), "<i2")
     empty = Drawn(nothing, 1.0, frames_read(moving), frames_read(moving), 0, 0.0, 0.0)
     room = MOST_BYTES - SPARE - len(_frame(moving, lines, empty, rate))
-    most = room * 3 // 4 // (6 * n_points)
+    most = room * 3 // 4 // (6 * n_points + TIME_BYTES)
     found = drawn(moving, max(1, most), max(1, int(rate // RATE)))
     return _frame(moving, lines, found, rate)
 
@@ -55,6 +56,7 @@ def _frame(moving: Moving, lines: Figure, found: Drawn, rate: float) -> str:
         "every": found.every,
         "total": moving.n_frames,
         "rate": rate / found.every,
+        "times": _times(moving, found),
         "step": found.step,
         "bones": lines.bones,
         "sides": lines.sides,
@@ -68,6 +70,14 @@ def _frame(moving: Moving, lines: Figure, found: Drawn, rate: float) -> str:
         f'<iframe srcdoc="{page}" sandbox="allow-scripts" title="Motion" '
         f'style="border:0;width:100%;max-width:720px;height:{HEIGHT}px"></iframe>'
     )
+
+
+def _times(moving: Moving, found: Drawn) -> list[float] | None:
+    """The times of the drawn frames to a millisecond, None where they are unknown."""
+    if moving.timeline is None:
+        return None
+    times = moving.timeline.times[:: found.every][: len(found.words)]
+    return [round(float(time), 3) for time in times]
 
 
 def _caption(moving: Moving, found: Drawn) -> str:

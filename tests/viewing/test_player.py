@@ -185,3 +185,12 @@ def test_the_script_is_small() -> None:
     assert len(text) < 6000
     motion = replace(smooth(50), name="</script>\u2028")
     assert "script" in document_of(motion._repr_html_())["caption"]
+
+
+def test_the_player_has_the_times_of_frames(samples: Path) -> None:
+    motion = replace(mcz.read(samples / "walk.c3d").cut(0, 40), source=None)
+    numbers = np.array([*range(101, 121), *range(300, 320)])
+    document = document_of(replace(motion, frame_numbers=numbers)._repr_html_())
+    shown = document["times"]
+    assert shown == [round((n - 1) / 120, 3) for n in numbers[:: document["every"]]]
+    assert document_of(replace(motion, frame_rate=None)._repr_html_())["times"] is None
