@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from mcz.cli.common import Exit, Failure, about, existing, say
+from mcz.cli.common import Exit, Failure, about, existing
 from mcz.cli.options import (
     copies_option,
     encoding_options,
@@ -52,6 +52,11 @@ from mcz.cli.progress import Progress
     is_flag=True,
     help="Of an .mcz leave out what is the same here under the same name.",
 )
+@click.option(
+    "--replace",
+    is_flag=True,
+    help="Put a file in the place of another one of its path; rewrites FILE.mcz.",
+)
 @copies_option("where the file has some")
 @encoding_options
 @rate_option()
@@ -68,6 +73,7 @@ def command(
     force: bool,
     rename: bool,
     skip_identical: bool,
+    replace: bool,
     copies: bool | None,
     as_json: bool,
     **options: Any,
@@ -99,12 +105,11 @@ def command(
             force=force,
             rename=rename,
             skip_identical=skip_identical,
+            replace=replace,
             copies=copies,
             progress=progress,
             **_known(options),
         )
-    for text in report.left_out:
-        say(f"left out: {text}")
     return conclude(report, target, as_json)
 
 

@@ -100,10 +100,12 @@ def conclude(report: Report, target: str, as_json: bool) -> Exit:
         ]
         counts = Counter(outcome.result for outcome in report.outcomes)
         document = {"target": target, "bytes": report.size, "counts": counts, "files": rows}
-        print_json(document | _damage(report))
+        print_json(document | _damage(report) | {"left_out": report.left_out})
     else:
         echo(f"{target}: {_summary(report)}", *_table(report))
     _say_left_out(report, target)
+    for text in report.left_out:
+        say(f"left out: {text}")
     _say_notes(report)
     for failure in report.failures:
         named = failure.path in failure.message

@@ -15,13 +15,21 @@ from mcz.container.metadata import Record
 from mcz.editing.appending import growing
 from mcz.editing.carrying import UNPROTECTED
 from mcz.editing.coded_parts import Far, ahead
-from mcz.editing.folders import files_below, left_out, motion_files, size_of, sources_named
+from mcz.editing.folders import (
+    files_below,
+    left_out,
+    motion_files,
+    not_kept,
+    size_of,
+    sources_named,
+)
 from mcz.editing.merging import add_files
 from mcz.editing.mtimes import stamp
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.protecting import redundancy_of, still_protect
 from mcz.editing.safe_names import notes_on
 from mcz.editing.stored_files import Content, stored_files
+from mcz.editing.superseding import superseding
 from mcz.errors import MczError, OptionError, SourceError
 from mcz.formats import wants_skeleton
 from mcz.jobs import limited as jobs_limited
@@ -106,6 +114,7 @@ def pack(
             _note_times(draft, entries)
         draft.finish()
     report.size = draft.writer.offset
+    report.left_out += not_kept(root, paths, with_times=mtimes)
     report.note(notes_on(entry.name for entry in entries))
     report.outcomes += sorted(others, key=lambda outcome: os.fsencode(outcome.path))
     return report
@@ -147,6 +156,7 @@ def append(
     force: bool = False,
     rename: bool = False,
     skip_identical: bool = False,
+    replace: bool = False,
     copies: bool | None = None,
     threads: int | None = None,
     jobs: int | None = None,
@@ -160,7 +170,9 @@ def append(
     taken is refused, and one whose content is there under another name is an alias. Of an MCZ file
     all that it holds is carried over, nothing coded anew; ``rename`` and ``skip_identical`` are
     those of ``mcz.merge``, ``rate`` and ``force_rate`` of ``mcz.pack``. When a source cannot be
-    added, nothing is. What is added to a file with recovery data gets its own.
+    added, nothing is. What is added to a file with recovery data gets its own. ``replace``: a file
+    takes the place of another one that came from the same path, for which the whole archive is
+    rewritten; what was said of that one's clip stays.
 
     A target whose writing was cut short is taken up from its last valid FOOT. Where whole clips
     lie behind that, ``salvage`` keeps them and ``force`` drops them; otherwise a FormatError names
@@ -182,7 +194,8 @@ def append(
     with (
         limited(threads),
         jobs_limited(jobs),
-        growing(Path(target), salvage=salvage, force=force) as growth,
+        superseding(Path(target), named if replace else ()) as grown,
+        growing(grown, salvage=salvage, force=force) as growth,
     ):
         container = growth.container
         paths, seen = stored_files(container)

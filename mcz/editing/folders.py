@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from mcz.editing.outcomes import Outcome
 from mcz.errors import AccessError, OptionError
 from mcz.formats import FORMATS
+from mcz.reading.names import FEW, listed
 
 SNIFFED = 2**16  # bytes that tell what a file is
 
@@ -76,6 +77,31 @@ def _is_motion(path: Path) -> bool:
 def left_out(path: Path, root: Path) -> Outcome:
     name = path.relative_to(root).as_posix()
     return Outcome(name, "skipped", size_of(path), "no motion file; --keep-all keeps it")
+
+
+def not_kept(root: Path, packed: Sequence[Path], *, with_times: bool) -> Iterator[str]:
+    """What of a folder no archive has: empty folders, modes, and times but of clips."""
+
+    def some(word: str, paths: Iterable[Path]) -> Iterator[str]:
+        names = [path.relative_to(root).as_posix() for path in paths]
+        if names:
+            yield f"{word}: {listed(names)}" + (f" ({len(names)} in all)" if names[FEW:] else "")
+
+    walk = os.walk(root)
+    yield from some(
+        "empty folders", sorted(Path(f) for f, below, files in walk if not below + files)
+    )
+    if os.name == "posix":
+        yield from some("modes of executable files", filter(_is_executable, packed))
+    if with_times:
+        others = (p for p in packed if p.suffix.lower() == ".asf" or not _is_motion(p))
+        yield from some("times of files that are no clips", others)
+
+
+def _is_executable(path: Path) -> bool:
+    with suppress(OSError):
+        return bool(path.stat().st_mode & 0o111)
+    return False
 
 
 def size_of(path: Path) -> int:

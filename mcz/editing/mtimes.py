@@ -37,8 +37,9 @@ def nanoseconds(text: str) -> int | None:
     return seconds * SECOND + int((match[2] or "").ljust(9, "0"))
 
 
-def set_time(path: Path, text: str | None) -> None:
-    """Give a file the time that its metadata state, where they do."""
+def set_time(path: Path, text: str | None) -> bool:
+    """Give a file the time that its metadata state; return whether they do."""
     found = None if text is None else nanoseconds(text)
     if found is not None:
         os.utime(path, ns=(found, found))
+    return found is not None

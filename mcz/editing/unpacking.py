@@ -21,6 +21,7 @@ from mcz.reading.clip import Clip
 from mcz.reading.fidelity import RESTORED, fidelity_of
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
+from mcz.reading.names import listed
 from mcz.reading.rate_notes import rate_note
 from mcz.reading.sharing import shared_out
 from mcz.writing.atomic import replacing
@@ -67,6 +68,7 @@ def unpack(
     with limited(jobs), open(target, salvage=salvage, **options) as opened:
         file = File(opened.container.strictly())
         report.damage += opened.damage
+        timeless: list[str] = []  # files whose times the archive does not have
         wanted, whole = file.chosen(clips, where), clips is None and where is None
         stored = list(files_of(file, None if whole else wanted))
         writing = _Writing(target, folder, force, names, [one.path for one in stored])
@@ -74,16 +76,23 @@ def unpack(
             for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
                 outcome = writing.outcome(one.path, restore)
                 if outcome.result == RESTORED:
-                    if mtimes and one.kind == "clip":
-                        set_time(writing.place, file.clips[one.name].metadata.get("mtime"))
+                    if mtimes and not set_time(writing.place, _time_of(file, one)):
+                        timeless.append(one.path)
                     outcome = replace(outcome, result=_fidelity(file, one), notes=_notes(file, one))
                 if salvage and writing.is_damaged:
                     outcome = replace(outcome, result="damaged")
                 report.outcomes.append(outcome)
                 if progress is not None:
                     progress(done + 1, len(stored), one.path)
+        if timeless:
+            report.left_out.append(f"times of files that are no clips: {listed(timeless)}")
         report.outcomes += _without_file(wanted)
     return report
+
+
+def _time_of(file: File, one: Stored) -> str | None:
+    """When a file was last changed, as the metadata of its clip have it."""
+    return file.clips[one.name].metadata.get("mtime") if one.kind == "clip" else None
 
 
 def _without_file(clips: Iterable[Clip]) -> Iterator[Outcome]:

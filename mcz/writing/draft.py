@@ -83,7 +83,8 @@ class Draft:
         there = self.paths[path]
         if (there if isinstance(there, bytes) else there()) == digest:
             return True
-        raise SourceError(f"the file already restores another {path!r}; rename this one")
+        hint = "--replace (in Python replace=) of append puts this one in its place"
+        raise SourceError(f"the file already restores another {path!r}; {hint}")
 
     def finish(self) -> None:
         self.writer.finish()

@@ -232,3 +232,66 @@ def test_a_row_that_may_mean_two_clips_says_how_to_be_exact(folder: Path, call: 
     words = ("--match", "{x-day}/{clip}", "--take", "subject")
     assert call("meta", "days.mcz", "--from", "t.csv", *words)[0] == 0
     assert call("meta", "days.mcz", "--clip", "1/run")[1] == "1/run:\n  subject: 05\n"
+
+
+# What an archive does not keep, and what takes another's place -------------------------
+
+
+def test_what_of_a_folder_is_not_kept_is_said(folder: Path, call: Call) -> None:
+    (folder / "takes/none/at all").mkdir(parents=True)
+    for name in ("walk.bvh", "walk.amc", "walk.asf"):
+        shutil.copy(name, "takes")
+    Path("takes/walk.bvh").chmod(0o755)
+    said = {
+        "empty folders: none/at all",
+        "modes of executable files: walk.bvh",
+        "times of files that are no clips: walk.asf",
+    }
+    code, _, errors = call("pack", "takes", "t.mcz", "--mtimes")
+    assert code == 0
+    assert {text.removeprefix("mcz: left out: ") for text in errors.splitlines()} == said
+    code, _, errors = call("unpack", "t.mcz", "out", "--mtimes")
+    assert (code, errors) == (0, "mcz: left out: times of files that are no clips: walk.asf\n")
+    for name in ("walk.bvh", "walk.amc"):
+        assert Path("out", name).stat().st_mtime_ns == Path("takes", name).stat().st_mtime_ns
+    report = mcz.pack("takes", "u.mcz")
+    assert set(report.left_out) == {text for text in said if "times" not in text}
+
+
+def test_append_replaces_what_came_from_the_path(folder: Path, call: Call) -> None:
+    assert call("meta", "all.mcz", "--set", "license=MIT", "--set", "x-day=2")[0] == 0
+    new = Path("walk.bvh").read_bytes().replace(b"0.008333333333333333", b"0.01")
+    assert new != Path("walk.bvh").read_bytes()
+    Path("walk.bvh").write_bytes(new)
+    before = Path("all.mcz").read_bytes()
+    code, _, errors = call("append", "walk.bvh", "all.mcz")
+    assert code == 1 and "--replace" in errors
+    Path("broken.bvh").write_bytes(new[:-900])
+    code, _, errors = call("append", "--replace", "walk.bvh", "broken.bvh", "all.mcz")
+    assert code == 1 and Path("all.mcz").read_bytes() == before
+    assert call("append", "--replace", "walk.bvh", "walk.c3d", "all.mcz")[0] == 0
+    assert not mcz.verify("all.mcz") and not list(folder.glob(".*"))
+    with mcz.open("all.mcz") as file:
+        assert sorted(file.clips) == ["walk", "walk.bvh", "walk.c3d"]
+        clip = file.clips["walk.bvh"]
+        assert clip.source_bytes() == new and clip.frame_rate == 100
+        assert clip.metadata == {"licence": "MIT", "x-day": "2"}
+    size = Path("all.mcz").stat().st_size
+    assert call("append", "--replace", "walk.bvh", "all.mcz")[0] == 0  # present
+    assert Path("all.mcz").stat().st_size == size
+
+
+def test_append_replaces_attachments_and_skeletons(folder: Path, call: Call) -> None:
+    (folder / "kept").mkdir()
+    Path("kept/notes.txt").write_text("one")
+    shutil.copy("walk.asf", "kept")
+    mcz.pack("kept", "kept.mcz", keep_all=True)
+    Path("kept/notes.txt").write_text("two")
+    asf = Path("walk.asf").read_bytes().replace(b":name", b"# changed\n:name", 1)
+    Path("kept/walk.asf").write_bytes(asf)
+    words = ("kept/notes.txt", "kept/walk.asf", "kept.mcz", "--replace", "--verbatim")
+    code, _, errors = call("append", *words)
+    assert code == 0, errors
+    assert call("unpack", "kept.mcz", "out")[0] == 0
+    assert Path("out/notes.txt").read_text() == "two"
+    assert Path("out/walk.asf").read_bytes() == asf
