@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import mcz
 from mcz.cli.common import run
@@ -316,3 +318,65 @@ def test_a_lost_skeleton_costs_names_alone(tmp_path: Path) -> None:
     assert any("its skeleton is lost" in line for line in found.lost)
     with mcz.open(repaired_data) as file:
         assert file.clips["t"].source is None
+
+
+SHARED = [HealthCheck.function_scoped_fixture]
+SMALL = [
+    path
+    for path in sorted((Path(__file__).parent.parent / "conformance/vectors/valid").rglob("*.mcz"))
+    if path.stat().st_size < 1500
+]
+
+
+@settings(max_examples=120, deadline=None, suppress_health_check=SHARED)
+@given(st.data())
+def test_any_mutant_is_repaired_or_refused(tmp_path: Path, data: st.DataObject) -> None:
+    """Bits, holes, bytes put in or cut out, also behind checksums that are made right again."""
+    vector = data.draw(st.sampled_from(SMALL)).read_bytes()
+    parts = parts_of(vector)
+    if parts and data.draw(st.booleans()):
+        which = data.draw(st.integers(0, len(parts) - 1))
+        payload = bytearray(parts[which][1])
+        if payload:
+            payload[data.draw(st.integers(0, len(payload) - 1))] ^= data.draw(st.integers(1, 255))
+            vector = joined(replaced(parts, which, bytes(payload)))
+    at, size = data.draw(st.integers(0, len(vector) - 1)), data.draw(st.integers(0, 300))
+    put = data.draw(st.sampled_from([b"", bytes(size), vector[:size], b"?" * (size % 50)]))
+    mutant = vector[:at] + put + vector[at + data.draw(st.sampled_from([0, 1, size])) :]
+    try:
+        mcz.repair(mutant, tmp_path / "out.mcz", force=True)
+    except mcz.MczError:
+        return
+    assert [p for p in mcz.verify(tmp_path / "out.mcz") if p.heading != "Codecs"] == []
+
+
+def test_what_breaks_a_rule_is_left_out(tmp_path: Path) -> None:
+    """A quality record that says nothing, its checksum right: all but the record is written."""
+    write_samples(tmp_path)
+    mcz.encode(tmp_path / "walk.bvh", tmp_path / "q.mcz", codec="mrdwt")
+    data = (tmp_path / "q.mcz").read_bytes()
+    whole, parts = values_of(data), parts_of(data)
+    which = next(i for i, (piece, _) in enumerate(parts) if piece.type == b"QUAL")
+    bad = joined(replaced(parts, which, b"\x05\xff"))
+    found, repaired_data = repaired(bad, tmp_path)
+    assert check(repaired_data, whole) == 240
+    assert any("break a rule" in line for line in found.lost)
+
+
+def test_extracts_of_damaged_files_end_with_4_or_1(samples: Path, tmp_path: Path) -> None:
+    """The damage is said; a clip whose end is lost is refused, and nothing is written."""
+    takes = tmp_path / "takes"
+    takes.mkdir()
+    text = (samples / "walk.bvh").read_bytes()
+    (takes / "a.bvh").write_bytes(text)
+    (takes / "b.bvh").write_bytes(text.replace(b"Time: ", b"Time:  "))
+    mcz.pack(takes, tmp_path / "x.mcz", copies=False)
+    data = (tmp_path / "x.mcz").read_bytes()
+    end = next(row for row in chunks_of(data) if row[0] == "CEND")
+    (tmp_path / "d.mcz").write_bytes(flipped(data, body_of(*end), 2))
+    for name, code in (("b", 4), ("a", 1)):
+        for more in ([], ["--frames", "0:10"]):
+            out = tmp_path / f"{name}{len(more)}.mcz"
+            arguments = ["extract", str(tmp_path / "d.mcz"), str(out), "--clip", name, *more]
+            assert run(cli, "mcz", [*arguments, "--salvage"]) == code
+            assert out.exists() == (code == 4)

@@ -18,7 +18,7 @@ from mcz.container.reader import Container
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource
 from mcz.editing.recovering import recover
-from mcz.editing.salvaging import Repair as Repair
+from mcz.editing.salvage_copier import Repair as Repair
 from mcz.editing.salvaging import write_whole
 from mcz.errors import FormatError, MczError, OptionError
 from mcz.reading.file import File, file_of, reached

@@ -7,77 +7,75 @@ SPEC.md, "Salvage" and "Cutting without re-encoding", are normative.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import fields
 from itertools import pairwise
 from operator import eq
-from pathlib import PurePosixPath
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
-from mcz.container import payloads
 from mcz.container.chunks import COPY, END_MAGIC, FOOT, RECOVERY, SIGNATURE, parse_foot
-from mcz.container.directory import ClipRow
-from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
 from mcz.container.source import ByteSource
-from mcz.container.writer import payload_id
 from mcz.editing.carrying import UNPROTECTED
-from mcz.editing.cutting import ClipCut, add_note, plan_cut
-from mcz.editing.extraction import Copier
-from mcz.editing.recovering import Recovery
+from mcz.editing.cutting import ClipCut, plan_cut
+from mcz.editing.salvage_copier import (
+    FULL,
+    NOTHING,
+    Repair,
+    Repairer,
+    Run,
+    SomeSignals,
+    WholeRun,
+    about_clip,
+    stated_frames,
+)
 from mcz.errors import FormatError, MczError
 from mcz.reading.clip import Clip
 from mcz.reading.file import File
 from mcz.reading.report import Problem, clip_problems, validate
-from mcz.reading.signal_info import SignalInfo
 from mcz.reading.signal_reader import SignalReader
-from mcz.schema import Fields, build
 from mcz.writing.clip_writer import Progress
 
-Run = tuple[int, int]  # frames a <= f < b
 # Chunks without content of their own, or of a clip that is named.
 TOLD = (b"HEAD", b"INDX", b"DATA", b"CEND", COPY, RECOVERY)
-NOTE = "lost: the template of the source file was damaged"
-NOTE_OF_SIGNALS = "lost: other signals of the clip were damaged, and with them its source file"
-
-
-@dataclass(slots=True)
-class Repair:
-    """What ``repair`` wrote: names of what is whole, runs of frames of other clips, what is lost.
-
-    ``damage`` is what was found wrong with the file, ``lost`` what of its content is gone.
-    ``recovery``: what its recovery data found, where it has some; ``restored``: these have given
-    every byte back, so that nothing is lost.
-    """
-
-    clips: list[str] = field(default_factory=list)
-    attachments: list[str] = field(default_factory=list)
-    skeletons: list[str] = field(default_factory=list)
-    runs: dict[str, list[Run]] = field(default_factory=dict)
-    lost: list[str] = field(default_factory=list)
-    damage: list[str] = field(default_factory=list)
-    size: int = 0
-    recovery: Recovery | None = None
-    restored: bool = False
 
 
 def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress | None) -> None:
     """Write all that is whole in ``file``, opened for salvage, to ``stream``, and read it again.
 
-    Raises FormatError where nothing is whole.
+    What breaks a rule there, though its checksums are right, is left out: of a clip first what
+    belongs to it, then its source, then the clip. Raises FormatError where nothing is whole.
     """
-    found.damage += file.damage
-    cuts = list(_cuts(file, found))
-    found.lost += _gone(file.container)
-    repairer = _Repairer(file, stream, progress, found)
-    repairer.run(cuts, alone=False)
-    found.size = repairer.found.size
-    for text in repairer.found.left_out:
-        (found.damage if text == UNPROTECTED else found.lost).append(f"left out: {text}")
-    if not (found.clips or found.runs or found.attachments or found.skeletons):
-        raise FormatError(f"{file.name}: no clip, skeleton or attachment in it is whole")
-    _check(stream, found.size, file.container.max_decoded)
+    damage, degrees = [*found.damage, *file.damage], dict[str, int]()
+    while True:
+        attempt = Repair(damage=list(damage), recovery=found.recovery)
+        repairer = Repairer(file, stream, progress, attempt, degrees)
+        cuts = list(_cuts(file, attempt))
+        attempt.lost += _gone(file.container)
+        repairer.run(cuts, alone=False)
+        attempt.size = repairer.found.size
+        for text in repairer.found.left_out:
+            (attempt.damage if text == UNPROTECTED else attempt.lost).append(f"left out: {text}")
+        if not (attempt.clips or attempt.runs or attempt.attachments or attempt.skeletons):
+            raise FormatError(f"{file.name}: no clip, skeleton or attachment in it is whole")
+        problems = _problems(stream, attempt.size, file.container.max_decoded)
+        if not problems:
+            break
+        for name in {_clip_at(repairer, problem.offset) for problem in problems}:
+            if not name or degrees.get(name, FULL) == NOTHING:
+                raise FormatError(f"the repaired file is not sound: {problems[0].message}")
+            degrees[name] = degrees.get(name, FULL) + 1
+        stream.seek(0)
+        stream.truncate()
+    for one in fields(Repair):
+        setattr(found, one.name, getattr(attempt, one.name))
+
+
+def _clip_at(repairer: Repairer, offset: int) -> str:
+    """The clip of the new file that lies at ``offset``; "" where none does."""
+    rows = repairer.writer.directory.clips.values()
+    return next((row.name for row in reversed(rows) if row.clip.offset <= offset), "")
 
 
 def _gone(container: Container) -> Iterator[str]:
@@ -124,15 +122,17 @@ def _names(container: Container) -> dict[int, str]:
     return names | {len(SIGNATURE): ""}  # HEAD
 
 
-def _check(stream: BinaryIO, size: int, max_decoded: int) -> None:
-    """Raise FormatError unless what was written to ``stream`` is a sound file."""
+def _problems(stream: BinaryIO, size: int, max_decoded: int) -> list[Problem]:
+    """What is wrong with what was written to ``stream``, read strictly."""
     stream.flush()
     source = ByteSource(stream, name="the repaired file", size=size)
-    file = File(Container(source, max_decoded=max_decoded))
-    problems = _faults(validate(file))
-    stream.seek(size)
-    if problems:
-        raise FormatError(f"the repaired file is not sound: {problems[0].message}")
+    try:
+        file = File(Container(source, max_decoded=max_decoded))
+        return _faults(validate(file))
+    except FormatError as error:
+        return [Problem(error.offset or 0, "structure", str(error))]
+    finally:
+        stream.seek(size)
 
 
 def _cuts(file: File, found: Repair) -> Iterator[ClipCut]:
@@ -170,29 +170,21 @@ def _unhashed(clip: Clip) -> list[Problem]:
     return []
 
 
-def _planned(clip: Clip) -> Iterator[_Run]:
+def _planned(clip: Clip) -> Iterator[WholeRun]:
     """A cut for each run of frames and the signals that can be decoded in it."""
     with suppress(MczError):  # what cannot be planned is lost, as is told
         parts = whole_parts(clip)
-        if not parts and _stated(clip) == clip.n_frames == 0:
+        if not parts and stated_frames(clip) == clip.n_frames == 0:
             parts = [((0, 0), tuple(range(len(clip.signals))))]  # nothing can have been lost of it
         for run, kept in parts:
-            one = clip if len(kept) == len(clip.signals) else _SomeSignals(clip, kept)
+            one = clip if len(kept) == len(clip.signals) else SomeSignals(clip, kept)
             cut = plan_cut(one, run, None, 0)
-            yield _Run(*(getattr(cut, one.name) for one in fields(ClipCut)))
+            yield WholeRun(*(getattr(cut, one.name) for one in fields(ClipCut)))
 
 
-def _stated(clip: Clip) -> int:
-    """How many frames a clip has had; of one that was cut short CLIP says it."""
-    with suppress(MczError):
-        row = clip.container.directory.clips[clip.name]
-        return max(clip.n_frames, int(clip.container.clip(row).n_frames))
-    return clip.n_frames
-
-
-def _lost(clip: Clip, runs: list[_Run], problems: list[Problem]) -> Iterator[str]:
+def _lost(clip: Clip, runs: list[WholeRun], problems: list[Problem]) -> Iterator[str]:
     """What a clip has lost, its source apart."""
-    stated = _stated(clip)
+    stated = stated_frames(clip)
     if not runs:
         yield f"clip {clip.name!r}: {stated:,} of {stated:,} frames: {problems[0].message}"
         return
@@ -213,7 +205,7 @@ def _lost(clip: Clip, runs: list[_Run], problems: list[Problem]) -> Iterator[str
         yield f"clip {clip.name!r}: the hashes of its values, which are whole"
         return
     source = _source_error(clip)
-    yield from (_about(clip.name, one.message) for one in problems[:1] if one.message != source)
+    yield from (about_clip(clip.name, one.message) for one in problems[:1] if one.message != source)
 
 
 def _source_error(clip: Clip) -> str:
@@ -225,12 +217,6 @@ def _source_error(clip: Clip) -> str:
     except MczError as error:
         return str(error)
     return ""
-
-
-def _about(name: str, text: str) -> str:
-    """``text``, which may name the clip already."""
-    start = f"clip {name!r}"
-    return text if text.startswith(start) else f"{start}: {text}"
 
 
 def whole_parts(clip: Clip) -> list[tuple[Run, tuple[int, ...]]]:
@@ -257,164 +243,3 @@ def whole_parts(clip: Clip) -> list[tuple[Run, tuple[int, ...]]]:
         elif kept:
             parts.append(((start, stop), kept))
     return parts
-
-
-class _SomeSignals(Clip):
-    """What is left of a clip of which some signals are lost, and with them its source."""
-
-    def __init__(self, clip: Clip, kept: tuple[int, ...]) -> None:
-        super().__init__(clip.container, clip.container.directory.clips[clip.name])
-        self.whole, self.kept = clip, kept
-
-    @property
-    def signals(self) -> tuple[SignalInfo, ...]:
-        own = (self.whole.signals[index] for index in self.kept)
-        return tuple(replace(info, index=index) for index, info in enumerate(own))
-
-    def is_scaled(self, signal: int) -> bool:
-        return self.whole.is_scaled(self.kept[signal])
-
-
-class _Run(ClipCut):
-    """A run of frames of a damaged clip: hashes and source are made anew, whatever its length."""
-
-    __slots__ = ()
-
-    @property
-    def is_whole(self) -> bool:
-        return False
-
-    @property
-    def name(self) -> str:
-        """That of the clip where all frames of its motion are there."""
-        has_motion = not isinstance(self.clip, _SomeSignals) or 0 in self.clip.kept
-        if has_motion and self.n_frames == _stated(self.clip):
-            return self.clip.name
-        of = "" if has_motion else f".{self.clip.signals[0].name}"
-        return f"{self.clip.name}.{self.start}-{self.stop}{of}"
-
-
-class _Repairer(Copier):
-    """Copies what is whole, and of everything else says that it is lost."""
-
-    def __init__(
-        self, file: File, stream: BinaryIO, progress: Progress | None, found: Repair
-    ) -> None:
-        super().__init__(file, stream, progress)
-        self.repair = found
-        self._skeletons: dict[bytes, bytes] = {}  # the payload that stands for each id
-
-    def name_of(self, cut: ClipCut) -> str:
-        if not isinstance(cut, _Run):
-            return cut.clip.name
-        name = cut.name
-        while name != cut.clip.name and name in self.file.clips.rows:
-            name += "+"
-        return name
-
-    def fields_of(self, cut: ClipCut) -> Any:
-        fields = super().fields_of(cut)
-        if not isinstance(cut.clip, _SomeSignals):
-            return fields
-        signals = [fields.signals[index] for index in cut.clip.kept]
-        return Fields(fields, signals=signals, source=[])
-
-    def _quality(self, cut: ClipCut, row: ClipRow) -> None:
-        """Figures are of the motion."""
-        if not isinstance(cut.clip, _SomeSignals) or 0 in cut.clip.kept:
-            super()._quality(cut, row)
-
-    def skeletons(self) -> None:
-        for kind, id_ in self.container.directory.shared:
-            if kind == b"SKEL":
-                with suppress(FormatError):  # what is wrong with it clips say, and is told
-                    self.skeleton(id_)
-                    self.repair.skeletons.append(self.container.skeleton(id_).name or id_.hex())
-
-    def attachments(self) -> None:
-        for name, held in self.file.attachments.items():
-            try:
-                held.read()
-            except MczError as error:
-                self.repair.lost.append(f"attachment {name!r}: {error}")
-                continue
-            self.attachment(name)
-            self.repair.attachments.append(name)
-
-    def before_clips(self) -> None:
-        with suppress(FormatError):  # what is damaged there has been told
-            super().before_clips()
-
-    def inside(self, row: ClipRow) -> None:
-        with suppress(FormatError):
-            if row.cend is not None:
-                super().inside(row)
-
-    def skeleton(self, id_: bytes) -> bytes:
-        """Without its source or its base, and so under another id, where these are lost."""
-        if id_ not in self._skeletons:
-            try:
-                self._skeletons[id_] = super().skeleton(id_)
-            except FormatError as error:
-                self._skeletons[id_] = self._poorer_skeleton(id_)
-                self.repair.lost.append(f"skeleton {id_.hex()}: its source or base: {error}")
-        return self._skeletons[id_]
-
-    def _poorer_skeleton(self, id_: bytes) -> bytes:
-        stored, where = self.carrier.stored(b"SKEL", id_), f"SKEL {id_.hex()}"
-        fields = dict(parse_skel(stored, where, self.container.profile))
-        bases = []
-        for base in fields["base"]:
-            with suppress(FormatError):
-                bases.append(payload_id(self.skeleton(bytes(base))))
-        payload = build(payloads.SKEL, fields | {"base": bases, "source": []}, "skeleton")
-        self.writer.shared(b"SKEL", payload)
-        return payload
-
-    def aliases(self, cuts: Mapping[str, ClipCut], alone: bool) -> None:
-        for name, (of, target) in self.file.aliases.items():
-            if self._restores(of, target):
-                self.writer.alias(name, of, target)
-            else:
-                self.repair.lost.append(f"{name!r}, another name of what is lost")
-
-    def _restores(self, of: int, target: bytes) -> bool:
-        """Whether the file that is written gives what an alias stands for."""
-        if of == payloads.OF_SKELETON:
-            return (b"SKEL", target) in self.writer.directory.shared
-        here = self.repair.clips if of == payloads.OF_CLIP else self.repair.attachments
-        return target.decode("utf-8", "replace") in here
-
-    def finish_fields(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
-        if isinstance(cut.clip, _SomeSignals):
-            add_note(new["metadata"], "source-note", NOTE_OF_SIGNALS)
-        try:
-            found = super().finish_fields(cut, new)
-        except FormatError as error:
-            if not new["source"]:
-                raise
-            found = self._without_source(cut, new, error)
-        if isinstance(cut, _Run) and cut.name != cut.clip.name and new["source"]:
-            held = new["source"][0]
-            if held["path"]:
-                path = PurePosixPath(held["path"])
-                named = path.with_name(f"{path.stem}.{cut.start}-{cut.stop}{path.suffix}")
-                new["source"] = [held | {"path": str(named)}]
-        return found
-
-    def _without_source(
-        self, cut: ClipCut, new: dict[str, Any], error: FormatError
-    ) -> tuple[bytes, list[bytes]]:
-        """The same of a clip whose template is lost, and with it what the file was like."""
-        text = _about(cut.clip.name, f"its source file: {error}")
-        if text not in self.repair.lost:
-            self.repair.lost.append(text)
-        metadata = new["metadata"]
-        if cut.is_whole:  # a list of records
-            metadata = {pair["key"]: pair["value"] for pair in metadata}
-        new["source"], new["metadata"] = [], metadata
-        add_note(metadata, "source-note", NOTE)
-        _, hashes = super().finish_fields(cut, new)
-        if cut.is_whole:
-            new["metadata"] = [{"key": key, "value": metadata[key]} for key in sorted(metadata)]
-        return b"", hashes

@@ -1,0 +1,258 @@
+"""Copying what is whole out of a damaged file: clips, runs of frames of others, some signals.
+
+Stored bytes are copied, never coded anew. Of a clip that has lost frames, each run of frames that
+can still be decoded becomes a clip of its own. Nothing is made up: what is lost stays lost.
+SPEC.md, "Salvage" and "Cutting without re-encoding", are normative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import PurePosixPath
+from typing import Any, BinaryIO
+
+from mcz.container import payloads
+from mcz.container.directory import ClipRow
+from mcz.container.packed import parse_skel
+from mcz.container.writer import payload_id
+from mcz.editing.cutting import ClipCut, add_note
+from mcz.editing.extraction import Copier, Extraction
+from mcz.editing.recovering import Recovery
+from mcz.errors import FormatError, MczError
+from mcz.reading.clip import Clip
+from mcz.reading.file import File
+from mcz.reading.signal_info import SignalInfo
+from mcz.schema import Fields, build
+from mcz.writing.clip_writer import Progress
+
+Run = tuple[int, int]  # frames a <= f < b
+NOTE = "lost: the template of the source file was damaged"
+NOTE_OF_SIGNALS = "lost: other signals of the clip were damaged, and with them its source file"
+# What of a clip is written: all, or without what breaks a rule though its checksums are right.
+FULL, WITHOUT_CHUNKS, WITHOUT_SOURCE_FILE, NOTHING = range(4)
+
+
+@dataclass(slots=True)
+class Repair:
+    """What ``repair`` wrote: names of what is whole, runs of frames of other clips, what is lost.
+
+    ``damage`` is what was found wrong with the file, ``lost`` what of its content is gone.
+    ``recovery``: what its recovery data found, where it has some; ``restored``: these have given
+    every byte back, so that nothing is lost.
+    """
+
+    clips: list[str] = field(default_factory=list)
+    attachments: list[str] = field(default_factory=list)
+    skeletons: list[str] = field(default_factory=list)
+    runs: dict[str, list[Run]] = field(default_factory=dict)
+    lost: list[str] = field(default_factory=list)
+    damage: list[str] = field(default_factory=list)
+    size: int = 0
+    recovery: Recovery | None = None
+    restored: bool = False
+
+
+def stated_frames(clip: Clip) -> int:
+    """How many frames a clip has had; of one that was cut short CLIP says it."""
+    with suppress(MczError):
+        row = clip.container.directory.clips[clip.name]
+        return max(clip.n_frames, int(clip.container.clip(row).n_frames))
+    return clip.n_frames
+
+
+def about_clip(name: str, text: str) -> str:
+    """``text``, which may name the clip already."""
+    start = f"clip {name!r}"
+    return text if text.startswith(start) else f"{start}: {text}"
+
+
+class SomeSignals(Clip):
+    """What is left of a clip of which some signals are lost, and with them its source."""
+
+    def __init__(self, clip: Clip, kept: tuple[int, ...]) -> None:
+        super().__init__(clip.container, clip.container.directory.clips[clip.name])
+        self.whole, self.kept = clip, kept
+
+    @property
+    def signals(self) -> tuple[SignalInfo, ...]:
+        own = (self.whole.signals[index] for index in self.kept)
+        return tuple(replace(info, index=index) for index, info in enumerate(own))
+
+    def is_scaled(self, signal: int) -> bool:
+        return self.whole.is_scaled(self.kept[signal])
+
+
+class WholeRun(ClipCut):
+    """A run of frames of a damaged clip: hashes and source are made anew, whatever its length."""
+
+    __slots__ = ()
+
+    @property
+    def is_whole(self) -> bool:
+        return False
+
+    @property
+    def name(self) -> str:
+        """That of the clip where all frames of its motion are there."""
+        has_motion = not isinstance(self.clip, SomeSignals) or 0 in self.clip.kept
+        if has_motion and self.n_frames == stated_frames(self.clip):
+            return self.clip.name
+        of = "" if has_motion else f".{self.clip.signals[0].name}"
+        return f"{self.clip.name}.{self.start}-{self.stop}{of}"
+
+
+class Repairer(Copier):
+    """Copies what is whole, and of everything else says that it is lost."""
+
+    def __init__(
+        self,
+        file: File,
+        stream: BinaryIO,
+        progress: Progress | None,
+        found: Repair,
+        degrees: Mapping[str, int],
+    ) -> None:
+        super().__init__(file, stream, progress)
+        self.repair, self.degrees = found, degrees
+        self._skeletons: dict[bytes, bytes] = {}  # the payload that stands for each id
+
+    def name_of(self, cut: ClipCut) -> str:
+        if not isinstance(cut, WholeRun):
+            return cut.clip.name
+        name = cut.name
+        while name != cut.clip.name and name in self.file.clips.rows:
+            name += "+"
+        return name
+
+    def fields_of(self, cut: ClipCut) -> Any:
+        fields = super().fields_of(cut)
+        if not isinstance(cut.clip, SomeSignals):
+            return fields
+        signals = [fields.signals[index] for index in cut.clip.kept]
+        return Fields(fields, signals=signals, source=[])
+
+    def _quality(self, cut: ClipCut, row: ClipRow) -> None:
+        """Figures are of the motion."""
+        has_motion = not isinstance(cut.clip, SomeSignals) or 0 in cut.clip.kept
+        if has_motion and self._degree(cut) == FULL:
+            super()._quality(cut, row)
+
+    def _degree(self, cut: ClipCut) -> int:
+        return self.degrees.get(self.name_of(cut), FULL)
+
+    def run(self, cuts: Sequence[ClipCut], *, alone: bool) -> Extraction:
+        return super().run([cut for cut in cuts if self._is_kept(cut)], alone=alone)
+
+    def _is_kept(self, cut: ClipCut) -> bool:
+        """Whether a clip is written, and say what of it is not, as it breaks a rule."""
+        name, degree = self.name_of(cut), self._degree(cut)
+        if degree == NOTHING:
+            self.repair.lost.append(f"clip {name!r}: all of it, which breaks a rule")
+            if not isinstance(cut, WholeRun):
+                self.repair.clips.remove(name)
+            elif self.repair.runs[cut.clip.name] == [(cut.start, cut.stop)]:
+                del self.repair.runs[cut.clip.name]
+            else:
+                self.repair.runs[cut.clip.name].remove((cut.start, cut.stop))
+        elif degree:
+            self.repair.lost.append(f"clip {name!r}: chunks that belong to it, which break a rule")
+        return degree < NOTHING
+
+    def skeletons(self) -> None:
+        for kind, id_ in self.container.directory.shared:
+            if kind == b"SKEL":
+                with suppress(FormatError):  # what is wrong with it clips say, and is told
+                    self.skeleton(id_)
+                    self.repair.skeletons.append(self.container.skeleton(id_).name or id_.hex())
+
+    def attachments(self) -> None:
+        for name, held in self.file.attachments.items():
+            try:
+                held.read()
+            except MczError as error:
+                self.repair.lost.append(f"attachment {name!r}: {error}")
+                continue
+            self.attachment(name)
+            self.repair.attachments.append(name)
+
+    def before_clips(self) -> None:
+        with suppress(FormatError):  # what is damaged there has been told
+            super().before_clips()
+
+    def inside(self, row: ClipRow) -> None:
+        with suppress(FormatError):
+            if row.cend is not None and self.degrees.get(row.name, FULL) == FULL:
+                super().inside(row)
+
+    def skeleton(self, id_: bytes) -> bytes:
+        """Without its source or its base, and so under another id, where these are lost."""
+        if id_ not in self._skeletons:
+            try:
+                self._skeletons[id_] = super().skeleton(id_)
+            except FormatError as error:
+                self._skeletons[id_] = self._poorer_skeleton(id_)
+                self.repair.lost.append(f"skeleton {id_.hex()}: its source or base: {error}")
+        return self._skeletons[id_]
+
+    def _poorer_skeleton(self, id_: bytes) -> bytes:
+        stored, where = self.carrier.stored(b"SKEL", id_), f"SKEL {id_.hex()}"
+        fields = dict(parse_skel(stored, where, self.container.profile))
+        bases = []
+        for base in fields["base"]:
+            with suppress(FormatError):
+                bases.append(payload_id(self.skeleton(bytes(base))))
+        payload = build(payloads.SKEL, fields | {"base": bases, "source": []}, "skeleton")
+        self.writer.shared(b"SKEL", payload)
+        return payload
+
+    def aliases(self, cuts: Mapping[str, ClipCut], alone: bool) -> None:
+        for name, (of, target) in self.file.aliases.items():
+            if self._restores(of, target):
+                self.writer.alias(name, of, target)
+            else:
+                self.repair.lost.append(f"{name!r}, another name of what is lost")
+
+    def _restores(self, of: int, target: bytes) -> bool:
+        """Whether the file that is written gives what an alias stands for."""
+        if of == payloads.OF_SKELETON:
+            return (b"SKEL", target) in self.writer.directory.shared
+        here = self.repair.clips if of == payloads.OF_CLIP else self.repair.attachments
+        return target.decode("utf-8", "replace") in here
+
+    def finish_fields(self, cut: ClipCut, new: dict[str, Any]) -> tuple[bytes, list[bytes]]:
+        if isinstance(cut.clip, SomeSignals):
+            add_note(new["metadata"], "source-note", NOTE_OF_SIGNALS)
+        try:
+            if self._degree(cut) >= WITHOUT_SOURCE_FILE and new["source"]:
+                raise FormatError("what it gives is not what the clip says")
+            found = super().finish_fields(cut, new)
+        except FormatError as error:
+            if not new["source"]:
+                raise
+            found = self._without_source(cut, new, error)
+        if isinstance(cut, WholeRun) and cut.name != cut.clip.name and new["source"]:
+            held = new["source"][0]
+            if held["path"]:
+                path = PurePosixPath(held["path"])
+                named = path.with_name(f"{path.stem}.{cut.start}-{cut.stop}{path.suffix}")
+                new["source"] = [held | {"path": str(named)}]
+        return found
+
+    def _without_source(
+        self, cut: ClipCut, new: dict[str, Any], error: FormatError
+    ) -> tuple[bytes, list[bytes]]:
+        """The same of a clip whose template is lost, and with it what the file was like."""
+        text = about_clip(cut.clip.name, f"its source file: {error}")
+        if text not in self.repair.lost:
+            self.repair.lost.append(text)
+        metadata = new["metadata"]
+        if cut.is_whole:  # a list of records
+            metadata = {pair["key"]: pair["value"] for pair in metadata}
+        new["source"], new["metadata"] = [], metadata
+        add_note(metadata, "source-note", NOTE)
+        _, hashes = super().finish_fields(cut, new)
+        if cut.is_whole:
+            new["metadata"] = [{"key": key, "value": metadata[key]} for key in sorted(metadata)]
+        return b"", hashes
