@@ -101,7 +101,7 @@ class LostFrameError(FormatError):
 
 
 class SkeletonWarning(UserWarning):
-    """An AMC was given a skeleton whose name or dofs are not its own."""
+    """An AMC got a skeleton whose name or dofs are not its own, or rest poses differ."""
 
 
 class ContactWarning(UserWarning):

@@ -73,7 +73,7 @@ def two_alike(draw: st.DrawFn) -> tuple[Skeleton, Skeleton]:
 def test_joints_turn_alike_on_other_bones(pair: tuple[Skeleton, Skeleton]) -> None:
     source, target = pair
     motion = Motion(source, (Signal(values_for(source)),))
-    made = mcz.retarget(motion, target, scale=2.0)
+    made = mcz.retarget(motion, target, scale=2.0, match_rest=())
     assert made.skeleton == target
     assert np.abs(world_turns(made) - world_turns(motion)).max() < 1e-9
     assert np.abs(origins(made)[:, 0] - 2 * origins(motion)[:, 0]).max() < 1e-9
@@ -262,6 +262,56 @@ def test_bones_point_alike_where_rest_poses_do_not() -> None:
     forked = Motion(two, (Signal(values_for(two)),))
     with pytest.raises(OptionError, match="'chest' has several bones"):
         mcz.retarget(forked, two, match_rest=["chest"])
+
+
+def turned_at(skeleton: Skeleton, name: str, turn: np.ndarray) -> Skeleton:
+    """The skeleton with the bones from this joint on turned in its rest pose."""
+    first, joints, below = skeleton.find(name), list(skeleton.joints), {skeleton.find(name)}
+    for number in range(first, len(joints)):
+        joint = joints[number]
+        if number != first and joint.parent not in below:
+            continue
+        below.add(number)
+        offset = joint.offset if number == first else tuple(turn @ joint.offset)
+        tails = tuple(tuple(turn @ tail) for tail in joint.tails)
+        joints[number] = replace(joint, offset=offset, tails=tails)
+    return replace(skeleton, joints=tuple(joints), source=None)
+
+
+def test_limbs_of_usual_skeletons_point_alike_by_themselves() -> None:
+    """Arms that rest elsewhere point as those of the motion; others are left as they are."""
+    walk = bvh_walk()
+    usual = {"Toes": "ToeBase", "Wrist": "Hand", "Hand": "FingerBase"}
+    motion = mcz.rename(
+        walk, {side + old: side + new for side in ("Left", "Right") for old, new in usual.items()}
+    )
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    other = turned_at(motion.skeleton, "LeftArm", quarter)
+    chain = [motion.skeleton.find(name) for name in ("LeftArm", "LeftForeArm", "LeftHand")]
+    away = {}
+    for match_rest in ("auto", ()):
+        made = mcz.retarget(motion, other, match_rest=match_rest)
+        bones = np.diff((origins(made) - origins(motion))[:, chain], axis=1)
+        away[match_rest] = float(np.abs(bones).max())
+    assert away["auto"] < 1e-4 < 0.1 < away[()]
+    same = mcz.retarget(motion, motion.skeleton)
+    plain = mcz.retarget(motion, motion.skeleton, match_rest=())
+    np.testing.assert_array_equal(same.values, plain.values)
+
+
+def test_rest_poses_that_differ_are_told_of_other_skeletons() -> None:
+    bones = Skeleton(
+        (
+            Joint("a", channels=POSITIONS + ROTATIONS),
+            Joint("b", 0, (0.0, 1.0, 0.0), channels=ROTATIONS, tails=((0.0, 1.0, 0.0),)),
+        )
+    )
+    other = replace(bones, joints=(bones.joints[0], replace(bones.joints[1], offset=(1, 0, 0))))
+    motion = Motion(bones, (Signal(values_for(bones)),))
+    with pytest.warns(mcz.SkeletonWarning, match=r"a by 90 degrees; match_rest="):
+        told = mcz.retarget(motion, other)
+    np.testing.assert_array_equal(told.values, mcz.retarget(motion, other, match_rest=()).values)
+    assert mcz.retarget(motion, other, match_rest="a").n_frames == motion.n_frames
 
 
 def test_what_cannot_be_done_is_refused() -> None:

@@ -7,6 +7,8 @@ from mcz.errors import OptionError
 from mcz.motion import Skeleton
 from mcz.retargeting.joint_names import SKELETONS, SMPL_BODY
 
+LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow")  # parts of a side
+
 
 def joint_map(a: str | Skeleton, b: str | Skeleton) -> dict[str, str]:
     """From joint names of ``a`` to those of ``b``, of joints that turn the same part of the body.
@@ -56,6 +58,15 @@ def _recognized(skeleton: Skeleton) -> dict[str, str]:
             f"{', '.join(SKELETONS)}"
         )
     return best
+
+
+def limbs_of(skeleton: Skeleton) -> set[str]:
+    """The names of the joints of thighs, shins, feet and arms, of a usual skeleton; else none."""
+    try:
+        known = _recognized(skeleton)
+    except OptionError:
+        return set()
+    return {name for part, name in known.items() if part.partition("_")[2] in LIMBS}
 
 
 def _in(names: tuple[str, ...], held: set[str]) -> list[str]:

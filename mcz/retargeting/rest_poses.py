@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from mcz.brief import among
-from mcz.errors import OptionError
+from mcz.errors import OptionError, SkeletonWarning
 from mcz.kinematics.chain import IDENTITY, Floats
 from mcz.kinematics.rest import rest_positions
 from mcz.motion import Skeleton
+from mcz.retargeting.joint_maps import limbs_of
 from mcz.retargeting.matching import nearest_above
 
 SHORT = 1e-9  # of the longest bone: no direction
+UNLIKE = 10.0  # degrees between bones at rest: more than people differ
+MOST_NAMED = 6
 
 
 def rest_turns(
@@ -27,27 +32,72 @@ def rest_turns(
 
     Raises OptionError for a joint that is not in ``pairs``, and for one without such a bone.
     """
-    named = _numbers(target, pairs, alike)
-    ours, theirs = rest_positions(target), rest_positions(source)
-    above = {joint: nearest_above(target, joint, pairs) for joint in pairs}
+    named, turns = _numbers(target, pairs, alike), _bone_turns(target, source, pairs)
     result: dict[int, Floats] = {-1: IDENTITY}
-    for joint, other in pairs.items():
-        result[joint] = result[above[joint]]
+    for joint in pairs:
+        result[joint] = result[nearest_above(target, joint, pairs)]
         if joint not in named:
             continue
-        below = [child for child in pairs if above[child] == joint]
-        if below:
-            bones = ours[below[0]] - ours[joint], theirs[pairs[below[0]]] - theirs[other]
-        else:
-            bones = _tail(target, joint), _tail(source, other)
-        turn = None if len(below) > 1 else _least_turn(*bones)
+        turn = turns.get(joint)
         if turn is None:
-            how = "several bones" if len(below) > 1 else "no bone"
+            how = "no bone" if joint in turns else "several bones"
             raise OptionError(
                 f"retarget: match_rest: joint {target.joint_names[joint]!r} has {how} to match"
             )
         result[joint] = turn[:, :, None]
     return result
+
+
+def _bone_turns(
+    target: Skeleton, source: Skeleton, pairs: Mapping[int, int]
+) -> dict[int, Floats | None]:
+    """The turn of each joint's bone to the source's, None where it has none.
+
+    Joints of several bones are left out.
+    """
+    ours, theirs = rest_positions(target), rest_positions(source)
+    children: dict[int, list[int]] = {joint: [] for joint in (-1, *pairs)}
+    for joint in pairs:
+        children[nearest_above(target, joint, pairs)].append(joint)
+    found: dict[int, Floats | None] = {}
+    for joint, other in pairs.items():
+        below = children[joint]
+        if len(below) == 1:
+            bones = ours[below[0]] - ours[joint], theirs[pairs[below[0]]] - theirs[other]
+            found[joint] = _least_turn(*bones)
+        elif not below:
+            found[joint] = _least_turn(_tail(target, joint), _tail(source, other))
+    return found
+
+
+def _angle(turn: Floats | None) -> float:
+    """The degrees of a turn, 0 where there is none."""
+    cosine = 1.0 if turn is None else (float(np.trace(turn)) - 1) / 2
+    return math.degrees(math.acos(min(1.0, max(-1.0, cosine))))
+
+
+def usual_alike(target: Skeleton, source: Skeleton, pairs: Mapping[int, int]) -> list[str]:
+    """The limbs of a usual skeleton, where one of them rests otherwise than the source's.
+
+    All of them, for what is not named turns along with the joint above. Warns with SkeletonWarning
+    of other skeletons whose bones rest otherwise.
+    """
+    names, others = target.joint_names, source.joint_names
+    ours, theirs = limbs_of(target), limbs_of(source)
+    turns = _bone_turns(target, source, pairs)
+    found = {joint: angle for joint, turn in turns.items() if (angle := _angle(turn)) > UNLIKE}
+    known = [joint for joint, turn in turns.items() if turn is not None]
+    limbs = [j for j in known if names[j] in ours or others[pairs[j]] in theirs]
+    if found and not (ours or theirs):
+        said = ", ".join(f"{names[j]} by {found[j]:.0f} degrees" for j in list(found)[:MOST_NAMED])
+        more = " ..." if len(found) > MOST_NAMED else ""
+        warnings.warn(
+            f"retarget: bones of the rest poses differ: {said}{more}; match_rest= names those that "
+            "are to point as the motion's, () accepts the difference",
+            SkeletonWarning,
+            stacklevel=3,
+        )
+    return [names[joint] for joint in limbs] if found.keys() & set(limbs) else []
 
 
 def _numbers(target: Skeleton, pairs: Mapping[int, int], alike: Iterable[str]) -> set[int]:

@@ -20,10 +20,12 @@ from mcz.kinematics.targets import Targets
 from mcz.motion import Motion, Skeleton
 from mcz.retargeting.edited import check_channels, computed, edited
 from mcz.retargeting.matching import matched, nearest_above
-from mcz.retargeting.rest_poses import rest_turns
+from mcz.retargeting.rest_poses import rest_turns, usual_alike
 from mcz.retargeting.sizes import size_ratio
 from mcz.retargeting.travel import Travel
 from mcz.retargeting.turns import back, finite, local_turns, relative, set_local_turns
+
+AUTO = "auto"
 
 
 def retarget(
@@ -32,7 +34,7 @@ def retarget(
     joint_map: Mapping[str, str] | None = None,
     *,
     scale: float | None = None,
-    match_rest: Collection[str] = (),
+    match_rest: Collection[str] = AUTO,
 ) -> Motion:
     """``motion`` on ``skeleton``: its joints turn as the same joints of the motion do.
 
@@ -40,8 +42,10 @@ def retarget(
     gives them; joints that it leaves out stay at rest, or are left out. None: the same names.
 
     Turns are turns from rest. Where the rest poses are unlike, one with arms down and one with
-    arms out, so are the poses. ``match_rest`` names joints of ``skeleton`` whose bones are to point
-    as those of the motion do, such as upper arms and forearms; joints below them turn along.
+    arms out, so would be the poses. ``match_rest`` names joints of ``skeleton`` whose bones are to
+    point as those of the motion do, such as upper arms and forearms; joints below them turn along.
+    "auto": the arms and legs of usual skeletons (see ``mcz.joint_map``) that rest otherwise; of
+    others a SkeletonWarning names the bones that do. (): none.
 
     The root's way is scaled by ``scale``, in length units of ``skeleton`` per length unit of the
     motion. None: by the length of the legs, from hip to foot, or of all bones where no foot has
@@ -60,6 +64,10 @@ def retarget(
     source = motion.skeleton
     _check(source, skeleton)
     pairs = matched(source, skeleton, joint_map)
+    if match_rest == AUTO:
+        match_rest = usual_alike(skeleton, source, pairs)
+    elif isinstance(match_rest, str):
+        match_rest = (match_rest,)
     if scale is None:
         scale = size_ratio(skeleton, source, pairs)
     if not 0 < scale < math.inf:
