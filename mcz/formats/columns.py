@@ -13,11 +13,14 @@ from fractions import Fraction
 
 from mcz.errors import SourceError
 from mcz.formats.csv_text import (
+    COMMENTS,
+    check_names,
     count_columns,
     first_row,
     has_decimal_commas,
     is_blank,
     texts_of,
+    whole_cells,
 )
 from mcz.formats.layout import FRAME_NUMBER
 from mcz.formats.rows import Rows, line_of
@@ -42,9 +45,11 @@ _UNIT = re.compile(
     r"|BW|sec|Nmm|N\.?m+|N\.mm|(?:deg|rad|m{1,2}|cm)/s(?:\^?2|²)?|g)[\])]?"
 )
 _COORDINATE = re.compile(r"(?i)(.*[^._: ])[._: ]([xyz])(?:[ _]?[\[(]?(mm|cm|m|in|ft)[\])]?)?")
-_NO_POSITION = re.compile(
-    r"(?i)(?:.*[^a-z])?(?:accel|acc|gyro?|mag|vel|ang|rot|euler|force|grf|moment|torque|imu)"
-    r"(?:[^a-z]|[a-z]{3,}|$).*"
+_WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+_NO_POSITION = re.compile(  # words of a name: LHipAngles, acc, ground_force, ...
+    r"acc(?:el(?:eration)?s?)?|gyro?(?:scope)?|mag(?:net\w*)?|vel(?:ocit(?:y|ies))?|speeds?|jerk"
+    r"|ang(?:les?|ular)?|rot(?:ations?)?|euler|omega|quat(?:ernions?)?|orient\w*|grf|forces?"
+    r"|moments?|torques?|powers?|imu|emg"
 )
 _SECONDS = {"m": Fraction(1, 1000), "u": Fraction(1, 10**6), "n": Fraction(1, 10**9)}
 
@@ -58,6 +63,7 @@ class _Head:
     names: list[str]
     units: list[str]
     labels: tuple[int, int]
+    note: str = ""
 
 
 def read_columns_of(data: bytes, name: str = "motion") -> Motion:
@@ -99,7 +105,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
         times.rate,
         times.exact,
         name,
-        table_metadata(encoding, [text_note(labels)]),
+        table_metadata(encoding, [text_note(labels), head.note]),
         table_source("csv", data, [(section, rows, 1)]),
         rows.numbers,
     )
@@ -139,7 +145,7 @@ def _markers(head: _Head, values: Sequence[int]) -> Skeleton | None:
         name = found[0][1] if found[0] else ""
         if sorted(axes) != ["x", "y", "z"] or any(match and match[1] != name for match in found):
             return None
-        if _NO_POSITION.fullmatch(name):
+        if any(_NO_POSITION.fullmatch(word.lower()) for word in _WORDS.findall(name)):
             return None
         joints.append(Joint(name, channels=tuple(Channel(f"t{axis}") for axis in axes)))
         units |= {
@@ -184,7 +190,7 @@ def _rows(data: bytes, head: _Head, time: int | None) -> tuple[TableRows, list[i
 
 
 def _head(data: bytes, encoding: str) -> _Head:
-    lines = lines_from(data, 0)
+    lines = whole_cells(lines_from(data, 0))
     found = first_row(lines)
     if found is None:
         if has_decimal_commas(lines):
@@ -208,6 +214,9 @@ def _head(data: bytes, encoding: str) -> _Head:
         units += [""] * (n_cells - len(units))
         above.pop()
     names: list[str] = []
+    note = ""
+    if texts and len(texts[-1]) < n_cells and not above[-1][1].startswith(COMMENTS):
+        note = check_names(texts[-1], lines[number][1], separator, line_of(data, above[-1][0]))
     if texts and len(texts[-1]) >= n_cells:
         at, line = above[-1]
         names, labels = texts[-1][:n_cells], (at, at + len(line))
@@ -215,7 +224,7 @@ def _head(data: bytes, encoding: str) -> _Head:
     names = names or [f"column {k + 1}" for k in range(n_cells)]
     names[1:] = [label or f"column {k + 2}" for k, label in enumerate(names[1:])]
     names = [_printable(label) for label in names]
-    return _Head(rows, separator, names, [_printable(u) for u in units], labels)
+    return _Head(rows, separator, names, [_printable(u) for u in units], labels, note)
 
 
 def _are_units(cells: Sequence[str]) -> bool:

@@ -6,10 +6,22 @@ Frame and Sub Frame, and all others are columns of numbers, or no table of them.
 
 from __future__ import annotations
 
+import re
+from itertools import islice
+
 from mcz.errors import MotionError, SourceError
 from mcz.formats.columns import counts_rows, read_columns_of
-from mcz.formats.csv_text import cells_of, first_row, is_blank, is_like, is_row, texts_of
+from mcz.formats.csv_text import (
+    cells_of,
+    first_row,
+    is_blank,
+    is_like,
+    is_row,
+    texts_of,
+    whole_cells,
+)
 from mcz.formats.motive import HEAD, read_motive
+from mcz.formats.rows import line_of
 from mcz.formats.table_restore import restore_table
 from mcz.formats.table_rows import lines_from
 from mcz.formats.text_source import BOM
@@ -18,6 +30,9 @@ from mcz.motion import Motion
 
 SNIFFED = 2**16  # bytes at the start that tell the kind
 NAMES = ("csv", "motive", "vicon")
+MOST_RETURNS = 1024  # carriage returns that are looked at
+
+_RETURN = re.compile(rb"\r(?=[^\r\n])")
 
 
 def kind_of(data: bytes) -> str | None:
@@ -27,7 +42,7 @@ def kind_of(data: bytes) -> str | None:
         return "motive"
     if AXIS.search(start):
         return "vicon"
-    return "csv" if first_row(lines_from(_whole_lines(data), 0)) else None
+    return "csv" if first_row(_lines(data)) else None
 
 
 def is_motion(data: bytes) -> bool:
@@ -39,7 +54,7 @@ def is_motion(data: bytes) -> bool:
     kind = kind_of(data)
     if kind != "csv":
         return kind is not None
-    lines = lines_from(_whole_lines(data), 0)
+    lines = _lines(data)
     found = first_row(lines)
     if found is None:
         return False
@@ -51,10 +66,11 @@ def is_motion(data: bytes) -> bool:
     return any(map(counts_rows, names)) and all(is_like(row, cells[0]) for row in cells)
 
 
-def _whole_lines(data: bytes) -> bytes:
-    """The start of ``data`` that is looked at, without a line that is cut off."""
+def _lines(data: bytes) -> list[tuple[int, bytes]]:
+    """The lines at the start of ``data`` that are looked at, without one that is cut off."""
     start = data[:SNIFFED]
-    return start if len(data) < SNIFFED else start[: start.rfind(b"\n") + 1]
+    whole = start if len(data) < SNIFFED else start[: start.rfind(b"\n") + 1]
+    return whole_cells(lines_from(whole, 0))
 
 
 def read(data: bytes, name: str = "motion") -> Motion:
@@ -62,10 +78,20 @@ def read(data: bytes, name: str = "motion") -> Motion:
 
     Raises SourceError, with the number of the line.
     """
-    if b"\n" not in data and data.strip(b"\r").count(b"\r"):
-        raise SourceError("line 1: lines end with carriage returns alone; save it with line feeds")
+    _check_line_ends(data)
     reader = {"motive": read_motive, "vicon": read_vicon}.get(kind_of(data) or "", read_columns_of)
     return reader(data, name)
+
+
+def _check_line_ends(data: bytes) -> None:
+    """Raise SourceError for a carriage return, outside of quotes, that ends a line by itself."""
+    for match in islice(_RETURN.finditer(data), MOST_RETURNS):
+        start = data.rfind(b"\n", 0, match.start()) + 1
+        if data.count(b'"', start, match.start()) % 2 == 0:
+            raise SourceError(
+                f"line {line_of(data, start)}: lines end with carriage returns alone; save it with "
+                f"line feeds"
+            )
 
 
 def write(motion: Motion) -> bytes:

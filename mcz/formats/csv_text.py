@@ -19,14 +19,17 @@ NOT_THERE = (b"", *NO_NUMBER)
 MOST_CELLS = MOST_CHANNELS
 BLANK_CELLS = b' \t\r\n,;"'  # bytes of cells that say nothing
 LOOKED_AT = 64  # lines in which rows of numbers have to begin
+COMMENTS = (b"#", b"%", b"//")  # how lines begin that are neither names nor rows
 
 _NUMBER = re.compile(
     rb"(?i)[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[-+]?[0-9]+)?|nan|inf(?:inity)?"
     rb"|[0-9]\.#[a-z]+[0-9]*)"
 )
+_OPEN = re.compile(rb'(?:\A|[,;\t])[ ]*"[^"]*\Z')  # a quoted cell that goes on below
+MOST_LINES = 16  # of a quoted cell
 _QUOTED = re.compile(rb'[ \t]*"((?:[^"]|"")*)"[ \t]*')
 _QUOTED_BY_TABS = re.compile(rb' *"((?:[^"]|"")*)" *')
-DECIMAL_COMMA = re.compile(rb"[-+]?[0-9]+,[0-9]+(?:[eE][-+]?[0-9]+)?")
+DECIMAL_COMMA = re.compile(rb"[-+]?[0-9]+(?:\.[0-9]{3})*,[0-9]+(?:[eE][-+]?[0-9]+)?")
 
 
 def cells_of(line: bytes, separator: bytes | None) -> list[bytes]:
@@ -40,6 +43,22 @@ def cells_of(line: bytes, separator: bytes | None) -> list[bytes]:
         return [cell.strip() for cell in line.split(separator)]
     spans, _ = cell_spans(line, separator, n + 1)
     return [line[start:stop].replace(b'""', b'"') for start, stop in spans]
+
+
+def whole_cells(lines: Sequence[tuple[int, bytes]]) -> list[tuple[int, bytes]]:
+    """``lines``, their offsets and bytes, where those of one quoted cell are one line."""
+    found: list[tuple[int, bytes]] = []
+    n_joined = 0
+    for number, (at, line) in enumerate(lines):
+        if n_joined:
+            n_joined -= 1
+            continue
+        if _OPEN.search(line.rstrip(b"\r\n")):
+            below = [text for _, text in lines[number + 1 : number + MOST_LINES]]
+            n_joined = next((k for k, text in enumerate(below, 1) if text.count(b'"') % 2), 0)
+            line = b"".join((line, *below[:n_joined]))
+        found.append((at, line))
+    return found
 
 
 def cell_spans(line: bytes, separator: bytes, most: int) -> tuple[list[tuple[int, int]], int]:
@@ -106,7 +125,7 @@ def first_row(
     Some columns may be text. A line of names may look like numbers; it has no other one below.
     """
     found = _first_numbers(lines)
-    if found is None and not has_decimal_commas(lines):
+    if found is None and not has_decimal_commas(lines, (b";", b"\t")):
         found = _last_row(lines)
     if found is None:
         return None
@@ -128,8 +147,7 @@ def _first_like(lines: Sequence[tuple[int, bytes]], number: int, separator: byte
     first = number
     while first and len(above[first - 1]) == len(cells) and any(map(_is_number, above[first - 1])):
         first -= 1
-    names = above[first - 1] if first else []
-    is_named = len(names) == len(cells) and all(names[1:]) and not any(map(_is_number, names))
+    is_named = first and _are_names(lines[first - 1 : first], separator, len(cells))
     return first if is_named else number
 
 
@@ -153,9 +171,20 @@ def _first_numbers(
         n_cells, separator = max(found, key=lambda entry: entry[0])
         first = first or (number, separator, n_cells)
         below = next((line for _, line in lines[number + 1 :] if line.strip()), None)
-        if below is None or is_row(_some_cells(below, separator)):
+        if (
+            below is None
+            or is_row(_some_cells(below, separator))
+            or below.lstrip().startswith(COMMENTS)
+            or _are_names(lines[number - 1 : number], separator, n_cells)
+        ):
             return number, separator, n_cells
     return first
+
+
+def _are_names(lines: Sequence[tuple[int, bytes]], separator: bytes | None, n_cells: int) -> bool:
+    """Whether one line is given, of ``n_cells`` names and no number."""
+    cells = [cell for _, line in lines for cell in _some_cells(line, separator)]
+    return len(cells) == n_cells and all(cells[1:]) and not any(map(_is_number, cells))
 
 
 def _last_row(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes, int] | None:
@@ -215,10 +244,28 @@ def check_points(cells: Sequence[bytes], line: int) -> None:
             )
 
 
-def has_decimal_commas(lines: Sequence[tuple[int, bytes]]) -> bool:
-    """Whether cells between semicolons or tabs are numbers such as 1,5."""
+def check_names(names: Sequence[str], row: bytes, separator: bytes | None, line: int) -> str:
+    """A note where ``line`` has fewer names than the row below it has cells; "" where it has not.
+
+    Raises SourceError where there are two cells for each name: numbers with decimal commas.
+    """
+    cells = cells_of(row, separator)
+    if not 1 < len(names) < len(cells):
+        return ""
+    if separator == b"," and len(cells) == 2 * len(names) and b"." not in row:
+        raise SourceError(
+            f"line {line}: {len(names)} names above {len(cells)} integers, which seem to have "
+            f"decimal commas; save the table with points or with other separators"
+        )
+    return f"line {line} has {len(names)} names for {len(cells)} columns: no column is named"
+
+
+def has_decimal_commas(
+    lines: Sequence[tuple[int, bytes]], separators: Sequence[bytes] = (b";", b"\t", b",")
+) -> bool:
+    """Whether cells are numbers such as 1,5; between commas they are in quotes."""
     return any(
         len(cells := cells_of(line, separator)) > 1 and any(map(DECIMAL_COMMA.fullmatch, cells))
         for _, line in lines[:LOOKED_AT]
-        for separator in (b";", b"\t")
+        for separator in separators
     )

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mcz.errors import SourceError
-from mcz.formats.csv_text import count_columns, is_blank, texts_of
+from mcz.formats.csv_text import count_columns, is_blank, texts_of, whole_cells
 from mcz.formats.layout import FRAME_NUMBER
 from mcz.formats.rows import line_of
 from mcz.formats.table_rows import begins_with_number, lines_from, read_table, without_zeros
@@ -34,20 +34,25 @@ QUATERNION = {"qx", "qy", "qz", "qw"}
 MAX_HEAD = 32  # lines above the rows
 
 HEAD = re.compile(rb'(?:sep=[,;\t]\r?\n)?[ \t]*"?Format Version"?([,;\t])')
-_AXIS = re.compile(rb'[ \t]*"?Frame"?[,;\t]"?Time')
+_AXIS = re.compile(rb'[ \t]*"?Frame"?[ \t]*[,;\t][ \t]*"?Time')
+_TIME = re.compile(r"(?i)time(?![a-z])")
 _ORDER = re.compile(r"(?i)(?=.*x)(?=.*y)(?=.*z)[xyz]{3}")
 _COUNT = re.compile(rb'(?i)[,;\t]"?Total Exported Frames"?[,;\t]"?([0-9]+)')
 
 
 @dataclass(frozen=True, slots=True)
 class _Head:
-    """What stands above the rows. ``columns``: of each what is said of it, one row a line."""
+    """What stands above the rows. ``columns``: of each what is said of it, one row a line.
+
+    ``time``: the column of the times, which ``columns`` are without.
+    """
 
     said: dict[str, str]
     columns: list[tuple[str, ...]]  # type, name, id, parent, kind, axis
     labels: tuple[int, int]
     rows: int
     separator: bytes
+    time: int
 
     def label(self, column: int | None) -> str:
         """The name of a column of text; None: that of the times."""
@@ -78,7 +83,8 @@ def read_motive(data: bytes, name: str = "motion") -> Motion:
     order = [column for found in objects for column in found.columns]
     place = {column: k for k, column in enumerate(order)}
     n = len(order)
-    cells = [[FRAME_NUMBER], [n], *([place[column]] for column in range(n))]
+    cells = [[FRAME_NUMBER], *([place[column]] for column in range(n))]
+    cells.insert(head.time, [n])
     table = read_table(data, head.rows, n + 1, cells, head.separator, numbers_at=n)
     texts = [order[text.column] if text.column < n else None for text in table.texts]
     objects = _without(objects, texts)
@@ -128,7 +134,8 @@ def _marked(data: bytes, head: _Head, names: Sequence[str], n_rows: int) -> byte
 
 
 def _head(data: bytes, encoding: str) -> _Head:
-    lines = [entry for entry in lines_from(data, 0)[:MAX_HEAD] if not is_blank(entry[1])]
+    lines = whole_cells(lines_from(data, 0)[:MAX_HEAD])
+    lines = [entry for entry in lines if not is_blank(entry[1])]
     match = HEAD.match(data.removeprefix(BOM))
     separator = match[1] if match else b","
     if lines and lines[0][1].removeprefix(BOM).startswith(b"sep="):
@@ -144,12 +151,14 @@ def _head(data: bytes, encoding: str) -> _Head:
     rows = [texts_of(line, separator, encoding) for _, line in lines[1 : axis + 1]]
     width = max(2, count_columns(rows, data[lines[axis + 1][0] :], separator))
     numbers = _numbers(rows)
+    time = next((k for k, cell in enumerate(rows[-1]) if _TIME.match(cell)), 1)
     columns = [
         tuple(rows[n][k] if n is not None and k < len(rows[n]) else "" for n in numbers)
-        for k in range(2, width)
+        for k in range(1, width)
+        if k != time
     ]
     at, line = lines[1 + (numbers[1] or 0)]
-    return _Head(said, columns, (at, at + len(line)), lines[axis + 1][0], separator)
+    return _Head(said, columns, (at, at + len(line)), lines[axis + 1][0], separator, time)
 
 
 def _numbers(rows: Sequence[Sequence[str]]) -> tuple[int | None, ...]:

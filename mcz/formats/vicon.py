@@ -166,10 +166,14 @@ def _part(
     groups: list[tuple[str, list[tuple[str, str]]]] = []
     for k in range(2, width):
         name = names[k] if k < len(names) else ""
-        if (name and not (groups and groups[-1][0] == name)) or not groups:
+        axis_name = (axes[k] if k < len(axes) else "") or f"{k + 1}"
+        if (
+            not groups
+            or (name and groups[-1][0] != name)
+            or axis_name in (before for before, _ in groups[-1][1])  # another one of that name
+        ):
             groups.append((name or f"column {k + 1}", []))
-        axis_name = axes[k] if k < len(axes) else ""
-        groups[-1][1].append((axis_name or f"{k + 1}", units[k] if k < len(units) else ""))
+        groups[-1][1].append((axis_name, units[k] if k < len(units) else ""))
     texts = [texts_of(data[slice(*place)], separator, encoding) for place in (title, rate)]
     said, stated = ((text[0] if text else "") for text in texts)
     return _Part(start, rows, stop, separator, said or "section", stated, labels, groups)

@@ -288,6 +288,9 @@ def test_coordinates_in_columns_are_markers(header: str, unit_cm: float | None) 
     "header",
     [
         "time,acc_x,acc_y,acc_z",
+        "time,LASI.x,LASI.y,LASI.z,Angle.x,Angle.y,Angle.z",
+        "time,LHipAngles_X,LHipAngles_Y,LHipAngles_Z",
+        "time,linAcc.x,linAcc.y,linAcc.z",
         "time,gyro.x,gyro.y,gyro.z",
         "time,A.x,A.y,B.z",
         "time,A.x,A.y,A.w",
@@ -310,7 +313,15 @@ REFUSED = {
     b'a,b\n"1,5","2"\n"2,5","3"\n': "line 2: b'1,5' has a decimal comma",
     MOTIVE.replace(b",", b";").replace(b".", b","): "has a decimal comma",
     VICON.replace(b",", b";").replace(b".", b","): "has a decimal comma",
+    b'time,a\n"0,0","1,5"\n"0,1","2,5"\n': "decimal commas",
+    b"time,a\n0,0,1,5\n0,1,2,5\n": "2 names above 4 integers",
+    b"time;a\n0;1.234,5\n1;2.234,5\n": "decimal commas",
     b"a,b\r1,2\r3,4\r": "carriage returns",
+    b"time,a\r0,1\r1,2\n2,3\n": "line 1: lines end with carriage returns",
+    b"time,a\n0,1\r1,2\n2,3\n": "line 2: lines end with carriage returns",
+    b"time,a,b\n0,1,2\n# pause\n1,2,3\n2,3,4\n": "line 3: b'# pause' is not a number",
+    b"0,1,2\n# pause\n1,2,3\n2,3,4\n": "line 2: b'# pause' is not a number",
+    b"time,a,b\n0,1,2\ntime,a,b\n1,2,3\n2,3,4\n": "line 3: b'time' is not a number",
     b"name,age\nAnn,31\nBob,32\n": "column 'name' is text beside integers",
     b"time,a\n0,1\n1,error\n2,3\n": "line 3: b'error' is not a number",
     b"time,label\n0,a\n1,b\n": "no column of numbers beside the times",
@@ -376,3 +387,44 @@ def test_grids_of_several_rows_a_frame_change_between_frames() -> None:
         lines.append(f"{k // 20 + 1},{k % 20},{value}")
     motion = back(("\n".join(lines) + "\n").encode())
     assert motion.signals[1].values.shape == (3000, 1)
+
+
+def test_names_may_have_line_breaks() -> None:
+    """As spreadsheets print the names of columns that are wrapped."""
+    motion = back(b'"time","x\r\n(mm)",y\r\n0,1.5,2\r\n1,2.5,3\r\n')
+    assert [joint.name for joint in motion.skeleton.joints] == ["x  (mm)", "y"]
+    assert motion.frame_rate == 1
+    data = MOTIVE.replace(b",Name,", b',"Name",').replace(b"Take Name,", b'"Take\nName",')
+    assert b'"Take\n' in data and meaning(back(data)) == meaning(back(MOTIVE))
+
+
+def test_fewer_names_than_columns_are_said() -> None:
+    motion = back(b"time,a,b\n0,1,2,5.5\n1,2,3,5.5\n")
+    assert [joint.name for joint in motion.skeleton.joints] == [f"column {k}" for k in range(1, 5)]
+    assert motion.metadata["source-note"] == (
+        "line 1 has 3 names for 4 columns: no column is named"
+    )
+
+
+@pytest.mark.parametrize("second", ["Ann:LASI", ""])
+def test_markers_of_one_name_or_none_are_apart(second: str) -> None:
+    motion = back(
+        f"Trajectories\n100\n,,Ann:LASI,,,{second},,\nFrame,Sub Frame,X,Y,Z,X,Y,Z\n"
+        f",,mm,mm,mm,mm,mm,mm\n1,0,1,2,3,4,5,6\n2,0,1,2,3,4,5,6\n".encode()
+    )
+    names = [joint.name for joint in motion.skeleton.joints]
+    assert names == ["Ann:LASI", second or "column 6"]
+    assert mcz.positions(motion)[0].tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_the_times_of_motive_are_where_their_name_is() -> None:
+    lines = [line.split(b",") for line in take(5).split(b"\r\n")]
+    for cells in lines[5:-1]:
+        cells[1], cells[2] = cells[2], cells[1]
+    moved = back(b"\r\n".join(map(b",".join, lines)))
+    assert meaning(moved) == meaning(back(take(5)))
+    assert moved.frame_rate == 120
+
+
+def test_blanks_around_cells_of_motive() -> None:
+    assert meaning(back(take(5).replace(b",", b", "))) == meaning(back(take(5)))
