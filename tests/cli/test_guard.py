@@ -193,7 +193,7 @@ def test_a_device_is_nobody_s_input(folder: Path, call: Call) -> None:
 
 @pytest.mark.parametrize(
     ("suffix", "start"),
-    [("bvh", b"HIERARCHY"), ("BVH", b"HIERARCHY"), ("csv", b"frame,root.tx"), ("npz", b"PK")],
+    [("bvh", b"HIERARCHY"), ("BVH", b"HIERARCHY"), ("csv", b"frame,time,root.tx"), ("npz", b"PK")],
 )
 def test_a_suffix_converts(folder: Path, call: Call, suffix: str, start: bytes) -> None:
     call("encode", folder / "walk.amc", "--rate", 120)
@@ -238,7 +238,7 @@ def test_joints_of_a_table(folder: Path, call: Call) -> None:
     call("encode", folder / "walk.bvh")
     words = ("decode", folder / "walk.mcz", "--joints", "Head", "-o")
     assert call(*words, folder / "x.csv")[0] == 0
-    assert (folder / "x.csv").read_text().startswith("frame,Head.rz")
+    assert (folder / "x.csv").read_text().startswith("frame,time,Head.rz")
     code, _, errors = call(*words, folder / "x.bvh")
     assert (code, "--joints needs" in errors) == (2, True)
 
