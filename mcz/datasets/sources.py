@@ -19,7 +19,8 @@ from mcz.datasets.fields import Field, Rows, Subject, features_of, subject_of
 from mcz.datasets.members import Member
 from mcz.kinematics.chain import Floats
 from mcz.poses.moving import values_of
-from mcz.poses.resampling import Times, resampled, times_at
+from mcz.poses.resampling import Times, resampled, times_at, turn_scalars
+from mcz.poses.scalar_quaternions import scalar_quaternions
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.skeleton import Joints
@@ -146,7 +147,11 @@ def _values(
     if times.share.any():  # splines look at one more on either side
         first, last = max(0, first - 1), min(member.n_source, last + 1)
     old = values_of(clip, (member.first + first, member.first + last), needed)
-    return resampled(clip.skeleton, old, Times(times.before - first, times.share))
+    times = Times(times.before - first, times.share)
+    new = resampled(clip.skeleton, old, times)
+    if times.share.any():
+        turn_scalars(scalar_quaternions(clip.skeleton, None, old), old, new, times)
+    return new
 
 
 def _steps(recipe: Recipe, clip: Clip, member: Member, low: int, high: int) -> Floats:

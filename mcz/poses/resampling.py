@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil
@@ -17,6 +17,7 @@ from mcz.kinematics.euler import ORDERS, euler_angles
 from mcz.kinematics.rotation_vectors import matrices_of_vectors, nearest_vector
 from mcz.motion import Motion, Signal, Skeleton, frame_rate_of
 from mcz.poses.conversions import from_matrices, slerp
+from mcz.poses.scalar_quaternions import Quaternion, scalar_quaternions, turned
 
 Ints = NDArray[np.int64]
 
@@ -44,7 +45,13 @@ class Times:
         return self.before + (self.share > 0)
 
 
-def resample(motion: Motion, rate: Fraction | float, *, drop_signals: bool = False) -> Motion:
+def resample(
+    motion: Motion,
+    rate: Fraction | float,
+    *,
+    drop_signals: bool = False,
+    components: bool = False,
+) -> Motion:
     """``motion`` at ``rate`` frames a second, from its first frame to at most its last.
 
     Joints of three rotations, a quaternion or a rotation vector turn the shortest way at a constant
@@ -55,6 +62,11 @@ def resample(motion: Motion, rate: Fraction | float, *, drop_signals: bool = Fal
     frames are left out. New frames lie between old ones by their times: a value between frames of
     which one is unknown is unknown, and where frames are missing there are none in the result
     either, whose frame numbers have the gap.
+
+    Four plain scalars side by side whose norm is 1 in every frame are a quaternion, too, and turn;
+    ``source-note`` of the result says so. OptionError where it is not clear which four are meant,
+    or where such that are named like a quaternion have another norm. ``components``: plain scalars
+    are splines, whatever they are.
 
     Other signals cannot follow: OptionError unless ``drop_signals``. The result has no source, and
     the times of the old. Raises OptionError where the times of ``motion`` are unknown, MotionError
@@ -74,6 +86,14 @@ def resample(motion: Motion, rate: Fraction | float, *, drop_signals: bool = Fal
     own = first.channels is not None
     old = np.asarray(motion.values, np.float64)
     values = resampled(None if own else motion.skeleton, old, times)
+    metadata = dict(motion.metadata)
+    if not components and times.share.any():
+        quaternions = scalar_quaternions(motion.skeleton, first.channels, old)
+        turn_scalars(quaternions, old, values, times)
+        if quaternions:
+            columns = ", ".join(f"{four[0] + 1} to {four[-1] + 1}" for four in quaternions)
+            note = f"columns {columns} were resampled as quaternions"
+            metadata["source-note"] = "; ".join(filter(None, (metadata.get("source-note"), note)))
     new = timeline.even[:1] + numbers / float(wanted)
     if not own and has_times(motion.skeleton):
         values[:, 0] = new * PER_SECOND[motion.skeleton.channels[0].unit]
@@ -88,6 +108,7 @@ def resample(motion: Motion, rate: Fraction | float, *, drop_signals: bool = Fal
         source=None,
         frame_numbers=None if (counted == np.arange(1, len(counted) + 1)).all() else counted,
         number_step=1,
+        metadata=metadata,
     )
     return made.at_times(Timeline(new, wanted, timeline.rounding))
 
@@ -176,12 +197,22 @@ def resampled(skeleton: Skeleton | None, old: Floats, times: Times) -> Floats:
     if not times.share.any():
         return old[times.before]
     new = splines(old, times)
-    if skeleton is not None and skeleton.angle_unit:
+    is_posed = skeleton is not None and any(channel.kind for channel in skeleton.channels)
+    if skeleton is not None and is_posed and skeleton.angle_unit:
         chain = chain_of(skeleton)
         for link in chain.links:
             if link.turns:
                 _turn(chain, link, old, new, times)
     return new
+
+
+def turn_scalars(quaternions: Sequence[Quaternion], old: Floats, new: Floats, times: Times) -> None:
+    """Fill the columns of quaternions among plain scalars in the frames that are between frames."""
+    between = np.flatnonzero(times.share > 0)
+    before, after, share = times.before[between], times.after[between], times.share[between]
+    for four in quaternions:
+        columns = slice(four[0], four[-1] + 1)
+        new[between, columns] = turned(old[before, columns], old[after, columns], share)
 
 
 def splines(old: Floats, times: Times) -> Floats:
