@@ -291,3 +291,35 @@ def test_a_rate_that_is_the_source_s_is_not_said(
         assert "states" not in capsys.readouterr().err
         assert not back.exists()
         assert len(part) < len(whole)
+
+
+@pytest.mark.parametrize("time", [b"0", b"-0.0083333", b"0.0"])
+def test_a_rate_for_a_file_that_states_none(time: bytes, tmp_path: Path) -> None:
+    path, target = tmp_path / "a.bvh", tmp_path / "a.mcz"
+    data = re.sub(rb"Frame Time: \S+", b"Frame Time: " + time, sample_files()["walk.bvh"])
+    path.write_bytes(data)
+    mcz.encode(path, target, rate=120)
+    with mcz.open(target) as file:
+        clip = file.only_clip()
+        assert clip.source_bytes() == data
+        part = re.search(rb"Frame Time: (\S+)", clip.source_bytes((3, 9)))
+        assert part is not None and abs(float(part[1]) * 120 - 1) < 1e-4
+    mcz.encode(path, target, force=True)
+    mcz.set_rate(target, 120)
+    with mcz.open(target) as file:
+        assert (file.only_clip().frame_rate, file.only_clip().source_bytes()) == (120, data)
+    with pytest.raises(mcz.OptionError, match="has 120 frames a second"):
+        mcz.set_rate(target, 100, ["a"])
+    mcz.set_rate(target, 100, ["a"], force=True)
+    with mcz.open(target) as file:
+        assert (file.only_clip().frame_rate, file.only_clip().source_bytes()) == (100, data)
+
+
+@pytest.mark.parametrize("command", ["pack", "append"])
+def test_force_rate_needs_a_rate(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, target = folder_of(tmp_path), tmp_path / "a.mcz"
+    mcz.encode(folder / "walk.asf", target)
+    assert run(cli, "mcz", [command, str(folder), str(target), "--force-rate"]) == 2
+    assert "--force-rate needs --rate" in capsys.readouterr().err

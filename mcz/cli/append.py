@@ -9,6 +9,7 @@ import click
 
 from mcz.cli.common import Exit, Failure, about, existing
 from mcz.cli.options import (
+    check_force_rate,
     copies_option,
     encoding_options,
     force_rate_option,
@@ -91,6 +92,7 @@ def command(
     for path in (*sources, target):
         if path == target or not Path(path).is_dir():
             existing(path)
+    check_force_rate(options)
     if salvage and force:
         raise Failure("--salvage keeps what --force drops; choose one", Exit.USAGE)
     if "-" in sources:

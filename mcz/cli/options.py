@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from mcz.cli.common import echo, to_params, to_rate
+from mcz.cli.common import Exit, Failure, echo, to_params, to_rate
 
 EFFORTS = ("fast", "normal", "best")  # as in mcz.codecs, which takes longer to import
 RATE_HELP = "Frames a second (120, 29.97, 30000/1001) of files that state none."
@@ -254,6 +254,12 @@ def _to_quality(ctx: click.Context, param: click.Parameter, value: str | None) -
         pass
     text = f"{value!r} is not one of {', '.join(PRESETS)}, nor a length such as 0.5mm"
     raise click.BadParameter(text)
+
+
+def check_force_rate(options: dict[str, Any]) -> None:
+    """Raise Failure for ``--force-rate`` without ``--rate``."""
+    if options["force_rate"] and options["rate"] is None:
+        raise Failure("--force-rate needs --rate", Exit.USAGE)
 
 
 def encoding_options(function: Function) -> Function:

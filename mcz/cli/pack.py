@@ -12,6 +12,7 @@ import click
 
 from mcz.cli.common import Exit, Failure, about
 from mcz.cli.options import (
+    check_force_rate,
     copies_option,
     encoding_options,
     force_option,
@@ -65,6 +66,7 @@ def command(
     A file that cannot be parsed is left out, listed at the end, and makes the exit code 1;
     --verbatim keeps it as an attachment instead.
     """
+    check_force_rate(options)
     if scheduler is not None and mtimes:
         raise Failure("--mtimes are not kept with --scheduler", Exit.USAGE)
     if "://" not in folder:

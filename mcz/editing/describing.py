@@ -22,6 +22,7 @@ from mcz.formats import FORMATS
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
+from mcz.reading.rate_notes import states_rate
 from mcz.writing.clip_writer import Progress
 
 Said = Mapping[str, str | None]  # a key and its value; None: it is not there any more
@@ -135,8 +136,7 @@ def set_rate(
 
 
 def _check_rate(clip: Clip, rate: Fraction, force: bool) -> None:
-    source = clip.source
-    if source is not None and FORMATS[source.format].states_rate:
+    if states_rate(clip):
         stated = ", ".join(sorted(name for name, known in FORMATS.items() if known.states_rate))
         raise OptionError(
             f"clip {shown(clip.name)}: its source states the rate, as {stated} do; encode it anew"

@@ -31,6 +31,7 @@ from mcz.schema import build, parse
 HEADER_RATE = 20  # where the header of a C3D has a binary32 of the rate
 WHERE = "source template"
 MOST_DECIMALS = 16
+NEAR = 1e-4  # relative: what a frame time may be off
 
 _FRAME_TIME = re.compile(rb"(?i)Frame\s+Time\s*:\s*([^\s]+)")
 _TRC_KEYS = re.compile(rb"(?i)(?m)^[ \t]*(DataRate\b[^\r\n]*)\r?\n([^\r\n]*)")
@@ -43,8 +44,11 @@ _PHRASE_MARKS = re.compile(b"[" + re.escape(bytes(PHRASES)) + b"]")
 _WORDS = re.compile(rb"[^\t ]+")
 
 
+NONE = Fraction(0)
+
+
 class Restated(NamedTuple):
-    """The rate that a template states, and the template that states another one."""
+    """The rate that a template states, 0 where that is none, and one that states another rate."""
 
     rate: Fraction
     template: bytes
@@ -58,11 +62,9 @@ def restate_bvh(template: bytes, rate: Fraction) -> Restated | None:
     if found is None:
         return None
     stated, _ = frame_rate(found[1].decode("latin-1"))
-    if stated is None:
-        return None
-    text = _like(found[1], 1 / rate, lambda text: frame_rate(text)[0] == rate)
+    text = _like(found[1], 1 / rate, lambda text: _is_time_of(text, rate))
     parts[-1] = _replaced(parts[-1], found.span(1), text or frame_time(rate).encode())
-    return Restated(stated, build(TEMPLATE, dict(fields) | {"header": parts}, WHERE))
+    return Restated(stated or NONE, build(TEMPLATE, dict(fields) | {"header": parts}, WHERE))
 
 
 def restate_c3d(template: bytes, rate: Fraction) -> Restated | None:
@@ -93,9 +95,7 @@ def _of_c3d(
     except SourceError:
         return None  # the parameters follow the data
     parameters = parse_parameters(bytes(head), order, start)
-    stated, _ = rate_of(bytes(head), parameters)
-    if stated is None:
-        return None
+    stated = rate_of(bytes(head), parameters)[0] or NONE
     head[HEADER_RATE : HEADER_RATE + 4] = order.build_real(float(rate))
     rates = (("POINT", rate), ("ANALOG", rate * shared.subframes))
     for group, value in rates:
@@ -182,6 +182,11 @@ def _like(old: bytes, number: Fraction, means_it: Callable[[str], bool]) -> byte
     places = len(old.partition(b".")[2]) if re.fullmatch(rb"[0-9]*\.?[0-9]*", old) else 0
     texts = (f"{float(number):.{digits}f}" for digits in range(places, MOST_DECIMALS))
     return next((text.encode() for text in texts if float(text) and means_it(text)), b"")
+
+
+def _is_time_of(text: str, rate: Fraction) -> bool:
+    """Whether a frame time stands for ``rate``, also to those who take its reciprocal."""
+    return frame_rate(text)[0] == rate and abs(Fraction(text) * rate - 1) <= NEAR
 
 
 def _is_near(rate: Fraction) -> Callable[[str], bool]:

@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import cast
 
 from mcz.clock import usual_step
-from mcz.formats import format_by_id
+from mcz.formats import FORMATS, format_by_id
 from mcz.formats.times import rate_of_times
 from mcz.reading.clip import Clip
 from mcz.reading.source_rates import contradiction, is_one_of
@@ -24,7 +24,19 @@ def rate_note(clip: Clip, *, is_file: bool) -> str | None:
     stated = _stated(clip, rate, is_file=is_file)
     if stated is None:
         return None
-    return f"its source states {float(stated):g} frames a second, the clip has {float(rate):g}"
+    what = f"{float(stated):g} frames a second" if stated else "no frame rate"
+    return f"its source states {what}, the clip has {float(rate):g}"
+
+
+def states_rate(clip: Clip) -> bool:
+    """Whether the source of ``clip`` states a frame rate; raises FormatError on bad bytes."""
+    rate, source = clip.frame_rate, clip.source
+    if rate is None or source is None or not FORMATS[source.format].states_rate:
+        return False
+    fields = clip._fields.source[0]
+    template = clip.container.template(fields.template, fields.format)
+    found = contradiction(source.format, template, rate, usual_step(clip.frame_numbers))
+    return found is None or bool(found.rate)
 
 
 def _stated(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
