@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import mcz
 from mcz.cli.common import run
@@ -21,7 +23,7 @@ from tests.formats.c3d_files import Made
 MARKER = (Joint("a", channels=tuple(map(Channel, ("tx", "ty", "tz")))),)
 
 
-def markers(n: int, rate: int | None = 100, **facts: object) -> Motion:
+def markers(n: int, rate: Fraction | int | None = 100, **facts: object) -> Motion:
     values = np.arange(n * 3.0).reshape(n, 3)
     skeleton = Skeleton(MARKER, unit_cm=0.1, angle_unit="")
     return Motion(skeleton, (Signal(values),), rate and Fraction(rate), **facts)  # type: ignore[arg-type]
@@ -596,3 +598,42 @@ def test_a_start_time_that_changes_nothing_is_told(
         assert ("start-time does not change" in capsys.readouterr().err) == told
         with mcz.open(path) as file:
             assert (file.only_clip().times[0] == 5) == (not told)
+
+
+@given(
+    st.integers(-(10**6), 10**6),
+    st.lists(st.sampled_from([1, 1, 1, 2, 7, 500]), max_size=12),
+    st.sampled_from([Fraction(100), Fraction(60000, 1001), Fraction(1, 3), Fraction(24)]),
+    st.sampled_from(["", "0", "-2.5", "1234.56789"]),
+    st.integers(1, 3),
+)
+def test_times_outlive_parts_files_and_steps(
+    first: int, steps: list[int], rate: Fraction, start: str, each: int
+) -> None:
+    numbers = np.cumsum([first, *(step * each for step in steps)])
+    motion = markers(
+        len(numbers),
+        rate,  # type: ignore[arg-type]
+        frame_numbers=numbers,
+        number_step=each,
+        metadata={"start-time": start} if start else {},
+    )
+    since = (numbers - numbers[0]) / float(rate * each)
+    wanted = since + (float(start) if start else (first - 1) / float(rate * each))
+    exact = {"rtol": 1e-12, "atol": 1e-9}
+    np.testing.assert_allclose(motion.times, wanted, **exact)  # type: ignore[arg-type]
+    for stop in (1, len(numbers)):
+        part = motion[stop // 2 : stop]
+        np.testing.assert_allclose(part.times, wanted[stop // 2 : stop], **exact)  # type: ignore[arg-type]
+        np.testing.assert_allclose(stored(part).times, wanted[stop // 2 : stop], **exact)  # type: ignore[arg-type]
+        np.testing.assert_allclose(stored(part.without_source()).times, part.times, **exact)  # type: ignore[arg-type]
+
+
+@given(st.lists(st.floats(0, 10, allow_subnormal=False), min_size=1, max_size=8))
+def test_any_rising_times_outlive_their_signal(times: list[float]) -> None:
+    times = sorted(times)
+    for rate in (None, Fraction(30)):
+        motion = markers(len(times), rate)  # type: ignore[arg-type]
+        kept = motion.at_times(Timeline(np.array(times), rate))
+        near(kept.times, times)
+        near(stored(kept).times, times)

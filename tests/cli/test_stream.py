@@ -627,6 +627,7 @@ def test_columns_that_are_not_values() -> None:
         return Rows(io.BytesIO(text), binary=False).names
 
     assert names(b"frame,a.tx,a.ty,a.tz,state\n") == ["a.tx", "a.ty", "a.tz"]
+    assert names(b"frame,time,a.tx,a.ty,a.tz\n") == ["a.tx", "a.ty", "a.tz"]
     assert names(b"frame,state\n") == ["frame", "state"]
     assert names(b'"a,b",c\r\n') == ["a,b", "c"]
     rows = Rows(io.BytesIO(b"frame,a.x,a.y,a.z\n7,1,,nan\n\n# what\n8,1,2,3\n"), binary=False)
