@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
+from math import isfinite
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -242,7 +243,7 @@ def timeline_of(
         note = note or "the frame numbers do not ascend: rows are counted"
         numbers = numbers[0] + np.arange(len(numbers)) * step
     start = metadata.get(START, "") if clock is None else ""
-    if _NUMBER.fullmatch(start) and len(numbers):
+    if len(numbers) and _NUMBER.fullmatch(start) and isfinite(float(start)):
         since = (numbers - numbers[0]) / float(rate * step)
         return Timeline(float(start) + since, rate, note=note)
     return Timeline((numbers - 1) / float(rate * step), rate, note=note)

@@ -637,3 +637,15 @@ def test_any_rising_times_outlive_their_signal(times: list[float]) -> None:
         kept = motion.at_times(Timeline(np.array(times), rate))
         near(kept.times, times)
         near(stored(kept).times, times)
+
+
+@pytest.mark.parametrize("rate", [Fraction(10) ** 300, Fraction(1, 10**300)])
+def test_absurd_rates_and_times_are_answered(rate: Fraction) -> None:
+    motion = markers(3, rate)
+    assert mcz.velocities(motion).shape == (3, 1, 3)
+    with pytest.raises(mcz.MczError, match="frame rate"):
+        mcz.to_npz(motion, io.BytesIO())
+    if rate < 1:
+        with pytest.raises(mcz.OptionError, match="too many"):
+            mcz.resample(motion, 50)
+    near(markers(3, metadata={"start-time": "9" * 400}).times, [0, 0.01, 0.02])

@@ -124,7 +124,7 @@ def times_of(timeline: Timeline, wanted: Fraction, signal: Signal) -> tuple[Ints
     parts: list[tuple[Ints, Times]] = []
     for run in timeline.runs:
         frames, lie = _frames_within(timeline, wanted, run)
-        room -= len(frames)
+        room -= max(0, frames.stop - frames.start)  # too many for len()
         if room < 0:
             raise OptionError(
                 f"{len(even)} frames in {even[-1] - even[0]:g} s make too many at {wanted} a second"

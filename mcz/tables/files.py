@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mcz.brief import printable, spreadsheet_cell
 from mcz.clock import numbers_or_rows
+from mcz.errors import MotionError
 from mcz.motion import Channel, Joint, Motion, Skeleton
 from mcz.tables.arrays import pose_arrays
 
@@ -119,6 +120,8 @@ def to_npz(table: Table) -> bytes:
     ``sample_rate`` counts rows a second, of which a frame may have several. No pickles.
     """
     rate = table.frame_rate
+    if rate is not None and max(rate.numerator, rate.denominator) >= 2**63:
+        raise MotionError(f"a frame rate of {float(rate):g}: an NPZ has terms below 2^63")
     more: dict[str, Any] = {"units": np.array(table.units, np.str_)} if table.units else {}
     more |= {} if table.times is None else {"times": table.times}
     if table.motion is not None:
