@@ -649,3 +649,13 @@ def test_absurd_rates_and_times_are_answered(rate: Fraction) -> None:
         with pytest.raises(mcz.OptionError, match="too many"):
             mcz.resample(motion, 50)
     near(markers(3, metadata={"start-time": "9" * 400}).times, [0, 0.01, 0.02])
+
+
+def test_a_rate_that_is_told_makes_gaps_of_frame_numbers(tmp_path: Path) -> None:
+    motion = replace(moving(GAPPED), frame_rate=None)
+    mcz.write(motion, tmp_path / "a.mcz")
+    fields = {"fields": "velocities", "window": 5, "stride": 1, "unit": "m", "dtype": "f8"}
+    data = mcz.dataset(tmp_path / "a.mcz", source_rate=100, **fields)  # type: ignore[arg-type]
+    assert len(data) == 12
+    near(data[np.arange(12)]["velocities"][:, :, 0, 0], np.ones((12, 5)))
+    near(data.window(6).time, 2.99)

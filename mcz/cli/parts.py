@@ -110,13 +110,9 @@ class Part:
         )
 
     def _timeline(self) -> Timeline | None:
-        """When the frames of the clip were, by the rate that it was given if it states none."""
-        from mcz.clock import Counting, timeline_of
+        from mcz.reading.timelines import timeline_at
 
-        clip = self.clip
-        if clip.timeline is None and self.rate is not None:
-            return timeline_of(Counting(clip.frame_numbers, self.rate), clip.metadata)
-        return clip.timeline
+        return timeline_at(self.clip, self.rate)
 
     def _rows(self, joints: Sequence[int | str] | None) -> Masked:
         return self.clip.read_masked(self.frames, joints, self.resolution)

@@ -23,6 +23,7 @@ from mcz.poses.resampling import Times, resampled, times_at, turn_scalars
 from mcz.poses.scalar_quaternions import scalar_quaternions
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
+from mcz.reading.timelines import timeline_at
 from mcz.skeleton import Joints
 
 MOST_OPEN = 64  # files at once: systems allow 256 and more
@@ -156,7 +157,8 @@ def _values(
 
 def _steps(recipe: Recipe, clip: Clip, member: Member, low: int, high: int) -> Floats:
     """The seconds from each of these frames to the next; NaN across a gap."""
-    if recipe.step(member) == 1 and recipe.reach and clip.timeline is not None:
-        return clip.timeline.steps[member.first + low : member.first + max(low, high - 1)]
+    timeline = timeline_at(clip, member.source_rate) if recipe.reach else None
+    if recipe.step(member) == 1 and timeline is not None:
+        return timeline.steps[member.first + low : member.first + max(low, high - 1)]
     rate = recipe.rate or member.source_rate
     return np.full(max(0, high - low - 1), 1.0 / float(rate) if rate else np.nan)

@@ -20,8 +20,9 @@ class Stored(Protocol):
     """What a clip has that says when its frames were."""
 
     container: Container
-    _fields: Any
 
+    @property
+    def _fields(self) -> Any: ...
     @property
     def skeleton(self) -> Skeleton: ...
     @property
@@ -31,8 +32,16 @@ class Stored(Protocol):
     @property
     def frame_numbers(self) -> NDArray[np.int64]: ...
     @property
+    def timeline(self) -> Timeline | None: ...
+    @property
     def metadata(self) -> Mapping[str, str]: ...
-    def read(self, *, joints: Any = None, signal: int | str = 0) -> NDArray[Any]: ...
+    def read(
+        self,
+        frames: tuple[int, int] | None = None,
+        joints: Any = None,
+        *,
+        signal: int | str = 0,
+    ) -> NDArray[Any]: ...
 
 
 def clip_timeline(clip: Stored) -> Timeline | None:
@@ -41,6 +50,14 @@ def clip_timeline(clip: Stored) -> Timeline | None:
     clock = read_clock(clip.container, clip._fields, clip.signals[0])
     counting = Counting(clip.frame_numbers, clip.frame_rate)
     return timeline_of(counting, clip.metadata, clock, column)
+
+
+def timeline_at(clip: Stored, rate: Fraction | None) -> Timeline | None:
+    """That of a clip, by ``rate`` where it states neither a rate nor times."""
+    found = clip.timeline
+    if found is None and rate is not None:
+        return timeline_of(Counting(clip.frame_numbers, rate), clip.metadata)
+    return found
 
 
 def times_column(clip: Stored) -> Column | None:
