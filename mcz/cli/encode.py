@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 @click.command(short_help="A .bvh, .amc, .c3d, .asf, .trc, .mot, .sto, .csv or .npz file to .mcz.")
 @click.argument("source", metavar="SRC", type=click.Path(readable=False))
+@click.argument("more", metavar="", nargs=-1, type=click.Path(readable=False))
 @click.option(
     "-o",
     "--output",
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
 @json_option
 def command(
     source: str,
+    more: tuple[str, ...],
     output: str | None,
     skeleton: str | None,
     force: bool,
@@ -83,6 +85,9 @@ def command(
     with levels=0) then writes each frame of a BVH or AMC before it reads the next, to standard
     output unless -o says otherwise.
     """
+    if more:
+        text = "encode takes one file; mcz pack takes a folder of them, mcz append several"
+        raise Failure(text, Exit.USAGE)
     if source == "-":
         return _encode_piped(output, skeleton, force, as_json, format_name, **options)
     if format_name is not None:

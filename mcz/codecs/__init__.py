@@ -6,6 +6,7 @@ from collections.abc import Iterator, MutableMapping
 from dataclasses import replace
 from importlib import import_module
 
+from mcz.brief import among
 from mcz.codecs.contract import Codec
 from mcz.errors import OptionError, UnsupportedError
 
@@ -73,10 +74,11 @@ ALIASES = {"lossy": "posewave"}  # the best lossy one there is
 def by_name(name: str) -> Codec:
     """The codec called ``name``, or by a name of ``ALIASES``; raises OptionError for another."""
     names = CODECS.names()
-    name = ALIASES.get(name, name)
-    if name not in names:
-        raise OptionError(f"no codec is called {name!r}; there are: {', '.join(names)}")
-    return CODECS[names[name]]
+    if ALIASES.get(name, name) not in names:
+        raise OptionError(
+            f"no codec is called {name!r}; there are: {among([*ALIASES, *names], name)}"
+        )
+    return CODECS[names[ALIASES.get(name, name)]]
 
 
 def chosen(codec: str | None, effort: str | None) -> str:

@@ -295,3 +295,25 @@ def test_append_replaces_attachments_and_skeletons(folder: Path, call: Call) -> 
     assert call("unpack", "kept.mcz", "out")[0] == 0
     assert Path("out/notes.txt").read_text() == "two"
     assert Path("out/walk.asf").read_bytes() == asf
+
+
+# Wrong words -----------------------------------------------------------------------------
+
+
+def test_answers_to_wrong_words_name_the_right_ones(folder: Path, call: Call) -> None:
+    for words, answer in (
+        (("encode", "walk.bvh", "--codec", "losy"), "did you mean 'lossy'?"),
+        (("encode", "walk.bvh", "walk.c3d"), "mcz pack takes a folder of them, mcz append several"),
+        (("list", "walk.bvh"), "not an MCZ file: it begins with b'HIERARCH'; mcz encode makes one"),
+        (("unpack", "walk.bvh", "out"), "; mcz encode makes one of a source file"),
+        (("encode", "all.mcz"), "all.mcz: is an .mcz already; mcz append adds it to another"),
+    ):
+        code, out, errors = call(*words)
+        assert code in (1, 2) and not out and errors.count("\n") == 1
+        assert answer in errors, errors
+
+
+def test_rows_of_numbers_are_taken_for_no_table(folder: Path, call: Call) -> None:
+    Path("cut.bvh").write_text("1 2 3\n4 5 6\n")
+    code, _, errors = call("encode", "cut.bvh")
+    assert code == 1 and "not a BVH file" in errors and ".csv" not in errors
