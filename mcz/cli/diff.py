@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
 from typing import TYPE_CHECKING, Any
@@ -277,7 +277,7 @@ def _compared(
 ) -> dict[str, Any]:
     """The document of one pair of motions."""
     from mcz.metrics.document import difference
-    from mcz.reading.differences import differences
+    from mcz.reading.differences import document_of
 
     one, other = left.load(a), right.load(b)
     if one.motion.n_frames != other.motion.n_frames:
@@ -295,5 +295,5 @@ def _compared(
             by_joint=wanted.by_joint,
             contact_list=wanted.contacts,
         )
-        found = [asdict(each) for each in differences(one.motion, other.motion)]
+        found = document_of(one.motion, other.motion)
     return document | {"differences": found, "ratios_a": one.ratios, "ratios_b": other.ratios}

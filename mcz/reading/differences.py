@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from mcz.formats import FORMATS, arrays_of
@@ -32,6 +32,11 @@ class Difference:
     only_in_a: tuple[str, ...] = ()
     only_in_b: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
+
+
+def document_of(a: Motion, b: Motion) -> list[dict[str, Any]]:
+    """The differences as JSON has them."""
+    return [asdict(each) for each in differences(a, b)]
 
 
 def differences(a: Motion, b: Motion) -> list[Difference]:

@@ -145,6 +145,7 @@ class Work:
     def diff(self, asked: Mapping[str, Any]) -> dict[str, Any]:
         """How far one clip is from another, as ``mcz diff --by-joint --json`` says it."""
         from mcz.metrics.document import difference
+        from mcz.reading.differences import document_of
         from mcz.reading.ratios import clip_ratios
 
         sides = [object_of(asked, key) for key in "ab"]
@@ -153,7 +154,9 @@ class Work:
             with self._opened(side) as (file, clip):
                 found = clip_ratios(file, clip)
                 ratios.append({key: found[key] for key in RATIOS})
-        document = difference(self._motion(sides[0]), self._motion(sides[1]), by_joint=True)
+        one, other = map(self._motion, sides)
+        document = difference(one, other, by_joint=True)
+        document |= {"differences": document_of(one, other)}
         document |= {"ratios_a": ratios[0], "ratios_b": ratios[1]}
         names = [self._file(side).name for side in sides]
         return {"a": names[0], "b": names[1], "clips": [document]}
