@@ -36,7 +36,7 @@ def row_numbers(key: Any, n_rows: int, noun: str) -> Rows:
     except ValueError:  # lists of different lengths
         raise OutOfRangeError(f"{noun}s {key!r} are no array") from None
     if array.dtype == np.bool_:
-        if array.shape != (n_rows,):
+        if array.shape not in ((n_rows,), (0,)):  # NumPy takes an empty mask of any axis
             raise OutOfRangeError(f"a mask of shape {array.shape} for {n_rows} {noun}s")
         return np.flatnonzero(array)
     if array.size == 0 and not isinstance(key, np.ndarray):
