@@ -8,7 +8,7 @@ SPEC.md, "Salvage" and "Cutting without re-encoding", are normative.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from typing import Any, BinaryIO
@@ -188,22 +188,34 @@ class Repairer(Copier):
 
     def skeleton(self, id_: bytes) -> bytes:
         """Without its source or its base, and so under another id, where these are lost."""
-        if id_ not in self._skeletons:
-            try:
-                self._skeletons[id_] = super().skeleton(id_)
-            except FormatError as error:
-                self._skeletons[id_] = self._poorer_skeleton(id_)
-                self.repair.lost.append(f"skeleton {id_.hex()}: its source or base: {error}")
+        chain: dict[bytes, None] = {}
+        wanted: bytes | None = id_
+        while wanted and wanted not in self._skeletons and wanted not in chain:
+            chain[wanted] = None
+            with suppress(FormatError):
+                bases = self.container.skeleton_fields(wanted).base
+                wanted = bytes(bases[0]) if bases else None
+        for one in reversed(chain):
+            with suppress(FormatError) if one != id_ else nullcontext():
+                self._skeletons[one] = self._after_its_base(one)
         return self._skeletons[id_]
 
-    def _poorer_skeleton(self, id_: bytes) -> bytes:
+    def _after_its_base(self, id_: bytes) -> bytes:
+        """Copy a skeleton, whose base is copied; return its payload."""
+        fields = self.container.skeleton_fields(id_)
+        kept = {base: self._skeletons.get(base) for base in map(bytes, fields.base)}
+        try:
+            if any(payload is None or payload_id(payload) != id_ for id_, payload in kept.items()):
+                raise FormatError("its base is not what it was")
+            if fields.source:
+                self.file.skeleton_bytes(id_)
+            return super().skeleton(id_)
+        except FormatError as error:
+            self.repair.lost.append(f"skeleton {id_.hex()}: its source or base: {error}")
         stored, where = self.carrier.stored(b"SKEL", id_), f"SKEL {id_.hex()}"
-        fields = dict(parse_skel(stored, where, self.container.profile))
-        bases = []
-        for base in fields["base"]:
-            with suppress(FormatError):
-                bases.append(payload_id(self.skeleton(bytes(base))))
-        payload = build(payloads.SKEL, fields | {"base": bases, "source": []}, "skeleton")
+        changed = dict(parse_skel(stored, where, self.container.profile))
+        bases = [payload_id(payload) for payload in kept.values() if payload is not None]
+        payload = build(payloads.SKEL, changed | {"base": bases, "source": []}, "skeleton")
         self.writer.shared(b"SKEL", payload)
         return payload
 

@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import cast
 
 from mcz.clock import usual_step
+from mcz.errors import FormatError
 from mcz.formats import FORMATS, format_by_id
 from mcz.formats.times import rate_of_times
 from mcz.reading.clip import Clip
@@ -43,7 +44,12 @@ def _stated(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
     """The rate that the text states, None where it is that of the clip or none."""
     step = usual_step(clip.frame_numbers)
     fields = clip._fields.source[0]
-    template = clip.container.template(fields.template, fields.format)
+    try:
+        template = clip.container.template(fields.template, fields.format)
+    except FormatError:
+        if not clip.container.salvage:
+            raise
+        return None  # it is lost, as is told
     found = contradiction(format_by_id(fields.format).name, template, rate, step)
     if found is not None:
         stated: Fraction = found.rate

@@ -86,7 +86,19 @@ def read_clock(container: Container, fields: Any, signal: SignalInfo) -> SourceC
         source_format = format_by_id(source.format)
     except UnsupportedError:  # nothing is known of it
         return None
-    return clock_of(source_format, container.template(source.template, source.format), signal)
+    if source_format.clock is None:
+        return None
+    try:
+        template = container.template(source.template, source.format)
+    except FormatError as error:
+        if not container.salvage:
+            raise
+        line = f"clip {fields.name!r}: its times are those of its rate, its source's are lost"
+        container.damage += (
+            [f"{line}: {error}"] if f"{line}: {error}" not in container.damage else []
+        )
+        return None
+    return clock_of(source_format, template, signal)
 
 
 def _notes(
