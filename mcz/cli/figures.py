@@ -38,6 +38,11 @@ def reached(quality: Mapping[str, str]) -> str:
     if mean is None or most is None:
         mse = quality.get("mse")
         text = "error unknown" if mse is None else f"mean squared error of channels {_number(mse)}"
+        greatest = quality.get("max_channel_error")
+        if greatest is not None:
+            frame, channel = (quality[f"max_channel_error_{word}"] for word in ("frame", "channel"))
+            text += f", greatest error {_number(greatest)} (frame {frame}, {channel})"
+            text += "; no bound is kept for channels that place no point"
     else:
         where = ", ".join(
             f"{word} {quality[f'max_position_error_{word}']}"

@@ -28,6 +28,11 @@ def times(value: Number, factor: Number) -> Number:
     return mean_of(value * factor, 1)
 
 
+def channel_errors(skeleton: Skeleton, signal: Signal, left: Values, right: Values) -> Values:
+    """Absolute differences of the channels of ``signal``, less whole turns."""
+    return np.abs(without_turns(left - right, skeleton, signal.channels))
+
+
 class ChannelErrors:
     """Squared differences of two signals with the same channels."""
 

@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 
 from mcz.container import payloads
 from mcz.metrics import compare
+from mcz.metrics.sums import channel_errors
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.schema import build
 
 CHUNK = b"QUAL"
 # What a record does without, for its bytes: the radius is 3 cm where it is not stated.
+NOT_STORED = ("max_channel_error", "max_channel_error_frame", "max_channel_error_channel")
 LEFT_OUT = ("shell_radius_cm", "shell_max_frame", "shell_max_joint")
 
 
@@ -29,15 +31,44 @@ def quality_record(
     options: Mapping[str, Any],
     remarks: Mapping[str, str],
 ) -> dict[str, str]:
-    """What the record says; ``decoded`` are the values of every signal as a reader has them."""
+    """What the record says; ``decoded`` are the values of every signal as a reader has them.
+
+    Where no point has a place, the entries ``NOT_STORED``, which are no metrics of the format, say
+    what the greatest error of a channel is.
+    """
     signals = tuple(map(with_values, original.signals, decoded))
     entries = quality_entries(original, replace(original, signals=signals), codec_name, options)
+    if "max_position_error" not in entries:
+        entries |= texts_of(_greatest_error(original, signals[0]))
     return entries | dict(remarks)
+
+
+def _greatest_error(original: Motion, decoded: Signal) -> dict[str, Any]:
+    """The greatest error of a channel, less whole turns, and its frame and channel."""
+    skeleton, signal = original.skeleton, original.signals[0]
+    given, found = (np.asarray(one.masked(), np.float64) for one in (signal, decoded))
+    with np.errstate(all="ignore"):  # what overflows is no figure
+        errors = channel_errors(skeleton, signal, given, found)
+    errors[~np.isfinite(errors)] = -1.0
+    if not errors.size or errors.max() < 0:
+        return {}
+    row, column = divmod(int(errors.argmax()), errors.shape[1])
+    found_at = row // signal.samples_per_frame
+    labels = [
+        f"{address}.{channel.label}"
+        for address, joint in zip(skeleton.addresses(), skeleton.joints, strict=True)
+        for channel in joint.channels
+    ]
+    if signal.channels is not None:
+        labels = [channel.label for channel in signal.channels]
+    figures = (float(errors[row, column]), found_at, labels[column])
+    return dict(zip(NOT_STORED, figures, strict=True))
 
 
 def quality_payload(entries: Mapping[str, str]) -> bytes:
     """The payload of QUAL that says this."""
-    rows = [{"key": key, "value": value} for key, value in entries.items()]
+    stored = {key: value for key, value in entries.items() if key not in NOT_STORED}
+    rows = [{"key": key, "value": value} for key, value in stored.items()]
     return build(payloads.QUAL, {"entries": rows, "extension": b""}, "quality record")
 
 

@@ -1,4 +1,4 @@
-"""Quaternions among plain scalars, resampled: they keep their norm, and this is said."""
+"""Plain scalars: quaternions among them keep their norm, and what a lossy codec does is said."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import mcz
+from mcz.cli.common import run
+from mcz.cli.main import cli
 from mcz.errors import OptionError
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 
@@ -103,3 +105,22 @@ def test_a_table_and_an_array_file(tmp_path: Path) -> None:
         found = mcz.resample(mcz.read(tmp_path / name, rate=30), 50)
         np.testing.assert_allclose(norms(found, at), 1, atol=1e-4)
         assert "as quaternions" in found.metadata["source-note"]
+
+
+def test_the_greatest_error_of_scalars_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Their channels place no point, and no codec keeps a bound for them."""
+    slope = np.arange(240)[:, None] * [0.02, 0.11]
+    (tmp_path / "a.csv").write_text("".join(f"{a:.6f},{b:.6f}\n" for a, b in slope.tolist()))
+    source, path = str(tmp_path / "a.csv"), str(tmp_path / "a.mcz")
+    options = ["--rate", "30", "--codec", "posewave", "--param", "step=0.001", "-o", path]
+    assert run(cli, "mcz", ["encode", source, *options]) == 0
+    said = capsys.readouterr().out
+    with mcz.open(path) as file:
+        clip = file.only_clip()
+        errors = np.abs(clip.values[:] - mcz.read(source).values)
+        assert not any(key.startswith("max_channel_error") for key in clip.quality or {})
+    frame, column = divmod(int(errors.argmax()), 2)
+    where = f"(frame {frame}, column {column + 1}.value)"
+    assert f"greatest error {errors.max():.6g} {where}; no bound is kept for channels" in said
