@@ -94,6 +94,12 @@ def test_frame_numbers_count_before_rows(tmp_path: Path) -> None:
     assert read(trc(every_other, "90"), "trc", tmp_path).frame_rate == 100
 
 
+def test_a_stated_rate_comes_before_one_of_frame_numbers(tmp_path: Path) -> None:
+    numbers = (*range(125, 190, 2), *range(231, 300, 2))  # every other frame, and a gap
+    assert read(trc(numbers, "60", 6, 120), "trc", tmp_path).frame_rate == 60
+    assert read(trc(numbers, "70", 6, 120), "trc", tmp_path).frame_rate == 120
+
+
 def test_times_that_are_no_frames_have_no_rate(tmp_path: Path) -> None:
     text = b"a\nendheader\ntime\tknee\n0.000\t1\n0.010\t2\n0.020\t3\n0.033\t4\n0.043\t5\n"
     assert read(text, "sto", tmp_path).frame_rate is None

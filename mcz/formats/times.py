@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,13 +107,20 @@ def rate_of_times(
     counts = [np.arange(len(times)), *([numbers - numbers[0]] if numbers is not None else [])]
     counts = [count for count in reversed(counts) if count[-1] > 0]
     noise = 8 * float(np.spacing(np.abs(times).max()))
+    given = [(count, list(stated)) for count in counts]
+    near = [(count, _round(_mean_rate(times, count))) for count in counts]
+    run = _longest_run(times)
+    of_run = _round(_mean_rate(run, np.arange(len(run)))) if len(run) > 1 else []
     for k, half_digit in enumerate(half_digits):
         digits = _Digits(2 * half_digit, noise)
-        rate = _rate_by(times, counts, digits, stated)
-        if rate is None:
-            rate = _rate_of_steps(times, digits, stated)
-        if rate is None and k == 0:
-            rate = _rate_by(times, counts, digits, (), coarsely=True)
+        found = chain(
+            _counted(times, given, digits, 1.0),
+            _stepped(times, stated, digits, 0.99),  # all of a digit: halfway between two frames
+            _counted(times, near, digits),
+            _stepped(times, of_run, digits),
+            _counted(times, near, digits, 1.0) if k == 0 else (),
+        )
+        rate = next(found, None)
         if rate is not None:
             is_round = any((rate / unit).denominator == 1 for unit in UNITS)
             return rate, rate in stated or is_round
@@ -137,55 +145,48 @@ class _Digits:
         return bool(spread <= allowed + self.noise)
 
 
-def _rate_by(
+def _counted(
     times: Floats,
-    counts: Sequence[Ints],
+    candidates: Sequence[tuple[Ints, list[Fraction]]],
     digits: _Digits,
-    stated: Sequence[Fraction],
-    *,
-    coarsely: bool = False,
-) -> Fraction | None:
-    """A stated rate or, near the mean, a round one, by the first of the counts that fits."""
-    candidates = [(count, rate, 1.0) for count in counts for rate in stated]
-    for count in counts:
-        near = _round(_mean_rate(times, count))
-        candidates += [(count, rate, float(coarsely)) for rate in near]
-    fits = (rate for count, rate, share in candidates if digits.fit(times, count, rate, share))
-    return next(fits, None)
+    share: float = 0,
+) -> Iterator[Fraction]:
+    """The rates of the candidates that fit, each with a count of the frames."""
+    for count, rates in candidates:
+        yield from (rate for rate in rates if digits.fit(times, count, rate, share))
 
 
 def _mean_rate(times: Floats, count: Ints) -> Fraction:
     """Frames a second on average; 0 where that is absurd."""
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", divide="ignore"):
         mean = float(count[-1] / (times[-1] - times[0]))
     return Fraction(mean) if 1e-9 < mean < 1e9 else Fraction(0)
 
 
-def _rate_of_steps(times: Floats, digits: _Digits, stated: Sequence[Fraction]) -> Fraction | None:
-    """The rate of rising times most of which follow each other by one frame, others by more.
+def _stepped(
+    times: Floats, rates: Sequence[Fraction], digits: _Digits, share: float = 0
+) -> Iterator[Fraction]:
+    """The rates by which most of rising times follow each other by one frame, others by more."""
+    if not (np.diff(times) > 0).all():
+        return
+    for rate in rates:
+        count = np.rint((times - times[0]) * float(rate))
+        if not count[-1] < MOST:
+            continue
+        frames = np.diff(count)
+        usual = np.count_nonzero(frames == 1)
+        is_apart = bool((frames >= 1).all()) and 2 * usual > len(frames)
+        if is_apart and digits.fit(times, count, rate, share):
+            yield rate
 
-    Round rates are tried near the mean of the longest run without a gap.
-    """
+
+def _longest_run(times: Floats) -> Floats:
+    """The longest part of some times without a gap."""
     steps = np.diff(times)
-    if not (steps > 0).all():
-        return None
     edges = np.flatnonzero(steps > 1.5 * np.median(steps))
     starts, stops = np.append(0, edges + 1), np.append(edges, len(steps))
     longest = int(np.argmax(stops - starts))
-    run = times[starts[longest] : stops[longest] + 1]
-    if len(run) < 2:
-        return None
-    for rate in (*stated, *_round(_mean_rate(run, np.arange(len(run))))):
-        share = 0.99 if rate in stated else 0.0  # all of a digit: halfway between two frames
-        count = np.rint((times - times[0]) * float(rate))
-        frames = np.diff(count)
-        if (
-            (frames >= 1).all()
-            and 2 * np.count_nonzero(frames == 1) > len(frames)
-            and digits.fit(times, count, rate, share)
-        ):
-            return rate
-    return None
+    return times[starts[longest] : stops[longest] + 1]
 
 
 def half_digits_of(data: bytes, stop: Ints, tokens: Tokens) -> list[float]:
