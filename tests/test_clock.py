@@ -18,6 +18,7 @@ from mcz.cli.common import run
 from mcz.cli.main import cli
 from mcz.clock import Timeline
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.tables.events import EVENT_EXPORTS
 from tests.formats.c3d_files import Made
 
 MARKER = (Joint("a", channels=tuple(map(Channel, ("tx", "ty", "tz")))),)
@@ -659,3 +660,11 @@ def test_a_rate_that_is_told_makes_gaps_of_frame_numbers(tmp_path: Path) -> None
     assert len(data) == 12
     near(data[np.arange(12)]["velocities"][:, :, 0, 0], np.ones((12, 5)))
     near(data.window(6).time, 2.99)
+
+
+def test_texts_of_events_are_no_formulas() -> None:
+    events = [mcz.Event("=1+1", 0.5, "Left"), mcz.Event("\x1b[2J", 1.5)]
+    rows = EVENT_EXPORTS["csv"](events).decode().splitlines()
+    assert rows[1] == "0.5,'=1+1,Left,," and rows[2].startswith("1.5,\\x1b[2J")
+    with np.load(io.BytesIO(EVENT_EXPORTS["npz"]([]))) as arrays:
+        assert arrays["times"].shape == arrays["label"].shape == (0,)

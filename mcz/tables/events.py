@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mcz.brief import printable
+from mcz.brief import printable, spreadsheet_cell
 
 TEXTS = ("label", "context", "subject", "description")
 
@@ -25,12 +25,15 @@ Events = Sequence[Event]
 
 
 def to_csv(events: Events) -> bytes:
-    """UTF-8 text: a header row, then a row an event; times in seconds, see ``mcz.times``."""
+    """UTF-8 text: a header row, then a row an event; times in seconds, see ``mcz.times``.
+
+    Texts are escaped as in other tables.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["time", *TEXTS])
     for event in events:
-        texts = (printable(getattr(event, name)) for name in TEXTS)
+        texts = (spreadsheet_cell(printable(getattr(event, name))) for name in TEXTS)
         writer.writerow([repr(event.time), *texts])
     return text.getvalue().encode("utf-8", "surrogateescape")
 
