@@ -74,7 +74,7 @@ def _plain(skeleton: Skeleton) -> str:
             f"    name {joint.name}",
             f"    direction {_text(direction)}",
             f"    length {size!r}",
-            f"    axis {_text(joint.axis)}  {joint.axis_order}",
+            f"    axis {_whole(joint.axis)}  {joint.axis_order}",
         ]
         if joint.channels:
             lines.append(f"    dof {' '.join(_dof(c) for c in joint.channels)}")
@@ -93,6 +93,11 @@ def _dof(channel: Channel) -> str:
 
 def _text(vector: Vector) -> str:
     return " ".join(f"{x!r}" for x in vector)
+
+
+def _whole(vector: Vector) -> str:
+    """The same with whole numbers as such, as angles of axes are usually written."""
+    return " ".join(repr(x).removesuffix(".0") for x in vector)
 
 
 def _polar(vector: Vector) -> tuple[Vector, float]:
