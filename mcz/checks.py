@@ -29,10 +29,15 @@ def check_fields(thing: Any, rules: Mapping[str, Rule]) -> None:
             found = rule.form(value)
         except (TypeError, ValueError, OverflowError, AttributeError):
             kind = type(thing).__name__.lower()
-            said = f"{kind}: {name} is {reprlib.repr(value)}, not {rule.words}"
+            said = f"{kind}: {name} is {shortened(value)}, not {rule.words}"
             raise MotionError(said) from None
         if found is not value:
             object.__setattr__(thing, name, found)
+
+
+def shortened(value: Any) -> str:
+    """A value as a message shows it, in one line."""
+    return " ".join(reprlib.repr(value).split())
 
 
 def _text(value: Any) -> str:
@@ -100,7 +105,7 @@ def _items(value: Any) -> tuple[Any, ...]:
     return tuple(value)
 
 
-def of_type(kind: type, words: str) -> Rule:
+def of_type(kind: type | tuple[type, ...], words: str) -> Rule:
     """The rule of a field that is a ``kind``."""
 
     def form(value: Any) -> Any:

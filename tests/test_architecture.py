@@ -42,6 +42,7 @@ ALLOWED = {
     "errors": set(),
     "arguments": {"errors"},
     "checks": {"errors"},
+    "call_checks": MODEL,
     "indexing": {"errors"},
     "schema": {"errors"},
     "numbers": {"brief", "checks", "errors", "schema"},

@@ -19,6 +19,7 @@ from mcz.editing.protecting import redundancy_of, still_protect
 from mcz.editing.rewriting import rewrite, source_of, whole
 from mcz.errors import ChecksumError, OptionError
 from mcz.formats import FORMATS
+from mcz.motion import frame_rate_of
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
@@ -108,7 +109,7 @@ def set_rate(
     the values stay what they are. Raises OptionError where the source of a clip states the rate,
     and for another rate than a clip has, unless ``force``.
     """
-    exact = Fraction(rate).limit_denominator(10**6)
+    exact = frame_rate_of(rate, "rate").limit_denominator(10**6)
     if exact <= 0:
         raise OptionError(f"rate is {rate}, not above 0")
     with source_of(target, output) as file:

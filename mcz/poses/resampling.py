@@ -180,9 +180,15 @@ def _between(frames: Floats, since: Floats, start: int) -> Times:
     return Times(before + upon + start, np.where(upon, 0.0, share), weights=weights)
 
 
+MOST_FRAMES = 2**28
+
+
 def resampled_frames(n_frames: int, rate: Fraction, wanted: Fraction) -> int:
     """How many frames there are at ``wanted`` a second, from the first to at most the last."""
-    return int((n_frames - 1) * wanted / rate) + 1 if n_frames else 0
+    count = int((n_frames - 1) * wanted / rate) + 1 if n_frames else 0
+    if count > MOST_FRAMES:
+        raise OptionError(f"{count} frames at {float(wanted):g} a second are over {MOST_FRAMES}")
+    return count
 
 
 def times_at(frames: Iterable[int], step: Fraction) -> Times:

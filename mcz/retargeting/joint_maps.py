@@ -28,7 +28,7 @@ def _joints(known: str | Skeleton) -> dict[str, str]:
     """The joints of a skeleton by part."""
     if isinstance(known, Skeleton):
         return _recognized(known)
-    if known not in SKELETONS:
+    if not isinstance(known, str) or known not in SKELETONS:
         near = nearest(known, SKELETONS) if isinstance(known, str) else ""
         raise OptionError(
             f"joint_map: no skeleton {known!r} among {', '.join(SKELETONS)}"

@@ -113,7 +113,7 @@ def encode(
     entry = Entry(path, path.name, terms)
     inputs = (source, skeleton, *(params or {}).values())  # a parameter may name a file
     with limited(threads), replacing(target, force=force, inputs=inputs) as stream:
-        short = path.stat().st_size <= SHORT or is_table(path)
+        short = is_table(path) or (path.exists() and path.stat().st_size <= SHORT)
         draft = Draft(stream, profile_of(archive), hold=verbatim, copies=copies, short=short)
         entry.write(draft, progress)
         refuse_inputs(target, entry.inputs)
