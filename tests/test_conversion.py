@@ -260,10 +260,19 @@ def test_refusals() -> None:
     odd = Skeleton((Joint("hips", channels=POSITION), smile))
     with pytest.raises(MotionError, match="no channel 'smile'"):
         mcz.convert(Motion(odd, (Signal(np.zeros((1, 4))),)), "amc")
-    analog = Signal(np.zeros((240, 1)), name="analog", channels=(Channel("", "emg"),))
-    for motion, to in ((amc, "bvh"), (bvh, "amc")):
-        with pytest.raises(MotionError, match="not the signals motion, analog"):
-            mcz.convert(replace(motion, signals=(*motion.signals, analog)), to)
+
+
+@pytest.mark.parametrize("to", ["bvh", "amc", "c3d", "trc", "sto", "mot"])
+def test_signals_without_a_place_are_left_out_and_named(to: str) -> None:
+    """As the soft tissue of AMASS is: what else there is converts as it would alone."""
+    tissue = Signal(np.zeros((240, 8)), name="dmpls", channels=(Channel("", "1"),) * 8)
+    for motion in (WALKS["amc"], WALKS["bvh"]):
+        more = replace(motion, signals=(*motion.signals, tissue))
+        plain, made = mcz.convert(motion, to), mcz.convert(more, to)
+        assert [signal.name for signal in made.signals] == [s.name for s in plain.signals]
+        assert made.values.tobytes() == plain.values.tobytes()
+        losses = set(mcz.left_out(more, to)) - set(mcz.left_out(motion, to))
+        assert losses == {"left out: signal dmpls"}
 
 
 def test_a_converted_motion_can_be_stored(tmp_path: Path) -> None:

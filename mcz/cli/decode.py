@@ -245,7 +245,7 @@ def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made
             outputs = [Output(target, f"{_stem(motion)}.{target}", made.scene.data, CONVERTED)]
         else:
             outputs = _converted(motion, target, rate, wanted.with_skeleton)
-            made.left_out = left_out(motion, target)
+        made.left_out = left_out(motion, target)
     else:
         outputs = [_export(clip, target, part, wanted)]
         made.left_out = _beside(clip, wanted)
@@ -362,14 +362,15 @@ def _export(clip: Clip, target: str, part: Part, wanted: Wanted) -> Output:
 
 def _beside(clip: Clip, wanted: Wanted) -> tuple[str, ...]:
     """The signals that a table does not have, and --signal would write."""
-    from mcz.conversion.losses import of_recording
+    from mcz.conversion.losses import of_recording, of_text
 
     if wanted.signal is not None or wanted.joints is not None:
         return ()
     others = [signal.name for signal in clip.signals[1:]]
     signals = [f"left out: signal {', '.join(others)} (--signal)"] if others else []
     events = " (--signal events)" if clip.recording is not None and clip.recording.events else ""
-    return (*signals, *(f"{text}{events}" for text in of_recording(clip.recording)))
+    told = (f"{text}{events}" for text in of_recording(clip.recording))
+    return (*signals, *of_text(clip.metadata), *told)
 
 
 def _stem(clip: Clip | Motion) -> str:

@@ -49,7 +49,8 @@ def told(clips: Mapping[str, Made]) -> Iterator[str]:
             yield _fit_told(made.fit)
         if made.scene is not None:
             yield from _scene_told(made.scene)
-        yield from made.left_out
+        scene_notes = () if made.scene is None else made.scene.notes
+        yield from (text for text in made.left_out if text not in scene_notes)
         yield from made.notes
 
 

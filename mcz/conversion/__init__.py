@@ -8,7 +8,7 @@ from fractions import Fraction
 from mcz.conversion.acclaim import to_amc
 from mcz.conversion.counted import COUNTING, counted
 from mcz.conversion.hierarchy import to_bvh
-from mcz.conversion.losses import left_out
+from mcz.conversion.losses import held, left_out
 from mcz.conversion.markers import to_c3d
 from mcz.conversion.solved import Fit, from_positions
 from mcz.conversion.tables import needs_rate, to_storage, to_trc
@@ -65,7 +65,7 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
             f"motion {motion.name!r}: its frame rate is unknown, and {to.upper()} states one; "
             "give the rate"
         )
-    made = replace(TARGETS[to](motion), source=None).at_times(motion.timeline)
+    made = replace(TARGETS[to](held(motion, to)), source=None).at_times(motion.timeline)
     return counted(made, to) if to in COUNTING else made
 
 

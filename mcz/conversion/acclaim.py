@@ -55,9 +55,8 @@ def _check(motion: Motion) -> None:
     roots = [joint.name for joint in skeleton.joints if joint.parent < 0]
     if len(roots) != 1:
         raise MotionError(f"ASF has one root, and the skeleton has {len(roots)}: {roots[:8]}")
-    if len(motion.signals) > 1 or motion.signals[0].channels is not None:
-        names = ", ".join(signal.name for signal in motion.signals)
-        raise MotionError(f"AMC holds the channels of a skeleton alone, not the signals {names}")
+    if motion.signals[0].channels is not None:
+        raise MotionError(f"motion {motion.name!r}: AMC holds the channels of a skeleton alone")
     for joint in skeleton.joints:
         for channel in joint.channels:
             if channel.kind not in POSITION_KINDS + ROTATION_KINDS:

@@ -123,9 +123,8 @@ def _check(motion: Motion) -> None:
     """Raises MotionError for what no BVH can hold."""
     if point_set(motion.skeleton) == "markers":
         raise MotionError(f"motion {motion.name!r}: markers have no skeleton, and BVH needs one")
-    if len(motion.signals) > 1 or motion.signals[0].channels is not None:
-        names = ", ".join(signal.name for signal in motion.signals)
-        raise MotionError(f"BVH holds the channels of a skeleton alone, not the signals {names}")
+    if motion.signals[0].channels is not None:
+        raise MotionError(f"motion {motion.name!r}: BVH holds the channels of a skeleton alone")
     if gap := first_gap(motion):
         raise MotionError(f"motion {motion.name!r}: BVH cannot leave out values, but {gap}")
     if is_bvh(motion.skeleton):

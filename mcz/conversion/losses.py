@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from mcz.clock import is_time
 from mcz.conversion.counted import COUNTING, first_number, lost_times
+from mcz.formats.c3d_plain import KNOWN
+from mcz.formats.c3d_recording import parameters_of
+from mcz.formats.table_signals import text_columns
 from mcz.kinematics import point_set
 from mcz.kinematics.rest import NO_LENGTHS, has_no_lengths
 from mcz.motion import Motion
@@ -16,10 +20,17 @@ from mcz.reading.recording import Recording, recording
 MOST_NAMES = 8
 POINTS = ("c3d", "trc")  # what becomes of joints are points
 SCENES = ("glb", "usda")
+GROUPS = ("POINT", "ANALOG", "FORCE_PLATFORM", "EVENT", "TRIAL")  # of C3D, written or named
 SHAPED = ("bvh", "amc", *POINTS, *SCENES)  # a skeleton or its points
 UNNUMBERED = ("bvh", "sto", "mot", *SCENES)
-ANY_SIGNAL = ("bvh", "amc", "c3d")  # they refuse, or hold, what is beside the motion
+HELD = {"c3d": KNOWN}  # signals beside the motion, of the formats that hold any
 ROOT = "root"  # the only name that ASF has for it
+
+
+def held(motion: Motion, to: str) -> Motion:
+    """``motion`` with the signals alone that a format of ``mcz.convert`` has a place for."""
+    kept = [signal for signal in motion.signals[1:] if signal.name in HELD.get(to, ())]
+    return replace(motion, signals=(motion.signals[0], *kept))
 
 
 def left_out(motion: Motion, to: str) -> tuple[str, ...]:
@@ -34,14 +45,18 @@ def left_out(motion: Motion, to: str) -> tuple[str, ...]:
 def _left_out(motion: Motion, to: str) -> Iterator[str]:
     if to in SHAPED and has_no_lengths(motion.skeleton):
         yield f"{NO_LENGTHS}: all joints lie where the root is, until rest offsets are given"
-    others = [signal.name for signal in motion.signals[1:] if not is_time(signal)]
-    if others and to not in ANY_SIGNAL:
+    known = HELD.get(to, ())
+    others = [s.name for s in motion.signals[1:] if s.name not in known and not is_time(s)]
+    if others:
         yield f"left out: signal {', '.join(others)}"
+    yield from of_text(motion.metadata)
     names = [channel.label for channel in motion.skeleton.channels if not channel.kind]
     if names and to in (*POINTS, *SCENES) and point_set(motion.skeleton) != "markers":
         more = " ..." if len(names) > MOST_NAMES else ""
         yield f"left out: {', '.join(names[:MOST_NAMES])}{more}, which move nothing"
     yield from of_recording(recording(motion))
+    if to == "c3d":
+        yield from _groups(motion)
     yield from _numbers(motion, to)
     if to in COUNTING:
         yield from lost_times(motion, to)
@@ -72,6 +87,12 @@ def _acclaim_names(motion: Motion) -> Iterator[str]:
         yield f"ASF cannot hold the joint names {shown}: they have _ instead"
 
 
+def of_text(metadata: Mapping[str, str]) -> Iterator[str]:
+    """The columns of text of a table: no other file has them."""
+    if texts := text_columns(metadata):
+        yield f"left out: columns of text: {texts}"
+
+
 def of_recording(told: Recording | None) -> Iterator[str]:
     """Of a C3D what it says beside its numbers: no other file has it, nor does a plain C3D."""
     if told is None:
@@ -80,6 +101,18 @@ def of_recording(told: Recording | None) -> Iterator[str]:
     found = [f"{count} {what}{'s' if count > 1 else ''}" for count, what in counts if count]
     if found:
         yield f"left out: {', '.join(found)}"
+
+
+def _groups(motion: Motion) -> Iterator[str]:
+    """The groups of parameters of a C3D that a plain one has not."""
+    source = motion.source
+    if source is None or recording(motion) is None:
+        return
+    found = parameters_of(source.format, source.template, source.detail).found
+    groups = [group for group in dict.fromkeys(group for group, _ in found) if group not in GROUPS]
+    if groups:
+        more = " ..." if len(groups) > MOST_NAMES else ""
+        yield f"left out: parameters of {', '.join(groups[:MOST_NAMES])}{more}"
 
 
 def _numbers(motion: Motion, to: str) -> Iterator[str]:

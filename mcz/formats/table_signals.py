@@ -5,7 +5,8 @@ The columns of a table are different things: a time, an angle, a force. So are t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ RUN_BITS = 48  # of one more run of grids in CLIP, and of what its heads need
 EXCEPTION_BITS = 200
 TEXT = "text"  # the signal of the numbers in text columns
 MAX_NOTE = 200
+_TEXT_NOTE = re.compile(r"(?:^|; )[0-9]+ columns? (?:is|are) text: ([^;]*)")
 MOST_TRIED = 2048  # columns; of more each may take long, and has little to gain
 
 
@@ -93,6 +95,12 @@ def text_note(labels: Sequence[str]) -> str:
     """A note that these columns are text; "" for none."""
     verb = "column is" if len(labels) == 1 else "columns are"
     return f"{len(labels)} {verb} text: {', '.join(labels)}"[:MAX_NOTE] if labels else ""
+
+
+def text_columns(metadata: Mapping[str, str]) -> str:
+    """The names of the columns of text of a table that was read; "" where it has none."""
+    match = _TEXT_NOTE.search(metadata.get("source-note", ""))
+    return match[1] if match else ""
 
 
 def table_metadata(encoding: str, notes: Sequence[str]) -> dict[str, str]:

@@ -7,6 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
+from mcz.clock import EXACT, numbers_or_rows
 from mcz.formats import FORMATS, arrays_of
 from mcz.formats.c3d_events import Event
 from mcz.formats.c3d_parameters import TEXT, Parameter, Parameters
@@ -47,14 +50,37 @@ def differences(a: Motion, b: Motion) -> list[Difference]:
         for what in facts[0]
         if facts[0][what] != facts[1][what]
     ]
+    if facts[0]["first frame"] == facts[1]["first frame"]:
+        found += _of_times(a, b, is_rate_same=facts[0]["frame rate"] == facts[1]["frame rate"])
+    names = [list(side["joints"]) for side in things]
+    if sorted(names[0]) == sorted(names[1]) and names[0] != names[1]:
+        found.append(Difference("order of joints", None, None))
     for one, other in (things, things[::-1]):  # a group that is not there is enough to say
         groups = other["groups of parameters"]
         both = {key: value for key, value in one["parameters"].items() if key[0] in groups}
         one["parameters"] = {f"{group}:{name}": value for (group, name), value in both.items()}
     found += filter(None, (_compared(what, things[0][what], things[1][what]) for what in things[0]))
-    if not found and _is_printed_otherwise(a, b):
-        found.append(Difference("header or layout of the files", None, None))
+    if not found and (what := _otherwise(a, b)):
+        found.append(Difference(what, None, None))
     return found
+
+
+def _of_times(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[Difference]:
+    """What frame numbers and times beyond the first frame's number and the rate say otherwise."""
+    numbers = numbers_or_rows(a.frame_numbers, a.n_frames)
+    if not np.array_equal(numbers, numbers_or_rows(b.frame_numbers, b.n_frames)):
+        yield Difference("frame numbers", None, None)
+        return
+    one, other = a.timeline, b.timeline
+    if one is None or other is None or not is_rate_same or len(one.times) != len(other.times):
+        return
+    off = np.abs(one.even - other.even)
+    allowed = one.rounding + other.rounding + EXACT
+    if (off[:1] > allowed).any():
+        first, others = float(one.even[0]), float(other.even[0])
+        yield Difference("time of the first frame in s", first, others)
+    elif (off > allowed).any():
+        yield Difference("times", None, None)
 
 
 def _compared(what: str, a: Mapping[str, Any], b: Mapping[str, Any]) -> Difference | None:
@@ -80,8 +106,16 @@ def _things(motion: Motion) -> dict[str, dict[Any, Any]]:
     """Things of which a motion may have several, by name or by what they say."""
     parameters, told = _parameters(motion), recording(motion)
     arrays = arrays_of(motion.source, [signal.name for signal in motion.signals]) or ()
+    bones = motion.skeleton
+    names = bones.addresses()
     return {
-        "signals": {s.name: (s.n_channels, s.samples_per_frame) for s in motion.signals},
+        "joints": {
+            name: (names[joint.parent] if joint.parent >= 0 else "", joint.channels)
+            for name, joint in zip(names, bones.joints, strict=True)
+        },
+        "signals": {
+            s.name: (s.n_channels, s.samples_per_frame, s.channels) for s in motion.signals
+        },
         "events": {} if told is None else dict(_events(told.events)),
         "force platforms": {} if told is None else dict(_platforms(told.platforms)),
         "groups of parameters": {group: None for group, _ in parameters},
@@ -125,9 +159,18 @@ def _value(held: Parameters, parameter: Parameter) -> Any:
     return parameter.type, parameter.dims, held.numbers_of(parameter)
 
 
-def _is_printed_otherwise(a: Motion, b: Motion) -> bool:
-    """Whether two sources of one format differ in what is neither a number nor named above."""
+def _otherwise(a: Motion, b: Motion) -> str:
+    """What two sources of one format say otherwise that is named nowhere else, "" if nothing."""
     one, other = a.source, b.source
     if one is None or other is None or one.format != other.format:
-        return False
-    return one.template != other.template
+        return ""
+    if one.template != other.template:
+        return "header or layout of the files"
+    numbers = [[signal.masked() for signal in motion.signals] for motion in (a, b)]
+    if not all(np.array_equal(x, y, equal_nan=True) for x, y in zip(*numbers, strict=True)):
+        return ""  # whose digits may take other places
+    notes = [source.notes and source.notes.cut(0, a.n_frames) for source in (one, other)]
+    if (one.detail, notes[0]) == (other.detail, notes[1]):
+        return ""
+    has_arrays = FORMATS[one.format].arrays is not None
+    return "arrays beside the signals" if has_arrays else "texts or layout of the rows"

@@ -62,6 +62,41 @@ def test_what_is_left_out_is_said(folder: Path, call: Call) -> None:  # noqa: F8
     assert (folder / "x.trc").read_bytes() == (folder / "y.trc").read_bytes()
 
 
+@pytest.mark.parametrize("to", ["bvh", "amc", "c3d", "trc", "sto", "mot", "glb", "usda", "csv"])
+def test_columns_and_signals_that_are_lost_are_said(tmp_path: Path, call: Call, to: str) -> None:  # noqa: F811
+    """In one step or two, in words and in JSON, whatever the target."""
+    head = "Frame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ,State"
+    text = (
+        f"Objects\n100\n,,A:A,,,,,,,\n{head}\n,,,,,,mm,mm,mm,\n"
+        "1,0,0,0,0,1,1,2,3,up\n2,0,0,0,0.6,0.8,1,2,4,down\n\n"
+        "Devices\n200\n,,Amp\nFrame,Sub Frame,EMG\n,,V\n1,0,1\n1,1,2\n2,0,3\n2,1,4\n"
+    )
+    (tmp_path / "a.csv").write_text(text)
+    assert call("encode", tmp_path / "a.csv")[0] == 0
+    up = ["--up", "z"] if to in ("c3d", "glb", "usda") else []
+    for verb, source in (("convert", "a.csv"), ("decode", "a.mcz")):
+        words = [verb, tmp_path / source, "--to", to, "-o", tmp_path / f"x.{to}", "--force", *up]
+        if verb == "convert":
+            words = [verb, tmp_path / source, tmp_path / f"x.{to}", "--force", *up]
+        if to == "csv" and verb == "convert":
+            continue  # the same format: restored
+        code, out, err = call(*words)
+        assert code == 0 and "converted" in out
+        told = json.loads(call(*words, "--json")[1])["left_out"]["a"]
+        for lost in ("left out: signal Devices", "left out: columns of text: A:A.State"):
+            assert err.count(lost) == 1 and any(line.startswith(lost) for line in told)
+
+
+def test_a_plain_c3d_names_the_groups_that_it_has_not(folder: Path, call: Call) -> None:  # noqa: F811
+    data = (folder / "walk.c3d").read_bytes()
+    assert data.count(b"FORCE_PLATFORM") == 1
+    (folder / "made.c3d").write_bytes(data.replace(b"FORCE_PLATFORM", b"MANUFACTURERS_"))
+    assert call("encode", folder / "made.c3d")[0] == 0
+    to = ("--to", "c3d", "-o", folder / "x.c3d")
+    err = call("decode", folder / "made.mcz", *to)[2]
+    assert "left out: parameters of MANUFACTURERS_" in err
+
+
 def test_nothing_is_overwritten(folder: Path, call: Call) -> None:  # noqa: F811
     (folder / "x.trc").write_bytes(b"mine")
     words = ("convert", folder / "walk.c3d", folder / "x.trc")

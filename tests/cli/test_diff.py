@@ -353,3 +353,52 @@ def test_records_with_contacts_are_shown() -> None:
     lines = list(figure_lines(told | {"shell_mean_cm": "0.25"}))
     assert lines[-2:] == ["contacts of feet: 3", "they slide 0.05 mm on average, at most 0.1 mm"]
     assert lines[-3].split() == ["shell_mean", "0.25"]
+
+
+TRC = (
+    "PathFileType\t4\t(X/Y/Z)\ta.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\t"
+    "OrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n100\t100\t3\t2\tmm\t100\t1\t3\n"
+    "Frame#\tTime\tA\t\t\tB\t\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n"
+    "1\t0.00\t1\t2\t3\t4\t5\t6\n2\t0.01\t1\t2\t3\t4\t5\t6\n3\t0.02\t1\t2\t3\t4\t5\t6\n"
+)
+COLUMNS = "time,x,y,label\n0.00,1.5,2,a\n0.01,2.5,3,b\n0.02,3.5,4,c\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "changes", "line"),
+    [
+        (TRC, [("\tB\t", "\tC\t")], "joints: 2 in A, 2 in B; only in A: B; only in B: C"),
+        (TRC, [("\tA\t\t\tB", "\tB\t\t\tA")], "order of joints: not the same"),
+        (TRC, [("3\t0.02", "5\t0.04")], "frame numbers: not the same"),
+        (TRC, [("\t0.0", "\t1.0")], "time of the first frame in s: 0 in A, 1 in B"),
+        (COLUMNS, [(",y,", ",z,")], "joints: 2 in A, 2 in B; only in A: y; only in B: z"),
+        (COLUMNS, [(",x,y,", ",y,x,")], "order of joints: not the same"),
+        (COLUMNS, [(",b\n", ",d\n")], "texts or layout of the rows: not the same"),
+        (COLUMNS, [("\n0.0", "\n5.0")], "time of the first frame in s: 0 in A, 5 in B"),
+    ],
+)
+def test_what_is_not_the_same_beside_the_numbers(
+    tmp_path: Path, call: Call, text: str, changes: list[tuple[str, str]], line: str
+) -> None:
+    """Two sources of the same numbers: names, order, frame numbers, times and texts are named."""
+    suffix = ".trc" if text is TRC else ".csv"
+    (tmp_path / f"a{suffix}").write_text(text)
+    for old, new in changes:
+        text = text.replace(old, new)
+    (tmp_path / f"b{suffix}").write_text(text)
+    code, out, _ = call("diff", tmp_path / f"a{suffix}", tmp_path / f"b{suffix}")
+    assert code == 0 and [f"  {line}"] == [
+        found for found in out.splitlines() if " in A, " in found or "not the same" in found
+    ]
+
+
+def test_arrays_that_are_no_signals_are_compared(tmp_path: Path, call: Call) -> None:
+    arrays: dict[str, Any] = {
+        "poses": np.ones((3, 66)),
+        "trans": np.zeros((3, 3)),
+        "mocap_framerate": 120.0,
+    }
+    for name, shape in (("a", 0.0), ("b", 1.0)):
+        np.savez(tmp_path / f"{name}.npz", **arrays, betas=np.full(10, shape))
+    code, out, _ = call("diff", tmp_path / "a.npz", tmp_path / "b.npz")
+    assert code == 0 and "arrays beside the signals: not the same" in out
