@@ -71,8 +71,8 @@ def _named(path: Path, reader: Any, data: bytes, *arguments: Any) -> Any:
 
 def _other_content(path: Path, data: bytes) -> str:
     """A hint where a file that cannot be read begins as one of another suffix does."""
-    likely = (name for name in likely_formats(data) if name != "csv")  # as many texts do
-    found = [FORMATS[name].suffix for name in likely]
+    formats = [FORMATS[name] for name in likely_formats(data)]
+    found = [known.suffix for known in formats if known.is_motion is None or known.is_motion(data)]
     return f"; it looks like {found[0]}" if found and path.suffix.lower() not in found else ""
 
 
