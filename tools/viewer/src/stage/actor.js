@@ -4,6 +4,7 @@ import { anatomyOf } from "../engine/anatomy.js";
 import { Poses } from "../engine/poses.js";
 import { Standing } from "../engine/standing.js";
 import { rateOf } from "../timeline/clock.js";
+import { isGapAfter } from "../ui/times.js";
 import { Axes, between } from "./axes.js";
 import { Body } from "./body.js";
 import { boundsOf, facing, measured, quantile, scaleOf } from "./framing.js";
@@ -193,9 +194,10 @@ export class Actor {
    *   unknown
    */
   speeds(frame, out) {
-    const last = this.clip.nFrames - 1;
-    const low = Math.max(0, Math.floor(frame) - 1);
-    const high = Math.min(last, Math.floor(frame) + 1);
+    const { clip } = this;
+    const row = Math.floor(frame);
+    const low = row === 0 || isGapAfter(clip, row - 1) ? row : row - 1;
+    const high = row === clip.nFrames - 1 || isGapAfter(clip, row) ? row : row + 1;
     const before = this.poses.held(low);
     const after = this.poses.held(high);
     if (before === null || after === null || high === low) return out.fill(0);
