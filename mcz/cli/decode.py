@@ -177,7 +177,7 @@ def decode(
         if not held.clips:
             _check_plain(file, wanted)
             outputs = [_other(held, names)]
-            check_kept(output, outputs[0].name)
+            check_kept(output, outputs[0].name, is_skeleton=outputs[0].kind == "skeleton")
         facts: dict[str, Any] = {"damage": held.damage, "unverified_segments": held.unverified}
     deliver(inputs, output, outputs, force, as_json, facts | facts_of(made))
     if facts["unverified_segments"]:

@@ -77,10 +77,13 @@ def target_of_clip(clip: Clip, output: str | None, *, plain: bool) -> str | None
     return target
 
 
-def check_kept(output: str | None, name: str) -> None:
-    """Raise Failure where the suffix of an output is not that of the file ``name`` itself."""
+def check_kept(output: str | None, name: str, *, is_skeleton: bool) -> None:
+    """Raise Failure where the suffix of an output is not that of the file ``name`` itself.
+
+    A skeleton's file is an ASF, whatever it is called.
+    """
     suffix, own = suffix_of(output), PurePosixPath(name).suffix.lower()
-    if suffix in ("", own):
+    if suffix in ("", own) or (is_skeleton and suffix == ".asf"):
         return
     if target_of(suffix) is not None or suffix in OTHERS:
         reason = f"what is kept is {name}, which is not converted to {suffix}"

@@ -206,14 +206,20 @@ def format_of(path: str | Path, data: bytes | None = None) -> Format:
     """
     suffix = Path(path).suffix.lower()
     own = next((f for f in FORMATS.values() if suffix in f.suffixes), None)
+    found = () if data is None else likely_formats(data)
     if own is None:
         known = ", ".join(dict.fromkeys(s for f in FORMATS.values() for s in f.suffixes))
+        looks = f"; it looks like {FORMATS[found[0]].suffix}" if found and found[0] != "csv" else ""
         name = Path(path).name
-        raise SourceError(f"{name}: no source format has the suffix {suffix!r}, but {known}")
-    found = () if data is None else likely_formats(data)
+        raise SourceError(f"{name}: no source format has the suffix {suffix!r}, but {known}{looks}")
     if not found or found[0] == "csv" or any(suffix in FORMATS[n].suffixes for n in found):
         return own
     return FORMATS[found[0]]
+
+
+def has_known_suffix(path: str | Path) -> bool:
+    """Whether a source format has the suffix of a file."""
+    return any(Path(path).suffix.lower() in known.suffixes for known in FORMATS.values())
 
 
 def is_table(path: str | Path) -> bool:

@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from mcz.errors import MczError, OptionError, SourceError
-from mcz.formats import FORMATS, Format, format_of, likely_formats
+from mcz.formats import (
+    FORMATS,
+    HEAD_BYTES,
+    Format,
+    format_of,
+    has_known_suffix,
+    likely_formats,
+)
 from mcz.formats.arrays.kinds import with_kinds
 from mcz.formats.arrays.shaped import with_model
 from mcz.motion import Motion, Skeleton
@@ -30,7 +37,8 @@ def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
 
 def load(path: Path) -> tuple[Format, bytes]:
     """The format of a source file, see ``format_of``, and its bytes; raises SourceError."""
-    format_of(path)  # files of other suffixes are refused unread
+    if not has_known_suffix(path):  # it is refused, whatever it holds
+        format_of(path, _start_of(path))
     data = read_bytes(path)
     return format_of(path, data), data
 
@@ -74,6 +82,15 @@ def _other_content(path: Path, data: bytes) -> str:
     formats = [FORMATS[name] for name in likely_formats(data)]
     found = [known.suffix for known in formats if known.is_motion is None or known.is_motion(data)]
     return f"; it looks like {found[0]}" if found and path.suffix.lower() not in found else ""
+
+
+def _start_of(path: Path) -> bytes:
+    """The first bytes of a file, none where there is no such file."""
+    try:
+        with path.open("rb") as file:
+            return file.read(HEAD_BYTES)
+    except OSError:
+        return b""
 
 
 def read_bytes(path: Path) -> bytes:

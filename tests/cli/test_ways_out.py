@@ -173,6 +173,11 @@ def test_what_is_kept_has_its_suffix(samples: Path, tmp_path: Path, call: Call) 
     assert "did you mean .asf?" in call("decode", tmp_path / "s.mcz", "-o", tmp_path / "x.asff")[2]
     path, result = result_of(call, tmp_path / "s.mcz", "-o", tmp_path / "x.ASF")
     assert (path.read_bytes(), result) == ((samples / "walk.asf").read_bytes(), "restored")
+    (tmp_path / "odd.bvh").write_bytes((samples / "walk.asf").read_bytes())
+    assert call("encode", tmp_path / "odd.bvh")[0] == 0
+    for word in ("y.asf", "y.bvh"):
+        path, result = result_of(call, tmp_path / "odd.mcz", "-o", tmp_path / word)
+        assert (path.read_bytes(), result) == ((samples / "walk.asf").read_bytes(), "restored")
     (tmp_path / "notes.txt").write_bytes(b"notes")
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "notes.txt").write_bytes(b"notes")

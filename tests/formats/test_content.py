@@ -10,6 +10,7 @@ import pytest
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
+from mcz.errors import SourceError
 from mcz.formats import FORMATS, format_of, likely_formats
 from tests.cli.test_ways_out import CLIPS, source_files
 
@@ -89,3 +90,17 @@ def test_content_that_is_no_other_format_is_refused_by_its_suffix(tmp_path: Path
     assert likely_formats(b"no motion\n") == ()
     with pytest.raises(mcz.SourceError, match="the end of a C3D header"):
         mcz.read(tmp_path / "t.c3d")
+
+
+@pytest.mark.parametrize("name", ["take", "take.dat", "take.c3d.old"])
+def test_a_file_without_a_known_suffix_is_refused_with_a_hint(
+    tmp_path: Path, samples: Path, name: str
+) -> None:
+    (tmp_path / name).write_bytes((samples / "walk.bvh").read_bytes())
+    with pytest.raises(SourceError, match=r"format has the suffix .*; it looks like .bvh"):
+        mcz.encode(tmp_path / name, tmp_path / "a.mcz")
+    (tmp_path / name).write_bytes(b"\0\1\2")
+    with pytest.raises(SourceError, match=r", .npz$"):
+        mcz.read(tmp_path / name)
+    with pytest.raises(SourceError, match=r", .npz$"):
+        mcz.read(tmp_path / f"no{name}")
