@@ -102,6 +102,7 @@ def _encode(
     """The same as ``mcz encode`` does by default."""
     from mcz.cli.encode import command as encode
 
-    options = {"source": file, "output": output, "force": force, "as_json": as_json}
+    options: dict[str, Any] = {"source": file, "output": output, "force": force}
+    options |= {"as_json": as_json, "params": None}  # invoke calls no callbacks
     code: Exit = click.get_current_context().invoke(encode, **options, **facts)
     return code
