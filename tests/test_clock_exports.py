@@ -72,6 +72,23 @@ def test_tables_have_the_times(source: str, to: str, tmp_path: Path) -> None:
     assert not [text for text in left_out(motion, to) if "time" in text]
 
 
+@pytest.mark.parametrize("to", ["trc", "sto", "mot"])
+@pytest.mark.parametrize(("rate", "places"), [("120", 3), ("59.94", 3), ("59.94", 6), ("250", 2)])
+def test_printed_times_are_printed_again(rate: str, places: int, to: str, tmp_path: Path) -> None:
+    times = np.round((GAP - 1) / float(rate), places)
+    rows = zip(GAP, times, strict=True)
+    text = (
+        "PathFileType\t4\t(X/Y/Z)\tin.trc\n"
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n"
+        f"{rate}\t{rate}\t{len(GAP)}\t1\tmm\nFrame#\tTime\tA\n\t\tX1\tY1\tZ1\n\n"
+        + "".join(f"{n}\t{time:.{places}f}\t{n}.5\t1.0\t2.0\n" for n, time in rows)
+    )
+    (tmp_path / "a.trc").write_text(text)
+    motion = mcz.read(tmp_path / "a.trc")
+    assert motion.times.tolist() == times.tolist()
+    assert np.abs(again(motion, to, tmp_path).times - times).max() < 1e-9
+
+
 def test_numbers_of_a_trc_are_the_source_s(tmp_path: Path) -> None:
     made = again(SOURCES["gap"](), "trc", tmp_path)
     assert made.frame_numbers is not None and made.frame_numbers.tolist() == GAP.tolist()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
+from mcz.clock import Timeline
 from mcz.conversion.acclaim import to_amc
 from mcz.conversion.counted import COUNTING, counted
 from mcz.conversion.hierarchy import to_bvh
@@ -65,7 +66,10 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
             f"motion {motion.name!r}: its frame rate is unknown, and {to.upper()} states one; "
             "give the rate"
         )
-    made = replace(TARGETS[to](held(motion, to)), source=None).at_times(motion.timeline)
+    timeline = motion.timeline
+    if timeline is not None and FORMATS[to].is_table:  # prints what the source prints
+        timeline = Timeline(timeline.times, timeline.rate)
+    made = replace(TARGETS[to](held(motion, to)), source=None).at_times(timeline)
     return counted(made, to) if to in COUNTING else made
 
 
