@@ -193,6 +193,14 @@ def is_time(signal: Timed) -> bool:
     )
 
 
+def times_place(skeleton: Skeleton, signals: Sequence[Timed]) -> tuple[int, str] | None:
+    """The signal whose first column is the time, and its unit; None where there is none."""
+    first, index = signals[0], time_signal(signals)
+    if first.channels is None and first.samples_per_frame == 1 and has_times(skeleton):
+        return 0, skeleton.channels[0].unit
+    return None if index is None else (index, (signals[index].channels or ())[0].unit)
+
+
 def column_of(numbers: NDArray[np.generic], grid: Grid, unit: str) -> Column:
     """The column of times that ``numbers``, (n_frames,), on ``grid`` are in ``unit``."""
     per_second = PER_SECOND[unit]

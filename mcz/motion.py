@@ -31,12 +31,11 @@ from mcz.clock import (
     Counting,
     Timeline,
     column_of,
-    has_times,
     known_timeline,
     numbered,
     numbers_or_rows,
-    time_signal,
     timeline_of,
+    times_place,
 )
 from mcz.displays import html_of
 from mcz.errors import MotionError, OutOfRangeError
@@ -195,14 +194,10 @@ class Motion:
     def timeline(self) -> Timeline | None:
         """When every frame was, None where neither times nor a rate are known."""
         column = None
-        index = time_signal(self.signals)
-        first = self.signals[0]
-        if first.channels is None and has_times(self.skeleton) and first.samples_per_frame == 1:
-            index = 0
-        if index is not None:
-            signal = self.signals[index]
-            channels = self.skeleton.channels if index == 0 else signal.channels or ()
-            column = column_of(signal.masked()[:, 0], signal.grids[0], channels[0].unit)
+        place = times_place(self.skeleton, self.signals)
+        if place is not None:
+            signal = self.signals[place[0]]
+            column = column_of(signal.masked()[:, 0], signal.grids[0], place[1])
         numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
         clock = self.source.clock if self.source is not None else None
         counting = Counting(numbers, self.frame_rate, self.number_step)

@@ -110,9 +110,7 @@ class Part:
         )
 
     def _timeline(self) -> Timeline | None:
-        from mcz.reading.timelines import timeline_at
-
-        return timeline_at(self.clip, self.rate)
+        return self.clip.timeline_at(self.rate)
 
     def _rows(self, joints: Sequence[int | str] | None) -> Masked:
         return self.clip.read_masked(self.frames, joints, self.resolution)

@@ -24,7 +24,6 @@ from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.source_report import is_source
-from mcz.reading.timelines import timeline_at
 from mcz.skeleton import Joints
 
 Target = str | os.PathLike[str] | File
@@ -147,7 +146,7 @@ def _members(
     clip: Clip, target: str, recipe: Recipe, assumed: Fraction | None, across_gaps: bool
 ) -> Iterator[Member]:
     """The parts of a clip between gaps, at the rate of the data set."""
-    own, timeline = clip.frame_rate or assumed, timeline_at(clip, assumed)
+    own, timeline = clip.frame_rate or assumed, clip.timeline_at(assumed)
     runs = [(0, clip.n_frames)] if timeline is None or across_gaps else timeline.runs
     for start, stop in runs or [(0, 0)]:
         n_frames = stop - start

@@ -23,7 +23,6 @@ from mcz.poses.resampling import Times, resampled, times_at, turn_scalars
 from mcz.poses.scalar_quaternions import scalar_quaternions
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
-from mcz.reading.timelines import timeline_at
 from mcz.skeleton import Joints
 
 MOST_OPEN = 64  # files at once: systems allow 256 and more
@@ -157,7 +156,7 @@ def _values(
 
 def _steps(recipe: Recipe, clip: Clip, member: Member, low: int, high: int) -> Floats:
     """The seconds from each of these frames to the next; NaN across a gap."""
-    timeline = timeline_at(clip, member.source_rate) if recipe.reach else None
+    timeline = clip.timeline_at(member.source_rate) if recipe.reach else None
     if recipe.step(member) == 1 and timeline is not None:
         return timeline.steps[member.first + low : member.first + max(low, high - 1)]
     rate = recipe.rate or member.source_rate

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import replace
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -11,7 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.brief import shown
-from mcz.clock import START, usual_step
+from mcz.clock import (
+    START,
+    Column,
+    Counting,
+    Timeline,
+    column_of,
+    known_timeline,
+    timeline_of,
+    times_place,
+    usual_step,
+)
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
 from mcz.container.value_hash import value_hash
@@ -23,7 +34,7 @@ from mcz.reading.posing import Posed
 from mcz.reading.preview import Preview, preview
 from mcz.reading.signal_info import SignalInfo, groups_of
 from mcz.reading.signal_reader import SignalReader
-from mcz.reading.source_info import SourceInfo, read_source, sourced_skeleton
+from mcz.reading.source_info import SourceInfo, read_clock, read_source, sourced_skeleton
 from mcz.reading.source_rates import stating_rate
 from mcz.reading.stored_clip import StoredClip
 from mcz.reading.views import ClipValues, FrameValues, Masked
@@ -213,6 +224,37 @@ class Clip(StoredClip, Posed):
         if (start, stop, resolution) == (0, self.n_frames, 0):
             return source
         return source.of_no_file()
+
+    @cached_property
+    def timeline(self) -> Timeline | None:
+        """When every frame was, None where neither times nor a rate are known."""
+        column = self.times_column()
+        clock = read_clock(self.container, self._fields, self.signals[0])
+        counting = Counting(self.frame_numbers, self.frame_rate)
+        return timeline_of(counting, self.metadata, clock, column)
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """The time of every frame in seconds, (n_frames,): see ``mcz.times``; OptionError.
+
+        At most the column of times is decoded.
+        """
+        return known_timeline(self.name, self.timeline).times
+
+    def timeline_at(self, rate: Fraction | None) -> Timeline | None:
+        """``timeline``, by ``rate`` where the clip states neither a rate nor times."""
+        if self.timeline is None and rate is not None:
+            return timeline_of(Counting(self.frame_numbers, rate), self.metadata)
+        return self.timeline
+
+    def times_column(self) -> Column | None:
+        """The times that stand among the values; None where there are none."""
+        place = times_place(self.skeleton, self.signals)
+        if place is None:
+            return None
+        index, unit = place
+        times = self.read(joints=None if index else [0], signal=index)[:, 0]
+        return column_of(times, self.signals[index].grids[0], unit)
 
     def preview(self, joints: Joints = None) -> FrameValues:
         """What can be read without decoding the rest: frames, counted from 0, and their values.

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clock import Timeline, known_timeline
 from mcz.displays import html_of
-from mcz.reading.timelines import Stored, clip_timeline
 from mcz.skeleton import Joints, joint_list
 
 if TYPE_CHECKING:
@@ -32,19 +29,6 @@ class Posed:
     @property
     def _whole(self) -> Motion:
         return cast("Motion", cast(Any, self).motion())
-
-    @cached_property
-    def timeline(self) -> Timeline | None:
-        """When every frame was, None where neither times nor a rate are known."""
-        return clip_timeline(cast("Stored", self))
-
-    @property
-    def times(self) -> NDArray[np.float64]:
-        """The time of every frame in seconds, (n_frames,): see ``mcz.times``; OptionError.
-
-        At most the column of times is decoded.
-        """
-        return known_timeline(self._clip.name, self.timeline).times
 
     @property
     def joint_names(self) -> tuple[str, ...]:

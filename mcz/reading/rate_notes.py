@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import cast
 
 from mcz.clock import usual_step
 from mcz.errors import FormatError
@@ -11,7 +10,6 @@ from mcz.formats import FORMATS, format_by_id
 from mcz.formats.times import rate_of_times
 from mcz.reading.clip import Clip
 from mcz.reading.source_rates import contradiction, is_one_of
-from mcz.reading.timelines import Stored, times_column
 
 
 def rate_note(clip: Clip, *, is_file: bool) -> str | None:
@@ -54,7 +52,7 @@ def _stated(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
     if found is not None:
         stated: Fraction = found.rate
         return stated if is_file or found.template == template else None
-    column = times_column(cast(Stored, clip))
+    column = clip.times_column()
     if column is None:
         return None
     own, _ = rate_of_times(column.times, [column.rounding])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
 from fractions import Fraction
 from functools import cached_property
@@ -16,18 +17,17 @@ from mcz.container.directory import ClipRow
 from mcz.container.frame_numbers import parse_frame_numbers
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
-from mcz.errors import FormatError, UnsupportedError
+from mcz.errors import FormatError, OptionError, UnsupportedError
 from mcz.formats.c3d_recording import Recording
 from mcz.motion import Skeleton
 from mcz.numbers.scaling import Scaling
-from mcz.reading.extent import Extent
 from mcz.reading.recording import index_of, read_recording, scaling_of
 from mcz.reading.signal_info import SignalInfo, read_signal
 from mcz.reading.source_info import SourceInfo, source_info, sourced_skeleton
 from mcz.schema import parse
 
 
-class StoredClip(Extent):
+class StoredClip:
     """What CLIP, CEND and the chunks that belong to a clip say."""
 
     def __init__(self, container: Container, row: ClipRow) -> None:
@@ -109,6 +109,33 @@ class StoredClip(Extent):
     def n_channels(self) -> int:
         """Channels of the motion signal."""
         return self._row.signals[0].n_channels
+
+    def __len__(self) -> int:
+        """The number of frames."""
+        return self.n_frames
+
+    def __bool__(self) -> bool:
+        """True: a clip without frames is a clip, too."""
+        return True
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_frames, n_channels) of the motion signal."""
+        return self.n_frames, self.n_channels
+
+    def checked_range(self, frames: tuple[int, int] | None) -> tuple[int, int]:
+        """``frames``, or all; raises OptionError where they are not in the clip."""
+        if frames is None:
+            return 0, self.n_frames
+        try:
+            start, stop = map(operator.index, frames)
+        except (TypeError, ValueError):
+            raise OptionError(f"frames {frames!r}: not two integers, first and end") from None
+        if not 0 <= start <= stop <= self.n_frames:
+            raise OptionError(
+                f"clip {self.name!r} has frames 0 to {self.n_frames}, not {start}:{stop}"
+            )
+        return start, stop
 
     @property
     def codec(self) -> str:
