@@ -76,9 +76,13 @@ def unpack(
             for done, (one, restore) in enumerate(zip(stored, restoring, strict=True)):
                 outcome = writing.outcome(one.path, restore)
                 if outcome.result == RESTORED:
-                    if mtimes and not set_time(writing.place, _time_of(file, one)):
+                    clip = file.clips[one.name] if one.kind == "clip" else None
+                    time = clip.metadata.get("mtime") if mtimes and clip is not None else None
+                    if mtimes and not set_time(writing.place, time):
                         timeless.append(one.path)
-                    outcome = replace(outcome, result=_fidelity(file, one), notes=_notes(file, one))
+                    note = None if clip is None else rate_note(clip, is_file=clip.gives_file())
+                    result, notes = _fidelity(file, one), (note,) if note else ()
+                    outcome = replace(outcome, result=result, notes=notes)
                 if salvage and writing.is_damaged:
                     outcome = replace(outcome, result="damaged")
                 report.outcomes.append(outcome)
@@ -88,11 +92,6 @@ def unpack(
             report.left_out.append(f"times of files that are no clips: {listed(timeless)}")
         report.outcomes += _without_file(wanted)
     return report
-
-
-def _time_of(file: File, one: Stored) -> str | None:
-    """When a file was last changed, as the metadata of its clip have it."""
-    return file.clips[one.name].metadata.get("mtime") if one.kind == "clip" else None
 
 
 def _without_file(clips: Iterable[Clip]) -> Iterator[Outcome]:
@@ -156,15 +155,6 @@ def _of_alias(file: File, name: str, of: int, target: bytes) -> bytes:
     if called not in (file.clips if of == payloads.OF_CLIP else file.attachments):
         raise FormatError(f"alias {name!r} names {target!r}, which is not there")
     return _of_thing(file, "clip" if of == payloads.OF_CLIP else "attachment", called)
-
-
-def _notes(file: File, one: Stored) -> tuple[str, ...]:
-    """Where a source that was written states another frame rate than its clip has."""
-    if one.kind != "clip":
-        return ()
-    clip = file.clips[one.name]
-    note = rate_note(clip, is_file=clip.gives_file())
-    return () if note is None else (note,)
 
 
 def _fidelity(file: File, one: Stored) -> str:

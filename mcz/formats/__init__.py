@@ -118,81 +118,58 @@ FORMATS: dict[str, Format] = {
             has_more_joints=_of("hierarchy", "has_more_joints"),
             restate=_of("stated_rates", "restate_bvh"),
         ),
-        Format(
-            "c3d",
-            4,
-            (".c3d",),
-            _of("c3d", "read"),
-            _of("c3d", "write"),
-            states_rate=True,
-            restate=_of("stated_rates", "restate_c3d"),
-            recording=_of("c3d_recording", "recording"),
-            clock=_of("c3d_layout", "clock_of"),
-        ),
-        Format(
-            "c3d-outputs",  # a C3D whose points are not all points; the table gives c3d for .c3d
-            5,
-            (".c3d",),
-            _of("c3d", "read"),
-            _of("c3d", "write"),
-            states_rate=True,
-            restate=_of("stated_rates", "restate_outputs"),
-            recording=_of("c3d_recording", "recording"),
-            clock=_of("c3d_layout", "clock_of"),
-        ),
-        *(
+        *(  # c3d-outputs: a C3D whose points are not all points; the table gives c3d for .c3d
             Format(
                 name,
                 format_id,
-                (f".{name}",),
-                _of(module, f"read_{name}"),
-                _of(module, f"write_{name}"),
-                join_table_notes,
+                (".c3d",),
+                _of("c3d", "read"),
+                _of("c3d", "write"),
                 states_rate=True,
-                is_table=True,
-                restate=_of("stated_rates", "restate_table"),
-                clock=_of("table_layout", "clock_of"),
+                restate=_of("stated_rates", restate),
+                recording=_of("c3d_recording", "recording"),
+                clock=_of("c3d_layout", "clock_of"),
             )
-            for format_id, name, module in (
-                (6, "trc", "trc"),
-                (7, "mot", "storage"),
-                (8, "sto", "storage"),
+            for format_id, name, restate in (
+                (4, "c3d", "restate_c3d"),
+                (5, "c3d-outputs", "restate_outputs"),
             )
         ),
         *(  # the table gives csv for .csv; which kind a file is, its reader finds
             Format(
                 name,
                 format_id,
-                (".csv",),
-                _of("csv_files", "read"),
-                _of("csv_files", "write"),
+                (f".{name if kind else 'csv'}",),
+                _of(module, f"read{kind}"),
+                _of(module, f"write{kind}"),
                 join_table_notes,
                 states_rate=True,
                 is_table=True,
                 restate=_of("stated_rates", "restate_table"),
-                is_motion=_of("csv_files", "is_motion"),
+                is_motion=None if kind else _of("csv_files", "is_motion"),
                 clock=_of("table_layout", "clock_of"),
             )
-            for format_id, name in ((11, "csv"), (9, "motive"), (10, "vicon"))
+            for format_id, name, module, kind in (
+                (6, "trc", "trc", "_trc"),
+                (7, "mot", "storage", "_mot"),
+                (8, "sto", "storage", "_sto"),
+                (11, "csv", "csv_files", ""),
+                (9, "motive", "csv_files", ""),
+                (10, "vicon", "csv_files", ""),
+            )
         ),
-        Format(
-            "npy",
-            12,
-            (".npy",),
-            _of("arrays.read", "read_npy"),
-            _of("arrays.read", "write_arrays"),
-            arrays=_of("arrays.listing", "arrays_listed"),
-            is_motion=_of("arrays.sniffing", "is_motion"),
-        ),
-        Format(
-            "npz",
-            13,
-            (".npz",),
-            _of("arrays.read", "read_npz"),
-            _of("arrays.read", "write_arrays"),
-            arrays=_of("arrays.listing", "arrays_listed"),
-            states_rate=True,
-            is_motion=_of("arrays.sniffing", "is_motion"),
+        *(
+            Format(
+                name,
+                format_id,
+                (f".{name}",),
+                _of("arrays.read", f"read_{name}"),
+                _of("arrays.read", "write_arrays"),
+                states_rate=name == "npz",
+                is_motion=_of("arrays.sniffing", "is_motion"),
+                arrays=_of("arrays.listing", "arrays_listed"),
+            )
+            for format_id, name in ((12, "npy"), (13, "npz"))
         ),
     )
 }

@@ -17,6 +17,7 @@ from mcz.metrics import compare
 from mcz.metrics.sums import channel_errors
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.schema import build
+from mcz.tables.files import channel_names
 
 CHUNK = b"QUAL"
 # What a record does without, for its bytes: the radius is 3 cm where it is not stated.
@@ -54,14 +55,8 @@ def _greatest_error(original: Motion, decoded: Signal) -> dict[str, Any]:
         return {}
     row, column = divmod(int(errors.argmax()), errors.shape[1])
     found_at = row // signal.samples_per_frame
-    labels = [
-        f"{address}.{channel.label}"
-        for address, joint in zip(skeleton.addresses(), skeleton.joints, strict=True)
-        for channel in joint.channels
-    ]
-    if signal.channels is not None:
-        labels = [channel.label for channel in signal.channels]
-    figures = (float(errors[row, column]), found_at, labels[column])
+    name = channel_names(skeleton, signal.channels)[column]
+    figures = (float(errors[row, column]), found_at, name)
     return dict(zip(NOT_STORED, figures, strict=True))
 
 
