@@ -5,11 +5,16 @@ from __future__ import annotations
 import gc
 import os
 import signal
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+from mcz.cli.common import run
+from mcz.cli.main import cli
+
+Call = Callable[..., tuple[int, str, str]]  # a command: its exit code and what it printed
 
 # No deadlines: the first call of a compiled function takes seconds, later ones microseconds.
 settings.register_profile("dev", max_examples=30, deadline=None)
@@ -66,3 +71,14 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("samples")
     write_samples(folder)
     return folder
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Call:
+    """``mcz`` with these arguments, in this process."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        code = run(cli, "mcz", [str(argument) for argument in arguments])
+        return int(code), *capsys.readouterr()
+
+    return call

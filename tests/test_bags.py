@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,22 +12,11 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.bags.manifests import manifest_text, read_manifest, read_tags, tags_text
-from mcz.cli.common import run
-from mcz.cli.main import cli
+from tests.conftest import Call
 from tests.motions import smooth
 
 bagit = pytest.importorskip("bagit")
-Call = Callable[..., tuple[int, str, str]]
 DATE = {"Bagging-Date": "2026-11-24"}
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Call:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = int(run(cli, "mcz", [str(word) for word in arguments]))
-        return code, *capsys.readouterr()
-
-    return call
 
 
 @pytest.fixture

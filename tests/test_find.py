@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.codecs import CODECS, by_name
 from mcz.container.clip_head import ClipHead, clip_head
 from mcz.container.writer import Writer
@@ -23,6 +20,7 @@ from mcz.reading.file import File
 from mcz.reading.report import info, part_problems
 from mcz.writing.clip_writer import write_clip
 from tests import live_codec
+from tests.conftest import Call
 from tests.motions import skeleton, smooth
 
 CLIPS = (
@@ -269,18 +267,6 @@ def test_real_clips(data: Path, tmp_path: Path) -> None:
 
 
 # The commands
-
-Call = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Call:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = run(cli, "mcz", [str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        return int(code), captured.out, captured.err
-
-    return call
 
 
 def test_list_and_info(call: Call, archive: Path) -> None:

@@ -6,18 +6,16 @@ import io
 import json
 import shutil
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.errors import SkeletonWarning, SourceError
 from mcz.live.text_writer import encode_live
 from mcz.writing.entry import Terms
+from tests.conftest import Call
 
 ASF = b""":name small
 :units
@@ -43,7 +41,6 @@ ASF = b""":name small
   end
 """
 AMC = b"1\nroot 0 0 0 0 0 0\nspine 1.5 2\n2\nroot 0 0 1 0 0 0\nspine 2.5 2\n"
-Said = Callable[..., tuple[int, str, str]]
 
 
 def asf(bone: bytes = b"spine", dofs: bytes = b"rx ry") -> bytes:
@@ -70,15 +67,6 @@ def read(path: Path, **options: object) -> tuple[mcz.Motion, list[str]]:
         motion = mcz.read(path, **options)
     assert all(one.category is SkeletonWarning for one in caught)
     return motion, [str(one.message) for one in caught]
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Said:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = int(run(cli, "mcz", [str(word) for word in arguments]))
-        return code, *capsys.readouterr()
-
-    return call
 
 
 @pytest.mark.parametrize(
@@ -197,7 +185,7 @@ def test_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
 # Every door ----------------------------------------------------------------------
 
 
-def test_encode_says_it_and_keeps_it(tmp_path: Path, call: Said) -> None:
+def test_encode_says_it_and_keeps_it(tmp_path: Path, call: Call) -> None:
     path = put(tmp_path, "05_01", **{"09": "fits"})
     code, _, errors = call("encode", path)
     assert (code, errors.count("\n")) == (0, 1)
@@ -208,7 +196,7 @@ def test_encode_says_it_and_keeps_it(tmp_path: Path, call: Said) -> None:
         mcz.encode(path, tmp_path / "b.mcz")
 
 
-def test_encode_refuses_and_leads_on(tmp_path: Path, call: Said) -> None:
+def test_encode_refuses_and_leads_on(tmp_path: Path, call: Call) -> None:
     path = put(tmp_path, "05_01", **{"09": "foreign"})
     code, out, errors = call("encode", path)
     assert (code, out, errors.count("\n")) == (1, "", 1)
@@ -220,7 +208,7 @@ def test_encode_refuses_and_leads_on(tmp_path: Path, call: Said) -> None:
     assert call("encode", path, "--force", "--verbatim")[0] == 0
 
 
-def test_pack_names_each(tmp_path: Path, call: Said) -> None:
+def test_pack_names_each(tmp_path: Path, call: Call) -> None:
     folder = tmp_path / "in"
     folder.mkdir()
     put(folder, "walk_1", walk="fits", other="dofs")
@@ -243,7 +231,7 @@ def test_pack_names_each(tmp_path: Path, call: Said) -> None:
     assert "mcz: zombie.amc: its skeleton is" in errors
 
 
-def test_append_names_it(tmp_path: Path, call: Said) -> None:
+def test_append_names_it(tmp_path: Path, call: Call) -> None:
     put(tmp_path, "walk", walk="fits")
     assert call("encode", tmp_path / "walk.amc")[0] == 0
     (tmp_path / "x").mkdir()
@@ -263,7 +251,7 @@ def test_write_keeps_what_read_recorded(tmp_path: Path) -> None:
     assert note == "ASF of the name of the take"
 
 
-def test_diff_and_bench(tmp_path: Path, call: Said) -> None:
+def test_diff_and_bench(tmp_path: Path, call: Call) -> None:
     path = put(tmp_path, "05_01", **{"09": "fits"})
     shutil.copy(path, tmp_path / "05_02.amc")
     code, _, errors = call("diff", path, tmp_path / "05_02.amc")

@@ -17,8 +17,6 @@ from hypothesis import strategies as st
 import mcz
 from conformance.manifest import VECTORS, load
 from mcz import codecs
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.container.checksums import Checked, check_checksums
 from mcz.container.chunks import FOOT, build_foot
 from mcz.container.index import index_content
@@ -26,19 +24,10 @@ from mcz.container.locks import lock
 from mcz.container.source import open_source
 from mcz.errors import UnsupportedError
 from tests import live_codec
+from tests.conftest import Call
 from tests.motions import skeleton, smooth
 
-Call = Callable[..., tuple[int, str, str]]
 DATE = "2026-11-24"
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Call:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = int(run(cli, "mcz", [str(word) for word in arguments]))
-        return code, *capsys.readouterr()
-
-    return call
 
 
 def archive() -> bytes:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,23 +14,10 @@ import pytest
 
 import mcz
 from mcz import codecs
-from mcz.cli.common import run
 from mcz.cli.figures import figure_lines
-from mcz.cli.main import cli
 from tests import overlap_codec
+from tests.conftest import Call
 from tests.test_contacts import markers
-
-Call = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Call:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = run(cli, "mcz", [str(a) for a in arguments])
-        captured = capsys.readouterr()
-        return int(code), captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture

@@ -3,29 +3,16 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.codecs.posewave.choices import PRESETS
 from mcz.formats import FORMATS
+from tests.conftest import Call
 
-Call = Callable[..., tuple[int, str, str]]
 SUFFIXES = sorted({suffix for found in FORMATS.values() for suffix in found.suffixes} | {".mcz"})
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Call:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = run(cli, "mcz", [str(a) for a in arguments])
-        captured = capsys.readouterr()
-        return int(code), captured.out, captured.err
-
-    return call
 
 
 @pytest.fixture

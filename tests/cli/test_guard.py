@@ -7,7 +7,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,20 +17,11 @@ from mcz.cli.common import run
 from mcz.cli.info import command as info_command
 from mcz.cli.main import cli
 from mcz.errors import OptionError
+from tests.conftest import Call
 
 ROOT = Path(__file__).parents[2]
-Call = Callable[..., tuple[int, str, str]]
 SLOPPY = "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n}\nMOTION\nFrames: %d\n"
 SLOPPY += "Frame Time: 0.01\n1\n2\n3\n"
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Call:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = int(run(cli, "mcz", [str(word) for word in arguments]))
-        return code, *capsys.readouterr()
-
-    return call
 
 
 @pytest.fixture

@@ -4,33 +4,21 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import redirect_stdout
 from functools import cache
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.formats import FORMATS
+from tests.conftest import Call
 
 SOURCES = Path(__file__).parents[2] / "conformance" / "vectors" / "valid" / "sources"
 CLIPS = [name for name, known in FORMATS.items() if not known.is_skeleton]
-Call = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Call:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = run(cli, "mcz", [str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        return int(code), captured.out, captured.err
-
-    return call
 
 
 @cache
@@ -97,8 +85,10 @@ def test_whole(source: Path, tmp_path: Path, call: Call) -> None:
         assert (path.read_bytes(), result) == (data, "restored"), word
     path, result = result_of(call, tmp_path / "a.mcz")
     assert path == tmp_path / source.name and path.read_bytes() == data and result == "restored"
-    command = [sys.executable, "-m", "mcz.cli.main", "decode", str(tmp_path / "a.mcz"), "-o", "-"]
-    assert subprocess.run(command, check=True, capture_output=True).stdout == data
+    piped = TextIOWrapper(BytesIO())
+    with redirect_stdout(piped):
+        assert call("decode", tmp_path / "a.mcz", "-o", "-")[0] == 0
+    assert piped.buffer.getvalue() == data  # type: ignore[attr-defined]
 
 
 def test_packed(source: Path, tmp_path: Path, call: Call) -> None:

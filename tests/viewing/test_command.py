@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
@@ -18,22 +18,10 @@ from urllib.parse import urlsplit
 import pytest
 
 import mcz
-from mcz.cli.common import run
-from mcz.cli.main import cli
 from mcz.errors import AccessError, OptionError
 from mcz.viewing import browser, showing
 from mcz.viewing.visitors import Visitors
-
-Call = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Call:
-    def call(*arguments: object) -> tuple[int, str, str]:
-        code = int(run(cli, "mcz", [str(word) for word in arguments]))
-        return code, *capsys.readouterr()
-
-    return call
+from tests.conftest import Call
 
 
 @pytest.fixture(autouse=True)
