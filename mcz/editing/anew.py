@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from mcz.clock import usual_step
 from mcz.container.writer import Writer
 from mcz.editing.cutting import WITHOUT_CHANNELS, ClipCut, add_note, joint_of_column
 from mcz.editing.recoding import recorded_options
@@ -61,7 +60,7 @@ def source_file(motion: Motion) -> bytes:
 
 def sourced(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
     """What is left of ``clip`` with a source of its own values, or none, and why there is none."""
-    motion = stating_rate(motion, usual_step(clip.frame_numbers))
+    motion = stating_rate(motion, clip.frame_numbers)
     if motion.source is None:
         return motion, None
     try:

@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any, BinaryIO
 
 from mcz.brief import brief
-from mcz.clock import usual_step
 from mcz.container import payloads
 from mcz.container.chunks import (
     read_chunk,
@@ -56,7 +55,7 @@ from mcz.reading.source_rates import stating_rate
 from mcz.schema import build, parse
 from mcz.skeleton import Joints
 from mcz.writing.atomic import replacing_file
-from mcz.writing.clip_writer import Progress
+from mcz.writing.clip_writer import Amend, Progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +147,7 @@ def with_stated_rate(
     writer: Writer, motion: Motion, held: Mapping[str, Any], clip: Clip
 ) -> tuple[Motion, Mapping[str, Any]]:
     """``motion`` and its CLIP_SOURCE ``held`` with a template that states the rate of ``clip``."""
-    changed = stating_rate(motion, usual_step(clip.frame_numbers))
+    changed = stating_rate(motion, clip.frame_numbers)
     if changed is motion or changed.source is None:
         return motion, held
     template = writer.template(held["format"], changed.source.template)
@@ -254,31 +253,33 @@ class Copier:
 
     def _anew(self, cut: ClipCut) -> None:
         """Write what is left of a clip, decoded and coded anew."""
-        clip, row = cut.clip, self.container.directory.clips[cut.clip.name]
-        self.skeleton(clip.skeleton_id)
-        old = clip.quality or {}
-        motion, left_out = sourced(replace(joints_alone(cut), name=self.name_of(cut)), clip)
-        if left_out is not None:
-            self.found.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
-        record = write_anew(
-            self.writer,
-            motion,
-            clip,
-            settings_of(clip) if cut.joints is None else settings_of_joints(clip),
-            partial(recoded_quality, cut, old),
-            self.progress,
-        )
+        clip, old = cut.clip, cut.clip.quality or {}
+        motion = replace(joints_alone(cut), name=self.name_of(cut))
+        settings = settings_of(clip) if cut.joints is None else settings_of_joints(clip)
+        record = self.recode(clip, motion, settings, partial(recoded_quality, cut, old))
         for name in OF_JOINTS:
             if f"param.{name}" in old and f"param.{name}" not in record:
                 said = f"its {name}, which other joints have a part in"
                 self.found.left_out.append(f"clip {clip.name}: {said}")
         if clip.source is not None and cut.joints is not None:
             self.found.left_out.append(f"clip {clip.name}: its source file, as joints were cut")
+        self._note(cut)
+
+    def recode(
+        self, clip: Clip, motion: Motion, settings: Mapping[str, Any], amend: Amend
+    ) -> dict[str, str]:
+        """Write ``motion``, coded anew, in the place of ``clip``; return its quality record."""
+        row = self.container.directory.clips[clip.name]
+        self.skeleton(clip.skeleton_id)
+        motion, left_out = sourced(motion, clip)
+        if left_out is not None:
+            self.found.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
+        record = write_anew(self.writer, motion, clip, settings, amend, self.progress)
         self.inside(row)
         for chunk in row.ancillary:
             if chunk.type != b"QUAL":
                 self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
-        self._note(cut)
+        return record
 
     def fields_of(self, cut: ClipCut) -> Any:
         """The fields of the CLIP that is cut."""

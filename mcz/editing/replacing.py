@@ -26,7 +26,7 @@ from mcz.container.directory import ClipRow, SegmentRow
 from mcz.container.locks import lock
 from mcz.container.segments import FRAME_NOTES, GROUP_NOTES, MASKS, SegmentHeader
 from mcz.container.value_hash import value_hash
-from mcz.editing.anew import check_anew, settings_of, source_file, sourced, write_anew
+from mcz.editing.anew import check_anew, settings_of, source_file
 from mcz.editing.cutting import ClipCut, add_note, cut_segment, plan_cut
 from mcz.editing.extraction import Copier, with_stated_rate
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
@@ -317,17 +317,7 @@ class _AnewEditor(Copier):
         if self.is_same(cut):
             super().clip(cut)
             return
-        row = self.container.directory.clips[cut.clip.name]
-        self.skeleton(cut.clip.skeleton_id)
-        motion, left_out = sourced(self.edited.motion, cut.clip)
-        if left_out is not None:
-            self.found.left_out.append(f"clip {motion.name}: its source file, as {left_out}")
-        settings = settings_of(cut.clip)
-        write_anew(self.writer, motion, cut.clip, settings, self._record, self.progress)
-        self.inside(row)
-        for chunk in row.ancillary:
-            if chunk.type != CHUNK:
-                self.carrier.ancillary(read_chunk(self.container.source, chunk.offset))
+        self.recode(cut.clip, self.edited.motion, settings_of(cut.clip), self._record)
 
     def _record(self, now: dict[str, str], decoded: Sequence[NDArray[Any]]) -> dict[str, str]:
         wanted = self.edited.motion.signals[0].masked()

@@ -21,7 +21,6 @@ from mcz.clock import (
     known_timeline,
     timeline_of,
     times_place,
-    usual_step,
 )
 from mcz.container.limits import check_decoded
 from mcz.container.reader import Container
@@ -229,7 +228,12 @@ class Clip(StoredClip, Posed):
     def timeline(self) -> Timeline | None:
         """When every frame was, None where neither times nor a rate are known."""
         column = self.times_column()
-        clock = read_clock(self.container, self._fields, self.signals[0])
+        clock = None
+        try:
+            clock = read_clock(self.container, self._fields, self.signals[0])
+        except FormatError as error:
+            lost = "its times are those of its rate, its source's are lost"
+            self._complain(f"{lost}: {error}", error)
         counting = Counting(self.frame_numbers, self.frame_rate)
         return timeline_of(counting, self.metadata, clock, column)
 
@@ -299,7 +303,7 @@ class Clip(StoredClip, Posed):
             )
         is_file = self.gives_file(frames, resolution)
         if not is_file:
-            motion = stating_rate(motion, usual_step(self.frame_numbers))
+            motion = stating_rate(motion, self.frame_numbers)
         data: bytes = FORMATS[info.format].write(motion)
         if is_file and not self.container.salvage:
             self._check_source(data, info)

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.clock import usual_step
 from mcz.errors import MotionError, OptionError
 from mcz.formats import FORMATS
 from mcz.kinematics import point_set
@@ -120,9 +119,7 @@ def filtered_source(
     motion = _with_places(clip, frames, resolution, decimate, rate)
     if clip.source is None or motion.source is None:
         raise OptionError(f"clip {clip.name!r} has no source file; choose a format with --to")
-    data: bytes = FORMATS[clip.source.format].write(
-        stating_rate(motion, usual_step(clip.frame_numbers))
-    )
+    data: bytes = FORMATS[clip.source.format].write(stating_rate(motion, clip.frame_numbers))
     return data
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 from mcz.clock import usual_step
 from mcz.errors import FormatError
@@ -32,23 +33,18 @@ def states_rate(clip: Clip) -> bool:
     rate, source = clip.frame_rate, clip.source
     if rate is None or source is None or not FORMATS[source.format].states_rate:
         return False
-    fields = clip._fields.source[0]
-    template = clip.container.template(fields.template, fields.format)
-    found = contradiction(source.format, template, rate, usual_step(clip.frame_numbers))
+    found, _ = _contradicted(clip, rate)
     return found is None or bool(found.rate)
 
 
 def _stated(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
     """The rate that the text states, None where it is that of the clip or none."""
-    step = usual_step(clip.frame_numbers)
-    fields = clip._fields.source[0]
     try:
-        template = clip.container.template(fields.template, fields.format)
+        found, template = _contradicted(clip, rate)
     except FormatError:
         if not clip.container.salvage:
             raise
         return None  # it is lost, as is told
-    found = contradiction(format_by_id(fields.format).name, template, rate, step)
     if found is not None:
         stated: Fraction = found.rate
         return stated if is_file or found.template == template else None
@@ -56,4 +52,13 @@ def _stated(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
     if column is None:
         return None
     own, _ = rate_of_times(column.times, [column.rounding])
+    step = usual_step(clip.frame_numbers)
     return own if own is not None and not is_one_of(own / rate, step) else None
+
+
+def _contradicted(clip: Clip, rate: Fraction) -> tuple[Any, bytes]:
+    """What ``contradiction`` says of the template of a clip, and the template."""
+    source = clip._fields.source[0]
+    template = clip.container.template(source.template, source.format)
+    name, step = format_by_id(source.format).name, usual_step(clip.frame_numbers)
+    return contradiction(name, template, rate, step), template

@@ -6,14 +6,15 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from mcz.container.reader import Container
-from mcz.errors import FormatError, OptionError, UnsupportedError
-from mcz.formats import format_by_id, recording_of
+from mcz.errors import FormatError, OptionError
+from mcz.formats import recording_of
 from mcz.formats.c3d_events import Event as Event
 from mcz.formats.c3d_recording import ForcePlatform as ForcePlatform
 from mcz.formats.c3d_recording import Recording as Recording
 from mcz.motion import Motion, Source
 from mcz.numbers.scaling import Scaling
 from mcz.reading.signal_info import SignalInfo
+from mcz.reading.source_info import known_format
 
 ANALOG = "analog"  # the signal whose stored numbers a source may have a meaning for
 
@@ -30,15 +31,10 @@ def recording(motion: Motion) -> Recording | None:
 
 def read_recording(container: Container, fields: Any) -> Recording | None:
     """The recording that the source of a clip, whose CLIP is ``fields``, tells of."""
-    if not fields.source:
+    form = known_format(fields)
+    if form is None or form.recording is None:
         return None
     source = fields.source[0]
-    try:
-        form = format_by_id(source.format)
-    except UnsupportedError:  # nothing is known of it
-        return None
-    if form.recording is None:
-        return None
     template = container.template(source.template, source.format)
     found: Recording | None = recording_of(Source(form.name, template, bytes(source.detail)))
     return found

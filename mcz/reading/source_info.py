@@ -43,6 +43,16 @@ def source_info(fields: Any, cend: Any) -> SourceInfo | None:
     return SourceInfo(name, source.path, source.size, bytes(hashes[0]) if hashes else b"")
 
 
+def known_format(fields: Any) -> Format | None:
+    """The source format of a clip whose CLIP is ``fields``; None: none that is known."""
+    if not fields.source:
+        return None
+    try:
+        return format_by_id(fields.source[0].format)
+    except UnsupportedError:
+        return None
+
+
 def read_source(
     container: Container, fields: Any, info: SourceInfo, signal: SignalInfo, frames: range
 ) -> Source:
@@ -79,26 +89,11 @@ def clock_of(source_format: Format, template: bytes, signal: SignalInfo) -> Sour
 
 def read_clock(container: Container, fields: Any, signal: SignalInfo) -> SourceClock | None:
     """The clock of the source of a clip whose CLIP is ``fields``, None where it has none."""
-    if not fields.source:
+    source_format = known_format(fields)
+    if source_format is None or source_format.clock is None:
         return None
     source = fields.source[0]
-    try:
-        source_format = format_by_id(source.format)
-    except UnsupportedError:  # nothing is known of it
-        return None
-    if source_format.clock is None:
-        return None
-    try:
-        template = container.template(source.template, source.format)
-    except FormatError as error:
-        if not container.salvage:
-            raise
-        line = f"clip {fields.name!r}: its times are those of its rate, its source's are lost"
-        container.damage += (
-            [f"{line}: {error}"] if f"{line}: {error}" not in container.damage else []
-        )
-        return None
-    return clock_of(source_format, template, signal)
+    return clock_of(source_format, container.template(source.template, source.format), signal)
 
 
 def _notes(

@@ -10,21 +10,23 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mcz.clock import SAME_RATE, usual_step
 from mcz.formats import FORMATS
 from mcz.motion import Motion
 
 
-def stating_rate(motion: Motion, step: int | None = None) -> Motion:
+def stating_rate(motion: Motion, numbers: NDArray[np.int64] | None = None) -> Motion:
     """``motion`` with a source that states its rate; as it is where it cannot, or states none.
 
-    ``step``: the usual one of the frame numbers, by default of those of ``motion``. Raises
-    FormatError on bad bytes.
+    ``numbers``: all frame numbers of a clip that it is a part of. Raises FormatError on bad bytes.
     """
     source, rate = motion.source, motion.frame_rate
     if source is None or rate is None:
         return motion
-    step = usual_step(motion.frame_numbers) if step is None else step
+    step = usual_step(motion.frame_numbers if numbers is None else numbers)
     found = contradiction(source.format, source.template, rate, step)
     if found is None:
         return motion
