@@ -328,7 +328,7 @@ SMALL = [
 ]
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=SHARED)
+@settings(suppress_health_check=SHARED)
 @given(st.data())
 def test_any_mutant_is_repaired_or_refused(tmp_path: Path, data: st.DataObject) -> None:
     """Bits, holes, bytes put in or cut out, also behind checksums that are made right again."""

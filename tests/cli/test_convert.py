@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import mcz
-from tests.cli.test_ways_out import Call, call  # noqa: F401
+from tests.conftest import Call
 
 UNITS = ["--unit", "cm"]
 
@@ -32,7 +32,7 @@ PAIRS = [
 
 
 @pytest.mark.parametrize(("origin", "to"), PAIRS)
-def test_one_step_is_two(folder: Path, call: Call, origin: str, to: str) -> None:  # noqa: F811
+def test_one_step_is_two(folder: Path, call: Call, origin: str, to: str) -> None:
     """Each pair of formats: the bytes are those of encode and decode, nothing else is written."""
     source = folder / f"walk{origin}"
     facts = [*UNITS, "--rate", "120"]
@@ -53,7 +53,7 @@ def test_one_step_is_two(folder: Path, call: Call, origin: str, to: str) -> None
     assert (folder / f"one{to}").read_bytes() == (folder / f"two{to}").read_bytes()
 
 
-def test_what_is_left_out_is_said(folder: Path, call: Call) -> None:  # noqa: F811
+def test_what_is_left_out_is_said(folder: Path, call: Call) -> None:
     code, out, err = call("convert", folder / "walk.c3d", folder / "x.trc")
     size = (folder / "x.trc").stat().st_size
     assert (code, out) == (0, f"{folder / 'x.trc'}  {size:,} bytes, converted\n")
@@ -63,7 +63,7 @@ def test_what_is_left_out_is_said(folder: Path, call: Call) -> None:  # noqa: F8
 
 
 @pytest.mark.parametrize("to", ["bvh", "amc", "c3d", "trc", "sto", "mot", "glb", "usda", "csv"])
-def test_columns_and_signals_that_are_lost_are_said(tmp_path: Path, call: Call, to: str) -> None:  # noqa: F811
+def test_columns_and_signals_that_are_lost_are_said(tmp_path: Path, call: Call, to: str) -> None:
     """In one step or two, in words and in JSON, whatever the target."""
     head = "Frame,Sub Frame,RX,RY,RZ,RW,TX,TY,TZ,State"
     text = (
@@ -87,7 +87,7 @@ def test_columns_and_signals_that_are_lost_are_said(tmp_path: Path, call: Call, 
             assert err.count(lost) == 1 and any(line.startswith(lost) for line in told)
 
 
-def test_a_plain_c3d_names_the_groups_that_it_has_not(folder: Path, call: Call) -> None:  # noqa: F811
+def test_a_plain_c3d_names_the_groups_that_it_has_not(folder: Path, call: Call) -> None:
     data = (folder / "walk.c3d").read_bytes()
     assert data.count(b"FORCE_PLATFORM") == 1
     (folder / "made.c3d").write_bytes(data.replace(b"FORCE_PLATFORM", b"MANUFACTURERS_"))
@@ -97,7 +97,7 @@ def test_a_plain_c3d_names_the_groups_that_it_has_not(folder: Path, call: Call) 
     assert "left out: parameters of MANUFACTURERS_" in err
 
 
-def test_nothing_is_overwritten(folder: Path, call: Call) -> None:  # noqa: F811
+def test_nothing_is_overwritten(folder: Path, call: Call) -> None:
     (folder / "x.trc").write_bytes(b"mine")
     words = ("convert", folder / "walk.c3d", folder / "x.trc")
     code, _, err = call(*words)
@@ -108,7 +108,7 @@ def test_nothing_is_overwritten(folder: Path, call: Call) -> None:  # noqa: F811
     assert code == 2 and "the input itself" in err and (folder / "walk.bvh").read_bytes() == data
 
 
-def test_the_skeleton_is_an_input(folder: Path, call: Call) -> None:  # noqa: F811
+def test_the_skeleton_is_an_input(folder: Path, call: Call) -> None:
     """What was read for a source, the ASF beside it too, is no output, whoever forces it."""
     data = (folder / "walk.asf").read_bytes()
     words = ["--to", "amc", "--with-skeleton", "--rate", "120", "--force"]
@@ -118,7 +118,7 @@ def test_the_skeleton_is_an_input(folder: Path, call: Call) -> None:  # noqa: F8
     assert (folder / "walk.asf").read_bytes() == data and not (folder / "x.amc").exists()
 
 
-def test_to_and_from_mcz(folder: Path, call: Call) -> None:  # noqa: F811
+def test_to_and_from_mcz(folder: Path, call: Call) -> None:
     assert call("convert", folder / "walk.bvh", folder / "w.mcz", *UNITS)[0] == 0
     assert mcz.read(folder / "w.mcz").skeleton.unit_cm == 1
     assert call("convert", folder / "w.mcz", folder / "w.trc")[0] == 0
@@ -137,7 +137,7 @@ def test_to_and_from_mcz(folder: Path, call: Call) -> None:  # noqa: F811
     assert not list(folder.glob("v*"))
 
 
-def test_a_part_in_its_own_format(folder: Path, call: Call) -> None:  # noqa: F811
+def test_a_part_in_its_own_format(folder: Path, call: Call) -> None:
     out = call("convert", folder / "walk.amc", folder / "cut.amc", "--frames", "10:20")[1]
     assert out.endswith(" bytes, cut\n")
     assert mcz.read(folder / "cut.amc", skeleton="none").n_frames == 10
@@ -146,7 +146,7 @@ def test_a_part_in_its_own_format(folder: Path, call: Call) -> None:  # noqa: F8
     assert (folder / "copy.amc").read_bytes() == (folder / "walk.amc").read_bytes()
 
 
-def test_decode_of_a_source_wants_an_output(folder: Path, call: Call) -> None:  # noqa: F811
+def test_decode_of_a_source_wants_an_output(folder: Path, call: Call) -> None:
     code, _, err = call("decode", folder / "walk.bvh", "--force")
     assert code == 2 and "a source file, no .mcz" in err
     code, _, err = call("decode", folder / "walk.bvh", "-o", folder / "x.csv", "--salvage")
@@ -155,7 +155,7 @@ def test_decode_of_a_source_wants_an_output(folder: Path, call: Call) -> None:  
     assert (folder / "walk.csv").exists()
 
 
-def test_an_mcz_file_of_another_name(folder: Path, call: Call) -> None:  # noqa: F811
+def test_an_mcz_file_of_another_name(folder: Path, call: Call) -> None:
     """What a file is called does not make it a source file."""
     mcz.encode(folder / "walk.c3d", folder / "w.mcz")
     (folder / "w.mcz").rename(folder / "w.bvh")
