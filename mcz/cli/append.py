@@ -16,6 +16,7 @@ from mcz.cli.options import (
     jobs_option,
     json_option,
     rate_option,
+    skeleton_option,
     threads_option,
 )
 from mcz.cli.outcomes import conclude
@@ -27,12 +28,7 @@ from mcz.cli.progress import Progress
     "sources", metavar="SRC...", nargs=-1, required=True, type=click.Path(readable=False)
 )
 @click.argument("target", metavar="FILE.mcz", type=click.Path(readable=False))
-@click.option(
-    "--skeleton",
-    metavar="FILE.asf",
-    type=click.Path(readable=False),
-    help="The ASF of the AMCs, or none.",
-)
+@skeleton_option("The ASF of the AMCs, or none.")
 @click.option(
     "--root",
     metavar="DIR",

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from mcz.cli.common import Exit, to_frames
+from mcz.cli.common import Exit
 from mcz.cli.decode import decode
 from mcz.cli.decode_input import Input
 from mcz.cli.options import (
@@ -15,10 +15,12 @@ from mcz.cli.options import (
     arrays_option,
     decoded_option,
     force_option,
+    frames_option,
     json_option,
     key_error_option,
     model_option,
     rate_option,
+    skeleton_option,
     threads_option,
     unit_option,
     up_option,
@@ -39,16 +41,9 @@ OF_SOURCES = ("skeleton", "arrays", "model")
 )
 @click.option("--clip", "names", metavar="NAME", multiple=True, help="Which clip of an .mcz.")
 @where_option
-@click.option(
-    "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B, counted from 0."
-)
+@frames_option("Frames A <= f < B, counted from 0.")
 @click.option("--joints", metavar="a,b", help="Joints by name or index (to csv or npz).")
-@click.option(
-    "--skeleton",
-    metavar="FILE.asf",
-    type=click.Path(readable=False),
-    help="The ASF of an AMC, or none. Default: the one beside it, as in mcz encode.",
-)
+@skeleton_option("The ASF of an AMC, or none. Default: the one beside it, as in mcz encode.")
 @rate_option(ITS_RATE_HELP)
 @unit_option("Length unit of a file that says none.")
 @up_option("Axis that points up, of a file that does not say.")

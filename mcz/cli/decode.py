@@ -14,7 +14,6 @@ from mcz.cli.common import (
     damage_of,
     plural,
     say,
-    to_frames,
 )
 from mcz.cli.decode_input import SOURCE_GIVEN, Input
 from mcz.cli.delivery import Output, check_count, deliver
@@ -22,6 +21,7 @@ from mcz.cli.made import Made, facts_of, told
 from mcz.cli.options import (
     decoded_option,
     force_option,
+    frames_option,
     json_option,
     key_error_option,
     rate_option,
@@ -63,9 +63,7 @@ if TYPE_CHECKING:
     help="Which clip; needed where there are several, and may be repeated.",
 )
 @where_option
-@click.option(
-    "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B, counted from 0."
-)
+@frames_option("Frames A <= f < B, counted from 0.")
 @click.option("--joints", metavar="a,b", help="Joints by name or index (with --to).")
 @click.option(
     "--resolution",

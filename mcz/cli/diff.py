@@ -20,15 +20,16 @@ from mcz.cli.common import (
     existing,
     opened,
     print_json,
-    to_frames,
 )
 from mcz.cli.diff_lines import lines_of
 from mcz.cli.options import (
     arrays_option,
     decoded_option,
+    frames_option,
     json_option,
     model_option,
     rate_option,
+    skeleton_option,
     unit_option,
     up_option,
     where_option,
@@ -65,16 +66,9 @@ def _to_names(ctx: click.Context, param: click.Parameter, value: str | None) -> 
     help="Which clip of an .mcz; may be repeated. Default: the only one, or all that both have.",
 )
 @where_option
-@click.option(
-    "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B of both, from 0."
-)
+@frames_option("Frames A <= f < B of both, from 0.")
 @unit_option("Length unit of a file that says none.")
-@click.option(
-    "--skeleton",
-    metavar="FILE.asf",
-    type=click.Path(readable=False),
-    help="The ASF of an AMC, or none.",
-)
+@skeleton_option("The ASF of an AMC, or none.")
 @rate_option()
 @up_option("Axis that points up, of a file that does not say.")
 @arrays_option

@@ -30,6 +30,7 @@ from mcz.cli.options import (
     force_option,
     json_option,
     rate_option,
+    skeleton_option,
     threads_option,
 )
 from mcz.cli.progress import Progress
@@ -48,12 +49,9 @@ if TYPE_CHECKING:
     metavar="OUT.mcz",
     help="A file, a folder, or - for standard output. Default: SRC with the suffix .mcz.",
 )
-@click.option(
-    "--skeleton",
-    metavar="FILE.asf",
-    type=click.Path(readable=False),
-    help="The ASF of an AMC, or none. Default: one beside it or in a sibling folder asf/ that has "
-    "the take's name or the subject's, or the only one whose bones fit.",
+@skeleton_option(
+    "The ASF of an AMC, or none. Default: one beside it or in a sibling folder asf/ that has "
+    "the take's name or the subject's, or the only one whose bones fit."
 )
 @click.option(
     "--format",

@@ -18,7 +18,6 @@ from mcz.cli.common import (
     plural,
     print_json,
     say,
-    to_frames,
 )
 from mcz.cli.damage import hinted
 from mcz.cli.options import (
@@ -26,6 +25,7 @@ from mcz.cli.options import (
     copies_option,
     decoded_option,
     force_option,
+    frames_option,
     json_option,
     salvage_option,
     where_option,
@@ -50,9 +50,7 @@ if TYPE_CHECKING:
 @click.option(
     "--joints", metavar="a,b", help="Keep the channels of these joints, by name or index."
 )
-@click.option(
-    "--frames", metavar="A:B", callback=to_frames, help="Keep frames A <= f < B, counted from 0."
-)
+@frames_option("Keep frames A <= f < B, counted from 0.")
 @click.option(
     "--recode",
     is_flag=True,

@@ -30,6 +30,7 @@ from mcz.cli.options import (
     decoded_option,
     json_option,
     salvage_option,
+    skeleton_option,
     version_option,
     where_option,
 )
@@ -67,9 +68,7 @@ RATIOS = (  # of the bytes that a codec wrote, which restore no source alone
 @clips_option
 @where_option
 @salvage_option
-@click.option(
-    "--skeleton", metavar="FILE.asf", type=click.Path(readable=False), help="The ASF of an AMC."
-)
+@skeleton_option("The ASF of an AMC.")
 @click.option(
     "--preview/--no-preview",
     default=None,

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mcz.cli.common import about, existing, opened, to_frames
+from mcz.cli.common import about, existing, opened
 from mcz.cli.options import (
     arrays_option,
     decoded_option,
+    frames_option,
     model_option,
     rate_option,
+    skeleton_option,
     unit_option,
     up_option,
 )
@@ -32,18 +34,11 @@ def moving_options(function: Function) -> Function:
         click.option(
             "--clip", "name", metavar="NAME", help="Which clip of an .mcz. Default: the only one."
         ),
-        click.option(
-            "--frames", metavar="A:B", callback=to_frames, help="Frames A <= f < B, from 0."
-        ),
+        frames_option("Frames A <= f < B, from 0."),
         rate_option(),
         unit_option("Length unit of a file without."),
         up_option("Axis that points up, of a file that does not say."),
-        click.option(
-            "--skeleton",
-            metavar="FILE.asf",
-            type=click.Path(readable=False),
-            help="The ASF of an AMC, or none.",
-        ),
+        skeleton_option("The ASF of an AMC, or none."),
         arrays_option,
         model_option,
         decoded_option,

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from mcz.cli.common import Exit, Failure, echo, to_params, to_rate
+from mcz.cli.common import Exit, Failure, echo, to_frames, to_params, to_rate
 
 EFFORTS = ("fast", "normal", "best")  # as in mcz.codecs, which takes longer to import
 RATE_HELP = "Frames a second (120, 29.97, 30000/1001) of files that state none."
@@ -226,6 +226,17 @@ def key_error_option(function: Function) -> Function:
         help="Keys of an animation are left out where all stays within MM (with --to glb). 0: a "
         "key in every frame. Default: 0.1, or 1/20,000 of the figure where its unit is unknown.",
     )(function)
+
+
+def skeleton_option(help_text: str) -> Callable[[Function], Function]:
+    """``--skeleton``, as the argument ``skeleton``: the path of an ASF."""
+    path = click.Path(readable=False)
+    return click.option("--skeleton", metavar="FILE.asf", type=path, help=help_text)
+
+
+def frames_option(help_text: str) -> Callable[[Function], Function]:
+    """``--frames``, as the argument ``frames``: a range."""
+    return click.option("--frames", metavar="A:B", callback=to_frames, help=help_text)
 
 
 def rate_option(help_text: str = RATE_HELP) -> Callable[[Function], Function]:

@@ -29,6 +29,7 @@ from mcz.cli.options import (
     param_option,
     rate_option,
     salvage_option,
+    skeleton_option,
     threads_option,
     to_bytes,
     unit_option,
@@ -72,12 +73,7 @@ LOOPBACK = "127.0.0.1"
 @click.option(
     "--port", metavar="N", type=click.IntRange(0, 65535), default=0, help="Default: any free one."
 )
-@click.option(
-    "--skeleton",
-    metavar="FILE.asf",
-    type=click.Path(readable=False),
-    help="The ASF of an AMC, or none. Default: found as mcz encode finds it.",
-)
+@skeleton_option("The ASF of an AMC, or none. Default: found as mcz encode finds it.")
 @rate_option()
 @unit_option("Length unit of a file that says none.")
 @up_option("Axis that points up, of a file that does not say.")
