@@ -393,13 +393,15 @@ class Walker:
     def _skip(self, at: int, done: int) -> int | None:
         """Where to go on after a fault in what begins at ``at`` and was good up to ``done``."""
         self.index = None
-        self.bounds.begin_fault(max(at, done))
         try:
             chunk = read_chunk(self.source, at)
             if chunk.length is not None:
+                self.bounds.begin_fault(max(at, done))
                 return chunk.offset + chunk.size  # its header is sound, so its end is known
+            done = self._end_of_packets(chunk, done)
         except FormatError:
             pass
+        self.bounds.begin_fault(max(at, done))
         try:
             limit = self.profile.chunk_bytes
             found = resynchronize(self.source, max(at + 1, done), limit, self._spend)
@@ -409,6 +411,15 @@ class Walker:
         if self.clip is not None and found is not None:
             self.found.doubts |= self.bounds.skip(found)
         return found
+
+    def _end_of_packets(self, chunk: Chunk, done: int) -> int:
+        """Return where the packets of an open DATA end that are whole, though none can be used."""
+        read = Forward(self.source, chunk.payload_offset)
+        with suppress(FormatError):
+            for _ in read_packets(read, self.profile.packet_bytes):
+                done = max(done, read.at)
+            done = max(done, read.at)
+        return done
 
     def _spend(self, size: int) -> None:
         """Count what is read in search of the next chunk; what looks like one seldom is none."""
