@@ -7,7 +7,6 @@ The public names and nothing else. Each is loaded when it is first used, so that
 from __future__ import annotations
 
 from importlib import import_module
-from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from mcz import version as _version
@@ -321,8 +320,6 @@ if not TYPE_CHECKING:  # a type checker shall find a name that is not there
         if name not in _HOME_OF:
             raise AttributeError(f"module 'mcz' has no attribute {name!r}")
         value = getattr(import_module(_HOME_OF[name]), name)
-        if isinstance(value, FunctionType):
-            value = import_module("mcz.call_checks").checked(value)
         globals()[name] = value
         return value
 

@@ -42,7 +42,6 @@ ALLOWED = {
     "errors": set(),
     "arguments": {"errors"},
     "checks": {"errors"},
-    "call_checks": MODEL,
     "indexing": {"errors"},
     "schema": {"errors"},
     "numbers": {"brief", "checks", "errors", "schema"},
