@@ -482,7 +482,7 @@ def test_the_commands_say_it(
     told("encode", bvh, "-o", path, "--copies", "--codec", "raw")
     with mcz.open(path) as file:
         size = info(file)["copy_bytes"]
-    assert f"copies {size:,} bytes" in told("info", path)
+    assert re.search(rf"copies +{size:,} ", told("info", path))
     assert "COPY payload" in told("info", "--layout", path)
     told("encode", bvh, "-o", path, "--force", "--codec", "raw")
     assert "copies" not in told("info", path)
