@@ -52,10 +52,12 @@ export class Packets {
   /**
    * @param {import("./clip.js").Clip} clip whose signals are given the segments
    * @param {object} limits of the profile
+   * @param {(offset: number, size: number) => void} [checkPlace] refuses a body by its place
    */
-  constructor(clip, limits) {
+  constructor(clip, limits, checkPlace = () => {}) {
     this.clip = clip;
     this.limits = limits;
+    this.checkPlace = checkPlace;
     this.sequence = 0;
     this.frameIsDue = false; // a segment of signal 0 has come in this DATA
   }
@@ -86,6 +88,7 @@ export class Packets {
     } else {
       segment = readFrame(reader, packet, body, check, clip, this.frameIsDue, limits);
     }
+    this.checkPlace(offset, packet.length);
     this.frameIsDue ||= segment.signal === 0;
     segment.offset = offset;
     segment.size = packet.length;
@@ -94,6 +97,24 @@ export class Packets {
     this.sequence++;
     return segment;
   }
+}
+
+/**
+ * Steps over a packet that is whole; of kind 3 its head alone can tell.
+ *
+ * @returns {boolean} whether it is the end packet
+ * @throws {Refused}
+ */
+export function passPacket(reader, sequence, limits) {
+  const packet = readHead(reader, sequence, limits);
+  if (packet.kind === KIND_END) {
+    checkEnd(reader, packet);
+    return true;
+  }
+  const body = reader.take(packet.length);
+  const check = reader.u16();
+  if (packet.kind !== KIND_NUMBERED) checkBody(reader, check, crc32(body));
+  return false;
 }
 
 function readHead(reader, sequence, limits) {

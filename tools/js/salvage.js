@@ -2,11 +2,12 @@
 
 import { sameBytes } from "./bytes.js";
 import { buildChunk } from "./chunks.js";
+import { Rows, readIndex } from "./directory.js";
 import { Refused } from "./errors.js";
 import { decodedLimit } from "./limits.js";
 import { overlaid } from "./overlay.js";
 import { Ranges } from "./ranges.js";
-import { Scan } from "./scan.js";
+import { Scan, placeKey } from "./scan.js";
 import { directoryFrom } from "./walked.js";
 
 /**
@@ -30,9 +31,30 @@ export async function salvaged(ranges, limit = decodedLimit(ranges.size)) {
       await scan.run();
     }
   }
+  const owners = scan.hasDoubts ? ownersOf(scan.lastIndex, ranges.size) : new Map();
+  if (owners.size > 0) {
+    scan = new Scan(better, limit, scan.repeated, owners);
+    await scan.run();
+  }
   if (scan.sound.length === 0) throw new Refused("nothing can be salvaged: no chunk is whole");
   const damage = [...notes, ...scan.damage.losses];
   return { ranges: better, directory: { ...directoryFrom(scan.file), damage } };
+}
+
+/** Whose the segments and CENDs are, as the last index says that is whole. */
+function ownersOf(payload, fileBytes) {
+  const owners = new Map();
+  try {
+    const { rows } = payload === null ? { rows: new Rows(0) } : readIndex(payload, fileBytes);
+    for (let i = 0; i < rows.length; i++) {
+      const { name, end, segments } = rows.at(i);
+      for (const { offset, size } of segments()) owners.set(placeKey(offset, size), name);
+      owners.set(placeKey(end.offset, end.length), name);
+    }
+  } catch (error) {
+    if (!(error instanceof Refused)) throw error;
+  }
+  return owners;
 }
 
 /** The damaged chunks of which there are copies. */

@@ -19,7 +19,7 @@ import { Damage } from "./damage.js";
 import { Refused } from "./errors.js";
 import { within } from "./limits.js";
 import { supplied } from "./missing.js";
-import { Packets } from "./packets.js";
+import { Packets, passPacket } from "./packets.js";
 import { resynchronize } from "./resynchronize.js";
 import { sha256 } from "./sha256.js";
 import { Walk } from "./walk.js";
@@ -30,16 +30,19 @@ const ID_SIZE = 16;
 const BASE_HEAD = Uint8Array.of(0, 9, 0, 2, 0); // of a file that has lost its own
 const REPEATED = new Set(["HEAD", "SKEL", "MODL", "CLIP"]);
 const MOST_OF_PACKET = 64; // bytes of a packet beside its body, and more
+const LEAST_BETWEEN = 2 * FRAMING_SIZE; // bytes in which a CEND and the next CLIP can have been
 
 /** A walk that goes on behind what is damaged. */
 export class Scan extends Walk {
   /**
    * @param {import("./ranges.js").Ranges} ranges
    * @param {number} limit bytes that an attachment or template may inflate to
-   * @param {Map<string, Uint8Array>} known payloads of SKEL and MODL that another walk has found in
-   *   REPT chunks, by type and id
+   * @param {Map<string, Uint8Array>} [known] payloads of SKEL and MODL that another walk has found
+   *   in REPT chunks, by type and id
+   * @param {Map<string, string>} [owners] whose the segments and CENDs are, as an index says: names
+   *   of clips by `placeKey`
    */
-  constructor(ranges, limit, known = new Map()) {
+  constructor(ranges, limit, known = new Map(), owners = new Map()) {
     super(ranges.size, limit);
     this.ranges = ranges;
     this.window = { start: 0, bytes: new Uint8Array(0) };
@@ -51,6 +54,11 @@ export class Scan extends Walk {
     this.repeated = new Map(); // what REPT chunks have of SKEL and MODL
     this.lostSkeletons = new Set();
     this.lostClip = null; // the name of a clip that cannot be read, until it ends
+    this.owners = owners;
+    this.faultAt = null; // where what cannot be taken in began, up to here
+    this.isInDoubt = false; // the open clip may have ended in bytes that are lost
+    this.hasDoubts = false;
+    this.lastIndex = null; // payload of the last INDX that is whole
     const { skeletons, templates } = this.file;
     this.references = {
       ...this.file,
@@ -69,8 +77,10 @@ export class Scan extends Walk {
       const begin = this.at;
       try {
         await this.step();
+        this.faultAt = null;
       } catch (error) {
         if (!(error instanceof Refused)) throw error;
+        this.faultAt ??= this.at;
         const next = await this.next(begin);
         this.note(error, begin, next ?? this.file.size);
         if (next === null) break;
@@ -185,6 +195,7 @@ export class Scan extends Walk {
       const id = hex(sha256(chunk.payload).subarray(0, ID_SIZE));
       this.repeated.set(`${chunk.type} ${id}`, chunk);
     }
+    if (this.isInDoubt) this.settle(chunks);
     if (this.clip !== null) return;
     for (const chunk of chunks) {
       if (chunk.type === "HEAD" && this.file.head !== null) continue;
@@ -192,10 +203,18 @@ export class Scan extends Walk {
     }
   }
 
+  /** A REPT tells whether the clip goes on that may have ended: it has the CLIP of its own. */
+  settle(chunks) {
+    const clips = chunks.filter(({ type }) => type === "CLIP");
+    const isSame = clips.length === 1 && sameBytes(clips[0].payload, this.clip.payload);
+    this.isInDoubt = !isSame;
+    if (clips.length > 0 && !isSame) this.closeClip();
+  }
+
   readInBody(chunk) {
     const { type } = chunk;
     if (type === "DATA" || type === "CEND") this.orphan(chunk);
-    else if (type === "INDX") this.index = chunk;
+    else if (type === "INDX") [this.index, this.lastIndex] = [chunk, chunk.payload];
     else super.readInBody(chunk);
   }
 
@@ -236,6 +255,7 @@ export class Scan extends Walk {
   }
 
   readData(chunk) {
+    this.checkOwner("DATA", chunk.offset + HEADER_SIZE, chunk.payload.length);
     super.readData(chunk);
     this.release(this.clip.segments.at(-1));
   }
@@ -249,7 +269,8 @@ export class Scan extends Walk {
     this.index = null;
     if (!this.clip) this.refuse("an open DATA outside a clip");
     const { clip, file } = this;
-    const packets = new Packets(clip, file.limits);
+    const place = (offset, size) => this.checkOwner("packet", offset, size);
+    const packets = new Packets(clip, file.limits, place);
     this.at = start + HEADER_SIZE;
     for (;;) {
       const most = Math.min(file.size - this.at, file.limits.packetBytes + MOST_OF_PACKET);
@@ -259,6 +280,7 @@ export class Scan extends Walk {
         segment = packets.next(reader, this.at);
       } catch (error) {
         if (error instanceof Refused) error.message += ` (from byte ${this.at} on)`;
+        await this.passPackets(packets.sequence);
         throw error;
       }
       this.at += reader.at;
@@ -268,8 +290,33 @@ export class Scan extends Walk {
     }
   }
 
+  /** Goes behind the packets that are whole, though they cannot be used. */
+  async passPackets(first) {
+    const { file } = this;
+    try {
+      for (let sequence = first; ; sequence++) {
+        const most = Math.min(file.size - this.at, file.limits.packetBytes + MOST_OF_PACKET);
+        const reader = new ByteReader(await this.view(this.at, most), "open DATA");
+        const isEnd = passPacket(reader, sequence, file.limits);
+        this.at += reader.at;
+        if (isEnd) return;
+      }
+    } catch (error) {
+      if (!(error instanceof Refused)) throw error;
+    }
+  }
+
+  /** Refuses what may belong to another clip than the one that is open. */
+  checkOwner(what, offset, size) {
+    const owner = this.owners.get(placeKey(offset, size));
+    if (owner === this.clip.name) this.isInDoubt = false;
+    else if (owner !== undefined || this.isInDoubt)
+      this.refuse(`${what} at ${offset} lies behind bytes that may have ended clip ${this.clip.name}`);
+  }
+
   readClipEnd({ payload, offset }) {
     const { clip } = this;
+    this.checkOwner("CEND", offset, payload.length);
     const end = readClipEnd(payload, clip, true);
     clip.end = { ...end, offset, length: payload.length };
     clip.nFrames = end.nFrames;
@@ -290,6 +337,7 @@ export class Scan extends Walk {
   /** Ends the clip that is open, perhaps without CEND. */
   closeClip() {
     const { clip } = this;
+    this.isInDoubt = false;
     if (clip === null) return;
     this.clip = null;
     clip.payload = null;
@@ -326,7 +374,7 @@ export class Scan extends Walk {
   /** Where to go on after a fault in what begins at `begin`; null: nowhere. */
   async next(begin) {
     this.index = null;
-    if (this.at > begin) return resynchronize(this, this.at); // behind whole packets
+    if (this.at > begin) return this.doubted(await resynchronize(this, this.at)); // behind whole packets
     try {
       const { open, length } = readHeader(await this.view(begin, HEADER_SIZE), 0);
       const end = begin + FRAMING_SIZE + length;
@@ -334,9 +382,21 @@ export class Scan extends Walk {
     } catch (error) {
       if (!(error instanceof Refused)) throw error;
     }
-    return resynchronize(this, begin + 1);
+    return this.doubted(await resynchronize(this, begin + 1));
+  }
+
+  /** `next`, up to which nothing is known: a clip may have ended there, and another one begun. */
+  doubted(next) {
+    if (this.clip !== null && next !== null) {
+      this.isInDoubt ||= next - this.faultAt >= LEAST_BETWEEN;
+      this.hasDoubts ||= this.isInDoubt;
+    }
+    return next;
   }
 }
+
+/** What tells a segment or CEND by its place in a file. */
+export const placeKey = (offset, size) => `${offset} ${size}`;
 
 /** Frames of a clip without CEND: up to the last segment of each signal. */
 function framesFound({ signals, nFrames }) {

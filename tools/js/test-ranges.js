@@ -155,6 +155,21 @@ test("a lost segment is told with its frames", async () => {
   await assert.rejects((await (await open(fromBytes(bytes))).clip(0)).read(), Refused);
 });
 
+test("no clip gets frames of the next one, where bytes between them are lost", async () => {
+  const bytes = bytesOf("valid/fast/appended.mcz").slice();
+  const whole = await open(fromBytes(bytes));
+  const [[first], [, second]] = await Promise.all(
+    [0, 1].map(async (index) => (await whole.clip(index)).segments()),
+  );
+  bytes.fill(0, first.offset - 16, second.offset - 16);
+  for (const part of [bytes, bytes.subarray(0, bytes.length - 40)]) {
+    const file = await open(fromBytes(part), { salvage: true });
+    const found = [...file.clips].find(({ name }) => name === "common");
+    const { values } = await (await file.clip(found.index)).read();
+    assert.ok(values.every(Number.isNaN), `${values}`);
+  }
+});
+
 test("sources, and what a C3D says beside its numbers", async () => {
   let n = 0;
   for (const name of vectors("valid/sources")) {
