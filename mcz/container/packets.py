@@ -8,9 +8,11 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 from mcz.container.limits import check
+from mcz.container.source import ByteSource, Forward
 from mcz.errors import ChecksumError, FormatError
 from mcz.schema import take_varint, varint
 
@@ -103,6 +105,16 @@ def read_packets(read: Callable[[int], bytes], limit: int) -> Iterator[Packet]:
             return
         yield packet
         sequence += 1
+
+
+def whole_until(source: ByteSource, start: int, limit: int) -> int:
+    """Return where the packets from ``start`` on end that are whole, whatever is in them."""
+    read, end = Forward(source, start), start
+    with suppress(FormatError):
+        for _ in read_packets(read, limit):
+            end = read.at
+        end = read.at
+    return end
 
 
 def read_packet(read: Callable[[int], bytes], limit: int) -> Packet:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 
 from mcz.container import payloads, strict
 from mcz.container.bounds import NOBODY, Bounds, Owners
@@ -39,7 +40,7 @@ from mcz.container.directory import (
     signal_rows,
 )
 from mcz.container.limits import PROFILES, Search, check, index_limit
-from mcz.container.packets import CHECK_SIZE, read_packets
+from mcz.container.packets import CHECK_SIZE, read_packets, whole_until
 from mcz.container.segments import header_of, parse_header
 from mcz.container.source import ByteSource, Forward
 from mcz.container.strict_ancillary import check_ancillary
@@ -393,37 +394,25 @@ class Walker:
     def _skip(self, at: int, done: int) -> int | None:
         """Where to go on after a fault in what begins at ``at`` and was good up to ``done``."""
         self.index = None
-        try:
+        end, profile = None, self.profile
+        with suppress(FormatError):
             chunk = read_chunk(self.source, at)
-            if chunk.length is not None:
-                self.bounds.begin_fault(max(at, done))
-                return chunk.offset + chunk.size  # its header is sound, so its end is known
-            done = self._end_of_packets(chunk, done)
-        except FormatError:
-            pass
+            start, most = chunk.payload_offset, profile.packet_bytes
+            end = None if chunk.length is None else chunk.offset + chunk.size
+            done = done if end else max(done, whole_until(self.source, start, most))
         self.bounds.begin_fault(max(at, done))
+        if end is not None:
+            return end  # its header is sound, so its end is known
         try:
-            limit = self.profile.chunk_bytes
-            found = resynchronize(self.source, max(at + 1, done), limit, self._spend)
+            spend = partial(self.search.spend, came=self.source.size, what="a chunk")
+            at = max(at + 1, done)
+            found = resynchronize(self.source, at, profile.chunk_bytes, spend)
         except LimitError as error:
             self._note(error)
             return None
         if self.clip is not None and found is not None:
             self.found.doubts |= self.bounds.skip(found)
         return found
-
-    def _end_of_packets(self, chunk: Chunk, done: int) -> int:
-        """Return where the packets of an open DATA end that are whole, though none can be used."""
-        read = Forward(self.source, chunk.payload_offset)
-        with suppress(FormatError):
-            for _ in read_packets(read, self.profile.packet_bytes):
-                done = max(done, read.at)
-            done = max(done, read.at)
-        return done
-
-    def _spend(self, size: int) -> None:
-        """Count what is read in search of the next chunk; what looks like one seldom is none."""
-        self.search.spend(size, self.source.size, "a chunk")
 
     def _finish(self) -> None:
         self._close_clip()
