@@ -309,6 +309,14 @@ def _decimal(seconds: float) -> str:
     return format(Decimal(repr(seconds)), "f")
 
 
+def parts_need_start(numbers: Ints | None, metadata: Mapping[str, str]) -> bool:
+    """Whether a part has its times only by a ``start-time`` of its own, unless a source says them.
+
+    So it is after a ``start-time``, and where numbers do not ascend, so that rows are counted.
+    """
+    return START in metadata or (numbers is not None and bool((np.diff(numbers) <= 0).any()))
+
+
 def numbers_or_rows(numbers: Ints | None, n_frames: int) -> Ints:
     """Frame numbers, 1, 2, 3, ... where there are none."""
     return np.arange(1, n_frames + 1) if numbers is None else numbers

@@ -34,6 +34,7 @@ from mcz.clock import (
     known_timeline,
     numbered,
     numbers_or_rows,
+    parts_need_start,
     timeline_of,
     times_place,
 )
@@ -180,7 +181,7 @@ class Motion:
             frame_numbers=None if numbers is None else numbers[start:stop],
             source=self.source and self.source.cut(start, stop),
         )
-        if START not in self.metadata:
+        if not parts_need_start(numbers, self.metadata):
             return made
         return made.at_times(self.timeline and self.timeline.cut(slice(start, stop)))
 

@@ -303,6 +303,66 @@ def test_windows_do_not_span_gaps(tmp_path: Path) -> None:
         np.testing.assert_allclose(resampled[3]["velocities"][:, 0, 0], 1, 1e-4)
 
 
+@pytest.mark.parametrize("rate", [None, 100])
+@pytest.mark.parametrize("frames_a_second", [None, 50, 200])
+def test_windows_go_by_irregular_times(
+    tmp_path: Path, rate: int | None, frames_a_second: int | None
+) -> None:
+    seconds = 5 + np.cumsum(np.random.default_rng(3).uniform(0.008, 0.012, 40))
+    seconds[20:] += 0.3
+    motion = markers(40, rate and Fraction(rate)).with_values(np.stack([seconds] * 3, axis=1))
+    motion = replace(motion, signals=(*motion.signals, times_signal(seconds.tolist())))
+    mcz.write(motion, tmp_path / "a.mcz")
+    for across in (False, True):
+        with mcz.open(tmp_path / "a.mcz") as file:
+            data = mcz.dataset(
+                file,
+                "positions,velocities",
+                window=4,
+                stride=3,
+                dtype="f8",
+                rate=frames_a_second,
+                across_gaps=across,
+            )
+            times = [
+                data.window(k).time + np.arange(4) / frames_a_second  # type: ignore[operator]
+                if frames_a_second
+                else file.only_clip().times[data.window(k).start : data.window(k).stop]
+                for k in range(len(data))
+            ]
+            found = data[:]
+        np.testing.assert_allclose(found["positions"][:, :, 0, 0], times, atol=1e-6)
+        np.testing.assert_allclose(found["velocities"], 1, atol=1e-3)
+        assert data.window(0).time == seconds[0]
+        assert across or not ((np.diff(times) > 0.1).any())
+
+
+def test_kept_windows_are_of_their_times(tmp_path: Path) -> None:
+    for name, stretch in (("a", 1.0), ("b", 2.0)):
+        motion = markers(9, None).with_values(np.arange(27.0).reshape(9, 3))
+        times = (np.arange(9) ** 1.1 * stretch).tolist()
+        motion = replace(motion, signals=(*motion.signals, times_signal(times)))
+        mcz.write(motion, tmp_path / f"{name}.mcz")
+    speeds = [
+        mcz.dataset(tmp_path / f"{name}.mcz", "velocities", folder=tmp_path / "kept")[0]
+        for name in "ab"
+    ]
+    near(speeds[0]["velocities"], speeds[1]["velocities"] * 2)
+
+
+@pytest.mark.parametrize("numbers", [[1, 1, 2, 3, 4, 5, 6, 7], [7] * 8, [9, 8, 7, 6, 5, 4, 3, 2]])
+def test_parts_of_numbers_that_do_not_ascend(tmp_path: Path, numbers: list[int]) -> None:
+    motion = markers(8, frame_numbers=np.array(numbers))
+    mcz.write(motion, tmp_path / "a.mcz")
+    mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(3, 7))
+    with mcz.open(tmp_path / "a.mcz") as file, mcz.open(tmp_path / "b.mcz") as part:
+        clip = file.only_clip()
+        for found in (motion[3:7], clip.motion((3, 7)), part.only_clip()):
+            near(found.times, motion.times[3:7])
+            assert found.frame_numbers is not None
+            assert found.frame_numbers.tolist() == numbers[3:7]
+
+
 # What every source format says of time, and what every target makes of it.
 
 

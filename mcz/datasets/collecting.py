@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mcz.clock import Timeline
 from mcz.datasets.caches import to_size
 from mcz.datasets.fields import chosen_fields, names_of
 from mcz.datasets.members import Member
@@ -19,7 +20,7 @@ from mcz.datasets.sources import MOST_OPEN, Recipe
 from mcz.datasets.windows import Dataset, Settings
 from mcz.errors import MczError, OptionError
 from mcz.motion import frame_rate_of
-from mcz.poses.resampling import resampled_frames
+from mcz.poses.resampling import MOST_VALUES, frames_within, resampled_frames, too_many
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
@@ -150,15 +151,27 @@ def _members(
     runs = [(0, clip.n_frames)] if timeline is None or across_gaps else timeline.runs
     for start, stop in runs or [(0, 0)]:
         n_frames = stop - start
-        time = float(timeline.even[start]) if timeline is not None and stop else None
-        member = Member(target, clip.name, n_frames, own, n_frames, start, time)
-        if recipe.rate is not None and own is None:
-            raise OptionError(
-                f"{member.label}: its frame rate is unknown; say it with source_rate="
-            )
-        if recipe.rate is not None and own is not None:
-            member = replace(member, n_frames=resampled_frames(n_frames, own, recipe.rate))
+        member = Member(target, clip.name, n_frames, own, n_frames, start)
+        part = timeline.cut(slice(start, stop)) if timeline is not None and n_frames else None
+        if part is not None and timeline is not None:
+            is_even = part.places is not None and bool((np.diff(part.places) == 1).all())
+            time = float(timeline.even[start])
+            member = replace(member, time=time, is_even=is_even)
+        if recipe.rate is not None:
+            member = replace(member, n_frames=_resampled_frames(member, part, recipe.rate))
         yield member
+
+
+def _resampled_frames(member: Member, part: Timeline | None, rate: Fraction) -> int:
+    """How many frames the clip, whose times are ``part``, has at ``rate``."""
+    if part is not None and not member.is_even:
+        frames, _ = frames_within(part, rate, (0, member.n_source))
+        if frames.stop > MOST_VALUES:
+            raise too_many(part, rate)
+        return len(frames)
+    if member.source_rate is None:
+        raise OptionError(f"{member.label}: its frame rate is unknown; say it with source_rate=")
+    return resampled_frames(member.n_source, member.source_rate, rate)
 
 
 class _Agreement:
@@ -167,11 +180,11 @@ class _Agreement:
     def __init__(self, recipe: Recipe) -> None:
         self._recipe = recipe
         self._first: tuple[Member, dict[str, Any]] | None = None
-        self._known: set[tuple[str, bytes, Fraction | None]] = set()
+        self._known: set[tuple[object, ...]] = set()
 
     def check(self, clip: Clip, member: Member) -> None:
         """Raises OptionError where ``clip`` differs from the first."""
-        key = member.target, clip.skeleton_id, member.source_rate
+        key = member.target, clip.skeleton_id, member.source_rate, member.time is None
         if key in self._known:
             return
         self._known.add(key)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -170,14 +169,14 @@ def subject_of(
     fields: Iterable[Field],
     joints: Joints,
     unit: str | None,
-    rate: Fraction | None,
+    is_timed: bool,
 ) -> Subject:
     """``skeleton`` as these fields look at it; raises MotionError and OptionError."""
     from mcz.kinematics.frames import frame_poses_of
 
     posed = any(field.posed for field in fields)
     lengths = any(field.lengths for field in fields)
-    if rate is None and any(field.reach for field in fields):
+    if not is_timed and any(field.reach for field in fields):
         raise OptionError("velocities and accelerations need a frame rate (source_rate=)")
     return Subject(
         skeleton,

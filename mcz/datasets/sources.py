@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from threading import Lock
 from typing import Any
@@ -13,13 +13,14 @@ from weakref import finalize
 
 import numpy as np
 
+from mcz.clock import Timeline, known_timeline
 from mcz.container.runs import Runs, SharedRuns
 from mcz.datasets.caches import Arrays
 from mcz.datasets.fields import Field, Rows, Subject, features_of, subject_of
 from mcz.datasets.members import Member
 from mcz.kinematics.chain import Floats
 from mcz.poses.moving import values_of
-from mcz.poses.resampling import Times, resampled, times_at, turn_scalars
+from mcz.poses.resampling import frames_within, resampled, times_at, turn_scalars
 from mcz.poses.scalar_quaternions import scalar_quaternions
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
@@ -45,8 +46,13 @@ class Recipe:
         return max(field.reach for field in self.fields)
 
     def subject(self, clip: Clip, member: Member) -> Subject:
-        rate = self.rate or member.source_rate
-        return subject_of(clip.skeleton, self.fields, self.joints, self.unit, rate)
+        is_timed = self.rate is not None or member.source_rate is not None
+        is_timed = is_timed or member.time is not None
+        return subject_of(clip.skeleton, self.fields, self.joints, self.unit, is_timed)
+
+    def copies(self, member: Member) -> bool:
+        """Whether frames of the data set are frames of the clip, one after the other."""
+        return self.rate is None or (member.is_even and self.rate == member.source_rate)
 
     def step(self, member: Member) -> Fraction:
         """How many frames of the clip one of the data set is."""
@@ -65,7 +71,7 @@ class Sources:
         self._given = dict(given)
         self._runs = Runs(runs_bytes)
         self._open: OrderedDict[str, File] = OrderedDict()
-        self._subjects: OrderedDict[tuple[bytes, Fraction | None], Subject] = OrderedDict()
+        self._subjects: OrderedDict[tuple[Any, ...], Subject] = OrderedDict()
         self._lock = Lock()
         # Where files take turns in being open, none is closed while another thread reads it.
         self._turns: AbstractContextManager[Any] = (
@@ -103,6 +109,16 @@ class Sources:
         while len(self._open) > MOST_OPEN:
             self._open.popitem(last=False)[1].close()
 
+    def time(self, recipe: Recipe, member: Member, frame: int) -> float | None:
+        """The time of a frame, as the data set counts them; None: unknown."""
+        if member.time is None:
+            return None
+        rate = recipe.rate or (member.source_rate if member.is_even else None)
+        if rate is not None:
+            return member.time + frame / float(rate)
+        with self._turns:
+            return float(timeline_of_member(self.clip(member), member).even[frame])
+
     def features(self, recipe: Recipe, member: Member, start: int, stop: int) -> Arrays:
         """The arrays of frames start <= f < stop, as the data set counts them."""
         with self._turns:
@@ -119,7 +135,8 @@ class Sources:
 
     def _subject(self, recipe: Recipe, clip: Clip, member: Member) -> Subject:
         """Prepared once for each skeleton."""
-        key = clip.skeleton_id, member.source_rate  # the id is the hash of the skeleton
+        # the id is the hash of the skeleton
+        key = clip.skeleton_id, member.source_rate, member.time is None
         with self._lock:
             found = self._subjects.get(key)
             if found is None:
@@ -127,6 +144,12 @@ class Sources:
                 if len(self._subjects) > MOST_SUBJECTS:
                     self._subjects.popitem(last=False)
             return found
+
+
+def timeline_of_member(clip: Clip, member: Member) -> Timeline:
+    """When the frames of a member were, whose times are known."""
+    timeline = known_timeline(clip.name, clip.timeline_at(member.source_rate))
+    return timeline.cut(slice(member.first, member.first + member.n_source))
 
 
 def _close(files: OrderedDict[str, File]) -> None:
@@ -139,15 +162,20 @@ def _values(
 ) -> Floats:
     """All channels of frames low <= f < high at the rate of the data set."""
     needed = sorted({joint for field in recipe.fields for joint in field.needs(subject)})
-    step = recipe.step(member)
-    if step == 1:
+    if recipe.copies(member):
         return values_of(clip, (member.first + low, member.first + high), needed)
-    times = times_at(range(low, high), step)
+    if member.is_even:
+        times = times_at(range(low, high), recipe.step(member))
+    else:
+        assert recipe.rate is not None
+        part = timeline_of_member(clip, member)
+        _, lie = frames_within(part, recipe.rate, (0, member.n_source))
+        times = lie(range(low, high))
     first, last = int(times.before[0]), int(times.after[-1]) + 1
     if times.share.any():  # splines look at one more on either side
         first, last = max(0, first - 1), min(member.n_source, last + 1)
     old = values_of(clip, (member.first + first, member.first + last), needed)
-    times = Times(times.before - first, times.share)
+    times = replace(times, before=times.before - first)
     new = resampled(clip.skeleton, old, times)
     if times.share.any():
         turn_scalars(scalar_quaternions(clip.skeleton, None, old), old, new, times)
@@ -157,7 +185,7 @@ def _values(
 def _steps(recipe: Recipe, clip: Clip, member: Member, low: int, high: int) -> Floats:
     """The seconds from each of these frames to the next; NaN across a gap."""
     timeline = clip.timeline_at(member.source_rate) if recipe.reach else None
-    if recipe.step(member) == 1 and timeline is not None:
+    if recipe.copies(member) and timeline is not None:
         return timeline.steps[member.first + low : member.first + max(low, high - 1)]
     rate = recipe.rate or member.source_rate
     return np.full(max(0, high - low - 1), 1.0 / float(rate) if rate else np.nan)

@@ -18,7 +18,7 @@ from mcz.datasets.caches import Arrays, Cache, FolderCache, MemoryCache
 from mcz.datasets.fields import FIELDS, Subject, names_of
 from mcz.datasets.members import Member
 from mcz.datasets.samplers import EPOCH, SEED, SIZE, WindowBatchSampler, WindowSampler
-from mcz.datasets.sources import BLOCK, Recipe, Sources
+from mcz.datasets.sources import BLOCK, Recipe, Sources, timeline_of_member
 from mcz.errors import OptionError, OutOfRangeError
 from mcz.indexing import row_numbers
 from mcz.poses.conversions import continuous
@@ -163,9 +163,8 @@ class Dataset:
         if not isinstance(number, int):
             raise OutOfRangeError(f"{index!r} is not the number of a window")
         member, start, stop = self._place(number)
-        rate = self._settings.recipe.rate or member.source_rate
-        time = None if member.time is None or rate is None else member.time + start / float(rate)
         first = ceil(member.first / self._settings.recipe.step(member))
+        time = self._sources.time(self._settings.recipe, member, start)
         return Window(member.target, member.clip, first + start, first + stop, time)
 
     def _place(self, number: int) -> tuple[Member, int, int]:
@@ -259,6 +258,8 @@ class Dataset:
             if isinstance(self._cache, FolderCache):
                 clip = self._sources.clip(member)
                 text += clip.value_hashes[0] + clip.skeleton_id
+                if not member.is_even:
+                    text += np.diff(timeline_of_member(clip, member).even).tobytes()
             else:
                 text += repr((member.target, member.clip)).encode()
             key = self._keys[member] = hashlib.sha256(text).hexdigest()[:32]

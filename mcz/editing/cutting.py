@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mcz.clock import START, numbered
+from mcz.clock import START, numbered, parts_need_start
 from mcz.codecs.contract import Codec
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
@@ -211,7 +211,7 @@ def clip_fields(cut: ClipCut, skeleton: bytes, fields: Any) -> dict[str, Any]:
         metadata |= frame_number_metadata(numbers if given else None)
     if cut.joints is not None:
         add_note(metadata, "skeleton-note", WITHOUT_CHANNELS)
-    if cut.joints is not None or START in metadata:
+    if cut.joints is not None or parts_need_start(cut.clip.frame_numbers, metadata):
         keep_times(cut, metadata)
     return dict(fields) | {
         "flags": fields.flags & ~payloads.OPEN_CLIP,

@@ -120,15 +120,13 @@ def times_of(timeline: Timeline, wanted: Fraction, signal: Signal) -> tuple[Ints
     In exact arithmetic where times lie at whole multiples of 1 / rate. Raises OptionError where
     they would be too many.
     """
-    even, room = timeline.even, MOST_VALUES // max(1, signal.n_channels)
+    room = MOST_VALUES // max(1, signal.n_channels)
     parts: list[tuple[Ints, Times]] = []
     for run in timeline.runs:
-        frames, lie = _frames_within(timeline, wanted, run)
+        frames, lie = frames_within(timeline, wanted, run)
         room -= max(0, frames.stop - frames.start)  # too many for len()
         if room < 0:
-            raise OptionError(
-                f"{len(even)} frames in {even[-1] - even[0]:g} s make too many at {wanted} a second"
-            )
+            raise too_many(timeline, wanted)
         parts.append((np.array(frames, np.int64), lie(frames)))
     if not parts:
         return np.empty(0, np.int64), Times(np.empty(0, np.int64), np.empty(0))
@@ -147,7 +145,15 @@ def times_of(timeline: Timeline, wanted: Fraction, signal: Signal) -> tuple[Ints
     return np.concatenate(numbers), times
 
 
-def _frames_within(
+def too_many(timeline: Timeline, wanted: Fraction) -> OptionError:
+    """The error that new frames are too many to be made."""
+    since = timeline.times[-1] - timeline.times[0]
+    return OptionError(
+        f"{len(timeline.times)} frames in {since:g} s make too many at {wanted} a second"
+    )
+
+
+def frames_within(
     timeline: Timeline, wanted: Fraction, run: tuple[int, int]
 ) -> tuple[range, Callable[[range], Times]]:
     """The new frames in a run of the old, and what tells where they lie."""

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from mcz.brief import shown
 from mcz.clock import (
-    START,
     Column,
     Counting,
     Timeline,
     column_of,
     known_timeline,
+    parts_need_start,
     timeline_of,
     times_place,
 )
@@ -191,10 +191,10 @@ class Clip(StoredClip, Posed):
         )
         step = 2**resolution if decimate else 1
         motion = decimated(motion, step) if step > 1 else motion
-        if step > 1 or START in motion.metadata:
-            timeline = self.timeline and self.timeline.cut(slice(start, stop, step))
-            motion = motion.at_times(timeline)
-        return replace(motion, source=self._source(start, stop, resolution, step))
+        motion = replace(motion, source=self._source(start, stop, resolution, step))
+        if step == 1 and not parts_need_start(self.frame_numbers, motion.metadata):
+            return motion
+        return motion.at_times(self.timeline and self.timeline.cut(slice(start, stop, step)))
 
     def _read_signal(self, info: SignalInfo, start: int, stop: int, resolution: int) -> Signal:
         whole = (start, stop) == (0, self.n_frames)
