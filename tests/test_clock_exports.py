@@ -19,6 +19,7 @@ from mcz.conversion import left_out
 from mcz.formats import FORMATS
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.sample import bvh_walk
+from tests.conftest import Call
 from tests.glb import Glb
 
 MARKER = (Joint("a", channels=tuple(map(Channel, ("tx", "ty", "tz")))),)
@@ -70,6 +71,12 @@ def test_tables_have_the_times(source: str, to: str, tmp_path: Path) -> None:
         assert made.frame_rate is not None
         assert abs(made.frame_rate / motion.frame_rate - 1) < 1e-8  # TRC prints 6 decimals of it
     assert not [text for text in left_out(motion, to) if "time" in text]
+
+
+@pytest.mark.parametrize("to", ["trc", "sto", "mot"])
+def test_times_of_a_calendar_are_printed(to: str, tmp_path: Path) -> None:
+    motion = markers(9, metadata={"start-time": "1700000000.123"})
+    assert np.abs(again(motion, to, tmp_path).times - motion.times).max() < 5e-7  # a binary64
 
 
 @pytest.mark.parametrize("to", ["trc", "sto", "mot"])
@@ -263,3 +270,28 @@ def test_the_second_decoder_and_the_viewer_have_the_times(tmp_path: Path) -> Non
     for path, found, ours in zip(paths, json.loads(done.stdout), wanted, strict=True):
         for times in found:
             assert np.abs(np.array(times) - ours).max() < 1e-9, path.name
+
+
+@pytest.mark.parametrize("name", ["walk.bvh", "fps.npz", "time.npz"])
+def test_cuts_say_that_they_begin_at_0(
+    name: str, samples: Path, tmp_path: Path, call: Call
+) -> None:
+    arrays = {"positions": np.zeros((40, 2, 3)), "fps": np.array(100)}
+    np.savez(tmp_path / "fps.npz", **arrays)
+    np.savez(tmp_path / "time.npz", **arrays, time=np.arange(40) / 100)
+    (tmp_path / "walk.bvh").write_bytes((samples / "walk.bvh").read_bytes())
+    mcz.encode(tmp_path / name, tmp_path / "a.mcz")
+    assert (
+        "begins at" not in call("decode", tmp_path / "a.mcz", "-o", tmp_path / f"whole-{name}")[2]
+    )
+    mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(12, 24))
+    told = name != "time.npz"
+    for arguments in (
+        ("decode", tmp_path / "a.mcz", "--frames", "12:24", "-o", tmp_path / name, "--force"),
+        ("decode", tmp_path / "b.mcz", "-o", tmp_path / name, "--force"),
+        ("unpack", tmp_path / "b.mcz", tmp_path / "all"),
+    ):
+        code, out, err = call(*arguments)
+        assert code == 0
+        assert ("left out: the time of the first frame, 0.1" in out + err) == told
+    assert (mcz.read(tmp_path / name).times[0] == 0) == told

@@ -253,14 +253,15 @@ def _of_clip(held: File, clip: Clip, wanted: Wanted) -> tuple[list[Output], Made
 
 
 def _rate_notes(clip: Clip, part: Part, wanted: Wanted) -> tuple[str, ...]:
-    """A note where the text that was written states another rate than the clip has."""
-    from mcz.reading.rate_notes import rate_note
+    """Notes where the text that was written states other times than the clip has."""
+    from mcz.reading.rate_notes import text_notes
 
     if wanted.decimate:
         return ()
     is_file = not wanted.filtered and clip.gives_file(part.frames, wanted.resolution)
-    note = rate_note(clip, is_file=is_file)
-    return () if note is None else (f"clip {clip.name}: {note}",)
+    start = part.frames[0] if part.frames else 0
+    notes = text_notes(clip, start, is_file=is_file)
+    return tuple(f"clip {clip.name}: {note}" for note in notes)
 
 
 def _corrected(clip: Clip, rate: Fraction | None) -> tuple[str, ...]:

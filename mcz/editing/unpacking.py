@@ -22,7 +22,7 @@ from mcz.reading.fidelity import RESTORED, fidelity_of
 from mcz.reading.fields import Where
 from mcz.reading.file import File, open
 from mcz.reading.names import listed
-from mcz.reading.rate_notes import rate_note
+from mcz.reading.rate_notes import text_notes
 from mcz.reading.sharing import shared_out
 from mcz.writing.atomic import replacing
 from mcz.writing.clip_writer import Progress
@@ -80,9 +80,8 @@ def unpack(
                     time = clip.metadata.get("mtime") if mtimes and clip is not None else None
                     if mtimes and not set_time(writing.place, time):
                         timeless.append(one.path)
-                    note = None if clip is None else rate_note(clip, is_file=clip.gives_file())
-                    result, notes = _fidelity(file, one), (note,) if note else ()
-                    outcome = replace(outcome, result=result, notes=notes)
+                    notes = () if clip is None else text_notes(clip)
+                    outcome = replace(outcome, result=_fidelity(file, one), notes=notes)
                 if salvage and writing.is_damaged:
                     outcome = replace(outcome, result="damaged")
                 report.outcomes.append(outcome)

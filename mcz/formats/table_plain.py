@@ -101,7 +101,8 @@ def _times(motion: Motion) -> tuple[Clock | None, tuple[Signal, ...]]:
     if timeline is None:
         raise MotionError(f"motion {motion.name!r}: its frame rate is unknown; a table has times")
     times = timeline.times
-    exact = (np.abs(np.round(times, DECIMALS) - times) < EXACT).all()
+    noise = EXACT + float(np.spacing(np.abs(times).max(initial=0.0)))
+    exact = (np.abs(np.round(times, DECIMALS) - times) < noise).all()
     grid = Grid(GridKind.FIXED, DECIMALS if exact else MORE_DECIMALS)
     clock = _clock(motion, timeline, grid)
     if clock is not None:

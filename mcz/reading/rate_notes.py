@@ -1,4 +1,4 @@
-"""Notes where a source states another frame rate than its clip has."""
+"""Notes where the text of a source states other times than its clip has."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from mcz.errors import FormatError
 from mcz.formats import FORMATS, format_by_id
 from mcz.formats.times import rate_of_times
 from mcz.reading.clip import Clip
+from mcz.reading.fidelity import RESTORED, fidelity_of
 from mcz.reading.source_rates import contradiction, is_one_of
 
+UNTIMED = ("bvh", "npy", "npz")  # with neither times, unless in an array, nor frame numbers
 
-def rate_note(clip: Clip, *, is_file: bool) -> str | None:
+
+def _rate_note(clip: Clip, is_file: bool) -> str | None:
     """A note where what ``source_bytes`` gives states another rate than ``clip`` has.
 
     ``is_file``: it gives the very file. Raises FormatError on bad bytes.
@@ -26,6 +29,29 @@ def rate_note(clip: Clip, *, is_file: bool) -> str | None:
         return None
     what = f"{float(stated):g} frames a second" if stated else "no frame rate"
     return f"its source states {what}, the clip has {float(rate):g}"
+
+
+def _start_note(clip: Clip, start: int, is_file: bool) -> str | None:
+    """A note where a part from frame ``start`` on is printed without the time of that frame.
+
+    ``is_file``: the text is the very file, which never said it.
+    """
+    source = clip.source
+    if source is None or source.format not in UNTIMED or start >= clip.n_frames:
+        return None
+    if clip.timeline is None or clip.times_column() is not None or clip.times[start] == 0:
+        return None
+    if is_file and fidelity_of(clip) == RESTORED:
+        return None
+    name = source.format.upper()
+    return f"left out: the time of the first frame, {clip.times[start]:.6g} s: {name} begins at 0 s"
+
+
+def text_notes(clip: Clip, start: int = 0, *, is_file: bool | None = None) -> tuple[str, ...]:
+    """All notes of the text of ``clip`` from frame ``start`` on; ``is_file``: None: of all."""
+    is_file = clip.gives_file() if is_file is None else is_file
+    notes = _rate_note(clip, is_file), _start_note(clip, start, is_file)
+    return tuple(note for note in notes if note)
 
 
 def states_rate(clip: Clip) -> bool:
