@@ -212,6 +212,11 @@ class Skeleton:
             names.append(joint.name if n == 0 else f"{joint.name}#{n}")
         return names
 
+    def channel_addresses(self) -> list[str]:
+        """``joint.channel`` of every channel."""
+        joints = zip(self.addresses(), self.joints, strict=True)
+        return [f"{name}.{channel.label}" for name, joint in joints for channel in joint.channels]
+
     def find(self, joint: int | str) -> int:
         """The index of a joint given by index or by name, ``name[#n]`` where a name repeats.
 

@@ -189,7 +189,7 @@ def _edited(
         now = "NaN" if not valid[row, at] else repr(float(given[row, at]))
         raise MotionError(
             f"clip {clip.name!r}: frame {row // old.samples_per_frame} of "
-            f"{_label(clip, columns[at])} is {now}; its source file says "
+            f"{clip.skeleton.channel_addresses()[columns[at]]} is {now}; its source file says "
             f"{'valid' if was_valid[row, columns[at]] else 'invalid'}"
         )
     new, mask = old.values.copy(), was_valid.copy()
@@ -207,12 +207,6 @@ def _edited(
     return _placed(clip, old, signal, on_grid)
 
 
-def _label(clip: Clip, column: int) -> str:
-    joint = joint_of_column(clip.skeleton)[column]
-    channel = clip.skeleton.channels[column]
-    return f"{clip.skeleton.addresses()[joint]}.{channel.label}"
-
-
 def _placed(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> Signal:
     """The signal, its new values on their grids where that is wanted or must be."""
     ordinals, exact = signal.to_ordinals()
@@ -228,7 +222,7 @@ def _placed(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> Signal:
         row, at = np.argwhere(block)[0].tolist()
         what = (
             f"clip {clip.name!r}: frame {(row + rows.start) // signal.samples_per_frame} of "
-            f"{_label(clip, columns[at])}: its grid {grid.kind.name} does not hold "
+            f"{clip.skeleton.channel_addresses()[columns[at]]}: its grid {grid.kind.name} does not hold "
             f"{values[row + rows.start, columns[at]]!r}"
         )
         if not on_grid:

@@ -162,10 +162,6 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 def unsolved_channels(skeleton: Skeleton) -> tuple[str, ...]:
     """The channels, ``joint.channel``, that inverse kinematics leaves at 0: they move nothing."""
-    names = (
-        f"{address}.{channel.label}"
-        for address, joint in zip(skeleton.addresses(), skeleton.joints, strict=True)
-        for channel in joint.channels
-    )
     units = Targets(skeleton, markers=False).units
-    return tuple(name for name, unit in zip(names, units, strict=True) if not unit)
+    pairs = zip(skeleton.channel_addresses(), units, strict=True)
+    return tuple(name for name, unit in pairs if not unit)

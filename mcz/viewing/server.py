@@ -10,7 +10,6 @@ from contextlib import suppress
 from http.server import ThreadingHTTPServer
 from socketserver import TCPServer
 from threading import BoundedSemaphore, Thread
-from types import TracebackType
 from typing import Any
 
 from mcz.errors import AccessError, OptionError
@@ -79,12 +78,7 @@ class Server(ThreadingHTTPServer):
     def __enter__(self) -> Server:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Sequence
 from fractions import Fraction
-from types import TracebackType
 from typing import Any, BinaryIO
 
 from mcz.errors import OptionError
@@ -45,12 +44,7 @@ class View:
     def __enter__(self) -> View:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 from threading import Condition
-from types import TracebackType
 
 PULSE = 0.5  # seconds between two looks, so that Ctrl-C is heard on every system
 
@@ -25,12 +24,7 @@ class Visitors:
             self._changed.notify_all()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with self._changed:
             self._n_open -= 1
             self._changed.notify_all()

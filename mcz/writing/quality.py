@@ -17,7 +17,6 @@ from mcz.metrics import compare
 from mcz.metrics.sums import channel_errors
 from mcz.motion import Exceptions, Motion, Signal
 from mcz.schema import build
-from mcz.tables.files import channel_names
 
 CHUNK = b"QUAL"
 # What a record does without, for its bytes: the radius is 3 cm where it is not stated.
@@ -55,7 +54,8 @@ def _greatest_error(original: Motion, decoded: Signal) -> dict[str, Any]:
         return {}
     row, column = divmod(int(errors.argmax()), errors.shape[1])
     found_at = row // signal.samples_per_frame
-    name = channel_names(skeleton, signal.channels)[column]
+    own = signal.channels
+    name = skeleton.channel_addresses()[column] if own is None else own[column].label
     figures = (float(errors[row, column]), found_at, name)
     return dict(zip(NOT_STORED, figures, strict=True))
 
