@@ -172,14 +172,26 @@ Cut = Callable[[bytes, Layout, int, int, tuple[int, ...]], bytes]
 # new ``numbers``. Looking up a group that is left out raises; the message is the caller's.
 Regroup = Callable[[bytes, Layout, int, Mapping[int, int]], bytes]
 
-# (header, source, groups, spans, options, fetch) -> of each span the streams of these groups, in
-# stored order, which a decoder reads under this header beside the streams of all other groups.
-# ``source`` holds the whole signal with its new values, ``options`` are the parameters, where they
-# were recorded, ``fetch`` gives the streams that are replaced.
-Recode = Callable[
-    [bytes, SignalSource, tuple[int, ...], Sequence[Span], Mapping[str, Any], Fetch],
-    Iterator[tuple[bytes, ...]],
-]
+
+@dataclass(frozen=True, slots=True)
+class Recoding:
+    """Groups of a coded signal that are coded anew, with the header that they have.
+
+    ``source`` holds the whole signal with its new values, ``options`` are the parameters, where
+    they were recorded, ``fetch`` gives the streams that are replaced.
+    """
+
+    header: bytes
+    source: SignalSource
+    groups: tuple[int, ...]
+    spans: Sequence[Span]
+    options: Mapping[str, Any]
+    fetch: Fetch
+
+
+# Of each span the streams of the groups, in stored order, which a decoder reads under the header
+# beside the streams of all other groups.
+Recode = Callable[[Recoding], Iterator[tuple[bytes, ...]]]
 
 
 class LiveEncoder(Protocol):

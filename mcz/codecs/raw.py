@@ -19,6 +19,7 @@ from mcz.codecs.contract import (
     Encoded,
     Fetch,
     Layout,
+    Recoding,
     Request,
     SignalSource,
     Span,
@@ -56,18 +57,12 @@ def _build(ordinals: NDArray[np.int64]) -> bytes:
     return b"".join(parts)
 
 
-def recode(
-    header: bytes,
-    source: SignalSource,
-    groups: tuple[int, ...],
-    spans: Sequence[Span],
-    options: Mapping[str, Any],
-    fetch: Fetch,
-) -> Iterator[tuple[bytes, ...]]:
+def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
     """The streams of some groups with new values."""
-    for span in spans:
-        ordinals = source.ordinals(span.first, span.stop)
-        yield tuple(_build(ordinals[:, list(source.layout.groups[group])]) for group in groups)
+    groups = [list(asked.source.layout.groups[group]) for group in asked.groups]
+    for span in asked.spans:
+        ordinals = asked.source.ordinals(span.first, span.stop)
+        yield tuple(_build(ordinals[:, columns]) for columns in groups)
 
 
 def decode(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Codec, Request
+from mcz.codecs.contract import Codec, Recoding, Request
 from mcz.codecs.parameters import TARGETS
 from mcz.editing.cutting import how_anew, joint_of_column
 from mcz.errors import MotionError, OptionError
@@ -222,8 +222,8 @@ def _placed(clip: Clip, old: Signal, signal: Signal, on_grid: bool) -> Signal:
         row, at = np.argwhere(block)[0].tolist()
         what = (
             f"clip {clip.name!r}: frame {(row + rows.start) // signal.samples_per_frame} of "
-            f"{clip.skeleton.channel_addresses()[columns[at]]}: its grid {grid.kind.name} does not hold "
-            f"{values[row + rows.start, columns[at]]!r}"
+            f"{clip.skeleton.channel_addresses()[columns[at]]}: its grid {grid.kind.name} does not "
+            f"hold {values[row + rows.start, columns[at]]!r}"
         )
         if not on_grid:
             raise MotionError(f"{what}; on_grid takes the nearest that it holds")
@@ -320,7 +320,7 @@ def _streams(
     numbers = range(len(info.rows)) if segments is None else segments
     spans = [info.spans[number] for number in numbers]
     options = recorded_options(info.codec, clip.quality or {})
-    coded = info.codec.recode(info.header, source, groups, spans, options, reader.fetch)
+    coded = info.codec.recode(Recoding(info.header, source, groups, spans, options, reader.fetch))
     return {
         (number, group): streams[at :: len(groups)]
         for number, streams in zip(numbers, coded, strict=True)

@@ -19,7 +19,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Codec, Encoded, Fetch, Layout, Request, Segment, SignalSource, Span
+from mcz.codecs.contract import (
+    Codec,
+    Encoded,
+    Fetch,
+    Layout,
+    Recoding,
+    Request,
+    Segment,
+    SignalSource,
+    Span,
+)
 from mcz.codecs.curves.choices import (
     BREAKS,
     LEAST_STEP,
@@ -148,20 +158,14 @@ def _segment_length(layout: Layout, plan: Plan) -> int:
     return max(delta, min(wanted, most // delta * delta))
 
 
-def recode(
-    header: bytes,
-    source: SignalSource,
-    groups: tuple[int, ...],
-    spans: Sequence[Span],
-    options: Mapping[str, Any],
-    fetch: Fetch,
-) -> Iterator[tuple[bytes, ...]]:
+def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
     """The streams of some joints with new values, with marks and steps of the header."""
-    fields = parse(QBC_HEADER, header, "qbc header")
-    plan = plan_of_header(fields, options)
-    code = _Coder(Part(source, groups, fields.coded_frames), fields.coded_frames, plan)
-    for span in spans:
-        yield code(span.first, span.stop)[: source.layout.n_resolutions * len(groups)]
+    fields = parse(QBC_HEADER, asked.header, "qbc header")
+    plan = plan_of_header(fields, asked.options)
+    part = Part(asked.source, asked.groups, fields.coded_frames)
+    code = _Coder(part, fields.coded_frames, plan)
+    for span in asked.spans:
+        yield code(span.first, span.stop)[: asked.source.layout.n_resolutions * len(asked.groups)]
 
 
 def preview(header: bytes, layout: Layout, spans: Sequence[Span]) -> Ints:

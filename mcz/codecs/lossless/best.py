@@ -9,7 +9,8 @@ can look at those before it, and needs no other.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from mcz.codecs.contract import (
@@ -50,18 +51,6 @@ def regroup(stream: bytes, layout: Layout, group: int, numbers: Mapping[int, int
     return stream[:1] + copying.regroup(stream[1:], layout, group, numbers)
 
 
-def recode(
-    header: bytes,
-    source: SignalSource,
-    groups: tuple[int, ...],
-    spans: Sequence[Span],
-    options: Mapping[str, Any],
-    fetch: Fetch,
-) -> Iterator[tuple[bytes, ...]]:
-    """The streams of some groups with new values, without copies."""
-    return copying.recode_streams(source, groups, spans, build_stream)
-
-
 CODEC = Codec(
     id=12,
     name="best",
@@ -72,6 +61,6 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     regroup=regroup,
-    recode=recode,
+    recode=partial(copying.recode_streams, build_stream),
     parameters=(segment_frames("57,000"),),
 )

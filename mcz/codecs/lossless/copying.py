@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Encoded, Fetch, Layout, Request, SignalSource, Span
+from mcz.codecs.contract import Encoded, Fetch, Layout, Recoding, Request, SignalSource, Span
 from mcz.codecs.lossless.segments import check_copy
 from mcz.codecs.segments import Sizing, gather, guessing
 from mcz.coding.ordinals.heads import COPY, read_heads
@@ -55,12 +55,13 @@ def _prepare(
     return lambda: tuple(streams())
 
 
-def recode_streams(
-    source: SignalSource, groups: tuple[int, ...], spans: Sequence[Span], build: Build
-) -> Iterator[tuple[bytes, ...]]:
-    """Streams of some groups with new values, without copies."""
-    layout = source.layout
-    for span in spans:
+def recode_streams(build: Build, asked: Recoding) -> Iterator[tuple[bytes, ...]]:
+    """Streams of some groups with new values, without copies.
+
+    What such a stream repeated, or who repeated it, need not be looked at then.
+    """
+    source, layout = asked.source, asked.source.layout
+    for span in asked.spans:
         ordinals, grids = source.ordinals(span.first, span.stop), source.grids(span.first)
         yield tuple(
             build(
@@ -69,7 +70,7 @@ def recode_streams(
                 group,
                 None,
             )
-            for group in groups
+            for group in asked.groups
         )
 
 

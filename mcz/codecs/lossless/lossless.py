@@ -9,7 +9,7 @@ that are copies of another group's.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -79,21 +79,6 @@ def _has_counts(source: SignalSource) -> bool:
     return any(find_counts(run[:, c], find_unit(run[:, c])) for run in runs for c in tried)
 
 
-def recode(
-    header: bytes,
-    source: SignalSource,
-    groups: tuple[int, ...],
-    spans: Sequence[Span],
-    options: Mapping[str, Any],
-    fetch: Fetch,
-) -> Iterator[tuple[bytes, ...]]:
-    """The streams of some groups with new values, without copies.
-
-    What such a stream repeated, or who repeated it, need not be looked at then.
-    """
-    return recode_streams(source, groups, spans, build_stream)
-
-
 def decode(
     header: bytes,
     layout: Layout,
@@ -118,6 +103,6 @@ CODEC = Codec(
     encode=encode,
     decode=decode,
     regroup=regroup,
-    recode=recode,
+    recode=partial(recode_streams, build_stream),
     parameters=(segment_frames("57,000"),),
 )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Encoded, Fetch, Layout, SignalSource, Span
+from mcz.codecs.contract import Encoded, Layout, Recoding, SignalSource
 from mcz.codecs.parameters import Parameter, integer
 from mcz.codecs.segments import Sizing, guessing
 from mcz.errors import FormatError
@@ -34,21 +34,13 @@ def encode_groups(
     return Encoded(b"", guessing(source, params["segment_frames"], sizing, prepare))
 
 
-def recode_groups(
-    build: Build,
-    header: bytes,
-    source: SignalSource,
-    groups: tuple[int, ...],
-    spans: Sequence[Span],
-    options: Mapping[str, Any],
-    fetch: Fetch,
-) -> Iterator[tuple[bytes, ...]]:
+def recode_groups(build: Build, asked: Recoding) -> Iterator[tuple[bytes, ...]]:
     """The streams of some groups with new values, without copies.
 
     What such a stream repeated, or who repeated it, need not be looked at then.
     """
-    for span in spans:
-        yield _prepare(build, source, groups, False, span.first, span.stop)()
+    for span in asked.spans:
+        yield _prepare(build, asked.source, asked.groups, False, span.first, span.stop)()
 
 
 def _prepare(

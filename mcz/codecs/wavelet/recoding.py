@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.codecs.contract import Fetch, Recode, SignalSource, Span
+from mcz.codecs.contract import Recode, Recoding, SignalSource
 from mcz.codecs.groups import Part
 from mcz.codecs.parameters import SCALED
 from mcz.codecs.steps import code_of
@@ -48,24 +48,17 @@ def recoder(name: str, weigh: Weigh) -> Recode:
     Elsewhere its encoder's ``weigh`` says what is small.
     """
 
-    def recode(
-        header: bytes,
-        source: SignalSource,
-        groups: tuple[int, ...],
-        spans: Sequence[Span],
-        options: Mapping[str, Any],
-        fetch: Fetch,
-    ) -> Iterator[tuple[bytes, ...]]:
+    def recode(asked: Recoding) -> Iterator[tuple[bytes, ...]]:
         """The streams of some channels with new values, with the steps of the header."""
-        fields = parse(WAVELET_HEADER, header, f"{name} header")
-        quantizer = _quantizer(fields, groups, spans, fetch, source, *weigh(source, options))
+        fields = parse(WAVELET_HEADER, asked.header, f"{name} header")
+        quantizer = _quantizer(fields, asked, *weigh(asked.source, asked.options))
         plan = Plan(name, _transform(fields), quantizer, 0)
-        part = Part(source, groups, fields.coded_frames)
+        part = Part(asked.source, asked.groups, fields.coded_frames)
         frames = Frames(name, part, plan.wavelet, plan.levels)
-        for span in spans:
+        for span in asked.spans:
             streams = segment_streams(frames, plan, span.first, span.stop)
             frames.keep(span.first, span.stop)
-            yield streams[: source.layout.n_resolutions * len(groups)]
+            yield streams[: asked.source.layout.n_resolutions * len(asked.groups)]
 
     return recode
 
@@ -79,21 +72,13 @@ def _transform(fields: Any) -> Transform:
     return Transform(fields.wavelet, wavelet, fields.levels)
 
 
-def _quantizer(
-    fields: Any,
-    groups: tuple[int, ...],
-    spans: Sequence[Span],
-    fetch: Fetch,
-    source: SignalSource,
-    weights: Floats,
-    threshold: float | None,
-) -> Quantizer:
-    columns = [column for group in groups for column in source.layout.groups[group]]
+def _quantizer(fields: Any, asked: Recoding, weights: Floats, threshold: float | None) -> Quantizer:
+    columns = [column for group in asked.groups for column in asked.source.layout.groups[group]]
     own = weights[columns]
     if fields.decimals == SCALED:
         codes = tuple(
-            _step_code(group, spans, fetch, code_of(float(weight)))
-            for group, weight in zip(groups, own, strict=True)
+            _step_code(group, asked, code_of(float(weight)))
+            for group, weight in zip(asked.groups, own, strict=True)
         )
         return _Held(DEAD_ZONE * fields.unit * own, None, fields.unit, codes, fields.least)
     if threshold is None:
@@ -102,10 +87,10 @@ def _quantizer(
     return _Held(threshold * own, fields.decimals, 1.0, (0,) * len(own), fields.least)
 
 
-def _step_code(group: int, spans: Sequence[Span], fetch: Fetch, default: int) -> int:
+def _step_code(group: int, asked: Recoding, default: int) -> int:
     """The step code that a channel has had, ``default`` where it was 0 all along."""
-    for segment in range(len(spans)):
-        stream = fetch(segment, 0, group)
+    for segment in range(len(asked.spans)):
+        stream = asked.fetch(segment, 0, group)
         if len(stream) > 1:
             return stream[1]
     return default
