@@ -1,8 +1,9 @@
-"""Rows chosen as NumPy indexes one axis: by integers, slices, ``...``, lists, arrays and masks."""
+"""Ranges, and rows chosen as NumPy indexes one axis: by integers, slices, lists, arrays, masks."""
 
 from __future__ import annotations
 
 import operator
+from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
@@ -56,3 +57,18 @@ def _single(number: int, n_rows: int, noun: str) -> int:
     if not -n_rows <= number < n_rows:
         raise OutOfRangeError(f"{noun} {number} of {n_rows}")
     return number % n_rows
+
+
+def merged_ranges(ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Ranges in order, those that touch as one.
+
+    >>> merged_ranges([(8, 9), (0, 4), (4, 6)])
+    [(0, 6), (8, 9)]
+    """
+    found: list[tuple[int, int]] = []
+    for start, stop in sorted(ranges):
+        if found and start <= found[-1][1]:
+            found[-1] = found[-1][0], max(stop, found[-1][1])
+        else:
+            found.append((start, stop))
+    return found

@@ -22,6 +22,7 @@ from mcz.editing.rewriting import (
     rewrite,
     source_of,
     source_path,
+    steps,
     used_by,
     used_by_skeleton,
     whole,
@@ -281,16 +282,9 @@ def split(
         outputs = {v: folder / portable(f"{v.replace('/', '_')}.mcz") for v in groups}
         _check_outputs(outputs.values(), force)
         folder.mkdir(parents=True, exist_ok=True)
-        done = 0
+        step = steps(progress, len(file.clips))
         for value, names in groups.items():
             plan = _part(file, names, with_rest=value == rest)
-
-            def step(name: str) -> None:
-                nonlocal done
-                done += 1
-                if progress is not None:
-                    progress(done, len(file.clips), name)
-
             output = outputs[value]
             written = rewrite(target, output, force, file, plan, step)
             said = counted(len(plan.clips), "clip")
@@ -363,14 +357,7 @@ def _finish(
     progress: Progress | None,
 ) -> Report:
     """Write the new file; let the report say its size, and what may not be carried over."""
-    done = 0
-
-    def step(name: str) -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done, len(plan.clips), name)
-
+    step = steps(progress, len(plan.clips))
     written = rewrite(target, output, force, file, plan, step)
     report.size = written.size
     report.left_out += written.left_out

@@ -16,7 +16,7 @@ from mcz.editing.appending import growing
 from mcz.editing.carrying import Change
 from mcz.editing.outcomes import Outcome, Report
 from mcz.editing.protecting import redundancy_of, still_protect
-from mcz.editing.rewriting import rewrite, source_of, whole
+from mcz.editing.rewriting import rewrite, source_of, steps, whole
 from mcz.errors import ChecksumError, OptionError
 from mcz.formats import FORMATS
 from mcz.motion import frame_rate_of
@@ -120,17 +120,9 @@ def set_rate(
             _check_rate(clip, exact, force)
             plan.clips[clip.name] = Change(rate=exact)
             report.outcomes.append(Outcome(clip.name, "rate", 0, f"{float(exact):g}"))
-        done = 0
-
-        def step(name: str) -> None:
-            nonlocal done
-            done += 1
-            if progress is not None:
-                progress(done, len(plan.clips), name)
-
         if not clips:
             return report
-        written = rewrite(target, output, force, file, plan, step)
+        written = rewrite(target, output, force, file, plan, steps(progress, len(plan.clips)))
         report.size, report.left_out = written.size, written.left_out
     _check_sources(target if output is None else output, [clip.name for clip in clips])
     return report

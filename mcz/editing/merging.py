@@ -24,6 +24,7 @@ from mcz.editing.rewriting import (
     Plan,
     carry,
     source_path,
+    steps,
     whole,
     writer_like,
 )
@@ -92,14 +93,7 @@ def carried(
     plans: Sequence[tuple[File, Plan]], writer: Writer, progress: Progress | None
 ) -> list[str]:
     """Write what the plans say of their files; return what may not be carried over."""
-    done, total, left_out = 0, sum(len(plan.clips) for _, plan in plans), []
-
-    def step(name: str) -> None:
-        nonlocal done
-        done += 1
-        if progress is not None:
-            progress(done, total, name)
-
+    step, left_out = steps(progress, sum(len(plan.clips) for _, plan in plans)), []
     for file, plan in plans:
         found = carry(file, writer, plan, step)
         left_out += [f"{file.name}: {text}" for text in found]

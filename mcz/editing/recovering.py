@@ -19,6 +19,7 @@ from mcz.brief import brief
 from mcz.container.source import ByteSource
 from mcz.editing.protecting import chunk_bytes
 from mcz.errors import FormatError
+from mcz.indexing import merged_ranges
 from mcz.reading.file import reached
 from mcz.recovery import making
 from mcz.recovery.code import LANE, encoded, recovered, runs_of
@@ -58,26 +59,11 @@ class Recovery:
             return []
         of = f"{self.bad_blocks:,} of {self.n_blocks:,} blocks are bad"
         can = f"of {self.n_recovery:,} recovery blocks {self.bad_recovery:,} are bad, too"
-        ranges = merged(self.bad_bytes)
+        ranges = merged_ranges(self.bad_bytes)
         places = ", ".join(f"{start:,} to {stop:,}" for start, stop in ranges[:FEW])
         more = f" and {len(ranges) - FEW:,} more ranges" if len(ranges) > FEW else ""
         where = [f"bytes {places}{more}"] if ranges else []
         return [f"recovery data: {of}; {can}", *where]
-
-
-def merged(ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Ranges of bytes, those that touch as one.
-
-    >>> merged([(8, 9), (0, 4), (4, 6)])
-    [(0, 6), (8, 9)]
-    """
-    found: list[tuple[int, int]] = []
-    for start, stop in sorted(ranges):
-        if found and start <= found[-1][1]:
-            found[-1] = found[-1][0], max(stop, found[-1][1])
-        else:
-            found.append((start, stop))
-    return found
 
 
 @dataclass(slots=True)

@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -33,9 +34,21 @@ from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
 from mcz.schema import parse
 from mcz.writing.atomic import replacing_file
+from mcz.writing.clip_writer import Progress
 
 Shared = tuple[bytes, bytes]  # type and id of a SKEL, MODL or SRCE
 Step = Callable[[str], None]  # is told the name of each clip that was carried over
+
+
+def steps(progress: Progress | None, total: int) -> Step:
+    """A step that counts for ``progress``."""
+    numbers = count(1)
+
+    def step(name: str) -> None:
+        if progress is not None:
+            progress(next(numbers), total, name)
+
+    return step
 
 
 @dataclass(slots=True)

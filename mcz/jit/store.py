@@ -23,16 +23,21 @@ def folder() -> Path | None:
     if given := os.environ.get("MCZ_CACHE_DIR"):
         return Path(given)
     try:
-        home = Path.home()
+        return user_cache() / "loops"
     except RuntimeError:
         return None
+
+
+def user_cache() -> Path:
+    """The folder of MCZ below that of the user's caches; RuntimeError where there is no home."""
+    home = Path.home()
     if sys.platform == "win32":
         base = os.environ.get("LOCALAPPDATA") or str(home / "AppData" / "Local")
     elif sys.platform == "darwin":
         base = str(home / "Library" / "Caches")
     else:
         base = os.environ.get("XDG_CACHE_HOME") or str(home / ".cache")
-    return Path(base) / "mcz" / "loops"
+    return Path(base) / "mcz"
 
 
 def load(name: str) -> bytes | None:

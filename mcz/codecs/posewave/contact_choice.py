@@ -21,6 +21,7 @@ from mcz.codecs.posewave.header import NAME
 from mcz.codecs.posewave.skeleton_plan import has_kinematics
 from mcz.codecs.segments import skeleton_of
 from mcz.errors import OptionError
+from mcz.indexing import merged_ranges
 from mcz.kinematics.contacts import USUAL_RATE, FootTracks
 from mcz.kinematics.feet import feet_of
 from mcz.kinematics.points import points_of, positions_of
@@ -151,9 +152,9 @@ def choose_contacts(
         tail = points_of(skeleton)[joint][0] + 1
         points.append({"joint": joint, "tail": tail, "step": step, "follows": follows})
     for group in _groups(skeleton, joints):
-        stances = _joined([span for joint in group for span in by_joint[joint]])
+        stances = merged_ranges([span for joint in group for span in by_joint[joint]])
         for joint in group:
-            for first, stop in _joined(by_joint[joint]):
+            for first, stop in merged_ranges(by_joint[joint]):
                 stance = n_stances + sum(end <= first for _, end in stances)
                 pieces.append(Piece(joints.index(joint), first, stop - first, first, stance))
         n_stances += len(stances)
@@ -180,14 +181,3 @@ def _joint(skeleton: Skeleton, name: str) -> int:
     if name not in addresses:
         raise OptionError(f"contacts: there is no joint {name!r}")
     return addresses.index(name)
-
-
-def _joined(spans: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
-    """In order, those that touch as one."""
-    found: list[tuple[int, int]] = []
-    for first, stop in sorted(spans):
-        if found and first <= found[-1][1]:
-            found[-1] = found[-1][0], max(stop, found[-1][1])
-        else:
-            found.append((first, stop))
-    return found
