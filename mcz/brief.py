@@ -56,7 +56,7 @@ def spreadsheet_cell(text: str) -> str:
 
 
 def cell_text(cell: str) -> str:
-    """What ``spreadsheet_cell`` made a cell of."""
+    """The text that ``spreadsheet_cell`` made a cell of."""
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 

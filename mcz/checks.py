@@ -25,12 +25,12 @@ def check_fields(thing: Any, rules: Mapping[str, Rule]) -> None:
     """Give fields of a frozen dataclass the form of their rules; MotionError names the field."""
     for name, rule in rules.items():
         value = getattr(thing, name)
-        found = formed(f"{type(thing).__name__.lower()}: {name}", rule, value, MotionError)
+        found = apply_rule(f"{type(thing).__name__.lower()}: {name}", rule, value, MotionError)
         if found is not value:
             object.__setattr__(thing, name, found)
 
 
-def formed(name: str, rule: Rule, value: Any, error: type[MczError]) -> Any:
+def apply_rule(name: str, rule: Rule, value: Any, error: type[MczError]) -> Any:
     """``value`` in the form of a rule; raises ``error``, which names it."""
     try:
         return rule.form(value)

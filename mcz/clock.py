@@ -104,7 +104,7 @@ class Timeline:
 
     @property
     def is_uniform(self) -> bool:
-        """Whether every frame follows the one before by the same step, up to rounding."""
+        """True if every frame follows the one before by the same step, up to rounding."""
         steps = self.steps
         return len(steps) == 0 or bool(np.isfinite(steps).all() and np.ptp(steps) <= EXACT)
 
@@ -117,7 +117,7 @@ class Timeline:
         return list(zip(starts, [*starts[1:], len(self.times)], strict=True))
 
     def is_near(self, other: Timeline) -> bool:
-        """Whether the times are those of ``other``, up to its rounding."""
+        """Return whether the times are those of ``other``, up to its rounding."""
         if len(self.times) != len(other.times):
             return False
         off = np.abs(self.times - other.even).max(initial=0.0)
@@ -170,7 +170,7 @@ class Timed(Protocol):
 
 
 def has_times(skeleton: Skeleton) -> bool:
-    """Whether the first column of a motion is the time, as of a STO or MOT that was read."""
+    """Return whether the first column of a motion is the time, as of a STO or MOT that was read."""
     channels = skeleton.joints[0].channels if skeleton.joints else ()
     return (
         len(channels) == 1
@@ -181,7 +181,7 @@ def has_times(skeleton: Skeleton) -> bool:
 
 
 def is_time(signal: Timed) -> bool:
-    """Whether a signal holds the time of every frame."""
+    """Return whether a signal holds the time of every frame."""
     own = signal.channels or ()
     return (
         signal.name in NAMES
@@ -267,7 +267,7 @@ def _fault(times: Floats) -> str:
 
 
 def known_timeline(name: str, timeline: Timeline | None) -> Timeline:
-    """That of the motion or clip ``name``; raises OptionError where nothing tells its times."""
+    """The timeline of ``name``, a motion or clip; raises OptionError where it is unknown."""
     if timeline is None:
         raise OptionError(
             f"{name!r}: its frame rate is unknown, and so are its times; say the rate when "
@@ -283,8 +283,8 @@ class Numbered(NamedTuple):
     start: str
 
 
-def numbered(timeline: Timeline, numbers: Ints) -> Numbered | None:
-    """What gives the times of ``timeline`` at its rate where no source and no column does.
+def numbering_of(timeline: Timeline, numbers: Ints) -> Numbered | None:
+    """Frame numbers for the times of ``timeline`` at its rate, without a source or column.
 
     ``numbers`` are kept where they can be. None where frame numbers cannot give such times.
     """

@@ -32,7 +32,7 @@ from mcz.clock import (
     Timeline,
     column_of,
     known_timeline,
-    numbered,
+    numbering_of,
     numbers_or_rows,
     parts_need_start,
     timeline_of,
@@ -193,7 +193,7 @@ class Motion:
 
     @property
     def timeline(self) -> Timeline | None:
-        """When every frame was, None where neither times nor a rate are known."""
+        """The times of all frames, None where neither times nor a rate are known."""
         column = None
         place = times_place(self.skeleton, self.signals)
         if place is not None:
@@ -237,7 +237,7 @@ class Motion:
         if timeline is None or not self.n_frames or (own and own.is_near(timeline)):
             return motion
         numbers = numbers_or_rows(self.frame_numbers, self.n_frames)
-        found = numbered(timeline, numbers)
+        found = numbering_of(timeline, numbers)
         if found is not None:
             metadata |= {START: found.start} if found.start else {}
             return replace(motion, frame_numbers=found.numbers, metadata=metadata, number_step=1)

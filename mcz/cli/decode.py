@@ -161,7 +161,7 @@ def decode(
     if output == "-" and (as_json or wanted.with_skeleton):
         raise Failure("-o - leaves no room for --json or --with-skeleton", Exit.USAGE)
     if given.is_source:
-        given, wanted = given.told(wanted)
+        given, wanted = given.with_facts(wanted)
         refuse(output is None and wanted.target is None, f"{file}: {SOURCE_GIVEN}")
     if target_of(suffix_of(output)) is None:
         check_options(wanted, salvage)

@@ -34,7 +34,7 @@ class Input:
 
         return is_source(self.file)
 
-    def told(self, wanted: Wanted) -> tuple[Input, Wanted]:
+    def with_facts(self, wanted: Wanted) -> tuple[Input, Wanted]:
         """The same with the facts among what is wanted of a source file, and the rest of that."""
         refuse(self.salvage or self.unverified, "--salvage and --unverified need an .mcz")
         facts = {"unit": wanted.unit, "up": wanted.up, "rate": wanted.rate}

@@ -32,14 +32,14 @@ def _to_pairs(
     ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
 ) -> dict[str, str]:
     """Callback of ``KEY=VALUE``; the value is text as it stands."""
-    from mcz.editing.describing import spelled
+    from mcz.editing.describing import registered_key
 
     pairs = {}
     for value in values:
         key, equals, text = value.partition("=")
         if not equals or not key:
             raise click.BadParameter(f"{value!r} is not KEY=VALUE")
-        key = spelled(key)
+        key = registered_key(key)
         if key in pairs:
             raise click.BadParameter(f"{key!r} is set twice")
         pairs[key] = text

@@ -40,7 +40,7 @@ def _height(height: float, unit_cm: float | None) -> str:
 
 
 def _is_plain(joints: list[dict[str, Any]]) -> bool:
-    """Whether the joints are numbers in order, all alike, as those of an array are."""
+    """Return whether the joints are numbers in order, all alike, as those of an array are."""
     alike = -1, joints[0]["channels"]
     return all(
         joint["name"] == str(index) and (joint["parent"], joint["channels"]) == alike
@@ -81,7 +81,7 @@ def rate_text(clip: dict[str, Any]) -> str:
 
 
 def time_lines(times: dict[str, Any] | None) -> Iterator[str]:
-    """When the frames were, where that is not from 0 s on without a gap."""
+    """The times of the frames, unless they run from 0 s on without a gap."""
     if times is None:
         return
     if times["first"] or times["gaps"]:

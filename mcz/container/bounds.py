@@ -1,4 +1,4 @@
-"""Where a clip ends in a damaged file: whether what lies behind lost bytes still belongs to it.
+"""The end of a clip in a damaged file: does the part behind lost bytes still belong to it?
 
 SPEC.md, "Salvage", is normative.
 """
@@ -17,7 +17,7 @@ NOBODY: Owners = MappingProxyType({})
 
 
 class Bounds:
-    """What is known of the end of the clip that is open; ``owners``: what an index says.
+    """Knowledge of the end of the clip that is open; ``owners``: that of an index.
 
     ``doubt``: it may have ended, and another one have begun, in bytes that are lost.
     """

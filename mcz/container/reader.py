@@ -50,7 +50,7 @@ from mcz.container.packets import (
     head_size,
     is_head,
 )
-from mcz.container.restoring import is_like, salvaged
+from mcz.container.restoring import is_like, scan_for_salvage
 from mcz.container.runs import Runs
 from mcz.container.scan import scan
 from mcz.container.segments import (
@@ -115,7 +115,7 @@ class Container:
         return other
 
     def _salvage(self) -> Directory:
-        self.source, found, notes = salvaged(self.source)
+        self.source, found, notes = scan_for_salvage(self.source)
         self.damage = notes + found.damage
         self.broken, self.feet = found.broken, found.feet
         return found.directory

@@ -1,4 +1,4 @@
-"""What copies and the index give back of a damaged file. SPEC.md, "Salvage", is normative."""
+"""Repair of a damaged file from copies and the index. SPEC.md, "Salvage", is normative."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from mcz.schema import build
 MOST_READ = 4  # times the bytes of a file, in search of a bit
 
 
-def salvaged(source: ByteSource) -> tuple[ByteSource, Found, list[str]]:
+def scan_for_salvage(source: ByteSource) -> tuple[ByteSource, Found, list[str]]:
     """A damaged file with what can be put right in it, a salvaging scan of it, and what was wrong.
 
     Raises FormatError where no chunk is whole.

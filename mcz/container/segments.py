@@ -174,7 +174,7 @@ def frame_table(header: SegmentHeader, counts: StreamCounts, size: int) -> Strea
 
 
 def header_of(packet: Packet, start: int, due: int | None) -> SegmentHeader:
-    """What the packet at ``start`` says of its segment.
+    """The header of the segment in the packet at ``start``.
 
     ``due``: the frame that follows those before it, None where none of these has told its own.
     """

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from mcz.clock import Timeline
 from mcz.conversion.acclaim import to_amc
-from mcz.conversion.counted import COUNTING, counted
+from mcz.conversion.counted_times import COUNTING, with_counted_times
 from mcz.conversion.hierarchy import to_bvh
 from mcz.conversion.losses import held, left_out
 from mcz.conversion.markers import to_c3d
@@ -70,7 +70,7 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
     if timeline is not None and FORMATS[to].is_table:  # prints what the source prints
         timeline = Timeline(timeline.times, timeline.rate)
     made = replace(TARGETS[to](held(motion, to)), source=None).at_times(timeline)
-    return counted(made, to) if to in COUNTING else made
+    return with_counted_times(made, to) if to in COUNTING else made
 
 
 def converted_files(

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from mcz.clock import is_time
-from mcz.conversion.counted import COUNTING, first_number, lost_times
+from mcz.conversion.counted_times import COUNTING, first_number, lost_times
 from mcz.formats.c3d_plain import KNOWN
 from mcz.formats.c3d_recording import parameters_of
 from mcz.formats.table_signals import text_columns

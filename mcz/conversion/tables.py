@@ -31,5 +31,5 @@ def to_storage(motion: Motion) -> Motion:
 
 
 def needs_rate(motion: Motion, to: str) -> bool:
-    """Whether a table cannot be written without a frame rate: TRC states it, others have times."""
+    """Return whether a table needs a frame rate: TRC states it, others have times."""
     return to == "trc" or (not has_times(motion.skeleton) and motion.timeline is None)

@@ -31,7 +31,7 @@ VERSION = 2  # of what features are: counted up where a kept one would be wrong
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Where a window of a data set comes from: frames start <= f < stop, at its rate.
+    """The origin of a window of a data set: frames start <= f < stop, at its rate.
 
     ``time`` is that of its first frame in seconds, on the clock of the clip; None while unknown.
     """

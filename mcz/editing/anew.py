@@ -58,8 +58,8 @@ def source_file(motion: Motion) -> bytes:
     return data
 
 
-def sourced(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
-    """What is left of ``clip`` with a source of its own values, or none, and why there is none."""
+def with_own_source(motion: Motion, clip: Clip) -> tuple[Motion, str | None]:
+    """The rest of ``clip`` with a source of its own values, or none and the reason for that."""
     motion = stating_rate(motion, clip.frame_numbers)
     if motion.source is None:
         return motion, None

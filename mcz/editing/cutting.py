@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mcz.clock import START, numbered, parts_need_start
+from mcz.clock import START, numbering_of, parts_need_start
 from mcz.codecs.contract import Codec
 from mcz.container import payloads
 from mcz.container.directory import SegmentRow
@@ -231,7 +231,7 @@ def keep_times(cut: ClipCut, metadata: dict[str, str]) -> None:
     if cut.clip.timeline is None or not cut.n_frames:
         return
     frames = slice(cut.start, cut.stop)
-    found = numbered(cut.clip.timeline.cut(frames), cut.clip.frame_numbers[frames])
+    found = numbering_of(cut.clip.timeline.cut(frames), cut.clip.frame_numbers[frames])
     if found is not None:
         metadata.pop(KEY, None)
         metadata |= frame_number_metadata(found.numbers)

@@ -68,14 +68,14 @@ def set_metadata(
     return report
 
 
-def spelled(key: str) -> str:
+def registered_key(key: str) -> str:
     """A key as it is registered: ``license`` is ``licence``."""
     return SPELLINGS.get(key, key)
 
 
 def _respelled(said: Said) -> Said:
     """``said`` under registered keys; raises OptionError where two of them are one."""
-    found = {spelled(key): value for key, value in said.items()}
+    found = {registered_key(key): value for key, value in said.items()}
     if len(found) < len(said):
         twice = next(key for key in SPELLINGS if key in said)
         raise OptionError(f"{twice!r} and {SPELLINGS[twice]!r} are one key")

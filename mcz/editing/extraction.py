@@ -28,7 +28,7 @@ from mcz.editing.anew import (
     joints_alone,
     settings_of,
     settings_of_joints,
-    sourced,
+    with_own_source,
     write_anew,
 )
 from mcz.editing.carrying import Carrier, said_of
@@ -80,7 +80,7 @@ class ExtractedClip:
 
 @dataclass(slots=True)
 class Extraction:
-    """What ``extract`` wrote, and what of the source file it left out beside what was cut.
+    """The outcome of ``extract``, and parts of the source file that it left out uncut.
 
     ``damage`` is what salvage found wrong.
     """
@@ -271,7 +271,7 @@ class Copier:
         """Write ``motion``, coded anew, in the place of ``clip``; return its quality record."""
         row = self.container.directory.clips[clip.name]
         self.skeleton(clip.skeleton_id)
-        motion, left_out = sourced(motion, clip)
+        motion, left_out = with_own_source(motion, clip)
         if left_out is not None:
             self.found.left_out.append(f"clip {clip.name}: its source file, as {left_out}")
         record = write_anew(self.writer, motion, clip, settings, amend, self.progress)

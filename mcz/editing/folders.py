@@ -80,7 +80,7 @@ def left_out(path: Path, root: Path) -> Outcome:
 
 
 def not_kept(root: Path, packed: Sequence[Path], *, with_times: bool) -> Iterator[str]:
-    """What of a folder no archive has: empty folders, modes, and times but of clips."""
+    """Parts of a folder that no archive has: empty folders, modes, and times but of clips."""
 
     def some(word: str, paths: Iterable[Path]) -> Iterator[str]:
         names = [path.relative_to(root).as_posix() for path in paths]

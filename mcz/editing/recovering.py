@@ -81,12 +81,12 @@ class _Set:
 
     @property
     def distance(self) -> int:
-        """How far its packets lie from where they belong, the nearest of them."""
+        """The distance of its packets from their place, of the nearest of them."""
         return min(map(abs, self.shifts), default=0)
 
 
 def recovery_sets(source: ByteSource) -> dict[int, list[_Set]]:
-    """What is left of the recovery data of a file, by where what they protect begins.
+    """The recovery data left in a file, by the offset of the range that they protect.
 
     A file may hold some of other files, whole ones that were attached or put behind it: those
     whose packets lie where they belong come first, and few of the others count.
@@ -130,7 +130,7 @@ class Examined:
 
     @property
     def is_possible(self) -> bool:
-        """Whether what is bad can be computed: no more blocks than there are recovery blocks."""
+        """True if what is bad can be computed: no more blocks than there are recovery blocks."""
         return self.n_bad <= len(self.set.blocks)
 
     @property

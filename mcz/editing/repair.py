@@ -92,7 +92,7 @@ def _repaired(
 
 
 def _size_of_whole(out: BinaryIO, stop: int, wanted: Content, found: Repair) -> int:
-    """How many of the bytes in ``out`` are a sound file that holds all that is ``wanted``.
+    """The number of bytes in ``out`` that are a sound file with all that is ``wanted``.
 
     Those behind ``stop``, where what was protected ends, count where they belong to it. Zero where
     there is no such file.
@@ -114,7 +114,7 @@ def _size_of_whole(out: BinaryIO, stop: int, wanted: Content, found: Repair) -> 
 
 
 def _content(source: ByteSource) -> Content:
-    """What a file holds that is whole, so that two files can be compared."""
+    """The whole content of a file, so that two files can be compared."""
     try:
         container = Container(source, salvage=True)
     except MczError:
@@ -136,7 +136,7 @@ def _content(source: ByteSource) -> Content:
 
 
 def _moved(out: BinaryIO, spool: BinaryIO, name: str) -> ByteSource:
-    """What is in ``out``, moved to ``spool``."""
+    """Move the content of ``out`` to ``spool``."""
     out.seek(0)
     shutil.copyfileobj(out, spool)
     spool.flush()

@@ -36,7 +36,7 @@ FULL, WITHOUT_CHUNKS, WITHOUT_SOURCE_FILE, NOTHING = range(4)
 
 @dataclass(slots=True)
 class Repair:
-    """What ``repair`` wrote: names of what is whole, runs of frames of other clips, what is lost.
+    """The outcome of ``repair``: names of whole things, runs of frames of other clips, losses.
 
     ``damage`` is what was found wrong with the file, ``lost`` what of its content is gone.
     ``recovery``: what its recovery data found, where it has some; ``restored``: these have given
@@ -55,7 +55,7 @@ class Repair:
 
 
 def stated_frames(clip: Clip) -> int:
-    """How many frames a clip has had; of one that was cut short CLIP says it."""
+    """The number of frames that a clip has had; of one that was cut short CLIP says it."""
     with suppress(MczError):
         row = clip.container.directory.clips[clip.name]
         return max(clip.n_frames, int(clip.container.clip(row).n_frames))
@@ -69,7 +69,7 @@ def about_clip(name: str, text: str) -> str:
 
 
 class SomeSignals(Clip):
-    """What is left of a clip of which some signals are lost, and with them its source."""
+    """The rest of a clip of which some signals are lost, and with them its source."""
 
     def __init__(self, clip: Clip, kept: tuple[int, ...]) -> None:
         super().__init__(clip.container, clip.container.directory.clips[clip.name])
@@ -95,7 +95,7 @@ class WholeRun(ClipCut):
 
     @property
     def name(self) -> str:
-        """That of the clip where all frames of its motion are there."""
+        """The name of the clip where all frames of its motion are there."""
         has_motion = not isinstance(self.clip, SomeSignals) or 0 in self.clip.kept
         if has_motion and self.n_frames == stated_frames(self.clip):
             return self.clip.name
@@ -146,7 +146,7 @@ class Repairer(Copier):
         return super().run([cut for cut in cuts if self._is_kept(cut)], alone=alone)
 
     def _is_kept(self, cut: ClipCut) -> bool:
-        """Whether a clip is written, and say what of it is not, as it breaks a rule."""
+        """Return whether a clip is written; note what of it is not, as it breaks a rule."""
         name, degree = self.name_of(cut), self._degree(cut)
         if degree == NOTHING:
             self.repair.lost.append(f"clip {name!r}: all of it, which breaks a rule")
@@ -227,7 +227,7 @@ class Repairer(Copier):
                 self.repair.lost.append(f"{name!r}, another name of what is lost")
 
     def _restores(self, of: int, target: bytes) -> bool:
-        """Whether the file that is written gives what an alias stands for."""
+        """Return whether the file that is written gives what an alias stands for."""
         if of == payloads.OF_SKELETON:
             return (b"SKEL", target) in self.writer.directory.shared
         here = self.repair.clips if of == payloads.OF_CLIP else self.repair.attachments

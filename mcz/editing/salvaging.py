@@ -79,7 +79,7 @@ def _clip_at(repairer: Repairer, offset: int) -> str:
 
 
 def _gone(container: Container) -> Iterator[str]:
-    """What lay where nothing can be read, by the name that an index has for it."""
+    """Lost things, by the names that an index has for them."""
     last = max(container.feet, default=0)
     indices = {_index_offset(container, foot) for foot in container.feet}
     names = _names(container)
@@ -98,13 +98,13 @@ def _index_offset(container: Container, foot: int) -> int:
 
 
 def _is_foot(container: Container, at: int) -> bool:
-    """Whether a FOOT lay there: most of the letters that end one do."""
+    """Return whether a FOOT lay there: most of the letters that end one do."""
     end = container.source.read(at, min(FOOT.size, container.source.size - at))[-len(END_MAGIC) :]
     return bool(sum(map(eq, end, END_MAGIC)) > len(END_MAGIC) // 2)
 
 
 def _names(container: Container) -> dict[int, str]:
-    """What the index, if it is sound, says that begins at each offset; "" where that is no loss."""
+    """The names, in a sound index, of the things at each offset; "" where that is no loss."""
     names: dict[int, str] = {}
     with suppress(FormatError):
         listed = Container(container.source).directory
@@ -123,7 +123,7 @@ def _names(container: Container) -> dict[int, str]:
 
 
 def _problems(stream: BinaryIO, size: int, max_decoded: int) -> list[Problem]:
-    """What is wrong with what was written to ``stream``, read strictly."""
+    """Problems of the file that was written to ``stream``, read strictly."""
     stream.flush()
     source = ByteSource(stream, name="the repaired file", size=size)
     try:
@@ -136,7 +136,7 @@ def _problems(stream: BinaryIO, size: int, max_decoded: int) -> list[Problem]:
 
 
 def _cuts(file: File, found: Repair) -> Iterator[ClipCut]:
-    """What is left of each clip."""
+    """The cuts that are left of each clip."""
     sound = File(file.container.strictly())
     for name, clip in file.clips.items():
         problems = clip_problems(sound, sound.clips[name])
@@ -158,7 +158,7 @@ def _faults(problems: list[Problem]) -> list[Problem]:
 
 
 def _unhashed(clip: Clip) -> list[Problem]:
-    """What is wrong with the end of a clip that cannot be decoded; nothing else has its hashes."""
+    """Problems of the end of a clip that cannot be decoded; nothing else has its hashes."""
     try:
         _ = clip.value_hashes, clip.source
     except MczError as error:
@@ -183,7 +183,7 @@ def _planned(clip: Clip) -> Iterator[WholeRun]:
 
 
 def _lost(clip: Clip, runs: list[WholeRun], problems: list[Problem]) -> Iterator[str]:
-    """What a clip has lost, its source apart."""
+    """Losses of a clip, its source apart."""
     stated = stated_frames(clip)
     if not runs:
         yield f"clip {clip.name!r}: {stated:,} of {stated:,} frames: {problems[0].message}"

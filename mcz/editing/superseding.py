@@ -58,7 +58,7 @@ def superseding(target: Path, named: Named) -> Iterator[Path]:
 
 
 def _old(file: File, named: Named) -> tuple[list[str], Said]:
-    """What came from the paths of other files of that name, and what was said of it by path."""
+    """The things that came from the paths of the files, and their metadata by path."""
     paths, _ = stored_files(file.container)
     clips = {clip.source.path: clip for clip in file.clips.values() if clip.source is not None}
     old: list[str] = []

@@ -195,7 +195,7 @@ def format_of(path: str | Path, data: bytes | None = None) -> Format:
 
 
 def has_known_suffix(path: str | Path) -> bool:
-    """Whether a source format has the suffix of a file."""
+    """Return whether a source format has the suffix of a file."""
     return any(Path(path).suffix.lower() in known.suffixes for known in FORMATS.values())
 
 
@@ -206,7 +206,7 @@ def is_table(path: str | Path) -> bool:
 
 
 def wants_skeleton(path: str | Path, data: bytes | None = None) -> bool:
-    """Whether the format of a file, see ``format_of``, has its skeleton in another file."""
+    """Return whether the format of a file, see ``format_of``, has its skeleton in another file."""
     try:
         return format_of(path, data).wants_skeleton
     except SourceError:

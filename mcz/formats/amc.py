@@ -156,7 +156,7 @@ def bones(data: bytes, *, whole: bool = False) -> dict[str, int]:
 
 
 def is_amc(data: bytes) -> bool:
-    """Whether there is a line with a frame number, and then one with a bone and its values."""
+    """Tell whether there is a line with a frame number, and then one with a bone and its values."""
     return _FIRST_BONE.search(data) is not None
 
 

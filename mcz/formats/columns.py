@@ -112,7 +112,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
 
 
 def counts_rows(name: str) -> bool:
-    """Whether a column of this name says when a row was recorded, as a number or in words."""
+    """Tell whether a column of this name says when a row was recorded, as a number or in words."""
     return bool(TIME.fullmatch(name) or (name and FRAME.fullmatch(name)) or _CLOCK.search(name))
 
 

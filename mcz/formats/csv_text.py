@@ -89,12 +89,12 @@ def cell_spans(line: bytes, separator: bytes, most: int) -> tuple[list[tuple[int
 
 
 def is_blank(line: bytes) -> bool:
-    """Whether all cells of a line are blank, as of the empty lines that spreadsheets fill up."""
+    """Return whether all cells of a line are blank, as spreadsheets fill up empty lines."""
     return not line.removeprefix(BOM).strip(BLANK_CELLS)
 
 
 def count_columns(heads: Sequence[Sequence[str]], rows: bytes, separator: bytes | None) -> int:
-    """How many columns a table has: up to the last cell that is not blank in any line.
+    """The number of columns of a table: up to the last cell that is not blank in any line.
 
     ``heads``: the cells of the lines above the rows. Spreadsheets fill all lines up to one width,
     so a blank cell at the end of a line is no column. Beyond the heads, all rows are looked at,
@@ -182,7 +182,7 @@ def _first_numbers(
 
 
 def _are_names(lines: Sequence[tuple[int, bytes]], separator: bytes | None, n_cells: int) -> bool:
-    """Whether one line is given, of ``n_cells`` names and no number."""
+    """Return whether one line is given, of ``n_cells`` names and no number."""
     cells = [cell for _, line in lines for cell in _some_cells(line, separator)]
     return len(cells) == n_cells and all(cells[1:]) and not any(map(_is_number, cells))
 
@@ -210,7 +210,7 @@ def _last_row(lines: Sequence[tuple[int, bytes]]) -> tuple[int, bytes, int] | No
 
 
 def is_like(cells: Sequence[bytes], others: Sequence[bytes]) -> bool:
-    """Whether a line has as many cells as another, and numbers where that has numbers."""
+    """Return whether a line has as many cells as another, and numbers where that has numbers."""
     if len(cells) != len(others):
         return False
     pairs = [cell for cell, other in zip(cells, others, strict=True) if _NUMBER.fullmatch(other)]
@@ -263,7 +263,7 @@ def check_names(names: Sequence[str], row: bytes, separator: bytes | None, line:
 def has_decimal_commas(
     lines: Sequence[tuple[int, bytes]], separators: Sequence[bytes] = (b";", b"\t", b",")
 ) -> bool:
-    """Whether cells are numbers such as 1,5; between commas they are in quotes."""
+    """Return whether cells are numbers such as 1,5; between commas they are in quotes."""
     return any(
         len(cells := cells_of(line, separator)) > 1 and any(map(DECIMAL_COMMA.fullmatch, cells))
         for _, line in lines[:LOOKED_AT]

@@ -42,7 +42,7 @@ _COUNT = re.compile(rb'(?i)[,;\t]"?Total Exported Frames"?[,;\t]"?([0-9]+)')
 
 @dataclass(frozen=True, slots=True)
 class _Head:
-    """What stands above the rows. ``columns``: of each what is said of it, one row a line.
+    """The text above the rows. ``columns``: of each what is said of it, one row a line.
 
     ``time``: the column of the times, which ``columns`` are without.
     """

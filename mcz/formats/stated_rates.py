@@ -185,7 +185,7 @@ def _like(old: bytes, number: Fraction, means_it: Callable[[str], bool]) -> byte
 
 
 def _is_time_of(text: str, rate: Fraction) -> bool:
-    """Whether a frame time stands for ``rate``, also to those who take its reciprocal."""
+    """Return whether a frame time stands for ``rate``, also to those who take its reciprocal."""
     return frame_rate(text)[0] == rate and abs(Fraction(text) * rate - 1) <= NEAR
 
 

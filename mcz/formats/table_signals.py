@@ -104,7 +104,7 @@ def text_columns(metadata: Mapping[str, str]) -> str:
 
 
 def table_metadata(encoding: str, notes: Sequence[str]) -> dict[str, str]:
-    """What the metadata of a clip say of its source: the encoding of its names, what is odd."""
+    """The metadata of a clip about its source: the encoding of its names, oddities."""
     found = {
         "name-encoding": encoding if encoding != "utf-8" else "",
         "source-note": "; ".join(filter(None, notes)),

@@ -216,7 +216,7 @@ def _means(points: Floats) -> Floats:
 
 
 def floor_of(track: Floats, up: int, rule: ContactRule = RULE) -> float | None:
-    """How low a point is at its lowest, None where it is never known."""
+    """The height of a point at its lowest, None where it is never known."""
     known: Flags = np.asarray(np.isfinite(track).all(axis=1))
     return float(np.percentile(track[known, up], rule.floor)) if known.any() else None
 

@@ -61,7 +61,7 @@ def figure_height(skeleton: Skeleton) -> float | None:
 
 
 def height_note(skeleton: Skeleton) -> str:
-    """That a figure is as high as no person, which a wrong unit may be the cause of; or ""."""
+    """A note on a figure of no person's height, perhaps of a wrong unit; or ""."""
     height, unit_cm = figure_height(skeleton), skeleton.unit_cm
     return "" if height is None or unit_cm is None else note_on_height(height, unit_cm)
 

@@ -113,7 +113,7 @@ def _arriving(
 
 
 def _remark(arriving: Arriving, terms: Terms) -> tuple[str, ...]:
-    """What is to be said of the skeleton and the rate that were given."""
+    """Remarks on the skeleton and the rate that were given."""
     notes = tuple(rate_notes(arriving.frame_rate, terms))
     if SKELETON_NOTE not in arriving.metadata:
         return notes

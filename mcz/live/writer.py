@@ -44,7 +44,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(slots=True)
 class LiveTraffic:
-    """What a live clip took on the wire, in bytes.
+    """The bytes of a live clip on the wire.
 
     ``total`` bytes were sent, ``frames`` of them with frames, ``coded`` of these as streams of the
     codec: the others are their framing, masks and repeated clip headers. ``asked`` is the bit rate

@@ -67,7 +67,7 @@ def joint_of(motion: Motion, joint: int | str | None) -> tuple[int, str, tuple[C
 
 
 def times_of(motion: Motion, first: int, signal: int = 0) -> tuple[Floats, str]:
-    """When every row of a signal is, in seconds, or in frames of the clip where that is unknown;
+    """The times of the rows of a signal in seconds, or in frames of the clip where that is unknown;
     what to write beside it."""
     chosen, timeline = motion.signals[signal], motion.timeline
     if timeline is None:

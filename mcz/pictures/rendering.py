@@ -178,7 +178,7 @@ def _shown_at(timeline: Timeline, fps: Fraction, speed: float) -> Ints:
 
 
 def _timeline(moving: Moving, rate: float | Fraction | None) -> Timeline | None:
-    """When frames were, at the motion's or else the caller's rate; None while unknown."""
+    """The times of frames, at the motion's or else the caller's rate; None while unknown."""
     if moving.timeline is not None or rate is None:
         return moving.timeline
     if not 0 < rate < np.inf:

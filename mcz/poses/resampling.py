@@ -17,7 +17,7 @@ from mcz.kinematics.euler import ORDERS, euler_angles
 from mcz.kinematics.rotation_vectors import matrices_of_vectors, nearest_vector
 from mcz.motion import Motion, Signal, Skeleton, frame_rate_of
 from mcz.poses.conversions import from_matrices, slerp
-from mcz.poses.scalar_quaternions import Quaternion, scalar_quaternions, turned
+from mcz.poses.scalar_quaternions import Quaternion, scalar_quaternions, slerp_quaternions
 
 Ints = NDArray[np.int64]
 
@@ -173,7 +173,7 @@ def _moved(times: Times, by: int) -> Times:
 
 
 def _between(frames: Floats, since: Floats, start: int) -> Times:
-    """Where ``frames`` lie among old ones at ``since``, rising, whose first is frame ``start``."""
+    """The places of ``frames`` among old ones at ``since``, rising, from frame ``start`` on."""
     before = np.clip(np.searchsorted(since, frames, side="right") - 1, 0, max(0, len(since) - 2))
     after = np.minimum(before + 1, len(since) - 1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -224,7 +224,7 @@ def turn_scalars(quaternions: Sequence[Quaternion], old: Floats, new: Floats, ti
     before, after, share = times.before[between], times.after[between], times.share[between]
     for four in quaternions:
         columns = slice(four[0], four[-1] + 1)
-        new[between, columns] = turned(old[before, columns], old[after, columns], share)
+        new[between, columns] = slerp_quaternions(old[before, columns], old[after, columns], share)
 
 
 def splines(old: Floats, times: Times) -> Floats:

@@ -65,7 +65,7 @@ def _plain_names(skeleton: Skeleton | None, own: Sequence[Channel] | None) -> li
 
 
 def _is_unit(four: Floats) -> bool | None:
-    """Whether norms are 1 in all rows; None where none is known, or all rows are the same."""
+    """Tell whether norms are 1 in all rows; None where none is known, or all rows are the same."""
     norms = np.sqrt((four * four).sum(axis=1))
     known = norms[~np.isnan(norms)]
     if not len(known) or (four == four[:1]).all():
@@ -81,7 +81,7 @@ def _listed(names: Sequence[str | None], at: int) -> str:
     return f"columns {at + 1} to {at + SIZE} ({shown(str(names[at]))}, ...)"
 
 
-def turned(first: Floats, last: Floats, share: Floats) -> Floats:
+def slerp_quaternions(first: Floats, last: Floats, share: Floats) -> Floats:
     """The quaternions (n, 4) a ``share``, (n,), of the shortest way from the first to the last."""
     with np.errstate(invalid="ignore", divide="ignore"):
         cosine = (first * last).sum(axis=1, keepdims=True)

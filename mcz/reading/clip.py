@@ -226,7 +226,7 @@ class Clip(StoredClip, Posed):
 
     @cached_property
     def timeline(self) -> Timeline | None:
-        """When every frame was, None where neither times nor a rate are known."""
+        """The times of all frames, None where neither times nor a rate are known."""
         column = self.times_column()
         clock = None
         try:
@@ -310,7 +310,7 @@ class Clip(StoredClip, Posed):
         return data
 
     def gives_file(self, frames: tuple[int, int] | None = None, resolution: int = 0) -> bool:
-        """Whether ``source_bytes`` gives the very file that the clip was made of."""
+        """Return whether ``source_bytes`` gives the very file that the clip was made of."""
         whole = self.checked_range(frames) == (0, self.n_frames) and not resolution
         return whole and all(signal.codec.lossless for signal in self.signals)
 

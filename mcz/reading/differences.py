@@ -1,4 +1,4 @@
-"""What two motions say beside their numbers, where it is not the same: events, parameters, ..."""
+"""Differences of two motions beside their numbers: events, parameters, ..."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def differences(a: Motion, b: Motion) -> list[Difference]:
 
 
 def _of_times(a: Motion, b: Motion, *, is_rate_same: bool) -> Iterator[Difference]:
-    """What frame numbers and times beyond the first frame's number and the rate say otherwise."""
+    """Differences of frame numbers and times beyond the first frame's number and the rate."""
     numbers = numbers_or_rows(a.frame_numbers, a.n_frames)
     if not np.array_equal(numbers, numbers_or_rows(b.frame_numbers, b.n_frames)):
         yield Difference("frame numbers", None, None)
@@ -160,7 +160,7 @@ def _value(held: Parameters, parameter: Parameter) -> Any:
 
 
 def _otherwise(a: Motion, b: Motion) -> str:
-    """What two sources of one format say otherwise that is named nowhere else, "" if nothing."""
+    """The kind of difference of two sources that is named nowhere else, "" if there is none."""
     one, other = a.source, b.source
     if one is None or other is None or one.format != other.format:
         return ""

@@ -41,7 +41,7 @@ from mcz.threads import checked
 
 
 def is_mcz(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is an MCZ file, by its suffix or by its first bytes; URLs by their suffix."""
+    """Return whether a file is an MCZ file, by suffix or first bytes; URLs by their suffix."""
     if str(path).partition("?")[0].lower().endswith(".mcz"):
         return True
     try:

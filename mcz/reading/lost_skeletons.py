@@ -78,7 +78,7 @@ def _without_joints(container: Container, row: ClipRow) -> None:
 
 
 def _joint_sizes(n_channels: int, kind: int) -> Iterator[list[int]]:
-    """How many channels each joint may have had: one way unless that decides about groups."""
+    """The numbers of channels that joints may have had: one way unless groups depend on it."""
     yield [n_channels]
     if kind == payloads.GROUP_JOINT:
         yield from ([size] * (n_channels // size) for size in (1, 3) if n_channels % size == 0)
@@ -87,7 +87,7 @@ def _joint_sizes(n_channels: int, kind: int) -> Iterator[list[int]]:
 
 
 def _has_its_hashes(clip: Clip, container: Container) -> bool:
-    """Whether the values of a clip, read strictly, are those that it says it has."""
+    """Return whether the values of a clip, read strictly, are those that it says it has."""
     try:
         for info in clip.signals:
             stops = [0, *(row.header.stop for row in info.rows)]

@@ -55,7 +55,7 @@ def text_notes(clip: Clip, start: int = 0, *, is_file: bool | None = None) -> tu
 
 
 def states_rate(clip: Clip) -> bool:
-    """Whether the source of ``clip`` states a frame rate; raises FormatError on bad bytes."""
+    """Tell whether the source of ``clip`` states a frame rate; raises FormatError on bad bytes."""
     rate, source = clip.frame_rate, clip.source
     if rate is None or source is None or not FORMATS[source.format].states_rate:
         return False
@@ -83,7 +83,7 @@ def _stated(clip: Clip, rate: Fraction, *, is_file: bool) -> Fraction | None:
 
 
 def _contradicted(clip: Clip, rate: Fraction) -> tuple[Any, bytes]:
-    """What ``contradiction`` says of the template of a clip, and the template."""
+    """The ``contradiction`` of the template of a clip, and the template."""
     source = clip._fields.source[0]
     template = clip.container.template(source.template, source.format)
     name, step = format_by_id(source.format).name, usual_step(clip.frame_numbers)

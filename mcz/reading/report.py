@@ -183,7 +183,7 @@ def _recording(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
 
 
 def _times(clip: Clip, unread: list[str]) -> dict[str, Any] | None:
-    """When its frames were; ``unread`` as above."""
+    """The times of its frames; ``unread`` as above."""
     try:
         return time_facts(clip.timeline)
     except UnsupportedError:

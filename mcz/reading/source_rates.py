@@ -34,12 +34,12 @@ def stating_rate(motion: Motion, numbers: NDArray[np.int64] | None = None) -> Mo
 
 
 def is_one_of(ratio: Fraction, step: int) -> bool:
-    """Whether two rates of this ratio agree, where frame numbers rise by ``step``."""
+    """Return whether two rates of this ratio agree, where frame numbers rise by ``step``."""
     return any(abs(ratio - n) <= SAME_RATE * n for n in (1, step))
 
 
 def contradiction(format_name: str, template: bytes, rate: Fraction, step: int) -> Any:
-    """What ``Format.restate`` gives where the template states another rate; None: it does not."""
+    """The result of ``Format.restate`` where the template states another rate; else None."""
     restate = FORMATS[format_name].restate
     found = restate(template, rate) if restate is not None else None
     return None if found is None or is_one_of(found.rate / rate, step) else found

@@ -23,7 +23,7 @@ SUFFIXES = tuple(suffix for found in FORMATS.values() for suffix in found.suffix
 
 
 def is_source(path: str) -> bool:
-    """Whether a path has the suffix of a source format, and its file is no MCZ file."""
+    """Return whether a path has the suffix of a source format, and its file is no MCZ file."""
     return path.lower().endswith(SUFFIXES) and not is_mcz(path)
 
 

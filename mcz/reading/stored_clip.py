@@ -1,4 +1,4 @@
-"""What the chunks of a clip say of it, its values apart: parsed when it is asked for."""
+"""The facts in the chunks of a clip, its values apart: parsed on demand."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from mcz.schema import parse
 
 
 class StoredClip:
-    """What CLIP, CEND and the chunks that belong to a clip say."""
+    """The facts in CLIP, CEND and the chunks that belong to a clip."""
 
     def __init__(self, container: Container, row: ClipRow) -> None:
         self.container = container
@@ -90,7 +90,7 @@ class StoredClip:
 
     @property
     def damage(self) -> list[str]:
-        """What salvage found wrong with this clip."""
+        """Damage of this clip that salvage found."""
         return self._row.damage
 
     @cached_property
@@ -166,7 +166,7 @@ class StoredClip:
 
     @cached_property
     def recording(self) -> Recording | None:
-        """What the source says beside all numbers: events, force platforms, units, descriptions.
+        """Facts in the source beside all numbers: events, force platforms, units, descriptions.
 
         None where it says nothing of the kind: only C3D does. Raises FormatError on bad bytes.
         """
@@ -180,7 +180,7 @@ class StoredClip:
         return read_recording(self.container, self._fields)
 
     def scaling(self, signal: int) -> Scaling | None:
-        """What the stored numbers of a signal mean; None where they are the values; FormatError.
+        """The meaning of the stored numbers of a signal; None: they are the values; FormatError.
 
         None also where salvage finds the source damaged that told it: the numbers are whole.
         """
@@ -192,7 +192,7 @@ class StoredClip:
             return None
 
     def is_scaled(self, signal: int) -> bool:
-        """Whether the stored numbers of a signal have a meaning that its source tells, or told."""
+        """Return whether a signal's source tells a meaning of its stored numbers, or told it."""
         try:
             return scaling_of(self.signals, signal, self._recording) is not None
         except FormatError:

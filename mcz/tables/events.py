@@ -15,7 +15,7 @@ TEXTS = ("label", "context", "subject", "description")
 
 
 class Event(Protocol):
-    """What a ``mcz.Event`` has that a table shows: its time and ``TEXTS``."""
+    """The part of a ``mcz.Event`` that a table shows: its time and ``TEXTS``."""
 
     @property
     def time(self) -> float: ...

@@ -75,7 +75,7 @@ def channel_names(skeleton: Skeleton, own: Sequence[Channel] | None = None) -> l
 
 
 def is_number(joint: Joint) -> bool:
-    """Whether a joint is a column of a table: one plain scalar without a name of its own."""
+    """Return whether a joint is a column of a table: one plain scalar without a name of its own."""
     return len(joint.channels) == 1 and (joint.channels[0].kind, joint.channels[0].label) == (
         "",
         "value",

@@ -89,7 +89,7 @@ def _add_signal(
 
 
 def row_times(motion: Motion, signal: Signal) -> tuple[NDArray[np.float64], str]:
-    """When each row was, and in which unit: "s", or "frames", from 0 on, while that is unknown."""
+    """The time of each row, and its unit: "s", or "frames", from 0 on, while that is unknown."""
     timeline = motion.timeline
     if timeline is None:
         return np.arange(signal.n_rows) / signal.samples_per_frame, "frames"

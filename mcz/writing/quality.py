@@ -31,7 +31,7 @@ def quality_record(
     options: Mapping[str, Any],
     remarks: Mapping[str, str],
 ) -> dict[str, str]:
-    """What the record says; ``decoded`` are the values of every signal as a reader has them.
+    """The entries of the record; ``decoded`` are the values of every signal as a reader has them.
 
     Where no point has a place, the entries ``NOT_STORED``, which are no metrics of the format, say
     what the greatest error of a channel is.

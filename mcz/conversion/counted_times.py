@@ -13,7 +13,7 @@ from mcz.motion import Motion
 COUNTING = ("bvh", "amc", "c3d")
 
 
-def counted(motion: Motion, to: str) -> Motion:
+def with_counted_times(motion: Motion, to: str) -> Motion:
     """``motion`` as a file that counts frames can have it: without a signal of times.
 
     The first frame of a C3D has the number that gives its time.
@@ -44,7 +44,7 @@ def first_number(motion: Motion) -> int:
 
 
 def lost_times(motion: Motion, to: str) -> Iterator[str]:
-    """What of the times such a file cannot say, in words: where they begin, and gaps."""
+    """Times that such a file cannot state, in words: their begin, and gaps."""
     line, rate, name = motion.timeline, motion.frame_rate, to.upper()
     if line is None or not len(line.times):
         return
