@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.errors import MczError, MotionError
+from mcz.errors import MotionError
 
 
 class Rule(NamedTuple):
@@ -25,19 +25,14 @@ def check_fields(thing: Any, rules: Mapping[str, Rule]) -> None:
     """Give fields of a frozen dataclass the form of their rules; MotionError names the field."""
     for name, rule in rules.items():
         value = getattr(thing, name)
-        found = apply_rule(f"{type(thing).__name__.lower()}: {name}", rule, value, MotionError)
+        try:
+            found = rule.form(value)
+        except (TypeError, ValueError, OverflowError, AttributeError):
+            kind = type(thing).__name__.lower()
+            shown = " ".join(reprlib.repr(value).split())  # in one line
+            raise MotionError(f"{kind}: {name} is {shown}, not {rule.words}") from None
         if found is not value:
             object.__setattr__(thing, name, found)
-
-
-def apply_rule(name: str, rule: Rule, value: Any, error: type[MczError]) -> Any:
-    """``value`` in the form of a rule; raises ``error``, which names it."""
-    try:
-        return rule.form(value)
-    except (TypeError, ValueError, OverflowError, AttributeError):
-        raise error(
-            f"{name} is {' '.join(reprlib.repr(value).split())}, not {rule.words}"
-        ) from None
 
 
 def _text(value: Any) -> str:
@@ -107,14 +102,9 @@ def _items(value: Any) -> tuple[Any, ...]:
 
 def of_type(kind: type | tuple[type, ...], words: str) -> Rule:
     """The rule of a field that is a ``kind``."""
-    return fitting(words, lambda value: isinstance(value, kind))
-
-
-def fitting(words: str, test: Callable[[Any], bool]) -> Rule:
-    """The rule of a field that passes a test, and is as it is."""
 
     def form(value: Any) -> Any:
-        if not test(value):
+        if not isinstance(value, kind):
             raise TypeError
         return value
 
