@@ -41,6 +41,12 @@ def _text(value: Any) -> str:
     return str(value)
 
 
+def _name(value: Any) -> str:
+    text = _text(value)
+    text.encode()  # UnicodeEncodeError, a ValueError, of half a surrogate pair
+    return text
+
+
 def _integer(value: Any) -> int:
     if isinstance(value, (bool, np.bool_)):
         raise TypeError
@@ -156,6 +162,7 @@ def plain(array: NDArray[Any]) -> NDArray[Any]:
 
 
 TEXT, INTEGER, TRUTH = Rule("text", _text), Rule("an integer", _integer), Rule("a bool", _truth)
+NAME = Rule("text that UTF-8 can hold", _name)
 DATA, HASH = Rule("bytes", _data), Rule("32 bytes or none", _hash)
 NUMBER = Rule("a finite number", _number)
 VECTOR = Rule("three finite numbers", _vector)

@@ -247,14 +247,20 @@ def timeline_of(
             return Timeline(told, rate, clock.rounding(rate and rate * step), note)
     if rate is None:
         return None
-    if len(numbers) and (np.diff(numbers) <= 0).any():
+    places = numbers.astype(np.float64)  # beyond 64 bits, too
+    since = (numbers - numbers[:1]).astype(np.uint64)
+    if not _ascend(numbers):
         note = note or "the frame numbers do not ascend: rows are counted"
-        numbers = numbers[0] + np.arange(len(numbers)) * step
+        since = np.arange(len(numbers), dtype=np.uint64) * np.uint64(step)
+        places = places[:1] + since
     start = metadata.get(START, "") if clock is None else ""
     if len(numbers) and _NUMBER.fullmatch(start) and isfinite(float(start)):
-        since = (numbers - numbers[0]) / float(rate * step)
-        return Timeline(float(start) + since, rate, note=note)
-    return Timeline((numbers - 1) / float(rate * step), rate, note=note)
+        return Timeline(float(start) + since / float(rate * step), rate, note=note)
+    return Timeline((places - 1) / float(rate * step), rate, note=note)
+
+
+def _ascend(numbers: Ints) -> bool:
+    return bool((numbers[1:] > numbers[:-1]).all())
 
 
 def _fault(times: Floats) -> str:
@@ -314,7 +320,7 @@ def parts_need_start(numbers: Ints | None, metadata: Mapping[str, str]) -> bool:
 
     So it is after a ``start-time``, and where numbers do not ascend, so that rows are counted.
     """
-    return START in metadata or (numbers is not None and bool((np.diff(numbers) <= 0).any()))
+    return START in metadata or (numbers is not None and not _ascend(numbers))
 
 
 def numbers_or_rows(numbers: Ints | None, n_frames: int) -> Ints:

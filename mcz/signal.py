@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mcz import brief
 from mcz.checks import (
     INTEGER,
-    TEXT,
+    NAME,
     Rule,
     array_of,
     check_fields,
@@ -57,7 +57,7 @@ GRID = of_type(Grid, "a Grid")
 MASK = array_of("b1", 2, "a bool for each value")
 VALUES = array_of("f8 i8", 2, "float64 or int64 of two dimensions (2-D)")
 SIGNAL = {
-    "name": TEXT,
+    "name": NAME,
     "values": VALUES,
     "grids": several(GRID, "Grids"),
     "samples_per_frame": INTEGER,

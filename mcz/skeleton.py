@@ -13,6 +13,7 @@ from mcz import brief
 from mcz.checks import (
     DATA,
     INTEGER,
+    NAME,
     NUMBER,
     TEXT,
     TRUTH,
@@ -66,10 +67,10 @@ class Channel:
         return self.name or self.kind
 
 
-CHANNEL = {"kind": TEXT, "name": TEXT, "unit": TEXT}
+CHANNEL = {"kind": TEXT, "name": NAME, "unit": NAME}
 CHANNELS = several(of_type(Channel, "a Channel"), "Channels")
 JOINT = {
-    "name": TEXT,
+    "name": NAME,
     "parent": INTEGER,
     "offset": VECTOR,
     "tails": several(VECTOR, "vectors of three finite numbers"),
@@ -108,7 +109,7 @@ class Joint:
 
 SKELETON = {
     "joints": several(of_type(Joint, "a joint"), "joints"),
-    "name": TEXT,
+    "name": NAME,
     "unit_cm": optional(NUMBER),
     "angle_unit": TEXT,
     "up_axis": TEXT,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,11 @@ def shapes() -> dict[str, mcz.Motion]:
         "huge": moving(bones, np.full((8, 10), 1e308)),
         "integers": moving(mcz.Skeleton(tuple(points[:1])), np.ones((8, 3), np.int64)),
         "no rate": replace(plain, frame_rate=None),
+        "fast markers": replace(markers, frame_rate=Fraction(10) ** 300),
+        "late": replace(plain, frame_numbers=np.full(8, 2**63 - 1)),
+        "early": replace(markers, frame_numbers=np.full(8, -(2**63))),
+        "for ever": replace(plain, frame_numbers=np.r_[-(2**63), np.arange(6), 2**63 - 1]),
+        "half a character": replace(markers, name="\ud800"),
         "no units": replace(plain, skeleton=replace(bones, unit_cm=None, up_axis="")),
         "no angle unit": replace(plain, skeleton=replace(bones, angle_unit="")),
         "gaps": replace(plain, frame_numbers=np.array([1, 2, 3, 7, 8, 9, 20, 21])),
@@ -154,6 +160,12 @@ def test_several_samples_are_no_poses(name: str) -> None:
     table = mcz.to_xarray(SHAPES[name])
     assert table["channels"].shape == SHAPES[name].signals[0].values.shape
     assert "positions" not in table
+
+
+@pytest.mark.parametrize("make", [mcz.Joint, lambda name: mcz.Channel("", name, "V")])
+def test_names_are_whole_characters(make: Callable[[str], object]) -> None:
+    with pytest.raises(mcz.MotionError, match="not text that UTF-8 can hold"):
+        make("a\ud800")
 
 
 def test_tables_without_frames_have_their_columns() -> None:

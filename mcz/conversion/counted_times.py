@@ -52,10 +52,10 @@ def lost_times(motion: Motion, to: str) -> Iterator[str]:
         yield f"left out: times, which {name} cannot state without a frame rate"
         return
     numbers, step = numbers_or_rows(motion.frame_numbers, motion.n_frames), 1
-    frames = np.arange(len(numbers))
+    frames = np.arange(len(numbers), dtype=np.float64)
     if to == "amc":
         yield f"left out: the frame rate, {float(rate):g} a second"
-        frames, step = numbers - 1, motion.number_step
+        frames, step = numbers.astype(np.float64) - 1, motion.number_step
     elif to == "c3d":
         frames += first_number(motion) - 1
     stated, times = frames / float(rate * step), line.even

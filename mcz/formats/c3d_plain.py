@@ -29,6 +29,7 @@ UNITS = {0.1: "mm", 1.0: "cm", 100.0: "m", 2.54: "in"}
 KNOWN = ("residuals", "analog", OUTPUTS)  # signals beside the points
 EVENTS_KEY = 12_345  # label and range data are of the kind that C3D has today
 FLOATS = Grid(GridKind.BINARY32)
+MOST_RATE = 1e30  # of frames: the samples of one second fit a binary32, too
 
 
 def plain(motion: Motion) -> Motion:
@@ -172,6 +173,8 @@ def _layout(motion: Motion, scale: float | None, said: Said, shape: tuple[int, i
     n_channels, subframes = shape
     first = 1 if motion.frame_numbers is None or not motion.n_frames else motion.frame_numbers[0]
     rate = Fraction(motion.frame_rate or 0)
+    if rate > MOST_RATE:
+        raise MotionError(f"C3D holds frame rates up to {MOST_RATE:.2g}, and this one is larger")
     section = section_of(said, -1.0 if scale is None else scale, rate, shape)
     start = BLOCK + len(section.data)
     header = bytearray(BLOCK)

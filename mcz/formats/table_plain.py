@@ -145,4 +145,5 @@ def _names(names: Sequence[str], n_frames: int) -> list[str]:
 
 def _printable(name: str) -> str:
     """The name of the motion on a line of its own."""
+    name = name.encode("utf-8", "replace").decode()
     return "".join(character if ord(character) >= 32 else "_" for character in name)

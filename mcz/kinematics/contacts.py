@@ -249,7 +249,7 @@ def speeds(track: Floats, rate: float, window: float) -> Floats:
 
     ``track`` is (n_frames, 3); the result (n_frames,), NaN where one of the places is unknown.
     """
-    half = max(1, frames_in(window / 2, rate))
+    half = min(max(1, frames_in(window / 2, rate)), len(track))
     frames = np.arange(len(track))
     before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(track) - 1)
     x, y, z = (track[after] - track[before]).T

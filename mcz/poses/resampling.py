@@ -182,7 +182,9 @@ def _between(frames: Floats, since: Floats, start: int) -> Times:
     upon = share > 1 - ALIGNED
     steps = np.concatenate([[np.nan], np.diff(since), [np.nan] * 2])  # up to each frame
     own = steps[before + 1]
-    weights = np.stack([own / (own + steps[before]), own / (own + steps[before + 2])])
+    with np.errstate(invalid="ignore"):  # times that are all one
+        weights = np.stack([own / (own + steps[before]), own / (own + steps[before + 2])])
+    weights = np.nan_to_num(weights, nan=0.5)
     return Times(before + upon + start, np.where(upon, 0.0, share), weights=weights)
 
 
