@@ -103,12 +103,6 @@ class Timeline:
         return steps
 
     @property
-    def is_uniform(self) -> bool:
-        """True if every frame follows the one before by the same step, up to rounding."""
-        steps = self.steps
-        return len(steps) == 0 or bool(np.isfinite(steps).all() and np.ptp(steps) <= EXACT)
-
-    @property
     def runs(self) -> list[tuple[int, int]]:
         """The frames a <= f < b between gaps."""
         if not len(self.times):

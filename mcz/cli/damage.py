@@ -18,18 +18,14 @@ def hinted(target: str | bytes, options: Mapping[str, Any]) -> Iterator[None]:
     except (UnsupportedError, LimitError):
         raise
     except FormatError as error:
+        from mcz.reading import source_report
+
         whole = None if options.get("salvage") else _whole(target)
         if whole is not None:
             error.args = (f"{error}; {whole}",)
-        elif isinstance(target, str) and _is_source(target):
+        elif isinstance(target, str) and source_report.is_source(target):
             error.args = (f"{error}; mcz encode makes one of a source file",)
         raise
-
-
-def _is_source(target: str) -> bool:
-    from mcz.reading.source_report import is_source
-
-    return is_source(target)
 
 
 def _whole(target: str | bytes) -> str | None:
