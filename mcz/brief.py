@@ -68,6 +68,15 @@ def counted(number: int, word: str) -> str:
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
+def first_of(names: Sequence[str], most: int) -> str:
+    """
+    >>> first_of(["hips", "spine", "head"], 2)
+    'hips, spine and 1 more'
+    """
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more:,} more" if more > 0 else "")
+
+
 def among(names: Sequence[str], missed: object) -> str:
     """Names as a message lists them, and which of them are like the one that was ``missed``.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from mcz.brief import first_of
 from mcz.cli.common import plural, table
 from mcz.cli.figures import figure_lines
 
@@ -25,8 +26,7 @@ def lines_of(a: str, b: str, document: dict[str, Any]) -> Iterator[str]:
     is_same = entries.get("mse_raw") == 0.0
     yield from (f"  {line}" for line in figure_lines(entries))
     if equal and not is_same:
-        more = f" and {len(equal) - FEW} more" if len(equal) > FEW else ""
-        yield f"  joints equal in every bit: {', '.join(equal[:FEW])}{more}"
+        yield f"  joints equal in every bit: {first_of(equal, FEW)}"
     if feet is not None:
         yield f"  {_feet_line(feet)}"
     if joints is not None:
@@ -49,9 +49,8 @@ def _difference_line(found: Mapping[str, Any]) -> str:
     text = f"{found['what']}: {_said(found['a'])} in A, {_said(found['b'])} in B"
     for key in ("only_in_a", "only_in_b", "changed"):
         if names := found[key]:
-            more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
             words = key.replace("_", " ").replace(" a", " A").replace(" b", " B")
-            text += f"; {words}: {', '.join(names[:FEW])}{more}"
+            text += f"; {words}: {first_of(names, FEW)}"
     return text
 
 
@@ -73,18 +72,15 @@ def _joint_lines(a: str, b: str, found: dict[str, Any]) -> Iterator[str]:
         )
     for path, names in ((a, found["only_in_a"]), (b, found["only_in_b"])):
         if names:
-            more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
-            yield f"joints of {path} alone: {', '.join(names[:FEW])}{more}"
+            yield f"joints of {path} alone: {first_of(names, FEW)}"
 
 
 def _feet_line(feet: Mapping[str, Any]) -> str:
     """What the contacts were found with."""
     guessed = " (guessed)" if feet["up_guessed"] else ""
     assumed = " (assumed)" if feet["rate_assumed"] else ""
-    names = feet["joints"]
-    more = f" and {len(names) - FEW} more" if len(names) > FEW else ""
     return (
-        f"feet: {', '.join(names[:FEW])}{more}; {feet['up_axis']} up{guessed}, "
+        f"feet: {first_of(feet['joints'], FEW)}; {feet['up_axis']} up{guessed}, "
         f"{feet['frame_rate']:g} frames a second{assumed}"
     )
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mcz.brief import first_of
 from mcz.cli.common import (
     EXIT_CODES,
     Exit,
@@ -334,8 +335,7 @@ def _notes(clips: list[dict[str, Any]]) -> Iterator[str]:
     if named:
         yield ""
     for note, names in named.items():
-        more = f" and {len(names) - FEW:,} more" if len(names) > FEW else ""
-        yield f"{note}: {', '.join(names[:FEW])}{more}"
+        yield f"{note}: {first_of(names, FEW)}"
 
 
 def _percent(part: int, total: int) -> str:

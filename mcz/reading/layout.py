@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from mcz.brief import first_of
 from mcz.container.chunks import CRC, FOOT, HEADER, SIGNATURE, Chunk
 from mcz.container.scan import scan
 from mcz.container.segments import StreamTable
@@ -73,14 +74,8 @@ def group_names(clip: Clip, signal: SignalInfo) -> list[tuple[int, str]]:
     names = []
     for number, group in enumerate(signal.layout.groups):
         called = channels if len(group) == 1 else owners
-        names.append((number, _listed(list(dict.fromkeys(called[c] for c in group)))))
+        names.append((number, first_of(list(dict.fromkeys(called[c] for c in group)), MOST_NAMED)))
     return names
-
-
-def _listed(names: list[str]) -> str:
-    """Some names, of many only how many more there are."""
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _chunk_parts(chunk: Chunk, tables: dict[int, _Segment]) -> Iterator[tuple[int, int, str]]:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from mcz.brief import first_of
 from mcz.errors import SourceError
 from mcz.formats import Format, format_of
 from mcz.formats.bones import Match, matched
@@ -242,9 +243,8 @@ def _ambiguous(path: Path, tried: Sequence[_Tried], text: str) -> AmbiguousError
 
 
 def _riddle(path: Path, tried: Sequence[_Tried], text: str) -> SourceError:
-    shown = ", ".join(_text(str(one)) for one in tried[:SHOWN])
-    more = f" and {len(tried) - SHOWN} more" if len(tried) > SHOWN else ""
-    return SourceError(f"{path}: {text}: {shown}{more}; {OPTION}")
+    shown = first_of([_text(str(one)) for one in tried], SHOWN)
+    return SourceError(f"{path}: {text}: {shown}; {OPTION}")
 
 
 def _listed(names: Sequence[str]) -> str:
