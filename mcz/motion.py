@@ -173,8 +173,8 @@ class Motion:
         if (start, stop) == (0, self.n_frames):
             return self
         numbers = self.frame_numbers
-        if numbers is None and start:
-            numbers = np.arange(1, self.n_frames + 1, dtype=np.int64)
+        if start:
+            numbers = numbers_or_rows(numbers, self.n_frames)
         made = replace(
             self,
             signals=tuple(signal.cut(start, stop) for signal in self.signals),

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import numbers_or_rows
 from mcz.errors import FormatError, LimitError
 from mcz.formats.cells import Cells
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, parse_layout
@@ -40,7 +41,9 @@ def restore(motion: Motion, source: Source) -> bytes:
     runs = pattern_runs(layout, notes, signal.n_rows)
     if any_numbers(runs) and signal.samples_per_frame != 1:  # AMC-08
         raise FormatError(f"source template: frame numbers of {signal.samples_per_frame} rows each")
-    rows = rows_text(signal, layout, notes, numbers_of(motion, signal.n_rows), limit)
+    rows = rows_text(
+        signal, layout, notes, numbers_or_rows(motion.frame_numbers, signal.n_rows), limit
+    )
     if len(layout.header) > 1:
         return printed_count(layout, signal.n_rows).join(layout.header) + rows
     return layout.header[0] + rows
@@ -85,13 +88,6 @@ def rows_text(
         return body
     # AMC-06
     return body[: len(body) - (len(runs[-1][0].tail) if runs else 0)] + layout.ending
-
-
-def numbers_of(motion: Motion, n_rows: int) -> Ints:
-    """The number of every row."""
-    if motion.frame_numbers is not None:
-        return motion.frame_numbers
-    return np.arange(1, n_rows + 1)
 
 
 def any_numbers(runs: Sequence[tuple[Pattern, int, int]]) -> bool:

@@ -9,10 +9,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from mcz.clock import EXACT, Timeline, has_times
+from mcz.clock import EXACT, Timeline, has_times, numbers_or_rows
 from mcz.errors import MotionError
 from mcz.formats.layout import FRAME_NUMBER, Layout, Pattern, runs_of
-from mcz.formats.restore import numbers_of
 from mcz.formats.table_layout import Clock, Section, build_table
 from mcz.motion import POSITION_KINDS, Channel, Motion, Signal, Source
 from mcz.numbers import Grid, GridKind
@@ -35,7 +34,7 @@ def plain_trc(motion: Motion) -> Motion:
     if unit is None:
         raise MotionError("TRC states a length unit: mm, cm or m; say which it is")
     rate = f"{float(_rate(motion)):.6f}"
-    first = int(numbers_of(motion, motion.n_frames)[0]) if motion.n_frames else 1
+    first = int(numbers_or_rows(motion.frame_numbers, motion.n_frames)[0]) if motion.n_frames else 1
     names = _names([joint.name for joint in skeleton.joints], motion.n_frames)
     values = (rate, rate, "\3", str(len(names)), unit, rate, str(first), str(motion.n_frames))
     axes = "".join("\tX\1\tY\2\tZ\2" for _ in names)
@@ -115,7 +114,7 @@ def _clock(motion: Motion, timeline: Timeline, grid: Grid) -> Clock | None:
     """A clock that counts frame numbers; None where there is none that gives the times."""
     if motion.frame_rate is None:
         return None
-    numbers = numbers_of(motion, motion.n_frames)
+    numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
     step = 10**grid.digits / motion.frame_rate / motion.number_step
     start = Fraction(float(timeline.times[0])).limit_denominator(10**12) * 10**grid.digits
     offset = start * step.denominator - int(numbers[0]) * step.numerator + step.denominator // 2

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from mcz.clock import numbers_or_rows
 from mcz.errors import FormatError
-from mcz.formats.restore import numbers_of, printed_count, rows_text, text_limit
+from mcz.formats.restore import printed_count, rows_text, text_limit
 from mcz.formats.table_layout import Section, fill, parse_table
 from mcz.formats.table_notes import TableNotes
 from mcz.motion import Exceptions, Motion, Signal
@@ -58,7 +59,7 @@ def _columns(motion: Motion, section: Section) -> tuple[Signal, Ints]:
         raise FormatError("source template: signals of a section differ in their rows a frame")
     signal = beside(signals)
     frame, within = np.divmod(np.arange(signal.n_rows), n_each)
-    numbers = numbers_of(motion, motion.n_frames)[frame]
+    numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)[frame]
     more, grids = [], []
     if section.clock is not None:
         counted = [n * n_each + k for n, k in zip(numbers.tolist(), within.tolist(), strict=True)]
