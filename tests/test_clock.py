@@ -363,6 +363,12 @@ def test_parts_of_numbers_that_do_not_ascend(tmp_path: Path, numbers: list[int])
             assert found.frame_numbers.tolist() == numbers[3:7]
 
 
+def test_a_whole_clip_says_of_its_times_what_the_motion_did() -> None:
+    """Also where binary64 cannot tell its numbers from those that rows would have."""
+    motion = markers(2, Fraction(2997, 100), frame_numbers=np.array([155575069868025] * 2))
+    assert stored(motion).metadata == motion.metadata == {}
+
+
 # What every source format says of time, and what every target makes of it.
 
 

@@ -312,7 +312,7 @@ def test_motions_come_back_or_are_refused(data: st.DataObject, codec: str) -> No
 
 
 @pytest.mark.parametrize("name", ["walk.bvh", "walk.amc", "walk.c3d", "walk.trc", "walk.csv"])
-@pytest.mark.parametrize("codec", ["fast", "best", "posewave"])
+@pytest.mark.parametrize("codec", ["fast", "posewave"])
 def test_a_replaced_signal_has_a_source_of_its_own(
     samples: Path, tmp_path: Path, name: str, codec: str
 ) -> None:

@@ -192,7 +192,9 @@ class Clip(StoredClip, Posed):
         step = 2**resolution if decimate else 1
         motion = decimated(motion, step) if step > 1 else motion
         motion = replace(motion, source=self._source(start, stop, resolution, step))
-        if step == 1 and not parts_need_start(self.frame_numbers, motion.metadata):
+        is_whole = (start, stop) == (0, self.n_frames) and not self.container.salvage
+        is_timed = is_whole or not parts_need_start(self.frame_numbers, motion.metadata)
+        if step == 1 and is_timed:
             return motion
         return motion.at_times(self.timeline and self.timeline.cut(slice(start, stop, step)))
 
