@@ -329,3 +329,17 @@ def test_force_rate_needs_a_rate(
     mcz.encode(folder / "walk.asf", target)
     assert run(cli, "mcz", [command, str(folder), str(target), "--force-rate"]) == 2
     assert "--force-rate needs --rate" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("suffix", ["trc", "motive.csv"])
+@pytest.mark.parametrize("rate", [120, 200])
+def test_times_of_parts_have_the_decimals_of_their_rate(
+    suffix: str, rate: int, tmp_path: Path
+) -> None:
+    path = tmp_path / (suffix if "." in suffix else f"a.{suffix}")
+    path.write_bytes(FILES[suffix](tuple(range(101, 121))))
+    mcz.encode(path, tmp_path / "a.mcz", rate=rate)
+    with mcz.open(tmp_path / "a.mcz") as file:
+        clip = file.only_clip()
+        path.write_bytes(clip.source_bytes(frames=(3, 14)))
+        assert np.abs(mcz.read(path).times - clip.times[3:14]).max() < 6e-7

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -31,6 +32,7 @@ from mcz.schema import build, parse
 HEADER_RATE = 20  # where the header of a C3D has a binary32 of the rate
 WHERE = "source template"
 MOST_DECIMALS = 16
+DECIMALS = 6  # of times
 NEAR = 1e-4  # relative: what a frame time may be off
 
 _FRAME_TIME = re.compile(rb"(?i)Frame\s+Time\s*:\s*([^\s]+)")
@@ -165,16 +167,23 @@ def _in_header(header: bytes, factor: Fraction) -> bytes:
 
 
 def _scaled(clock: Clock, factor: Fraction) -> dict[str, Any] | None:
-    """A clock whose times are divided by ``factor``; None where its terms are too large."""
+    """A clock whose times are divided by ``factor``; None where its terms are too large.
+
+    It prints more decimals, up to ``DECIMALS``, where the times need them.
+    """
     step = Fraction(clock.numerator, clock.denominator) / factor
     half = Fraction(1, 2)  # that rounds to the nearest time; an exact clock needs none
     old = Fraction(clock.offset, clock.denominator) - half * (1 - Fraction(1, clock.denominator))
+    first, grid = old / factor, clock.grid
+    while (step.denominator > 1 or first.denominator > 1) and grid.digits < DECIMALS:
+        grid = replace(grid, digits=grid.digits + 1)
+        step, first = step * 10, first * 10
     numerator, denominator = step.numerator * 2, step.denominator * 2
-    offset = round((old / factor + half) * denominator)
+    offset = round((first + half) * denominator)
     if max(numerator, denominator, abs(offset)) >= 2**52:
         return None
     terms = {"numerator": numerator, "denominator": denominator, "offset": offset}
-    return {"grid": clock.grid, **terms}
+    return {"grid": grid, **terms}
 
 
 def _like(old: bytes, number: Fraction, means_it: Callable[[str], bool]) -> bytes:
