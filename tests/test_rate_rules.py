@@ -18,6 +18,7 @@ from mcz.cli.common import run
 from mcz.cli.main import cli
 from mcz.formats import FORMATS
 from mcz.sample import sample_files
+from tests.formats.c3d_files import Made
 
 GAP = (*range(124, 127), *range(130, 136))  # numbers of frames: 127 to 129 are missing
 
@@ -343,3 +344,32 @@ def test_times_of_parts_have_the_decimals_of_their_rate(
         clip = file.only_clip()
         path.write_bytes(clip.source_bytes(frames=(3, 14)))
         assert np.abs(mcz.read(path).times - clip.times[3:14]).max() < 6e-7
+
+
+def test_events_keep_their_frames_at_a_corrected_rate(tmp_path: Path) -> None:
+    path = tmp_path / "a.c3d"
+    made = Made(np.zeros((15, 1, 4), np.uint32), np.ones((15, 4, 1), np.uint32), first=124)
+    made.parameters["EVENT"] = {
+        "USED": made.number(2),
+        "TIMES": (4, (2, 2), b"".join(made.real(number)[2] for number in (0.0, 1.3, 0.0, 1.35))),
+    }
+    made.parameters["ANALOG"] = {"RATE": made.real(400.0)}
+    path.write_bytes(made.build())
+    told = mcz.recording(mcz.read(path))
+    assert told is not None and told.events
+    rate = mcz.read(path).frame_rate
+    assert rate is not None
+    frames = [event.time * float(rate) for event in told.events]
+    mcz.encode(path, tmp_path / "a.mcz", rate=rate * 2)
+    mcz.extract(tmp_path / "a.mcz", tmp_path / "b.mcz", frames=(5, 14))
+    with mcz.open(tmp_path / "a.mcz") as file, mcz.open(tmp_path / "b.mcz") as part:
+        assert file.only_clip().source_bytes() == path.read_bytes()
+        path.write_bytes(part.only_clip().source_bytes())
+        motions = file.only_clip().motion(), part.only_clip().motion((3, 8)), mcz.read(path)
+        found = [file.only_clip().recording, part.only_clip().recording]
+        found += [mcz.recording(motion) for motion in motions]
+    for recording in found:
+        assert recording is not None
+        assert recording.analog_rate == (told.analog_rate and told.analog_rate * 2)
+        times = [event.time * float(rate * 2) for event in recording.events]
+        np.testing.assert_allclose(times, frames, rtol=1e-6)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mcz.formats.c3d_parameters import Parameters, decoded
+from mcz.formats.c3d_parameters import FLOAT, Parameters, decoded
 
 KEY = 12_345  # says that labels in the header have four characters
 WORD_OF_KEY, WORD_OF_COUNT = 298, 300  # offsets in the header
@@ -32,6 +33,16 @@ class Event:
 def find_events(header: bytes, parameters: Parameters) -> tuple[Event, ...]:
     """The events, in the order of the file."""
     return _of_parameters(parameters) or _of_header(header, parameters)
+
+
+def event_times(header: bytes, parameters: Parameters) -> Iterator[int]:
+    """Where ``header`` has the binary32 of times of events: minutes and seconds, or seconds."""
+    found = parameters.get("EVENT", "TIMES")
+    if found is not None and found.type == FLOAT:
+        yield from range(found.at, found.at + len(found.data), 4)
+    if parameters.order.integer(header, WORD_OF_KEY) == KEY:
+        n_events = min(parameters.order.integer(header, WORD_OF_COUNT), MOST)
+        yield from range(TIMES, TIMES + 4 * n_events, 4)
 
 
 def _of_parameters(parameters: Parameters) -> tuple[Event, ...]:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from mcz.clock import SAME_RATE
 from mcz.errors import SourceError
 from mcz.formats.c3d import rate_of
+from mcz.formats.c3d_events import event_times
 from mcz.formats.c3d_layout import C3D_OUTPUTS_TEMPLATE, C3D_TEMPLATE
 from mcz.formats.c3d_parameters import FLOAT, INTEGER, find_parameters, parse_parameters
 from mcz.formats.layout import MAX_RUNS, TEMPLATE
@@ -109,6 +110,9 @@ def _of_c3d(
         text = order.build_real(float(value)) if found.type == FLOAT else b""
         text = text or order.build_integer(int(value))
         head[found.at : found.at + len(text)] = text
+    for at in event_times(bytes(head), parameters) if stated else ():
+        time = order.real(bytes(head[at : at + 4]), 0) * float(stated / rate)
+        head[at : at + 4] = order.build_real(time)
     return Restated(stated, build(schema, with_head(fields, {"head": bytes(head)}), WHERE))
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 from mcz.container.reader import Container
@@ -15,6 +17,7 @@ from mcz.motion import Motion, Source
 from mcz.numbers.scaling import Scaling
 from mcz.reading.signal_info import SignalInfo
 from mcz.reading.source_info import known_format
+from mcz.reading.source_rates import contradiction
 
 ANALOG = "analog"  # the signal whose stored numbers a source may have a meaning for
 
@@ -25,19 +28,34 @@ def recording(motion: Motion) -> Recording | None:
     Of a C3D: events, force platforms, units and descriptions. ``Clip.recording`` is that of a clip.
     Raises FormatError on bad bytes.
     """
-    found: Recording | None = recording_of(motion.source)
-    return found
+    source = motion.source
+    return None if source is None else _on_clock(source, motion.frame_rate)
 
 
-def read_recording(container: Container, fields: Any) -> Recording | None:
+def _on_clock(source: Source, rate: Fraction | None) -> Recording | None:
+    """What a source says, its times corrected where the clip's ``rate`` corrects its own."""
+    found: Recording | None = recording_of(source)
+    if found is None or rate is None:
+        return found
+    stated = contradiction(source.format, source.template, rate, 1)
+    if stated is None or not stated.rate:
+        return found
+    factor = float(stated.rate / rate)
+    events = tuple(replace(event, time=event.time * factor) for event in found.events)
+    samples = found.analog_rate and found.analog_rate / factor
+    return replace(found, events=events, analog_rate=samples)
+
+
+def read_recording(
+    container: Container, fields: Any, rate: Fraction | None = None
+) -> Recording | None:
     """The recording that the source of a clip, whose CLIP is ``fields``, tells of."""
     form = known_format(fields)
     if form is None or form.recording is None:
         return None
     source = fields.source[0]
     template = container.template(source.template, source.format)
-    found: Recording | None = recording_of(Source(form.name, template, bytes(source.detail)))
-    return found
+    return _on_clock(Source(form.name, template, bytes(source.detail)), rate)
 
 
 def scaling_of(

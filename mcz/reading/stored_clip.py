@@ -177,7 +177,7 @@ class StoredClip:
             return None
 
     def _recording(self) -> Recording | None:
-        return read_recording(self.container, self._fields)
+        return read_recording(self.container, self._fields, self.frame_rate)
 
     def scaling(self, signal: int) -> Scaling | None:
         """The meaning of the stored numbers of a signal; None: they are the values; FormatError.

@@ -210,7 +210,7 @@ export class RangedClip {
     const { source } = this.clip;
     if (!source || !isC3d(source.format)) return null;
     await this.file.shared.loadTemplate(source, "clip");
-    return c3dRecording(source);
+    return c3dRecording(source, this.rate);
   }
 
   /**

@@ -10,6 +10,8 @@ const WORD_OF_KEY = 298;
 const WORD_OF_COUNT = 300;
 const TIMES_AT = 304;
 const LABELS_AT = 396;
+const RATE_AT = 20; // where a header has the frame rate
+const SAME_RATE = 1e-5; // relative: frame rates that differ by less are one
 const MOST_EVENTS = 18; // in a header
 const LABEL_SIZE = 4;
 const TURN_WORDS = 17; // of a rotation
@@ -49,10 +51,11 @@ const UNITS_OF = {
  * The recording that the source of a clip tells of.
  *
  * @param {{format: number, template: {data: Uint8Array}, detail: Uint8Array}} source of CLIP, a C3D
+ * @param {number | null} rate of the clip, which corrects that of the source
  * @returns {Recording}
  * @throws {import("./errors.js").Refused}
  */
-export function c3dRecording(source) {
+export function c3dRecording(source, rate = null) {
   const { template, detail, head } = c3dLayout(source);
   const order = new Order(template.processor);
   const { points, channels, subframes, word, rotations, ratio, gap } = template;
@@ -63,15 +66,25 @@ export function c3dRecording(source) {
   tail.set(template.tail);
   tail.set(detail.tail, template.tail.length);
   const parameters = findParameters(head, tail, tailAt, order);
+  const corrected = correction(parameters, head, order, rate);
+  const events = eventsOf(parameters, head);
+  const analogRate = parameters.number("ANALOG", "RATE");
   return {
     firstFrame: detail.first,
     unit: parameters.text("POINT", "UNITS"),
     points: pointsOf(parameters, points),
     analog: analogOf(parameters, channels),
     generalScale: parameters.numbers("ANALOG", "GEN_SCALE")[0] ?? 1,
-    analogRate: parameters.number("ANALOG", "RATE"),
-    events: eventsOf(parameters, head),
+    analogRate: analogRate && analogRate / corrected,
+    events: events.map((event) => ({ ...event, time: event.time * corrected })),
   };
+}
+
+/** By what times are multiplied where the rate of the clip corrects that of the source. */
+function correction(parameters, head, order, rate) {
+  const stated = parameters.number("POINT", "RATE") || order.float(head, RATE_AT);
+  if (!rate || !(stated >= 1e-6 && stated <= 1e9)) return 1;
+  return Math.abs(stated / rate - 1) <= SAME_RATE ? 1 : stated / rate;
 }
 
 /**
