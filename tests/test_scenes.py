@@ -220,10 +220,12 @@ def test_short_clips(kind: str, n_frames: int) -> None:
 
 
 def test_odd_names_are_text() -> None:
-    joint = Joint('a"\\\n\ud800\x00é')
+    with pytest.raises(mcz.MotionError, match="not text that UTF-8 can hold"):
+        Joint("\ud800")
+    joint = Joint('a"\\\n\x00é')
     motion = Motion(Skeleton((joint,)), (Signal(np.zeros((2, 0))),), Fraction(1), name="</script>")
     nodes = Glb(mcz.to_glb(motion).data).document["nodes"]
-    assert [node["name"] for node in nodes] == ["</script>", 'a"\\\n?\x00é', "bones"]
+    assert [node["name"] for node in nodes] == ["</script>", 'a"\\\n\x00é', "bones"]
 
 
 Call = Callable[..., tuple[int, str, str]]

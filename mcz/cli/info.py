@@ -211,9 +211,12 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
     if len(document["skeletons"]) > FEW:
         yield ""
         yield f"{len(document['skeletons']) - FEW:,} more skeletons; --json lists them"
+    alone = bool(document["parts"]) and len(document["clips"]) == 1
     if len(document["clips"]) <= FEW:
         for clip in document["clips"]:
-            yield from _clip(clip, alone=bool(document["parts"]) and len(document["clips"]) == 1)
+            yield from _clip(clip, alone)
+            if not alone:
+                yield from _preview(clip)
     else:
         yield from ("", *_clips(document["clips"]).split("\n"))
         yield from _notes(document["clips"])
@@ -222,6 +225,13 @@ def lines(file: str, document: dict[str, Any]) -> Iterator[str]:
         yield f"attachment {attachment['name']}: {attachment['bytes']:,} bytes, verbatim"
     if document["parts"]:
         yield from _file_parts(document)
+    if alone:
+        yield from _preview(document["clips"][0])
+
+
+def _preview(clip: dict[str, Any]) -> Iterator[str]:
+    if "preview" in clip:
+        yield from preview_lines(clip["preview"])
 
 
 def _file_parts(document: dict[str, Any]) -> Iterator[str]:
@@ -275,8 +285,6 @@ def _clip(clip: dict[str, Any], alone: bool) -> Iterator[str]:
         if clip[key] is not None:
             yield f"  {clip[key]:7.2f} : 1, {against}"
     yield from (f"  damage: {line}" for line in clip["damage"])
-    if "preview" in clip:
-        yield from preview_lines(clip["preview"])
 
 
 def _codec(name: str, signal: dict[str, Any]) -> str:
