@@ -15,14 +15,21 @@ from tests.conftest import Call
 SUFFIXES = sorted({suffix for found in FORMATS.values() for suffix in found.suffixes} | {".mcz"})
 
 
+@pytest.fixture(scope="module")
+def made(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The samples, and two files of them."""
+    target = tmp_path_factory.mktemp("made") / "here"
+    shutil.copytree(samples, target)
+    mcz.encode(target / "walk.bvh", target / "walk.mcz", unit="cm")
+    mcz.pack(samples, target / "all.mcz")
+    return target
+
+
 @pytest.fixture
-def folder(samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The samples in the current folder, and two files of them."""
-    for path in samples.iterdir():
-        shutil.copy(path, tmp_path)
+def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The same in the current folder."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
-    mcz.encode("walk.bvh", "walk.mcz", unit="cm")
-    mcz.pack(samples, "all.mcz")
     return tmp_path
 
 
