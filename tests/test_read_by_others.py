@@ -19,6 +19,7 @@ import pytest
 import mcz
 from mcz.cli.common import run
 from mcz.cli.main import cli
+from mcz.clock import has_times
 from mcz.conversion import converted_files
 from mcz.kinematics.points import origins_of
 from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton
@@ -55,8 +56,10 @@ def check_tables(motion: Motion) -> None:
     found = pandas.read_csv(io.BytesIO(EXPORTS["csv"](table)), index_col="frame")
     if motion.timeline is not None:
         np.testing.assert_allclose(found.pop("time"), motion.times, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(found.to_numpy(np.float64), motion.values, rtol=3e-16)
-    assert len(found.columns) == len(table.names)
+    n_times = int(has_times(motion.skeleton))  # a first column that is the time itself
+    values = motion.values[:, n_times:]
+    np.testing.assert_allclose(found.to_numpy(np.float64), values, rtol=3e-16)
+    assert len(found.columns) == len(table.names) - n_times
     np.testing.assert_array_equal(found.index, table.frame_numbers)
     with np.load(io.BytesIO(EXPORTS["npz"](table)), allow_pickle=False) as arrays:
         np.testing.assert_array_equal(
@@ -187,7 +190,8 @@ def test_plain_scalars_frame_numbers_and_names_are_named(samples: Path) -> None:
     assert "left out: smile, which move nothing" in told(odd, "glb")
     assert told(odd, "bvh") == told(odd, "sto") == ""
     later = replace(motion, frame_numbers=np.arange(5, 245))
-    assert told(later, "bvh") == "left out: frame numbers, which begin with 5"
+    start = "the time of the first frame, 0.0333333 s: BVH begins at 0 s"
+    assert told(later, "bvh") == f"left out: frame numbers, which begin with 5; left out: {start}"
     assert told(later, "c3d") == told(later, "trc") == ""
     with_a_hole = np.arange(5, 245) + (np.arange(240) > 99)
     holed = replace(motion, frame_numbers=with_a_hole)

@@ -278,7 +278,7 @@ class Walker:
         told = False  # a segment of signal 0 has said which frame it is
         for packet in read_packets(read, self.profile.packet_bytes):
             start = read.at - CHECK_SIZE - len(packet.body)
-            header = header_of(packet, start, self.first[0] if told else None)
+            header = header_of(packet, start, self.first[0], is_known=told)
             self._segment(SegmentRow(start, len(packet.body), header, packet.kind))
             told = told or header.signal == 0
             yield read.at

@@ -173,13 +173,13 @@ def frame_table(header: SegmentHeader, counts: StreamCounts, size: int) -> Strea
     return StreamTable(header, counts, 0, (0,), (size,))
 
 
-def header_of(packet: Packet, start: int, due: int | None) -> SegmentHeader:
+def header_of(packet: Packet, start: int, due: int, *, is_known: bool) -> SegmentHeader:
     """The header of the segment in the packet at ``start``.
 
-    ``due``: the frame that follows those before it, None where none of these has told its own.
+    ``due``: the frame that follows those before it; ``is_known``: one of these has told its own.
     """
     if packet.kind in SHORT:
-        if due is None:  # PACK-14
+        if not is_known:  # PACK-14
             raise FormatError(f"packet at {start}: none before it in its DATA tells its frame")
         check_number(packet, due)
         return SegmentHeader(0, due, 1, flags=FRESH if packet.fresh else 0)  # PACK-12

@@ -90,8 +90,9 @@ class PortableNames:
 
 
 def visible(part: str) -> str:
-    """
-    >>> visible("a:b\u202egpj.c3d"), visible("Icon\r")
+    """Return a part of a path with ``_`` for each character that would not be seen.
+
+    >>> visible("a:b" + chr(0x202E) + "gpj.c3d"), visible("Icon" + chr(13))
     ('a:b_gpj.c3d', 'Icon_')
     """
     return HIDDEN.sub("_", part)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from decimal import ROUND_HALF_UP, Decimal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,9 @@ def note_on_height(height: float, unit_cm: float) -> str:
     """
     if PEOPLE_CM[0] <= height * unit_cm <= PEOPLE_CM[1]:
         return ""
+    # Halves up, of the decimals that are shown: 27.5 units of 2.54 cm are 69.9 cm.
+    shown = Decimal(f"{height * unit_cm:.6g}").quantize(Decimal("0.1"), ROUND_HALF_UP)
     return (
-        f"height {height:.3g} units = {height * unit_cm:,.1f} cm, which is no person's; "
+        f"height {height:.3g} units = {shown:,} cm, which is no person's; "
         f"is 1 unit = {unit_cm:.6g} cm right?"
     )
