@@ -10,7 +10,7 @@ const END_MAGIC = Uint8Array.of(0x89, 0x5a, 0x43, 0x4d, 0x0d, 0x0a, 0x1a, 0x0a);
 
 export const SIGNATURE_SIZE = 8;
 export const HEADER_SIZE = 16; // of a chunk, up to its payload
-const CRC_SIZE = 4;
+export const CRC_SIZE = 4;
 export const FRAMING_SIZE = HEADER_SIZE + CRC_SIZE;
 export const FOOT_SIZE = 32;
 

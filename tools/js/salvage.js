@@ -1,14 +1,16 @@
 // SPEC.md, "Salvage": what a damaged file still holds, with what its copies give back.
 
-import { sameBytes } from "./bytes.js";
-import { buildChunk } from "./chunks.js";
-import { Rows, readIndex } from "./directory.js";
-import { Refused } from "./errors.js";
+import { readIndex } from "./directory.js";
+import { MczError, Refused } from "./errors.js";
+import { readHead } from "./head.js";
 import { decodedLimit } from "./limits.js";
 import { overlaid } from "./overlay.js";
 import { Ranges } from "./ranges.js";
+import { restored } from "./restoring.js";
 import { Scan, placeKey } from "./scan.js";
 import { directoryFrom } from "./walked.js";
+
+const BASE_HEAD = Uint8Array.of(0, 9, 0, 2, 0); // of a file that has lost its own
 
 /**
  * @param {Ranges} ranges
@@ -23,7 +25,7 @@ export async function salvaged(ranges, limit = decodedLimit(ranges.size)) {
   const notes = [];
   let better = ranges;
   if (scan.damage.losses.length > 0) {
-    const parts = await partsOf(ranges, scan, notes);
+    const parts = await restored(ranges, scan, notes);
     const isKnown = [...scan.lostSkeletons].some((key) => scan.repeated.has(key));
     if (parts.length > 0) better = new Ranges(overlaid(ranges.source, parts));
     if (parts.length > 0 || isKnown) {
@@ -31,21 +33,33 @@ export async function salvaged(ranges, limit = decodedLimit(ranges.size)) {
       await scan.run();
     }
   }
-  const owners = scan.hasDoubts ? ownersOf(scan.lastIndex, ranges.size) : new Map();
+  const listed = scan.damage.losses.length > 0 ? indexIn(scan.lastIndex, ranges.size) : null;
+  const owners = scan.hasDoubts && listed !== null ? ownersOf(listed) : new Map();
   if (owners.size > 0) {
     scan = new Scan(better, limit, scan.repeated, owners);
     await scan.run();
   }
   if (scan.sound.length === 0) throw new Refused("nothing can be salvaged: no chunk is whole");
+  const directory = directoryFrom(scan.file);
+  for (const text of fromIndex(directory, listed)) scan.damage.add(text);
   const damage = [...notes, ...scan.damage.losses];
-  return { ranges: better, directory: { ...directoryFrom(scan.file), damage } };
+  return { ranges: better, directory: { ...directory, damage } };
 }
 
-/** Whose the segments and CENDs are, as the last index says that is whole. */
-function ownersOf(payload, fileBytes) {
+/** What the last index says that is whole, null without one. */
+function indexIn(payload, fileBytes) {
+  try {
+    return payload === null ? null : readIndex(payload, fileBytes);
+  } catch (error) {
+    if (!(error instanceof Refused)) throw error;
+    return null;
+  }
+}
+
+/** Whose the segments and CENDs are, as an index says. */
+function ownersOf({ rows }) {
   const owners = new Map();
   try {
-    const { rows } = payload === null ? { rows: new Rows(0) } : readIndex(payload, fileBytes);
     for (let i = 0; i < rows.length; i++) {
       const { name, end, segments } = rows.at(i);
       for (const { offset, size } of segments()) owners.set(placeKey(offset, size), name);
@@ -57,30 +71,29 @@ function ownersOf(payload, fileBytes) {
   return owners;
 }
 
-/** The damaged chunks of which there are copies. */
-async function partsOf(ranges, scan, notes) {
-  const parts = [];
-  for (const { offset, type, payload } of scan.copies) {
-    const bytes = buildChunk(type, payload);
-    const stop = offset + bytes.length;
-    if (sameBytes(await ranges.read(offset, stop), bytes)) continue;
-    const use = meets(scan.sound, offset, stop)
-      ? "is not used: what lies there is sound"
-      : "is used in place of what is damaged";
-    const text = `the copy of ${type} at ${offset} ${use}`;
-    notes.push({ text, clip: null, signal: null, frames: null, bytes: [offset, stop] });
-    if (!meets(scan.sound, offset, stop)) parts.push({ start: offset, bytes });
+/** Gives a directory the HEAD and the aliases that are lost; yields what was. */
+function* fromIndex(directory, listed) {
+  if (directory.head === null && listed !== null && isHead(listed.head)) {
+    directory.head = listed.head;
+    yield "the file has no HEAD; it is taken from the index";
   }
-  return parts;
+  if (directory.head === null) {
+    directory.head = BASE_HEAD;
+    yield "the file has no HEAD; it is read as one of this version";
+  }
+  for (const [name, alias] of listed?.aliases ?? []) {
+    if (directory.aliases.has(name)) continue;
+    directory.aliases.set(name, alias);
+    yield `the alias ${name} is lost; it is taken from the index`;
+  }
 }
 
-/** Whether something sound has bytes from `start` up to `stop`; `spans` are starts and stops. */
-function meets(spans, start, stop) {
-  let [low, high] = [0, spans.length / 2];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (spans[2 * middle + 1] <= start) low = middle + 1;
-    else high = middle;
+function isHead(payload) {
+  try {
+    readHead(payload);
+    return true;
+  } catch (error) {
+    if (!(error instanceof MczError)) throw error;
+    return false;
   }
-  return low < spans.length / 2 && spans[2 * low] < stop;
 }

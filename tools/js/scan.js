@@ -3,6 +3,7 @@
 import { ByteReader, hex, sameBytes } from "./bytes.js";
 import { readClipEnd } from "./cend.js";
 import {
+  CRC_SIZE,
   FOOT_SIZE,
   FRAMING_SIZE,
   HEADER_SIZE,
@@ -14,7 +15,7 @@ import {
   readHeader,
 } from "./chunks.js";
 import { frameNumbers } from "./clip.js";
-import { copiesIn } from "./copies.js";
+import { COPIED, copiesIn } from "./copies.js";
 import { Damage } from "./damage.js";
 import { Refused } from "./errors.js";
 import { within } from "./limits.js";
@@ -25,11 +26,10 @@ import { sha256 } from "./sha256.js";
 import { Walk } from "./walk.js";
 
 const WINDOW = 4 * 1024 * 1024; // bytes that are read at once
-const MOST_CHUNK = 2 ** 29; // bytes of a payload
+export const MOST_CHUNK = 2 ** 29; // bytes of a payload
 const ID_SIZE = 16;
-const BASE_HEAD = Uint8Array.of(0, 9, 0, 2, 0); // of a file that has lost its own
 const REPEATED = new Set(["HEAD", "SKEL", "MODL", "CLIP"]);
-const MOST_OF_PACKET = 64; // bytes of a packet beside its body, and more
+export const MOST_OF_PACKET = 64; // bytes of a packet beside its body, and more
 const LEAST_BETWEEN = 2 * FRAMING_SIZE; // bytes in which a CEND and the next CLIP can have been
 
 /** A walk that goes on behind what is damaged. */
@@ -48,6 +48,8 @@ export class Scan extends Walk {
     this.window = { start: 0, bytes: new Uint8Array(0) };
     this.damage = new Damage();
     this.sound = []; // where chunks and FOOTs lie that are whole: start, stop
+    this.badHeaders = []; // where one is due
+    this.places = new Map(); // of chunks that may have copies: offsets by `chunkKey`
     this.copies = [];
     this.copyBytes = ranges.size; // that copies may still have
     this.known = known;
@@ -111,9 +113,15 @@ export class Scan extends Walk {
       const bytes = await this.view(start, FRAMING_SIZE + length);
       const chunk = readChunk(bytes, 0, this.file.limits.payloadBytes);
       await supplied(() => this.take(this.placed(chunk, start)));
+      if (COPIED.has(chunk.type)) this.keepPlace(chunkKey(chunk.type, bytes), start);
       this.at = start + FRAMING_SIZE + length;
     }
     this.sound.push(start, this.at);
+  }
+
+  keepPlace(key, start) {
+    if (!this.places.has(key)) this.places.set(key, []);
+    this.places.get(key).push(start);
   }
 
   /** A chunk or FOOT that was read apart, with its place in the file. */
@@ -360,10 +368,6 @@ export class Scan extends Walk {
     this.closeClip();
     for (const [key, chunk] of this.repeated) if (key.startsWith("MODL")) super.readInBody(chunk);
     if (this.endOfFoot === 0) this.damage.add("the file has no valid FOOT");
-    if (this.file.head === null) {
-      this.damage.add("the file has no HEAD; it is read as one of this version");
-      this.file.head = BASE_HEAD;
-    }
     this.damage.flush();
   }
 
@@ -381,6 +385,7 @@ export class Scan extends Walk {
       if (!open && end <= this.file.size) return end;
     } catch (error) {
       if (!(error instanceof Refused)) throw error;
+      this.badHeaders.push(begin);
     }
     return this.doubted(await resynchronize(this, begin + 1));
   }
@@ -397,6 +402,10 @@ export class Scan extends Walk {
 
 /** What tells a segment or CEND by its place in a file. */
 export const placeKey = (offset, size) => `${offset} ${size}`;
+
+/** What tells a chunk from others: its type, length and crc. */
+export const chunkKey = (type, bytes) =>
+  `${type} ${bytes.length} ${hex(bytes.subarray(bytes.length - CRC_SIZE))}`;
 
 /** Frames of a clip without CEND: up to the last segment of each signal. */
 function framesFound({ signals, nFrames }) {

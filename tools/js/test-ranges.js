@@ -170,6 +170,85 @@ test("no clip gets frames of the next one, where bytes between them are lost", a
   }
 });
 
+/** Where the first chunk of a type begins. */
+const chunkAt = (bytes, type) => Buffer.from(bytes).indexOf(type, 0, "latin1");
+
+/** Salvages a file, and compares its values with those of the sound one. */
+async function salvagedLike(bytes, whole) {
+  const file = await open(fromBytes(bytes), { salvage: true });
+  const clips = decode(whole);
+  assert.deepEqual([...file.clips].map(({ name }) => name), clips.map(({ name }) => name));
+  for (const [index, { nFrames, signals }] of clips.entries()) {
+    const clip = await file.clip(index);
+    assert.equal(clip.nFrames, nFrames);
+    for (const [signal, expected] of signals.entries()) {
+      const found = await clip.read({ signal });
+      assert.deepEqual(found.lost, []);
+      same(found, expected, `signal ${signal}`);
+    }
+  }
+  return file;
+}
+
+test("a header with one wrong bit is put right, and no more", async () => {
+  const types = ["HEAD", "SKEL", "CLIP", "DATA", "CEND"];
+  for (const name of ["valid/fast/appended.mcz", "valid/online/repeat-each.mcz"]) {
+    const whole = bytesOf(name);
+    for (const type of types) {
+      const at = chunkAt(whole, type);
+      for (const bit of [0, 13, 37, 44, 50, 63, 64, 90, 127]) {
+        const bytes = whole.slice();
+        bytes[at + (bit >> 3)] ^= 1 << (bit & 7);
+        const { damage } = await salvagedLike(bytes, whole);
+        const text = `a header at ${at} has one wrong bit, which is put right`;
+        assert.deepEqual(damage.map((loss) => loss.text), [text], `${name} ${type} ${bit}`);
+      }
+    }
+    const bytes = whole.slice();
+    bytes[chunkAt(bytes, "DATA") + 8] ^= 3;
+    const { damage } = await open(fromBytes(bytes), { salvage: true });
+    assert.ok(!damage.some(({ text }) => text.includes("put right")));
+  }
+});
+
+test("copies are found where bytes were put in or cut out before them", async () => {
+  const whole = bytesOf("valid/container/copies.mcz");
+  const put = (at, n) => [...whole.subarray(0, at), ...new Uint8Array(n), ...whole.subarray(at)];
+  for (const type of ["SKEL", "CLIP", "CEND"]) {
+    const at = chunkAt(whole, type);
+    const bytes = Uint8Array.from(put(8, 7));
+    bytes[at + 7 + 20] ^= 1;
+    const { damage } = await salvagedLike(bytes, whole);
+    const text = `the copy of ${type} at ${at + 7} is used in place of what is damaged`;
+    assert.ok(damage.some((loss) => loss.text === text), type);
+  }
+  const at = chunkAt(whole, "SKEL");
+  const cut = Uint8Array.from([...whole.subarray(0, 8), ...whole.subarray(9)]);
+  cut[at - 1 + 20] ^= 1;
+  await salvagedLike(cut, whole);
+  const unclear = Uint8Array.from(put(at, 7));
+  unclear[at + 7 + 20] ^= 1;
+  const { clips, damage } = await open(fromBytes(unclear), { salvage: true });
+  const text = `the copy of SKEL at ${at + 7} is not used: where it belongs is not clear`;
+  assert.ok(damage.some((loss) => loss.text === text));
+  assert.ok(clips.length < decode(whole).length);
+});
+
+test("HEAD and aliases that are lost are those of the index", async () => {
+  const whole = bytesOf("valid/sources/amc.mcz");
+  const { aliases, limits } = await open(fromBytes(whole));
+  assert.ok(aliases.length > 0);
+  const bytes = whole.slice();
+  bytes[chunkAt(bytes, "HEAD") + 16] ^= 1;
+  bytes[chunkAt(bytes, "ALIA") + 16] ^= 1;
+  const file = await salvagedLike(bytes, whole);
+  assert.deepEqual(file.aliases, aliases);
+  assert.deepEqual(file.limits, limits);
+  const texts = file.damage.map(({ text }) => text);
+  assert.ok(texts.includes("the file has no HEAD; it is taken from the index"));
+  assert.ok(texts.includes(`the alias ${aliases[0].name} is lost; it is taken from the index`));
+});
+
 test("sources, and what a C3D says beside its numbers", async () => {
   let n = 0;
   for (const name of vectors("valid/sources")) {
