@@ -310,7 +310,7 @@ def _decimal(seconds: float) -> str:
 
 
 def parts_need_start(numbers: Ints | None, metadata: Mapping[str, str]) -> bool:
-    """Whether a part has its times only by a ``start-time`` of its own, unless a source says them.
+    """Return True if only a ``start-time`` gives a part its times, unless a source does.
 
     So it is after a ``start-time``, and where numbers do not ascend, so that rows are counted.
     """

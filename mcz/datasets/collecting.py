@@ -163,7 +163,7 @@ def _members(
 
 
 def _resampled_frames(member: Member, part: Timeline | None, rate: Fraction) -> int:
-    """How many frames the clip, whose times are ``part``, has at ``rate``."""
+    """The number of frames at ``rate`` of the clip whose times are ``part``."""
     if part is not None and not member.is_even:
         frames, _ = frames_within(part, rate, (0, member.n_source))
         if frames.stop > MOST_VALUES:

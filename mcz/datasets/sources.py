@@ -51,7 +51,7 @@ class Recipe:
         return subject_of(clip.skeleton, self.fields, self.joints, self.unit, is_timed)
 
     def copies(self, member: Member) -> bool:
-        """Whether frames of the data set are frames of the clip, one after the other."""
+        """Return True if frames of the data set are consecutive frames of the clip."""
         return self.rate is None or (member.is_even and self.rate == member.source_rate)
 
     def step(self, member: Member) -> Fraction:
@@ -147,7 +147,7 @@ class Sources:
 
 
 def timeline_of_member(clip: Clip, member: Member) -> Timeline:
-    """When the frames of a member were, whose times are known."""
+    """The times of the frames of a member, where they are known."""
     timeline = known_timeline(clip.name, clip.timeline_at(member.source_rate))
     return timeline.cut(slice(member.first, member.first + member.n_source))
 

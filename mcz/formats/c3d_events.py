@@ -36,7 +36,7 @@ def find_events(header: bytes, parameters: Parameters) -> tuple[Event, ...]:
 
 
 def event_times(header: bytes, parameters: Parameters) -> Iterator[int]:
-    """Where ``header`` has the binary32 of times of events: minutes and seconds, or seconds."""
+    """Offsets in ``header`` of the binary32 times of events: minutes and seconds, or seconds."""
     found = parameters.get("EVENT", "TIMES")
     if found is not None and found.type == FLOAT:
         yield from range(found.at, found.at + len(found.data), 4)

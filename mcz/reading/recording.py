@@ -33,7 +33,7 @@ def recording(motion: Motion) -> Recording | None:
 
 
 def _on_clock(source: Source, rate: Fraction | None) -> Recording | None:
-    """What a source says, its times corrected where the clip's ``rate`` corrects its own."""
+    """The recording of a source, its times corrected where the clip's ``rate`` corrects its own."""
     found: Recording | None = recording_of(source)
     if found is None or rate is None:
         return found
