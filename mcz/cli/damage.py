@@ -18,12 +18,12 @@ def hinted(target: str | bytes, options: Mapping[str, Any]) -> Iterator[None]:
     except (UnsupportedError, LimitError):
         raise
     except FormatError as error:
-        from mcz.reading import source_report
+        from mcz.reading.file import is_source
 
         whole = None if options.get("salvage") else _whole(target)
         if whole is not None:
             error.args = (f"{error}; {whole}",)
-        elif isinstance(target, str) and source_report.is_source(target):
+        elif isinstance(target, str) and is_source(target):
             error.args = (f"{error}; mcz encode makes one of a source file",)
         raise
 

@@ -30,7 +30,7 @@ class Input:
 
     @property
     def is_source(self) -> bool:
-        from mcz.reading.source_report import is_source
+        from mcz.reading.file import is_source
 
         return is_source(self.file)
 

@@ -94,9 +94,10 @@ def command(
     Of a source file (.bvh, .amc, .asf, .c3d, .trc, .mot, .sto, .csv, .npy, .npz) it shows the
     skeleton and the clip.
     """
-    from mcz.reading import report, source_report
+    from mcz.reading import report
+    from mcz.reading.file import is_source
 
-    if source_report.is_source(file) and not (show_layout or check):
+    if is_source(file) and not (show_layout or check):
         if where is not None:
             raise Failure("--where chooses among the clips of an .mcz", Exit.USAGE)
         return _of_source(file, skeleton, as_json, bool(preview))

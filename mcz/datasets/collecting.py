@@ -23,8 +23,7 @@ from mcz.motion import frame_rate_of
 from mcz.poses.resampling import MOST_VALUES, frames_within, resampled_frames, too_many
 from mcz.reading.clip import Clip
 from mcz.reading.fields import Where
-from mcz.reading.file import File, open
-from mcz.reading.source_report import is_source
+from mcz.reading.file import File, is_source, open
 from mcz.skeleton import Joints
 
 Target = str | os.PathLike[str] | File

@@ -51,6 +51,12 @@ def is_mcz(path: str | os.PathLike[str]) -> bool:
         return False
 
 
+def is_source(path: str) -> bool:
+    """Return whether a path has the suffix of a source format, and its file is no MCZ file."""
+    suffixes = tuple(suffix for known in FORMATS.values() for suffix in known.suffixes)
+    return path.lower().endswith(suffixes) and not is_mcz(path)
+
+
 class StoredSkeleton(NamedTuple):
     """A skeleton of a file, and its id, by which clips name it."""
 

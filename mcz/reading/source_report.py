@@ -12,19 +12,11 @@ from mcz.clock import time_facts
 from mcz.errors import SkeletonWarning
 from mcz.formats import FORMATS, Format, arrays_of
 from mcz.motion import Motion, Skeleton
-from mcz.reading.file import is_mcz
 from mcz.reading.recording import recording
 from mcz.reading.recording_report import document_of
 from mcz.reading.report import joint_facts
 from mcz.reading.skeletons import take
 from mcz.reading.source_files import load, read_skeleton
-
-SUFFIXES = tuple(suffix for found in FORMATS.values() for suffix in found.suffixes)
-
-
-def is_source(path: str) -> bool:
-    """Return whether a path has the suffix of a source format, and its file is no MCZ file."""
-    return path.lower().endswith(SUFFIXES) and not is_mcz(path)
 
 
 def source_info(
