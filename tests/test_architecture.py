@@ -35,7 +35,7 @@ MODEL = GROUND | {"clock", "motion", "skeleton", "source"}
 JOINT = MODEL | {"units", "kinematics", "transforms", "codecs", "container", "formats"}
 DOORS = {"reading", "writing", "editing", "live", "conversion"}
 ALLOWED = {
-    "jit": set(),
+    "kernels": set(),
     "interrupts": set(),
     "brief": set(),
     "displays": set(),
@@ -101,10 +101,10 @@ ALLOWED = {
     | {"retargeting", "tables", "version", "viewing"}
     | DOORS,  # mcz/__init__.py
 }
-COMPILER = {"jit"}  # the decorator of compiled loops: any layer's kernels may use it
+KERNELS = {"kernels"}  # their decorator and types: any layer's kernels may use them
 
 BANNED_CONSTRUCTS = {"GreedyRange", "Enum", "Flag", "Padding", "VarInt", "Compressed"}
-HEAVY = {"construct", "llvmlite", "rich", "fsspec", "pywt", "scipy", "matplotlib", "PIL", "av"}
+HEAVY = {"construct", "rich", "fsspec", "pywt", "scipy", "matplotlib", "PIL", "av"}
 HEAVY |= {"xarray", "rerun"}
 
 
@@ -166,7 +166,7 @@ def longest_module(parts: list[str]) -> str:
 
 def against_the_arrows(path: Path) -> set[str]:
     part = part_of(name_of(path))
-    allowed = ALLOWED[part] | {part} | COMPILER
+    allowed = ALLOWED[part] | {part} | KERNELS
     if part == "cli":
         allowed |= {""}  # the command line uses the public names
     if name_of(path) == "cli.bench":
@@ -252,7 +252,7 @@ def test_what_is_optional_is_imported_on_use() -> None:
                 found.add((node.module or "").partition(".")[0])
         return found & HEAVY
 
-    assert faults(at_once).keys() == {"jit.machine", "schema.twins"}  # imported on use themselves
+    assert faults(at_once).keys() == {"schema.twins"}  # imported on use itself
     pywt = faults(lambda path: "pywt" in set(others(path)))
     assert pywt.keys() == {"transforms.wavelets"}
 

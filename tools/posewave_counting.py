@@ -7,10 +7,9 @@ many zeros, then how many ones each context has seen, at the same places.
 from __future__ import annotations
 
 import os
-import tempfile
 
-# Loops that count are other loops: their machine code must not lie where that of the codec's does.
-os.environ["MCZ_CACHE_DIR"] = tempfile.mkdtemp()
+# Functions that count take the places of others only where kernels are plain Python.
+os.environ["MCZ_LOOPS"] = "interpreted"
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +18,12 @@ from mcz.codecs.posewave import decision_kernels, rows, segment
 from mcz.codecs.posewave.model import Start, make_model
 from mcz.codecs.posewave.state import N_OPINIONS, Model
 from mcz.coding import mixing
-from mcz.jit import inner
 
 Ints = NDArray[np.int64]
 
 plain_learn, plain_learn_small = decision_kernels.learn, mixing._learn
 
 
-@inner
 def counting_learn(
     model: Model, slot: int, one: Ints, other: Ints, second: Ints, bit: int, chance: int, x: int
 ) -> None:
@@ -37,7 +34,6 @@ def counting_learn(
         slots[len(slots) // 3 * (1 + bit) + at[k] + slot] += 1
 
 
-@inner
 def counting_learn_small(state: Ints, context: int, target: int) -> None:
     """``mixing._learn``, counting."""
     plain_learn_small(state, context, target)

@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import json
 import os
+import sys
 import tempfile
 from collections.abc import Iterable
 from functools import cache
@@ -13,15 +14,21 @@ from pathlib import Path
 from typing import Any
 
 import mcz
-from mcz.jit.store import user_cache
 
 # Of this part; of cli/ no measured figure depends on any file.
 MEASURING = ("cases.py", "ladder.py", "measure.py", "peers.py", "tasks.py")
 
 
 def default_folder() -> Path:
-    """Below the user's cache folder."""
-    return user_cache() / "bench"
+    """Below the user's cache folder; RuntimeError where there is no home."""
+    home = Path.home()
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or str(home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = str(home / "Library" / "Caches")
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or str(home / ".cache")
+    return Path(base) / "mcz" / "bench"
 
 
 @cache

@@ -6,9 +6,9 @@ SPEC.md, "Numbers in a row" and "Bases", are normative. Imported on first use on
 from __future__ import annotations
 
 from mcz.coding import residuals
-from mcz.coding.mixing import Bytes, Ints
 from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
-from mcz.jit import kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Ints, Ints2
 
 MAX_INDEX = 1 << 40
 MEANS = 0, 0  # residuals of a stream
@@ -16,7 +16,7 @@ BASIS = residuals.N_CONTEXTS, residuals.N_MIXERS
 
 
 @kernel
-def code_table(state: Ints, data: Bytes, table: Ints, scales: Ints, is_basis: int) -> int:
+def code_table(state: Ints, data: Bytes, table: Ints2, scales: Ints, is_basis: int) -> int:
     """Code a table (rows, channels) in place, each row from its scale on; 1 where impossible."""
     for row in range(len(table)):
         fast = slow = scales[row] << 4

@@ -6,13 +6,11 @@ bits and whether it encodes. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.coding.mixing import Bytes, Ints
-from mcz.jit import inner
+from mcz.kernels.types import Bytes, Ints
 
 AT, WRITING = 0, 1
 
 
-@inner
 def plain(coder: Ints, data: Bytes, value: int, n_bits: int) -> int:
     """Code the low ``n_bits`` of ``value``, the highest first.
 

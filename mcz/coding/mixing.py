@@ -10,14 +10,9 @@ several times quicker than with five.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mcz.coding.logistic import COUNT_LIMIT, LIMIT
-from mcz.jit import inner, kernel
-
-Ints = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Ints
 
 # Indices in ``state``: the ends of the interval, the 32 bits within it, the index in the data,
 # whether it encodes; then the tables, the weights of 64 mixers, the models.
@@ -40,7 +35,6 @@ def start(state: Ints, data: Bytes, encoding: int) -> None:
             state[CODE] = state[CODE] << 8 | _next(state, data)
 
 
-@inner
 def _next(state: Ints, data: Bytes) -> int:
     """The next byte; zeros follow the end of the data."""
     at = state[POSITION]
@@ -48,7 +42,6 @@ def _next(state: Ints, data: Bytes) -> int:
     return int(data[at]) if at < len(data) else 0  # RANGE-02
 
 
-@inner
 def _put(state: Ints, data: Bytes, byte: int) -> None:
     """Add a byte; where ``data`` is full it is only counted, and the caller tries a longer one."""
     at = state[POSITION]
@@ -57,7 +50,6 @@ def _put(state: Ints, data: Bytes, byte: int) -> None:
         data[at] = byte
 
 
-@inner
 def code(state: Ints, data: Bytes, bit: int, one: int) -> int:
     """Code a bit that is 1 with probability ``one`` / 65536, 0 < one < 65536."""
     low, high = state[LOW], state[HIGH]
@@ -106,7 +98,6 @@ def coded_size(state: Ints) -> int:
     return int(state[POSITION] - 4 + last_bytes(state))
 
 
-@inner
 def number(state: Ints, data: Bytes, value: int, n_bits: int) -> int:
     """Code the low ``n_bits`` of ``value``, the highest first, each bit as likely 0 as 1."""
     out = 0
@@ -115,7 +106,6 @@ def number(state: Ints, data: Bytes, value: int, n_bits: int) -> int:
     return out
 
 
-@inner
 def mixed(state: Ints, data: Bytes, bit: int, mixer: int, a: int, b: int, c: int) -> int:
     """Code a bit by the opinions of contexts ``a``, ``b`` and ``c``, then let them learn."""
     a, b, c, w = MODELS + 2 * a, MODELS + 2 * b, MODELS + 2 * c, WEIGHTS + 3 * mixer
@@ -136,7 +126,6 @@ def mixed(state: Ints, data: Bytes, bit: int, mixer: int, a: int, b: int, c: int
     return bit
 
 
-@inner
 def adaptive(state: Ints, data: Bytes, bit: int, context: int) -> int:
     """Code a bit by the opinion of one context, then let it learn."""
     at = MODELS + 2 * context
@@ -145,13 +134,11 @@ def adaptive(state: Ints, data: Bytes, bit: int, context: int) -> int:
     return bit
 
 
-@inner
 def _weigh(state: Ints, weight: int, change: int) -> None:
     # RANGE-05
     state[weight] = min(max(state[weight] + ((change + 8192) >> 14), -MAX_WEIGHT), MAX_WEIGHT)
 
 
-@inner
 def _learn(state: Ints, context: int, target: int) -> None:
     count = state[context + 1]
     state[context] += ((target - state[context]) * state[RATES + count]) >> 16

@@ -9,14 +9,9 @@ the prediction fails, as in robust regression.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from mcz.kernels.types import Floats
 
-from mcz.jit import inner
-
-Floats = NDArray[np.float64]
 # Room to work in: for the sums while they are solved, for a row of them, for a weighted row.
-Desk = tuple[Floats, Floats, Floats]
 
 LIMIT = 1048576.0  # 2^20: estimates beyond it are none, targets are cut
 SPIKES, LEAST = 0.3, 1e-9  # how much an error takes from its row's weight; of a variance
@@ -24,19 +19,16 @@ EARLY_ROWS, EARLY, LATE = 20, 0.2, 0.05  # how fast the typical error follows
 SLACK, FLOOR, AWAY = 1e-10, 1e-6, 1e300  # of pivots
 
 
-@inner
 def width_of(n: int) -> int:
     """How many numbers a row of sums has: ``n`` features and the target, in eights."""
     return (n + 8) // 8 * 8
 
 
-@inner
 def bounded(value: float) -> float:
     """``value``, or 0 for one that is too large or no number."""
     return value if abs(value) < LIMIT else 0.0
 
 
-@inner
 def estimate(weights: Floats, features: Floats, n: int) -> float:
     total = 0.0
     for i in range(n):
@@ -44,25 +36,27 @@ def estimate(weights: Floats, features: Floats, n: int) -> float:
     return bounded(total)
 
 
-@inner
 def weight_of(error: float, typical: float) -> float:
     """How much a row counts that was missed by ``error``."""
     return 1.0 / ((typical * typical + SPIKES * (error * error)) + LEAST)
 
 
-@inner
 def follow(typical: float, error: float, row: int) -> float:
     """The typical error after one more."""
     return typical + (abs(error) - typical) * (EARLY if row < EARLY_ROWS else LATE)
 
 
-@inner
 def take_in(
-    sums: Floats, features: Floats, n: int, target: float, weight: float, keep: float, desk: Desk
+    sums: Floats,
+    features: Floats,
+    n: int,
+    target: float,
+    weight: float,
+    keep: float,
+    weighted: Floats,
 ) -> None:
     """Let a row join the sums of products, what they held multiplied by ``keep``."""
     width = width_of(n)
-    weighted = desk[2]
     for i in range(n):
         weighted[i] = weight * features[i]
     weighted[n] = weight * target
@@ -75,11 +69,9 @@ def take_in(
             row[j] = keep * row[j] + feature * weighted[j]
 
 
-@inner
-def solve(sums: Floats, weights: Floats, n: int, ridge: float, desk: Desk) -> None:
+def solve(sums: Floats, weights: Floats, n: int, ridge: float, work: Floats, top: Floats) -> None:
     """The weights that fit the sums, by elimination without exchange; pivots have a floor."""
     width = width_of(n)
-    work, top = desk[0], desk[1]
     for i in range(n * width):
         work[i] = sums[i]
     for i in range(n):

@@ -6,8 +6,8 @@ scales and the neighbors of an integer are, and has its own contexts. Imported o
 
 from __future__ import annotations
 
-from mcz.coding.mixing import Bytes, Ints, mixed, number
-from mcz.jit import inner
+from mcz.coding.mixing import mixed, number
+from mcz.kernels.types import Bytes, Ints
 
 # First context of each kind of bit, and its mixer; "more" has twelve, by how far the length is.
 C_BELOW, C_LESS, C_MORE, C_SECOND, C_THIRD, C_SIDE, N_CONTEXTS = 0, 72, 152, 2072, 2232, 2552, 2568
@@ -17,7 +17,6 @@ FAULT = -(1 << 62)
 LENGTH_BITS = 6  # of the length of a first number
 
 
-@inner
 def bits(value: int) -> int:
     """Bits of ``value`` >= 0 without leading zeros."""
     n = 0
@@ -28,25 +27,21 @@ def bits(value: int) -> int:
     return n + value
 
 
-@inner
 def quarters(value: int) -> int:
     """About 4 log2(value), value >= 1, at most 111."""
     n = bits(value)
     return min(4 * (n - 1) + ((value << 2) >> (n - 1) & 3), 111)  # RESID-01
 
 
-@inner
 def clamp(value: int, low: int, high: int) -> int:
     return min(max(value, low), high)
 
 
-@inner
 def side_of(value: int) -> int:
     """0 for 0, 1 above it, 2 below."""
     return 0 if value == 0 else 1 if value > 0 else 2
 
 
-@inner
 def code_first(state: Ints, data: Bytes, value: int) -> int:
     """Code a number of which nothing is known: its length, its bits, its sign."""
     length = number(state, data, bits(abs(value)), LENGTH_BITS)
@@ -58,7 +53,6 @@ def code_first(state: Ints, data: Bytes, value: int) -> int:
     return -found if number(state, data, 1 if value < 0 else 0, 1) else found  # QBC-17
 
 
-@inner
 def code_residual(
     state: Ints,
     data: Bytes,
@@ -89,7 +83,6 @@ def code_residual(
     return -found if (side == 1) != (negative == 1) else found
 
 
-@inner
 def code_length(
     state: Ints, data: Bytes, length: int, kf: int, ks: int, near: int, first: tuple[int, int]
 ) -> int:
@@ -124,12 +117,10 @@ def code_length(
     return -1
 
 
-@inner
 def octave(quarters_of: int) -> int:
     return 0 if quarters_of < 28 else (quarters_of - 24) >> 2
 
 
-@inner
 def code_size(
     state: Ints,
     data: Bytes,

@@ -9,14 +9,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.coding import residuals
-from mcz.coding.mixing import Bytes, Ints
 from mcz.coding.residuals import FAULT, bits, code_residual, side_of
-from mcz.jit import inner
-
-Floats = NDArray[np.float64]
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 
 MAX_INDEX = 1 << 40
 LENGTHS = 0, 0  # residuals of a stream
@@ -32,9 +28,9 @@ class Transform(NamedTuple):
     (n_matrices, n_points) the channel of each point, ``weights`` (n_channels,).
     """
 
-    vectors: Floats
+    vectors: Floats2
     starts: Ints
-    columns: Ints
+    columns: Ints2
     step: float
     weights: Floats
 
@@ -42,9 +38,8 @@ class Transform(NamedTuple):
 LAST, BEFORE, FAST, SLOW, TRACK_SIZE = range(5)  # remembered of a coefficient
 
 
-@inner
 def code_frame(
-    state: Ints, data: Bytes, indices: Ints, starts: Ints, lengths: Ints, tracks: Ints, first: int
+    state: Ints, data: Bytes, indices: Ints, starts: Ints, lengths: Ints, tracks: Ints2, first: int
 ) -> int:
     """Code ``indices`` (n_rows,) in place; 1 where that is impossible.
 
@@ -83,8 +78,7 @@ def code_frame(
     return 0
 
 
-@inner
-def remember(indices: Ints, tracks: Ints) -> None:
+def remember(indices: Ints, tracks: Ints2) -> None:
     for r in range(len(indices)):
         track, size = tracks[r], 16 * abs(indices[r])
         track[BEFORE] = track[LAST]
@@ -93,7 +87,6 @@ def remember(indices: Ints, tracks: Ints) -> None:
         track[SLOW] += (size - track[SLOW]) >> 4  # FRAME-08
 
 
-@inner
 def add_frame(
     values: Floats, indices: Ints, transform: Transform, step: float, sums: Floats
 ) -> None:
@@ -114,7 +107,6 @@ def add_frame(
             values[c] = values[c] + (sums[j] * step) * weights[c]  # FRAME-11, ONLINE-24
 
 
-@inner
 def coefficient_of(points: Floats, row: Floats) -> float:
     """What a row of the analysis makes of points."""
     total = 0.0
@@ -123,7 +115,6 @@ def coefficient_of(points: Floats, row: Floats) -> float:
     return total
 
 
-@inner
 def index_of(coefficient: float, threshold: float) -> int:
     """A coefficient in steps as an integer; MAX_INDEX + 1 where it is too large."""
     size = abs(coefficient)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.errors import FormatError, LimitError
+from mcz.kernels.types import Bytes, Ints
 from mcz.schema import SIZED, SVARINT, UVARINT, ExprValidator, Struct, build, counted, parse
 
 FRAME_NUMBER = -1  # the column of the frame number
@@ -26,7 +26,6 @@ MAX_ROW_GAPS = 2**20  # bytes of the gaps and the tail of one frame
 
 WORDS, FULL, BLANKS, FREE = -1, 0, 1, 2  # what the tokens of a row are: text_kernels.match_rows
 
-Ints = NDArray[np.int64]
 
 # SRC-12
 _WIDTH = ExprValidator(SVARINT, lambda obj, ctx: -MAX_WIDTH <= obj <= MAX_WIDTH and obj != -1)
@@ -76,7 +75,7 @@ class Items(NamedTuple):
     """A pattern as parallel arrays, one entry an item: where its gap lies in ``gaps``, its column
     (-1: the frame number), its width. The last gap is the tail."""
 
-    gaps: NDArray[np.uint8]
+    gaps: Bytes
     gap_start: Ints
     gap_stop: Ints
     columns: Ints

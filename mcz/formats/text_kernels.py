@@ -5,14 +5,9 @@ Blanks are the bytes up to 0x20.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mcz.formats.layout import BLANKS, FREE, WORDS, Items
-from mcz.jit import kernel
-
-Bytes = NDArray[np.uint8]
-Ints = NDArray[np.int64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Ints, Ints2
 
 BLANK, QUOTE, COMMA, SEMICOLON = 0x20, 0x22, 0x2C, 0x3B
 MINUS, PLUS, HASH, ZERO, NINE, LF = 0x2D, 0x2B, 0x23, 0x30, 0x39, 0x0A
@@ -139,7 +134,14 @@ def _match_row(
 
 @kernel
 def match_rows(
-    text: Bytes, at: int, items: Items, row: int, start: Ints, stop: Ints, numbers: Ints, cells: int
+    text: Bytes,
+    at: int,
+    items: Items,
+    row: int,
+    start: Ints2,
+    stop: Ints2,
+    numbers: Ints,
+    cells: int,
 ) -> tuple[int, int]:
     """Match as many rows of one pattern as possible from offset ``at`` and row ``row`` on.
 
@@ -170,12 +172,12 @@ def _pad(first: int, size: int, width: int) -> int:
 
 
 @kernel
-def measure_rows(items: Items, gap_size: int, texts: Bytes, start: Ints, size: Ints) -> int:
+def measure_rows(items: Items, gap_size: int, texts: Bytes, start: Ints2, size: Ints2) -> int:
     """Bytes of rows of one pattern whose gaps and tail take ``gap_size``; see ``fill_rows``."""
     columns, widths = items.columns, items.widths
     total = gap_size * len(start)
     for k in range(len(columns)):
-        column = columns[k]
+        column = columns[k] if columns[k] >= 0 else start.shape[1] - 1
         for row in range(start.shape[0]):
             total += int(size[row, column])
             if widths[k]:
@@ -184,11 +186,11 @@ def measure_rows(items: Items, gap_size: int, texts: Bytes, start: Ints, size: I
 
 
 @kernel
-def fill_rows(out: Bytes, at: int, items: Items, texts: Bytes, start: Ints, size: Ints) -> int:
+def fill_rows(out: Bytes, at: int, items: Items, texts: Bytes, start: Ints2, size: Ints2) -> int:
     """Write rows of one pattern to ``out`` from ``at`` on; returns the offset after them.
 
     The token of ``row`` and ``column`` is texts[start[row, column]:][:size[row, column]]; column -1
-    wraps around to the last one, which holds the frame numbers. No token is empty.
+    stands for the last one, which holds the frame numbers. No token is empty.
     """
     gaps, gap_start, gap_stop, columns, widths = items
     n_items = len(columns)
@@ -199,7 +201,8 @@ def fill_rows(out: Bytes, at: int, items: Items, texts: Bytes, start: Ints, size
                 at += 1
             if k == n_items:
                 break
-            first, count, width = start[row, columns[k]], size[row, columns[k]], widths[k]
+            column = columns[k] if columns[k] >= 0 else start.shape[1] - 1
+            first, count, width = start[row, column], size[row, column], widths[k]
             pad = _pad(texts[first], count, width) if width else 0
             if width > 0:  # AMC-06
                 out[at : at + pad] = BLANK

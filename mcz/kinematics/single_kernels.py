@@ -9,12 +9,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Floats2, Floats3, Floats4, Ints, Ints2, Ints3
 
 
 class Joints(NamedTuple):
@@ -26,13 +23,13 @@ class Joints(NamedTuple):
     """
 
     parents: Ints
-    changes: Floats
-    offsets: Floats
-    backs: Floats
-    owns: Floats
+    changes: Floats3
+    offsets: Floats2
+    backs: Floats3
+    owns: Floats3
     replaces: Ints
-    moves: Ints
-    turns: Ints
+    moves: Ints2
+    turns: Ints3
     radians: float
 
 
@@ -40,12 +37,12 @@ class Points(NamedTuple):
     """``joints`` (n_points,), and ``tails`` (n_points, 3) along the axes of each."""
 
     joints: Ints
-    tails: Floats
+    tails: Floats2
 
 
 @kernel
 def position_points(
-    values: Floats, joints: Joints, points: Points, out: Floats, origins: Floats, axes: Floats
+    values: Floats, joints: Joints, points: Points, out: Floats2, origins: Floats2, axes: Floats3
 ) -> None:
     """Write the positions of ``points`` to ``out`` (n_points, 3), and ``origins`` and ``axes``.
 
@@ -59,7 +56,7 @@ def position_points(
 
 @kernel
 def place_frames(
-    values: Floats, joints: Joints, wanted: Ints, points: Points, out: Floats, kept: Floats
+    values: Floats2, joints: Joints, wanted: Ints, points: Points, out: Floats3, kept: Floats4
 ) -> None:
     """Write ``points`` of all frames to ``out`` (n_frames, n_points, 3), and axes to ``kept``.
 
@@ -80,7 +77,7 @@ def place_frames(
 
 
 @kernel
-def turn_frames(values: Floats, joints: Joints, wanted: Ints, out: Floats) -> None:
+def turn_frames(values: Floats2, joints: Joints, wanted: Ints, out: Floats4) -> None:
     """Write how each joint of ``wanted`` is turned from its parent, (n_frames, n_wanted, 3, 3).
 
     These are C M C^-1, M the product of the joint's own turns: the identity in the rest pose.
@@ -101,9 +98,8 @@ def turn_frames(values: Floats, joints: Joints, wanted: Ints, out: Floats) -> No
                     out[frame, number, i, j] = total
 
 
-@inner
 def _place(
-    values: Floats, joints: Joints, joint: int, arm: Floats, origins: Floats, axes: Floats
+    values: Floats, joints: Joints, joint: int, arm: Floats, origins: Floats2, axes: Floats3
 ) -> None:
     """The origin and the axes of a joint whose parent is placed; ``arm`` (3,) is scratch."""
     for i in range(3):
@@ -135,8 +131,7 @@ def _place(
     _turn(values, joints, joint, own)
 
 
-@inner
-def _turn(values: Floats, joints: Joints, joint: int, own: Floats) -> None:
+def _turn(values: Floats, joints: Joints, joint: int, own: Floats2) -> None:
     """Turn the axes of a joint, (3, 3), by its channels."""
     turns = joints.turns
     for turn in range(turns.shape[1]):
@@ -152,8 +147,7 @@ def _turn(values: Floats, joints: Joints, joint: int, own: Floats) -> None:
             own[i, k] = after * cosine - before * sine
 
 
-@inner
-def _mark(points: Points, origins: Floats, axes: Floats, out: Floats) -> None:
+def _mark(points: Points, origins: Floats2, axes: Floats3, out: Floats2) -> None:
     for point in range(len(points.joints)):
         joint = points.joints[point]
         for i in range(3):

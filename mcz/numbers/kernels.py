@@ -11,10 +11,8 @@ Everything is int64, the one kind of integer that compiled loops have.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mcz.jit import kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Flags, Ints, Ints2
 
 HUGE = 1_000_000
 
@@ -38,10 +36,10 @@ _POINT_ZERO, _POINT_ONLY, _NO_ZERO, _PLUS, _EXP3, _EXP1, _UPPER = 1, 2, 4, 8, 16
 
 @kernel
 def scan(
-    text: NDArray[np.uint8],
-    start: NDArray[np.int64],
-    stop: NDArray[np.int64],
-    fields: NDArray[np.int64],
+    text: Bytes,
+    start: Ints,
+    stop: Ints,
+    fields: Ints2,
 ) -> None:
     """Fill ``fields`` (n, 3) from the tokens ``text[start[i]:stop[i]]``."""
     for token in range(len(start)):
@@ -88,7 +86,7 @@ def scan(
 
 
 @kernel
-def _exponent(text: NDArray[np.uint8], at: int, end: int) -> tuple[int, int]:
+def _exponent(text: Bytes, at: int, end: int) -> tuple[int, int]:
     """The number after the ``e`` at ``at``, and bits of the shape."""
     if text[at] != 101 and text[at] != 69:
         return 0, BAD
@@ -112,10 +110,10 @@ def _exponent(text: NDArray[np.uint8], at: int, end: int) -> tuple[int, int]:
 
 @kernel
 def match(
-    fields: NDArray[np.int64],
+    fields: Ints2,
     rule: tuple[int, int, int, int, int, int, int],
-    ordinals: NDArray[np.int64],
-    printed: NDArray[np.bool_],
+    ordinals: Ints,
+    printed: Flags,
 ) -> int:
     """Ordinals of the tokens that a decimal grid prints; returns how many it does not print.
 
@@ -236,12 +234,12 @@ def _positional(
 
 @kernel
 def write(
-    negative: NDArray[np.bool_],
-    mantissas: NDArray[np.int64],
-    fractions: NDArray[np.int64],
+    negative: Flags,
+    mantissas: Ints,
+    fractions: Ints,
     rule: tuple[int, int, int, int],
-    out: NDArray[np.uint8],
-    offsets: NDArray[np.int64],
+    out: Bytes,
+    offsets: Ints,
 ) -> None:
     """Print ``mantissa * 10^-fraction`` for every i at ``out[offsets[i]:offsets[i + 1]]``.
 
@@ -279,9 +277,7 @@ def write(
 
 
 @kernel
-def _digits(
-    mantissa: int, count: int, fraction: int, flags: int, out: NDArray[np.uint8], at: int
-) -> int:
+def _digits(mantissa: int, count: int, fraction: int, flags: int, out: Bytes, at: int) -> int:
     """Print ``mantissa * 10^-fraction`` without sign or exponent; return where it ends."""
     integers = count - fraction
     if integers < 1:
@@ -306,7 +302,7 @@ def _digits(
 
 
 @kernel
-def _power(power: int, flags: int, out: NDArray[np.uint8], at: int) -> int:
+def _power(power: int, flags: int, out: Bytes, at: int) -> int:
     """Print ``e``, sign and digits of an exponent; return where it ends."""
     out[at] = 69 if flags & _UPPER else 101
     out[at + 1] = 45 if power < 0 else 43

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.jit import inner, kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes2, Floats, Floats2, Ints, Ints2
 from mcz.numbers.rules import MIN_POWER
 from mcz.numbers.value_kernels import (
     DIGITS,
@@ -18,14 +18,9 @@ from mcz.numbers.value_kernels import (
     scaled,
 )
 
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
-
 LEAST_POWER, GREATEST_POWER = -324, 308  # of ten, in the table of powers
 
 
-@inner
 def decimal(value: float, power: int, digits: int, tens: Floats, powers: Floats) -> tuple[int, int]:
     """The mantissa of so many digits nearest to a value above 0, and the power of its first digit.
 
@@ -48,24 +43,22 @@ def decimal(value: float, power: int, digits: int, tens: Floats, powers: Floats)
     return mantissa, power
 
 
-@inner
 def magnitude_of(mantissa: int, power: int, digits: int, tens: Floats) -> int:
     """That of a number of so many significant digits, the first of them at a power of ten."""
     low = int(tens[digits - 1])
     return (power - MIN_POWER) * 9 * low + 1 + mantissa - low
 
 
-@inner
 def general_column(
-    values: Floats,
+    values: Floats2,
     c: int,
     start: int,
     stop: int,
     digits: int,
     tens: Floats,
     powers: Floats,
-    ordinals: Ints,
-    exact: Bytes,
+    ordinals: Ints2,
+    exact: Bytes2,
 ) -> bool:
     """Numbers of so many significant digits; False where one is to be looked at more closely."""
     power = 0
@@ -88,16 +81,15 @@ def general_column(
     return True
 
 
-@inner
 def fixed_column(
-    values: Floats,
+    values: Floats2,
     c: int,
     start: int,
     stop: int,
     rule: Ints,
     tens: Floats,
-    ordinals: Ints,
-    exact: Bytes,
+    ordinals: Ints2,
+    exact: Bytes2,
 ) -> bool:
     """Numbers of so many decimals; False where one is beyond the grid or none."""
     ten = tens[rule[POWER]]
@@ -117,12 +109,12 @@ def fixed_column(
 
 @kernel
 def fill(
-    values: Floats,
-    rules: Ints,
+    values: Floats2,
+    rules: Ints2,
     tens: Floats,
     powers: Floats,
-    ordinals: Ints,
-    exact: Bytes,
+    ordinals: Ints2,
+    exact: Bytes2,
     left: Ints,
 ) -> None:
     """Fill ``ordinals`` (rows, channels), and where they give the values back ``exact`` with 1.

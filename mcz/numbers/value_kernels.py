@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mcz.jit import inner, kernel
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Floats2, Ints, Ints2
 
 # Columns of ``rules``, one row a channel.
 DIGITS, POWER, LIMIT = range(3)
@@ -18,7 +13,6 @@ ROWS = 256  # that are worked on at a time, so that they stay in the processor's
 EXACT_POWER = 22
 
 
-@inner
 def scaled(mantissa: int, power: int, tens: Floats) -> float:
     """``mantissa * 10^power``, rounded once: both factors are exact."""
     if power < 0:
@@ -26,9 +20,8 @@ def scaled(mantissa: int, power: int, tens: Floats) -> float:
     return float(mantissa * tens[power])
 
 
-@inner
 def general_column(
-    ordinals: Ints, values: Floats, c: int, start: int, stop: int, rule: Ints, tens: Floats
+    ordinals: Ints2, values: Floats2, c: int, start: int, stop: int, rule: Ints, tens: Floats
 ) -> bool:
     """Numbers of so many significant digits; False where one has too large a power of ten."""
     low = int(tens[rule[DIGITS] - 1])
@@ -54,7 +47,7 @@ def general_column(
 
 
 @kernel
-def fill(ordinals: Ints, rules: Ints, tens: Floats, values: Floats, left: Ints) -> None:
+def fill(ordinals: Ints2, rules: Ints2, tens: Floats, values: Floats2, left: Ints) -> None:
     """Fill ``values`` (rows, channels) with those of the ordinals; ``left``: channels not filled.
 
     These have another grid than a decimal one, or a number that no exact division gives, or none.

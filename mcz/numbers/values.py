@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mcz import jit
+from mcz.kernels import lacks_compiled_kernels
 from mcz.numbers.blocks import grid_blocks
 from mcz.numbers.grid import Grid
 from mcz.numbers.magnitudes import POWERS
@@ -30,7 +30,7 @@ def values_of(
     values = np.empty(ordinals.shape) if out is None else out
     if not changes and ordinals.flags.c_contiguous:
         left = np.ones(len(grids), np.int64)
-        if not jit.lacks_compiler():
+        if not lacks_compiled_kernels():
             left[:] = 0
             _kernels("value").fill(ordinals, _rules(tuple(grids)), TENS, values, left)
         for grid, columns in _left(left, grids):

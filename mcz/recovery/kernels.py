@@ -5,17 +5,12 @@ Blocks are rows of int64, four elements in each. Imported on first use only.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mcz.jit import inlined, inner, kernel
-
-Ints = NDArray[np.int64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Ints, Ints2
 
 REDUCED = 0x1100B
 
 
-@inner
 def fill_table(table: Ints, factor: int) -> int:
     """``table`` (512,): the products of ``factor`` with each low byte, then with each high one."""
     table[0] = 0
@@ -32,7 +27,6 @@ def fill_table(table: Ints, factor: int) -> int:
     return 0
 
 
-@inlined
 def product(table: Ints, x: int) -> int:
     """The products of the four elements in ``x``."""
     a = table[x & 255] ^ table[256 + ((x >> 8) & 255)]
@@ -51,8 +45,7 @@ def add_product(target: Ints, source: Ints, factor: int, table: Ints) -> int:
     return 0
 
 
-@inner
-def skew_at(skews: Ints, level: int, point: int) -> int:
+def skew_at(skews: Ints2, level: int, point: int) -> int:
     value = 0
     for bit in range(16):
         if (point >> bit) & 1:
@@ -61,7 +54,7 @@ def skew_at(skews: Ints, level: int, point: int) -> int:
 
 
 @kernel
-def to_coefficients(blocks: Ints, levels: int, offset: int, skews: Ints, table: Ints) -> int:
+def to_coefficients(blocks: Ints2, levels: int, offset: int, skews: Ints2, table: Ints) -> int:
     """Values at ``offset`` + 0 ... 2^levels - 1 in place to coefficients; a row each."""
     n, width = blocks.shape
     for level in range(levels):
@@ -80,7 +73,7 @@ def to_coefficients(blocks: Ints, levels: int, offset: int, skews: Ints, table: 
 
 
 @kernel
-def to_values(blocks: Ints, levels: int, offset: int, skews: Ints, table: Ints) -> int:
+def to_values(blocks: Ints2, levels: int, offset: int, skews: Ints2, table: Ints) -> int:
     """The inverse of ``to_coefficients``."""
     n, width = blocks.shape
     for step in range(levels):

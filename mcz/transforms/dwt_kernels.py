@@ -6,17 +6,13 @@ the order below. Imported on first use only.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mcz.jit import kernel
-
-Floats = NDArray[np.float64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Floats2
 
 
 @kernel
 def synthesize(
-    out: Floats, approx: Floats, detail: Floats, first: int, start: int, lo: Floats, hi: Floats
+    out: Floats2, approx: Floats2, detail: Floats2, first: int, start: int, lo: Floats, hi: Floats
 ) -> None:
     """Write samples n >= start of the next finer approximation, (samples, channels).
 
@@ -40,9 +36,9 @@ def synthesize(
 
 @kernel
 def analyze(
-    approx: Floats,
-    detail: Floats,
-    signal: Floats,
+    approx: Floats2,
+    detail: Floats2,
+    signal: Floats2,
     first: int,
     n_samples: int,
     start: int,

@@ -6,12 +6,8 @@ step both ways, so that ``split`` undoes what ``join`` does. Imported on first u
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats2
 
 # I. Daubechies and W. Sweldens, Factoring wavelet transforms into lifting steps, 1998.
 ALPHA, BETA = -1.586134342059924, -0.052980118572961
@@ -19,8 +15,7 @@ GAMMA, DELTA = 0.882911075530934, 0.443506852043971
 LOW, HIGH = 1.230174104914001, 1.149604398860241  # of approximations, of details
 
 
-@inner
-def lift(signal: Floats, first: int, factor: float) -> None:
+def lift(signal: Floats2, first: int, factor: float) -> None:
     """Add to the rows ``first``, ``first`` + 2, ... ``factor`` times the sum of their neighbors.
 
     At an end of the signal, of at least two rows, the one neighbor counts twice.
@@ -34,7 +29,7 @@ def lift(signal: Floats, first: int, factor: float) -> None:
 
 
 @kernel
-def join(signal: Floats, approx: Floats, detail: Floats) -> None:
+def join(signal: Floats2, approx: Floats2, detail: Floats2) -> None:
     """Write the ``signal``, (n_rows, n_channels), that has these coefficients."""
     n_channels = signal.shape[1]
     for n in range(len(approx)):
@@ -50,7 +45,7 @@ def join(signal: Floats, approx: Floats, detail: Floats) -> None:
 
 
 @kernel
-def split(signal: Floats, approx: Floats, detail: Floats) -> None:
+def split(signal: Floats2, approx: Floats2, detail: Floats2) -> None:
     """Write the coefficients of ``signal``, which is lost."""
     n_channels = signal.shape[1]
     lift(signal, 1, ALPHA)

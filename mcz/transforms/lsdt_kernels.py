@@ -7,18 +7,16 @@ one order, so the same frames give the same bytes. Imported on first use only.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.jit import kernel
-
-Floats = NDArray[np.float64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats2
 
 BLOCK = 128  # frames; coefficients, magnitudes and ranks of 31 points then fit the second cache
 
 
 @kernel
 def truncate(
-    columns: Floats, rows: Floats, basis: Floats, n_kept: int, n_counted: int, products: Floats
+    columns: Floats2, rows: Floats2, basis: Floats2, n_kept: int, n_counted: int, products: Floats2
 ) -> float:
     """Keep the ``n_kept`` largest coefficients of every frame.
 
@@ -49,7 +47,7 @@ def truncate(
         for k in range(1, n_points):
             for l in range(k):  # noqa: E741
                 for i in range(width):
-                    first = np.int64(magnitudes[l, i] >= magnitudes[k, i])
+                    first = int(magnitudes[l, i] >= magnitudes[k, i])
                     ranks[k, i] += first
                     ranks[l, i] += 1 - first
         for i in range(width):

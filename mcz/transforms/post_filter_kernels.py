@@ -7,12 +7,9 @@ loops inside run over channels. Imported on first use only.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Floats2, Ints
 
 SIDE = 12  # rows on each side
 FAR = 2.0**40  # a number that is not nearer to 0 is taken for unknown (FILT-05)
@@ -20,7 +17,7 @@ FAR = 2.0**40  # a number that is not nearer to 0 is taken for unknown (FILT-05)
 
 @kernel
 def filter_middle(
-    rows: Floats, past: Floats, bank: Floats, low: float, high: float, out: Floats
+    rows: Floats2, past: Floats2, bank: Floats2, low: float, high: float, out: Floats2
 ) -> None:
     """Fill ``out``, (n, n_channels), with the filtered rows 12 to n + 11 of ``rows``.
 
@@ -53,7 +50,6 @@ def filter_middle(
             past[0, c] = filtered
 
 
-@inner
 def _has_gap(row: Floats) -> bool:
     n_unknown = 0
     for c in range(len(row)):
@@ -61,8 +57,7 @@ def _has_gap(row: Floats) -> bool:
     return n_unknown > 0
 
 
-@inner
-def _choose(window: Floats, past: Floats, low: float, high: float, choice: Ints) -> None:
+def _choose(window: Floats2, past: Floats2, low: float, high: float, choice: Ints) -> None:
     """Which filter each channel is to go through; ``past`` is filled where a run begins."""
     for c in range(window.shape[1]):
         here, before = window[SIDE, c], window[SIDE - 1, c]
@@ -74,8 +69,7 @@ def _choose(window: Floats, past: Floats, low: float, high: float, choice: Ints)
         choice[c] = 0 if error <= low else (1 if error <= high else 2)  # FILT-08
 
 
-@inner
-def _patch(window: Floats, patched: Floats) -> None:
+def _patch(window: Floats2, patched: Floats2) -> None:
     """``window`` with the first and the last number of the run of its middle repeated outwards."""
     n_channels = window.shape[1]
     inside = np.empty(n_channels)
@@ -89,8 +83,7 @@ def _patch(window: Floats, patched: Floats) -> None:
                 patched[row, c] = window[row, c] if inside[c] else patched[nearer, c]  # FILT-06
 
 
-@inner
-def _sum(window: Floats, bank: Floats, choice: Ints, total: Floats) -> None:
+def _sum(window: Floats2, bank: Floats2, choice: Ints, total: Floats) -> None:
     """What the filter of each channel adds to the middle of ``window``."""
     total[:] = 0.0
     middle = window[SIDE]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from contextlib import ExitStack
 from unittest import mock
 
 import numpy as np
@@ -11,10 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz import jit
 from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.lossless import fast
-from mcz.coding.ordinals import heads
+from mcz.coding.ordinals import degrees, heads
 from mcz.coding.ordinals.counts import Law
 from mcz.coding.ordinals.degrees import DEGREE, of_products
 from mcz.coding.quick import kernels, streams, tables
@@ -62,10 +62,13 @@ def test_extreme_ordinals_of_any_form(extreme: int) -> None:
 
 
 def outcomes(stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> list[object]:
-    """What is decoded as loops say it, and without a compiler: rows, or that it is refused."""
+    """What is decoded with compiled kernels and without: rows, or that it is refused."""
     found: list[object] = []
     for lacking in (False, True):
-        with mock.patch.object(jit, "lacks_compiler", return_value=lacking):
+        with ExitStack() as stack:
+            for module in (degrees, streams):
+                name = f"{module.__name__}.lacks_compiled_kernels"
+                stack.enter_context(mock.patch(name, return_value=lacking))
             try:
                 found.append(decoded(stream, n_rows, n_channels, grid).tolist())
             except FormatError:

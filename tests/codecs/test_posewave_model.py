@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from mcz.codecs.posewave.decision_kernels import bucket_of
 from mcz.codecs.posewave.model import log_table, make_model, new_rows, no_rows, start_tables
 from mcz.codecs.posewave.model_kernels import NO_CHOICE, begin_level, code_rows
-from mcz.codecs.posewave.state import MAX_INDEX, N_CLASSES, N_SLOTS, Floats, Ints, Model
+from mcz.codecs.posewave.state import MAX_INDEX, N_CLASSES, N_SLOTS, Model
 from mcz.coding import mixing
+from mcz.kernels.types import Floats, Ints
 
 NO_EXPONENTS = np.zeros(1000, np.int64), 0
 LENGTHS = 3, 2, 5, 9, 18, 35  # rows of the levels of 72 frames

@@ -119,16 +119,17 @@ def test_a_wheel_has_the_page_unless_told(
 ) -> None:
     """With a package of a few modules in place of ours, and the real hook and settings."""
     monkeypatch.delenv("MCZ_BUILD_WITHOUT_VIEWER", raising=False)
+    monkeypatch.setenv("MCZ_BUILD", "interpreted")
     wheel = pytest.importorskip("hatchling.builders.wheel")
     sdist = pytest.importorskip("hatchling.builders.sdist")
-    for name in ("pyproject.toml", "README.md", "LICENSE", "tools/viewer/hatch_hook.py"):
+    for name in ("pyproject.toml", "README.md", "LICENSE", "tools/build_hook.py"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
     shutil.copytree(ROOT / "mcz" / "viewing", tmp_path / "mcz" / "viewing")
     for name in ("__init__.py", "errors.py"):
         (tmp_path / "mcz" / name).write_bytes((ROOT / "mcz" / name).read_bytes())
     if has_page:
-        (tmp_path / "tools/viewer/dist").mkdir()
+        (tmp_path / "tools/viewer/dist").mkdir(parents=True)
         shutil.copy(PAGE, tmp_path / "tools/viewer/dist/viewer.html")
     else:
         for builder in (wheel.WheelBuilder, sdist.SdistBuilder):

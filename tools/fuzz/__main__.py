@@ -120,7 +120,6 @@ def _run(
         "--seeds": seeds,
         "--findings": findings,
         "--figures": figures,
-        "--cache": Path.home() / ".cache" / "mcz-fuzz",
         "--seconds": seconds,
         "--runs": given.runs,
         "--seed": given.seed + outcome.deaths,

@@ -21,7 +21,6 @@ def main() -> None:
     given = _parser().parse_args()
     # An index out of bounds then raises in compiled loops, too, instead of reading what is there.
     os.environ["MCZ_LOOPS"] = "interpreted" if given.plain else "checked"
-    os.environ.setdefault("MCZ_CACHE_DIR", str(given.cache))
     import atheris
 
     _import_instrumented(atheris, plain=given.plain)
@@ -49,7 +48,7 @@ def main() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="tools.fuzz.worker", description=__doc__)
     parser.add_argument("target")
-    for folder in ("--corpus", "--seeds", "--findings", "--figures", "--cache"):
+    for folder in ("--corpus", "--seeds", "--findings", "--figures"):
         parser.add_argument(folder, type=Path, required=True)
     parser.add_argument("--seconds", type=int, default=0)
     parser.add_argument("--runs", type=int, default=-1)
@@ -63,9 +62,9 @@ def _import_instrumented(atheris: Any, *, plain: bool) -> None:
     """Import the package with counters of branches, but for loops that are to be compiled."""
     modules = {_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
     wanted = [name for name in modules if not name.startswith(APART)]
-    loops = [name for name in wanted if "mcz.jit" in modules[name].read_text()]
-    compiled = [] if plain else loops
-    with atheris.instrument_imports(include=["mcz"], exclude=["mcz.jit", *compiled]):
+    kernels = [name for name in wanted if "import kernel" in modules[name].read_text()]
+    compiled = [] if plain else kernels
+    with atheris.instrument_imports(include=["mcz"], exclude=["mcz.kernels", *compiled]):
         for name in wanted:
             importlib.import_module(name)
 

@@ -8,12 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Flags, Floats, Floats2, Ints
 
 PUBLISHED, LEAST_SQUARES = 0, 1  # how a middle point is found
 
@@ -31,7 +28,6 @@ class Rule(NamedTuple):
     closed: int
 
 
-@inner
 def rounded(value: float, per: float, step: float) -> float:
     """``value`` on the grid, halves away from zero; ``per`` 10^decimals, or 0 for ``step``."""
     scaled = abs(value) * per if per > 0 else abs(value) / step
@@ -40,8 +36,7 @@ def rounded(value: float, per: float, step: float) -> float:
     return float(-found if value < 0 else found)
 
 
-@inner
-def middle(points: Floats, a: int, b: int, ends: Floats, method: int, out: Floats) -> None:
+def middle(points: Floats2, a: int, b: int, ends: Floats2, method: int, out: Floats) -> None:
     """The middle control point of the curve over frames a to b, written to ``out``.
 
     ``ends`` are its end points, (2, channels).
@@ -72,9 +67,8 @@ def middle(points: Floats, a: int, b: int, ends: Floats, method: int, out: Float
         out[c] /= total
 
 
-@inner
 def worst(
-    points: Floats, a: int, b: int, ends: Floats, mid: Floats, enough: float
+    points: Floats2, a: int, b: int, ends: Floats2, mid: Floats, enough: float
 ) -> tuple[float, int]:
     """The greatest squared distance from the curve, and the first frame that has it.
 
@@ -97,15 +91,14 @@ def worst(
     return greatest, at
 
 
-@inner
 def fit(
-    points: Floats,
-    exact: Floats,
+    points: Floats2,
+    exact: Floats2,
     a: int,
     b: int,
     rule: Rule,
     enough: float,
-    work: Floats,
+    work: Floats2,
 ) -> tuple[float, int]:
     """Fit one curve; ``work`` (3, channels) then has its two ends and its middle.
 
@@ -122,12 +115,12 @@ def fit(
 
 @kernel
 def breaks_by_splitting(
-    points: Floats,
-    exact: Floats,
+    points: Floats2,
+    exact: Floats2,
     marks: Ints,
     limit: float,
     rule: Rule,
-    is_break: NDArray[np.bool_],
+    is_break: Flags,
 ) -> None:
     """Set ``is_break`` at the frames at which curves meet between marks: split at the worst one."""
     work = np.zeros((3, points.shape[1]))
@@ -151,12 +144,12 @@ def breaks_by_splitting(
 
 @kernel
 def breaks_of_fewest(
-    points: Floats,
-    exact: Floats,
+    points: Floats2,
+    exact: Floats2,
     marks: Ints,
     limit: float,
     rule: Rule,
-    is_break: NDArray[np.bool_],
+    is_break: Flags,
 ) -> None:
     """As ``breaks_by_splitting``, but as few breaks as there can be; of these the best fit.
 
@@ -189,7 +182,7 @@ def breaks_of_fewest(
 
 
 @kernel
-def middles(out: Floats, points: Floats, exact: Floats, breaks: Ints, method: int) -> None:
+def middles(out: Floats2, points: Floats2, exact: Floats2, breaks: Ints, method: int) -> None:
     """Write the middle point of every curve, unrounded, (curves, channels)."""
     ends = np.zeros((2, points.shape[1]))
     for k in range(len(breaks) - 1):

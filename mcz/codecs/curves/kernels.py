@@ -7,14 +7,12 @@ serves encoder and decoder. Imported on first use only.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.coding import residuals
-from mcz.coding.mixing import Bytes, Ints, mixed
+from mcz.coding.mixing import mixed
 from mcz.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, FloatColumns, Floats2, Ints, Ints2
 
 MAX_INDEX = 1 << 40  # of a control point
 
@@ -22,20 +20,18 @@ MAX_INDEX = 1 << 40  # of a control point
 LENGTHS = 0, 0
 BREAKS = residuals.N_CONTEXTS, residuals.N_MIXERS
 MIDDLES = 2 * residuals.N_CONTEXTS, 2 * residuals.N_MIXERS
-KINDS = BREAKS, MIDDLES  # QBC-14
 C_LAST, M_LAST = 3 * residuals.N_CONTEXTS, 3 * residuals.N_MIXERS
 N_DETAIL_MIXERS = M_LAST + 1
 
 FAST, SLOW, SIDE_1, SIDE_2, TRACK_SIZE = range(5)  # what is remembered of a channel
 
 
-@inner
 def code_point(
     state: Ints,
     data: Bytes,
     point: Ints,
     predicted: Ints,
-    tracks: Ints,
+    tracks: Ints2,
     first: tuple[int, int],
 ) -> int:
     """Code the channels of one control point in place; 1 where that is impossible."""
@@ -67,7 +63,7 @@ def code_point(
 
 
 @kernel
-def code_marks(state: Ints, data: Bytes, points: Ints, count: int, scale: int) -> int:
+def code_marks(state: Ints, data: Bytes, points: Ints2, count: int, scale: int) -> int:
     """Code points[:count], (n, channels), in place; return the index of a fault or -1."""
     n_channels = points.shape[1]
     tracks = np.zeros((n_channels, TRACK_SIZE), np.int64)
@@ -85,7 +81,6 @@ def code_marks(state: Ints, data: Bytes, points: Ints, count: int, scale: int) -
     return -1
 
 
-@inner
 def towards(a: int, b: int, part: int, whole: int) -> int:
     """The integer nearest to a + (b - a) part / whole, halves up."""
     return int(a + (2 * (b - a) * part + whole) // (2 * whole))  # QBC-23
@@ -95,11 +90,11 @@ def towards(a: int, b: int, part: int, whole: int) -> int:
 def code_details(
     state: Ints,
     data: Bytes,
-    marks: Ints,
+    marks: Ints2,
     frames: Ints,
     lengths: Ints,
-    ends: Ints,
-    mids: Ints,
+    ends: Ints2,
+    mids: Ints2,
     scales: Ints,
 ) -> int:
     """Code the curves between marks in place; return how many there are, or -1 for a fault.
@@ -126,7 +121,9 @@ def code_details(
                 return -1
             lengths[curve] = length
             for kind in range(2):
-                point = ends[curve] if kind == 0 else mids[curve]
+                point = ends[curve]
+                if kind == 1:
+                    point = mids[curve]
                 for c in range(n_channels):
                     if kind == 0:
                         predicted[c] = towards(start[c], marks[k + 1, c], length, left)
@@ -135,7 +132,14 @@ def code_details(
                 if (length == left) if kind == 0 else (length == 1):
                     for c in range(n_channels):
                         point[c] = predicted[c]
-                elif code_point(state, data, point, predicted, tracks[kind], KINDS[kind]):
+                elif code_point(
+                    state,
+                    data,
+                    point,
+                    predicted,
+                    tracks[kind],
+                    MIDDLES if kind else BREAKS,  # QBC-14
+                ):
                     return -1
             start = ends[curve]
             left -= length
@@ -145,7 +149,6 @@ def code_details(
     return curve
 
 
-@inner
 def code_length(state: Ints, data: Bytes, length: int, left: int, n_here: int, usual: int) -> int:
     """Code the frames of a curve, of which ``left`` are left up to the next mark; 0 for a fault."""
     if left == 1:
@@ -165,12 +168,12 @@ def code_length(state: Ints, data: Bytes, length: int, left: int, n_here: int, u
 
 @kernel
 def evaluate(
-    out: Floats,
+    out: FloatColumns,
     first: int,
     start: int,
-    starts: Floats,
-    mids: Floats,
-    ends: Floats,
+    starts: Floats2,
+    mids: Floats2,
+    ends: Floats2,
     lengths: Ints,
 ) -> None:
     """Write the frames of curves that begin at ``start`` into ``out``, whose row 0 is ``first``.

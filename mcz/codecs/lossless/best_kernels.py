@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.codecs.lossless.best_numbers import code_number
-from mcz.coding.mixing import Bytes, Ints
 from mcz.coding.ordinals.kernels import (
     BAD,
     FAST,
@@ -24,8 +23,6 @@ from mcz.coding.ordinals.kernels import (
 )
 from mcz.coding.regression import (
     LIMIT,
-    Desk,
-    Floats,
     bounded,
     estimate,
     follow,
@@ -34,7 +31,8 @@ from mcz.coding.regression import (
     weight_of,
     width_of,
 )
-from mcz.jit import inner, kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 
 # Columns of ``links``, one row a coded channel: powers of two that its steps and levels are
 # counted in, where its sums begin, how many other channels it looks at, and which.
@@ -60,25 +58,21 @@ NOW, BEFORE, FIRST = range(3)
 FARTHEST = 17592186044416.0  # 2^44
 
 
-@inner
 def sizes_of(n_seen: int) -> tuple[int, int]:
     """How many numbers the sums of the first two regressions are."""
     near, bent = n_nearby(n_seen), n_bent(n_seen)
     return near * width_of(near), bent * width_of(bent)
 
 
-@inner
 def n_nearby(n_seen: int) -> int:
     return NEARBY_LAGS + 2 * min(n_seen, NEARBY_SEEN)
 
 
-@inner
 def n_bent(n_seen: int) -> int:
     return BENT_LAGS + n_seen + n_seen * (n_seen + 1) // 2
 
 
-@inner
-def look_nearby(features: Floats, link: Ints, channel: int, steps: Floats) -> None:
+def look_nearby(features: Floats, link: Ints, channel: int, steps: Floats2) -> None:
     """The features of the first regression: steps, a row's own and those of others."""
     n_seen = min(link[N_SEEN], NEARBY_SEEN)
     for lag in range(NEARBY_LAGS):
@@ -88,9 +82,8 @@ def look_nearby(features: Floats, link: Ints, channel: int, steps: Floats) -> No
         features[NEARBY_LAGS + n_seen + i] = steps[link[SEEN + i], 1]
 
 
-@inner
 def look_bent(
-    features: Floats, link: Ints, channel: int, steps: Floats, levels: Floats, ratio: float
+    features: Floats, link: Ints, channel: int, steps: Floats2, levels: Floats2, ratio: float
 ) -> None:
     """Those of the second: steps, and the steps of products of two levels."""
     n_seen = link[N_SEEN]
@@ -109,23 +102,22 @@ def look_bent(
             at += 1
 
 
-@inner
-def to_next_row(steps: Floats, levels: Floats) -> None:
+def to_next_row(steps: Floats2, levels: Floats2) -> None:
     for channel in range(len(steps)):
         for lag in range(STEPS - 1, 0, -1):
             steps[channel, lag] = steps[channel, lag - 1]
         levels[channel, BEFORE] = levels[channel, NOW]
 
 
-@inner
 def foresee(opinions: Floats, weights: Floats, row: int) -> float:
     """The step that is expected, of what the two regressions and the taps say."""
     return opinions[FINAL] if row < FIRST_ROWS else estimate(weights, opinions, N_FINAL)
 
 
-@inner
 def learn(
-    one: tuple[Floats, Floats, Floats],
+    sums: Floats,
+    weights: Floats,
+    features: Floats,
     which: int,
     n: int,
     target: float,
@@ -133,26 +125,25 @@ def learn(
     typical: Floats,
     row: int,
     due: bool,
-    desk: Desk,
+    work: Floats,
+    top: Floats,
+    weighted: Floats,
 ) -> None:
     """Teach a regression, its sums, weights and features, what the step was that it guessed."""
-    sums, weights, features = one
     keep, ridge = KEEP[which], RIDGE[which]
     error = target - guess  # BEST-11
-    take_in(sums, features, n, target, weight_of(error, typical[which]), keep, desk)
+    take_in(sums, features, n, target, weight_of(error, typical[which]), keep, weighted)
     if due:
-        solve(sums, weights, n, ridge, desk)
+        solve(sums, weights, n, ridge, work, top)
     typical[which] = follow(typical[which], error, row)
 
 
-@inner
 def is_due(row: int, channel: int) -> bool:
     """Whether the second regression is solved."""
     return row % 2 == 0 if row < OFTEN_ROWS else (row + channel) % 4 == 0
 
 
-@inner
-def echo_of(ordinals: Ints, place: int) -> int:
+def echo_of(ordinals: Ints2, place: int) -> int:
     """The number at ``place``, counted through from 1; of the other sign where that is below 0."""
     at = abs(place) - 1
     found = int(ordinals[at // ordinals.shape[1], at % ordinals.shape[1]])
@@ -163,12 +154,12 @@ def echo_of(ordinals: Ints, place: int) -> int:
 def code_rows(
     state: Ints,
     data: Bytes,
-    ordinals: Ints,
-    plans: Ints,
-    powers: Ints,
-    links: Ints,
+    ordinals: Ints2,
+    plans: Ints2,
+    powers: Ints2,
+    links: Ints2,
     n_sums: int,
-    echoes: Ints,
+    echoes: Ints2,
 ) -> int:
     """Code all rows of (n_rows, n_channels) ordinals in place; return the row of a fault or -1.
 
@@ -192,7 +183,6 @@ def code_rows(
     opinions = np.zeros(N_FINAL, np.float64)
     work = np.zeros(MOST_BENT * width_of(MOST_BENT), np.float64)
     top, weighted = np.zeros(64, np.float64), np.zeros(64, np.float64)
-    desk = work, top, weighted
     for row in range(len(ordinals)):
         flow[NEAR], flow[OTHER] = 0, 3
         to_next_row(steps, levels)
@@ -227,11 +217,50 @@ def code_rows(
             steps[channel, 0] = step
             levels[channel, NOW] = (value - levels[channel, FIRST]) / reach
             at, end = link[NEAR_SUMS], link[BENT_SUMS]
-            one = sums[at:end], near_weights[channel], near
-            learn(one, NEARBY, n_near, step, opinions[NEARBY], typical[channel], row, True, desk)
-            one = sums[end : end + n_bend * width_of(n_bend)], bent_weights[channel], bent
-            due = is_due(row, channel)
-            learn(one, BENT, n_bend, step, opinions[BENT], typical[channel], row, due, desk)
-            one = final_sums[channel], final_weights[channel], opinions
-            learn(one, FINAL, N_FINAL, step, guess, typical[channel], row, True, desk)
+            learn(
+                sums[at:end],
+                near_weights[channel],
+                near,
+                NEARBY,
+                n_near,
+                step,
+                opinions[NEARBY],
+                typical[channel],
+                row,
+                True,
+                work,
+                top,
+                weighted,
+            )
+            own = sums[end : end + n_bend * width_of(n_bend)]
+            learn(
+                own,
+                bent_weights[channel],
+                bent,
+                BENT,
+                n_bend,
+                step,
+                opinions[BENT],
+                typical[channel],
+                row,
+                is_due(row, channel),
+                work,
+                top,
+                weighted,
+            )
+            learn(
+                final_sums[channel],
+                final_weights[channel],
+                opinions,
+                FINAL,
+                N_FINAL,
+                step,
+                guess,
+                typical[channel],
+                row,
+                True,
+                work,
+                top,
+                weighted,
+            )
     return -1

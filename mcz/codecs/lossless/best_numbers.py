@@ -7,7 +7,7 @@ the one above, so that its class need not be coded; digits below the unit come a
 from __future__ import annotations
 
 from mcz.coding import residuals
-from mcz.coding.mixing import Bytes, Ints, adaptive, code, number
+from mcz.coding.mixing import adaptive, code, number
 from mcz.coding.ordinals.kernels import (
     BAD,
     BASE,
@@ -29,7 +29,7 @@ from mcz.coding.ordinals.kernels import (
     remember,
 )
 from mcz.coding.residuals import FAULT, bits, clamp, code_residual
-from mcz.jit import inner
+from mcz.kernels.types import Bytes, Ints, Ints2
 
 # First context of each kind of bit; residuals come last.
 C_ZERO, C_MINUS, C_DOWN, C_RESIDUAL = 0, 2, 4, 17
@@ -40,7 +40,6 @@ MAX_DOWN_LENGTH = 12
 EIGHT_OR_NINE = 13107  # of 65536: a fifth of the decimal digits
 
 
-@inner
 def code_number(
     state: Ints,
     data: Bytes,
@@ -49,7 +48,7 @@ def code_number(
     plan: Ints,
     track: Ints,
     flow: Ints,
-    powers: Ints,
+    powers: Ints2,
 ) -> int:
     """Code an ordinal against what is ``predicted``; return it, or set BAD."""
     if plan[BASE] == 0:
@@ -58,7 +57,6 @@ def code_number(
     return code_digits(state, data, ordinal, predicted, plan, track, flow, base)
 
 
-@inner
 def code_plain(
     state: Ints, data: Bytes, ordinal: int, predicted: int, plan: Ints, track: Ints, flow: Ints
 ) -> int:
@@ -73,7 +71,6 @@ def code_plain(
     return int(value << plan[DROP]) | number(state, data, ordinal, plan[DROP])
 
 
-@inner
 def code_error(state: Ints, data: Bytes, error: int, unit: int, track: Ints, flow: Ints) -> int:
     """Code what the prediction missed, counted in ``unit``, or return FAULT."""
     scales = track[FAST] // unit, track[SLOW] // unit
@@ -82,7 +79,6 @@ def code_error(state: Ints, data: Bytes, error: int, unit: int, track: Ints, flo
     return code_residual(state, data, error, 0, scales, near, sides, RESIDUALS)
 
 
-@inner
 def code_digits(
     state: Ints,
     data: Bytes,
@@ -137,7 +133,6 @@ def code_digits(
 ZERO = -(1 << 40)  # the class of zero
 
 
-@inner
 def class_of(size: int, base: int, powers: Ints) -> int:
     """How many digits ``size`` has."""
     if base == 2:
@@ -148,7 +143,6 @@ def class_of(size: int, base: int, powers: Ints) -> int:
     return found
 
 
-@inner
 def in_units(mantissa: int, shift: int, powers: Ints) -> int:
     """mantissa * base^shift, rounded down."""
     if shift >= 0:
@@ -156,7 +150,6 @@ def in_units(mantissa: int, shift: int, powers: Ints) -> int:
     return int(mantissa // powers[min(-shift, LAST_POWER)])
 
 
-@inner
 def code_rest(
     state: Ints, data: Bytes, mantissa: int, count: int, shift: int, plan: Ints, powers: Ints
 ) -> int:
@@ -168,7 +161,6 @@ def code_rest(
     return int(count // unit) if count % unit == 0 else -1
 
 
-@inner
 def code_small(
     state: Ints,
     data: Bytes,
@@ -195,7 +187,6 @@ def code_small(
     return negative, unit - down, lead * low + rest
 
 
-@inner
 def code_down(state: Ints, data: Bytes, steps: int) -> int:
     """Code how many classes a number lies below the unit; -1 for too many."""
     length = bits(max(steps, 0))
@@ -209,7 +200,6 @@ def code_down(state: Ints, data: Bytes, steps: int) -> int:
     return at if at < 2 else 1 << (at - 1) | number(state, data, steps, at - 1)
 
 
-@inner
 def code_below(state: Ints, data: Bytes, value: int, n_digits: int, base: int) -> int:
     """Code the last digits of ``value``, each as likely as any; the lowest first in base 10."""
     if base == 2:
@@ -221,7 +211,6 @@ def code_below(state: Ints, data: Bytes, value: int, n_digits: int, base: int) -
     return found
 
 
-@inner
 def code_digit(state: Ints, data: Bytes, digit: int) -> int:
     """Code a decimal digit."""
     if code(state, data, 1 if digit >= 8 else 0, EIGHT_OR_NINE):

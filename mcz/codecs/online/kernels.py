@@ -10,7 +10,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.online.rate_kernels import MOD as FIXED
 from mcz.codecs.online.rate_kernels import (
@@ -24,7 +23,7 @@ from mcz.codecs.online.rate_kernels import (
 )
 from mcz.codecs.online.units import GOLOMB, INTRA, LTR, STR
 from mcz.coding import mixing, residuals
-from mcz.coding.mixing import Bytes, Ints, adaptive, number
+from mcz.coding.mixing import adaptive, number
 from mcz.coding.residuals import bits
 from mcz.coding.space_kernels import (
     LAST,
@@ -36,11 +35,11 @@ from mcz.coding.space_kernels import (
     coefficient_of,
     index_of,
 )
-from mcz.jit import inner, kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Floats, Floats2, IntColumn, Ints, Ints2
 
 __all__ = ["N_MEMORY", "TRACK_SIZE", "Choice", "Past", "decode_frames", "encode_frames"]
 
-Floats = NDArray[np.float64]
 
 N_STEPS = 512
 FIRST_STEP = 256  # the code of 1
@@ -67,7 +66,7 @@ class Past(NamedTuple):
     reference: Floats
     memory: Ints
     lengths: Ints
-    tracks: Ints
+    tracks: Ints2
 
 
 class Choice(NamedTuple):
@@ -77,7 +76,7 @@ class Choice(NamedTuple):
     ``rate_kernels``.
     """
 
-    analysis: Floats
+    analysis: Floats2
     threshold: float
     n_group: int
     plan: Floats
@@ -85,13 +84,11 @@ class Choice(NamedTuple):
     gauss: Floats
 
 
-@inner
 def _ratio(code: int) -> float:
     """What a step code stands for, about 2^((code - 256) / 8)."""
     return math.ldexp(float(8 + (code & 7)), int((code >> 3) - 35))  # ONLINE-24
 
 
-@inner
 def _code_step(state: Ints, data: Bytes, step: int, kind: int, memory: Ints, flags: int) -> int:
     """Code the step of a frame against the one before; N_STEPS where it is none."""
     if kind == INTRA:
@@ -112,9 +109,8 @@ def _code_step(state: Ints, data: Bytes, step: int, kind: int, memory: Ints, fla
     return int(found) if 0 <= found < N_STEPS else N_STEPS  # ONLINE-17, ONLINE-18
 
 
-@inner
 def _code_golomb(
-    state: Ints, data: Bytes, indices: Ints, sizes: Ints, starts: Ints, kind: int
+    state: Ints, data: Bytes, indices: Ints, sizes: IntColumn, starts: Ints, kind: int
 ) -> int:
     """Code ``indices`` (n_rows,) in place, ``sizes`` those before; 1 where that is impossible."""
     for m in range(len(starts) - 1):
@@ -136,7 +132,6 @@ def _code_golomb(
     return 0
 
 
-@inner
 def _code_size(state: Ints, data: Bytes, size: int, activity: int, kind: int) -> int:
     """Code an absolute value by a Golomb-Rice code whose prefix is coded bit by bit."""
     rice = max(0, bits(activity) - 3)
@@ -156,7 +151,6 @@ def _code_size(state: Ints, data: Bytes, size: int, activity: int, kind: int) ->
     return ones << rice | number(state, data, size, rice)
 
 
-@inner
 def _code_frame(
     state: Ints,
     data: Bytes,
@@ -200,7 +194,6 @@ def _code_frame(
     return step
 
 
-@inner
 def _predict(kind: int, values: Floats, reference: Floats) -> None:
     """Make ``values`` what a frame is predicted to be."""
     if kind == INTRA:
@@ -215,7 +208,7 @@ def decode_frames(
     data: Bytes,
     coder: int,
     kind: int,
-    out: Floats,
+    out: Floats2,
     past: Past,
     transform: Transform,
 ) -> int:
@@ -241,20 +234,18 @@ def decode_frames(
     return -1
 
 
-@inner
 def _bits_of(state: Ints) -> float:
     """The bits that an encoder has written so far, with those that are still in the interval."""
     width = float(state[mixing.HIGH] - state[mixing.LOW]) + 1.0
     return float(8.0 * state[mixing.POSITION] + 32.0 - np.log2(width))
 
 
-@inner
 def _transform(
     coefficients: Floats,
     frame: Floats,
     values: Floats,
     transform: Transform,
-    analysis: Floats,
+    analysis: Floats2,
     points: Floats,
 ) -> None:
     """The coefficients (n_rows,) of what ``frame`` adds to ``values``, in units of its step."""
@@ -267,7 +258,6 @@ def _transform(
             coefficients[r] = coefficient_of(points, analysis[r])
 
 
-@inner
 def _quantize(indices: Ints, coefficients: Floats, ratio: float, threshold: float) -> float:
     """Fill ``indices`` (n_rows,); return the mean square of what they stand for, -1 at a fault."""
     squares = 0.0
@@ -279,7 +269,6 @@ def _quantize(indices: Ints, coefficients: Floats, ratio: float, threshold: floa
     return squares / max(1, len(indices))
 
 
-@inner
 def _choose(
     indices: Ints, coefficients: Floats, wanted: float, threshold: float, is_fixed: bool
 ) -> tuple[int, float]:
@@ -304,7 +293,7 @@ def encode_frames(
     data: Bytes,
     coder: int,
     kind: int,
-    frames: Floats,
+    frames: Floats2,
     past: Past,
     transform: Transform,
     choice: Choice,

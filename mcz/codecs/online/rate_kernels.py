@@ -8,12 +8,9 @@ Algorithms 1 and 2; mcz/codecs/online/README.md describes it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.online.units import LTR, MODES, STR
-from mcz.jit import inner
-
-Floats = NDArray[np.float64]
+from mcz.kernels.types import Floats
 
 # How the step is chosen: it is fixed; Algorithm 1; Algorithm 2; ours.
 MOD, RC, RCA, STEADY = range(len(MODES))
@@ -46,7 +43,6 @@ FIRST_COST = 8.0  # of an LTR, where none is known, in costs of an STR
 LOW, PER_OCTAVE, N_RATES = 16.0, 16.0, 384
 
 
-@inner
 def largest_of(values: Floats) -> float:
     """The greatest magnitude; where one is not a number, neither is it."""
     largest = 0.0
@@ -57,7 +53,6 @@ def largest_of(values: Floats) -> float:
     return largest
 
 
-@inner
 def log_step(rates: Floats, bits: float, variance: float) -> float:
     """log2 of the step at which a coefficient of that variance takes so many bits.
 
@@ -76,7 +71,6 @@ def log_step(rates: Floats, bits: float, variance: float) -> float:
     return float((low + part) / PER_OCTAVE - LOW + 0.5 * np.log2(variance))
 
 
-@inner
 def begin_group(plan: Floats, n_frames: int) -> None:
     """What the group that begins may have: its share, and what the last one left or overdrew."""
     carry = plan[DUE] - plan[SPENT] if plan[AT] > 0 else 0.0
@@ -89,7 +83,6 @@ def begin_group(plan: Floats, n_frames: int) -> None:
     plan[SPENT] = plan[AT] = plan[STR_SUM] = 0.0
 
 
-@inner
 def _alpha(plan: Floats, n_frames: int, n_coefficients: int) -> float:
     """The bits of an LTR coefficient for each of an STR one: given, or eq. 17, 1 to MOST_ALPHA."""
     if plan[MODE] == RC or plan[LTR_VARIANCE] < 0 or plan[STR_VARIANCE] < 0:
@@ -103,7 +96,6 @@ def _alpha(plan: Floats, n_frames: int, n_coefficients: int) -> float:
     return float(min(max(1.0 + n_frames * more / rest, 1.0), MOST_ALPHA))
 
 
-@inner
 def _steady_step(plan: Floats) -> float:
     """log2 of the step with which a group, costing what the last ones did, has its bits."""
     if plan[STR_COST] <= 0:
@@ -118,7 +110,6 @@ def _steady_step(plan: Floats) -> float:
     return float(min(max(found, FINEST), COARSEST))
 
 
-@inner
 def ltr_step(
     plan: Floats, coefficients: Floats, intra: bool, n_frames: int, laplace: Floats
 ) -> float:
@@ -135,7 +126,6 @@ def ltr_step(
     return float(max(found, FINEST))
 
 
-@inner
 def _ltr_step(
     plan: Floats, coefficients: Floats, intra: bool, n_frames: int, laplace: Floats
 ) -> float:
@@ -154,7 +144,6 @@ def _ltr_step(
     return log_step(laplace, bits, max(variance, plan[FLOOR]))
 
 
-@inner
 def str_step(plan: Floats, n_coefficients: int, n_frames: int, gauss: Floats) -> float:
     """log2 of the step of an STR frame, of a group of ``n_frames``."""
     if plan[MODE] == STEADY:
@@ -166,7 +155,6 @@ def str_step(plan: Floats, n_coefficients: int, n_frames: int, gauss: Floats) ->
     return max(log_step(gauss, bits, max(plan[VARIANCE], plan[FLOOR])), FINEST)
 
 
-@inner
 def settle(plan: Floats, kind: int, used: float, bits: float, variance: float) -> None:
     """Take in a frame: log2 of its step, its bits, the variance of its decoded coefficients."""
     plan[LAST] = bits
@@ -183,7 +171,6 @@ def settle(plan: Floats, kind: int, used: float, bits: float, variance: float) -
             plan[BASE] = used - plan[LTR_SHIFT]
 
 
-@inner
 def _settle_steady(plan: Floats, kind: int, used: float, bits: float, empty: bool) -> None:
     """What lies beyond the rate, and what frames cost now.
 
@@ -213,6 +200,5 @@ def _settle_steady(plan: Floats, kind: int, used: float, bits: float, empty: boo
         plan[OWED] -= paid
 
 
-@inner
 def _followed(before: float, now: float, share: float) -> float:
     return now if before <= 0 else before + (now - before) * min(share, 1.0)

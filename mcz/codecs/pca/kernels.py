@@ -7,14 +7,11 @@ encoder and decoder. Imported on first use only.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.coding import residuals
-from mcz.coding.mixing import Bytes, Ints
 from mcz.coding.residuals import FAULT, bits, clamp, code_first, code_residual, side_of
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 
 MAX_INDEX = 1 << 40
 COEFFICIENTS = 2 * residuals.N_CONTEXTS, 2 * residuals.N_MIXERS
@@ -23,8 +20,7 @@ N_SETS = 3
 FAST, SLOW, SIDE_1, SIDE_2, MOVED, TRACK_SIZE = range(6)  # remembered of a component
 
 
-@inner
-def expected(rows: Ints, at: int, i: int, predictor: int) -> int:
+def expected(rows: Ints2, at: int, i: int, predictor: int) -> int:
     """A coefficient from those of the same component before it, by one of the four predictors."""
     step = rows[at - 1, i] - rows[at - 2, i] if at > 1 else 0
     if predictor == 0:
@@ -38,7 +34,7 @@ def expected(rows: Ints, at: int, i: int, predictor: int) -> int:
 
 
 @kernel
-def code_coefficients(state: Ints, data: Bytes, rows: Ints, predictors: Ints, scales: Ints) -> int:
+def code_coefficients(state: Ints, data: Bytes, rows: Ints2, predictors: Ints, scales: Ints) -> int:
     """Code coefficients (frames, components) in place; return the frame of a fault or -1."""
     count = rows.shape[1]
     tracks = np.zeros((count, TRACK_SIZE), np.int64)
@@ -78,7 +74,7 @@ def code_coefficients(state: Ints, data: Bytes, rows: Ints, predictors: Ints, sc
 
 
 @kernel
-def evaluate(out: Floats, means: Floats, basis: Floats, coefficients: Floats) -> None:
+def evaluate(out: Floats2, means: Floats, basis: Floats2, coefficients: Floats2) -> None:
     """Write means + coefficients (frames, components) times basis (components, channels)."""
     for f in range(len(out)):
         for c in range(out.shape[1]):

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.posewave.skeleton_plan import Floats, Ints, Plan
-from mcz.jit import inner, kernel
+from mcz.codecs.posewave.skeleton_plan import Plan
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Floats2, Ints
 
 GREATEST_VALUE = 2.0**100  # of what comes back
 
@@ -34,7 +35,7 @@ def _room(plan: Plan, factors: Floats, rows: Floats) -> Floats:
 
 
 @kernel
-def rows_into(plan: Plan, factors: Floats, rows: Floats, result: Floats, which: Ints) -> None:
+def rows_into(plan: Plan, factors: Floats2, rows: Floats2, result: Floats2, which: Ints) -> None:
     """Fill ``result`` (n_rows, n_kept): row n of ``rows`` in the metric of pose ``which[n]``.
 
     ``factors`` (n_poses, n_entries).
@@ -50,13 +51,12 @@ def rows_into(plan: Plan, factors: Floats, rows: Floats, result: Floats, which: 
 
 
 @kernel
-def rows_out_of(plan: Plan, factors: Floats, rows: Floats, result: Floats, which: Ints) -> None:
+def rows_out_of(plan: Plan, factors: Floats2, rows: Floats2, result: Floats2, which: Ints) -> None:
     """The inverse of ``rows_into``."""
     for n in range(len(rows)):
         row_out_of(plan, factors[which[n]], rows[n], result[n])
 
 
-@inner
 def row_out_of(plan: Plan, factor: Floats, row: Floats, result: Floats) -> None:
     for c in range(len(plan.joints)):
         last = plan.starts[c + 1] - 1

@@ -13,9 +13,11 @@ from mcz.codecs.posewave.contact_plan import START_UNITS, Held
 from mcz.codecs.posewave.displacement_kernels import Track
 from mcz.codecs.posewave.metric_kernels import factor_rows
 from mcz.codecs.posewave.pose_kernels import Lanes, place_joints
-from mcz.codecs.posewave.skeleton_plan import Floats, Ints, Plan
+from mcz.codecs.posewave.pose_kernels import lanes_of as lanes_of
+from mcz.codecs.posewave.skeleton_plan import Plan
 from mcz.codecs.posewave.turns import BEYOND
-from mcz.jit import inner, kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Floats2, Floats3, Ints, Ints2
 
 DAMPING = 2.0**-14  # of the trace of the normal equations
 LEAST_DAMPING = 2.0**-100
@@ -24,31 +26,23 @@ LEANING, STANDING = 1, 2  # a point before or after a contact, and in one
 
 
 @kernel
-def place(plan: Plan, held: Held, values: Floats, found: Floats) -> None:
+def place(plan: Plan, held: Held, lanes: Lanes, values: Floats2, found: Floats3) -> None:
     """Fill ``found`` (n_points, n_frames, 3) with places in frames ``values`` (n_frames, ...)."""
-    batch = (
-        np.empty((len(plan.turns), 1)),
-        np.empty((len(plan.turns), 1)),
-        np.empty((9, 1)),
-        np.empty((len(plan.parents) + 1, 9, 1)),
-        np.empty((len(plan.parents) + 1, 3, 1)),
-        np.zeros((len(plan.joints), 6, 1)),
-    )
     for n in range(found.shape[1]):
-        place_joints(plan, values, n, batch, 1)
+        place_joints(plan, values, n, lanes, 1)
         for k in range(len(held.joints)):
-            _place_point(plan, held, k, values[n], batch, found[k, n])
+            _place_point(plan, held, k, values[n], lanes, found[k, n])
 
 
 @kernel
 def aim(
-    places: Floats, contacts: Track, step: float, ramp: int, shifts: Floats, active: Ints
+    places: Floats2, contacts: Track, step: float, ramp: int, shifts: Floats2, active: Ints
 ) -> None:
     """How far a point, at ``places`` (n_frames, 3), is to be from there, and when.
 
     ``shifts`` (n_frames, 3) and ``active`` (n_frames,) are filled.
     """
-    stands, starts, moves = contacts
+    stands, starts, moves = contacts.stands, contacts.starts, contacts.moves
     n_frames, first = len(stands), 0
     for f in range(n_frames):
         if stands[f] == 0:
@@ -72,8 +66,7 @@ def aim(
                 _lean(f, f + n, 1.0 - n / (span + 1.0), shifts, active)
 
 
-@inner
-def _lean(end: int, f: int, share: float, shifts: Floats, active: Ints) -> None:
+def _lean(end: int, f: int, share: float, shifts: Floats2, active: Ints) -> None:
     """Shift a frame in no contact by a share of what one at the end of a contact is shifted by."""
     active[f] = LEANING
     for i in range(3):
@@ -82,7 +75,13 @@ def _lean(end: int, f: int, share: float, shifts: Floats, active: Ints) -> None:
 
 @kernel
 def correct(
-    plan: Plan, held: Held, values: Floats, active: Ints, shifts: Floats, rounds: int
+    plan: Plan,
+    held: Held,
+    lanes: Lanes,
+    values: Floats2,
+    active: Ints2,
+    shifts: Floats3,
+    rounds: int,
 ) -> None:
     """Shift the points in frames ``values`` (n_frames, n_channels), in place.
 
@@ -90,14 +89,6 @@ def correct(
     3) away from where it is. Points that only lean to a contact are left alone after a round.
     """
     n_points, n_kept = len(held.joints), len(plan.joints)
-    batch = (
-        np.empty((len(plan.turns), 1)),
-        np.empty((len(plan.turns), 1)),
-        np.empty((9, 1)),
-        np.empty((len(plan.parents) + 1, 9, 1)),
-        np.empty((len(plan.parents) + 1, 3, 1)),
-        np.zeros((n_kept, 6, 1)),
-    )
     pose, factors = np.empty((1, values.shape[1])), np.empty((1, len(plan.path)))
     points, goals = np.empty((n_points, 3)), np.empty((n_points, 3))
     pulls, square = np.zeros((3 * n_points, n_kept)), np.zeros((3 * n_points, 3 * n_points))
@@ -112,19 +103,19 @@ def correct(
             pose[0, c] = values[n, c]
         for c in range(n_kept):
             total[c] = 0.0
-        factor_rows(plan, pose, factors, 1, 1)
+        factor_rows(plan, lanes, pose, factors, 1, 1)
         factor = factors[0]
         n_next = 0
         for turn in range(rounds):
-            place_joints(plan, pose, 0, batch, 1)
+            place_joints(plan, pose, 0, lanes, 1)
             for a in range(n_active):
                 k = which[a]
-                _place_point(plan, held, k, pose[0], batch, points[k])
+                _place_point(plan, held, k, pose[0], lanes, points[k])
                 for i in range(3):
                     if turn == 0:
                         goals[k, i] = points[k, i] + shifts[k, n, i]
                     wanted[3 * a + i] = goals[k, i] - points[k, i]
-                _note_pulls(plan, held, k, batch, factor, pulls[3 * a :])
+                _note_pulls(plan, held, k, lanes, factor, pulls[3 * a :])
             if turn == 0:
                 n_next = _note_active(active, n, STANDING, which)
             _solve(pulls, wanted, square, pivots, 3 * n_active)  # HOLD-15
@@ -145,8 +136,7 @@ def correct(
             values[n, held.columns[c]] = pose[0, held.columns[c]]
 
 
-@inner
-def _note_active(active: Ints, n: int, least: int, which: Ints) -> int:
+def _note_active(active: Ints2, n: int, least: int, which: Ints) -> int:
     """Which points are that active in a frame, and how many."""
     found = 0
     for k in range(len(active)):
@@ -156,11 +146,10 @@ def _note_active(active: Ints, n: int, least: int, which: Ints) -> int:
     return found
 
 
-@inner
-def _place_point(plan: Plan, held: Held, k: int, row: Floats, batch: Lanes, point: Floats) -> None:
+def _place_point(plan: Plan, held: Held, k: int, row: Floats, lanes: Lanes, point: Floats) -> None:
     """Where point ``k`` is: from its root on as the joints are placed, and where the root is."""
     joint, root = held.joints[k], held.roots[k]
-    own, origin = batch[3][joint + 1], batch[4][joint + 1]
+    own, origin = lanes.axes[joint + 1], lanes.origins[joint + 1]
     x, y, z = held.tails[k, 0], held.tails[k, 1], held.tails[k, 2]
     for i in range(3):
         way = own[3 * i, 0] * x + own[3 * i + 1, 0] * y + own[3 * i + 2, 0] * z
@@ -172,13 +161,12 @@ def _place_point(plan: Plan, held: Held, k: int, row: Floats, batch: Lanes, poin
             point[i] += value * plan.directions[move, i]
 
 
-@inner
 def _note_pulls(
-    plan: Plan, held: Held, k: int, batch: Lanes, factor: Floats, pulls: Floats
+    plan: Plan, held: Held, k: int, lanes: Lanes, factor: Floats, pulls: Floats2
 ) -> None:
     """How the channels move point ``k``, in the metric: three rows of J R^-1."""
     joint = held.joints[k]
-    own, origin, motions = batch[3][joint + 1], batch[4][joint + 1], batch[5]
+    own, origin, motions = lanes.axes[joint + 1], lanes.origins[joint + 1], lanes.motions
     x, y, z = held.tails[k, 0], held.tails[k, 1], held.tails[k, 2]
     a = origin[0, 0] + (own[0, 0] * x + own[1, 0] * y + own[2, 0] * z)
     b = origin[1, 0] + (own[3, 0] * x + own[4, 0] * y + own[5, 0] * z)
@@ -203,8 +191,7 @@ def _note_pulls(
             pulls[i, number] = min(max(pull * factor[last], -GREATEST_PULL), GREATEST_PULL)
 
 
-@inner
-def _solve(pulls: Floats, wanted: Floats, square: Floats, pivots: Floats, n: int) -> None:
+def _solve(pulls: Floats2, wanted: Floats, square: Floats2, pivots: Floats, n: int) -> None:
     """Make ``wanted`` the solution of (pulls pulls' + damping) x = wanted, by L D L'."""
     trace = 0.0
     for i in range(n):

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mcz.codecs.posewave.skeleton_plan import PLAIN, Floats, Ints, Plan, limited, orientation
+from mcz.codecs.posewave.skeleton_plan import PLAIN, Plan, limited, orientation
 from mcz.codecs.posewave.turns import RULES
 from mcz.errors import FormatError
+from mcz.kernels.types import Floats, Floats2, Ints
 from mcz.motion import Skeleton
 from mcz.schema import UVARINT, ExprValidator, Float32l, Int8ul, Struct, counted
 
@@ -70,7 +71,7 @@ class Held(NamedTuple):
     """
 
     joints: Ints
-    tails: Floats
+    tails: Floats2
     roots: Ints
     chains: Ints
     starts: Ints

@@ -7,7 +7,7 @@ point moves, on a fine grid, and a decoder changes the pose as little as it can 
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from mcz.codecs.posewave.rows import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan
 from mcz.coding.logistic import rate_table, squash_table, stretch_table
 from mcz.errors import FormatError
+
+if TYPE_CHECKING:  # compiled kernels, imported on first use
+    from mcz.codecs.posewave.displacement_kernels import Leader, Track
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -92,8 +95,8 @@ class Coder:
         self,
         places: Floats,
         step: float,
-        track: tuple[Ints, Ints, Ints],
-        leader: tuple[Ints, Floats],
+        track: Track,
+        leader: Leader,
         wanted: Floats,
         radii: Floats,
     ) -> int:
@@ -116,6 +119,7 @@ class Corrections:
 
     def __init__(self, contacts: Contacts, plan: Plan, held: Held, values: Floats) -> None:
         self.contacts, self.plan, self.held, self.values = contacts, plan, held, values
+        self.lanes = _kernels().lanes_of(plan, 1)
         self.places = self.placed(values)
         self.stands = np.zeros(self.places.shape[:2], np.int64)
         self.starts = np.zeros(self.places.shape, np.int64)
@@ -126,19 +130,20 @@ class Corrections:
     def placed(self, values: Floats) -> Floats:
         """Where the points are in frames ``values``, (n_points, n_frames, 3)."""
         found = np.empty((len(self.contacts.joints), len(values), 3))
-        _kernels().place(self.plan, self.held, values, found)
+        _kernels().place(self.plan, self.held, self.lanes, values, found)
         return found
 
-    def track(self, point: int) -> tuple[Ints, Ints, Ints]:
-        return self.stands[point], self.starts[point], self.moves[point]
+    def track(self, point: int) -> Track:
+        found: Track = _coding().Track(self.stands[point], self.starts[point], self.moves[point])
+        return found
 
     def code(self, coder: Coder, point: int, wanted: Floats, radii: Floats) -> int:
         """As ``Coder.point``."""
         contacts, places = self.contacts, self.places[point]
         step, followed = contacts.steps[point], contacts.follows[point] - 1
-        leader = np.zeros(len(places), np.int64), self.shifts[0]
+        leader = _coding().Leader(np.zeros(len(places), np.int64), self.shifts[0])
         if followed >= 0:
-            leader = self.stands[followed], self.shifts[followed]
+            leader = _coding().Leader(self.stands[followed], self.shifts[followed])
         padded = np.pad(places, ((1, 1), (0, 0)), "edge")
         fault = coder.point(padded, step, self.track(point), leader, wanted, radii)
         goal = self.shifts[point], self.active[point]
@@ -148,7 +153,7 @@ class Corrections:
 
     def correct(self) -> None:
         """Change the values so that the points are where they should be."""
-        args = self.held, self.values, self.active, self.shifts, self.contacts.rounds
+        args = self.held, self.lanes, self.values, self.active, self.shifts, self.contacts.rounds
         _kernels().correct(self.plan, *args)
 
 

@@ -9,15 +9,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.posewave.apply_kernels import row_out_of
 from mcz.codecs.posewave.metric_kernels import factor_rows
+from mcz.codecs.posewave.pose_kernels import Lanes
+from mcz.codecs.posewave.pose_kernels import lanes_of as lanes_of
 from mcz.codecs.posewave.skeleton_plan import Plan
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Floats2, Ints
 
 MEMORY = 0.97  # of what was learned, from row to row
 PRIOR, PRIOR_SHARE = 0.25, 0.5  # (PRIOR * greatest step)^2 times 4, and the share it stands for
@@ -31,7 +30,7 @@ class Course(NamedTuple):
     ``below`` the products of neighboring differences and their squares. ``n_rows`` (1,).
     """
 
-    pose: Floats
+    pose: Floats2
     kept: Ints
     expected: Floats
     moved: Floats
@@ -55,7 +54,6 @@ def course_of(still: Floats, kept: Ints, greatest: Floats) -> Course:
     )
 
 
-@inner
 def go_on(course: Course, difference: Floats) -> None:
     """The next row is ``difference`` (n_kept,) away from what was expected."""
     n_rows = course.n_rows[0]
@@ -74,13 +72,13 @@ def go_on(course: Course, difference: Floats) -> None:
 
 
 @kernel
-def next_factor(plan: Plan, course: Course, factor: Floats) -> None:
+def next_factor(plan: Plan, lanes: Lanes, course: Course, factor: Floats2) -> None:
     """Fill ``factor`` (1, n_entries) at the last pose."""
-    factor_rows(plan, course.pose, factor, 1, 1)
+    factor_rows(plan, lanes, course.pose, factor, 1, 1)
 
 
 @kernel
-def take_row(plan: Plan, course: Course, factor: Floats, row: Floats) -> None:
+def take_row(plan: Plan, course: Course, factor: Floats2, row: Floats2) -> None:
     """Go on by a row (1, n_kept) that is in the metric."""
     difference = np.empty(len(course.kept))
     row_out_of(plan, factor[0], row[0], difference)
@@ -88,12 +86,12 @@ def take_row(plan: Plan, course: Course, factor: Floats, row: Floats) -> None:
 
 
 @kernel
-def take_rows(plan: Plan, course: Course, rows: Floats, approx: Floats) -> None:
+def take_rows(plan: Plan, lanes: Lanes, course: Course, rows: Floats2, approx: Floats2) -> None:
     """The approximations, (n_rows, n_kept), of rows in the metric."""
     n_kept = len(course.kept)
     factor, difference = np.empty((1, len(plan.path))), np.empty(n_kept)
     for m in range(len(rows)):
-        factor_rows(plan, course.pose, factor, 1, 1)
+        factor_rows(plan, lanes, course.pose, factor, 1, 1)
         row_out_of(plan, factor[0], rows[m], difference)
         go_on(course, difference)
         for k in range(n_kept):

@@ -15,14 +15,13 @@ from mcz.codecs.posewave.state import (
     N_INPUTS,
     N_OPINIONS,
     N_SLOTS,
-    Ints,
     Model,
 )
 from mcz.coding import mixing
 from mcz.coding.logistic import LIMIT
-from mcz.coding.mixing import Bytes, adaptive, code, mixed, number
+from mcz.coding.mixing import adaptive, code, mixed, number
 from mcz.coding.residuals import bits
-from mcz.jit import inner
+from mcz.kernels.types import Bytes, Ints
 
 BIAS = 77
 INSIDE = (1 << 24) - 1  # no index of a slot is larger: says that none is below zero
@@ -38,7 +37,6 @@ Contexts = tuple[int, int, int, int, int, int, int, int]
 LEVEL, ONE, OTHER, SECOND, SIGN_1, SIGN_2, SIGN_3, DOWN = range(8)
 
 
-@inner
 def opinion(model: Model, slot: int, one: Ints, other: Ints, second: Ints) -> tuple[int, int, int]:
     """The mixed chance of a 1, that after second thoughts, and the mixed one stretched."""
     slots, at, inputs = model.slots, model.at, model.inputs
@@ -57,7 +55,6 @@ def opinion(model: Model, slot: int, one: Ints, other: Ints, second: Ints) -> tu
     return chance, min(max(final, LEAST_CHANCE), 65536 - LEAST_CHANCE), x
 
 
-@inner
 def learn(
     model: Model, slot: int, one: Ints, other: Ints, second: Ints, bit: int, chance: int, x: int
 ) -> None:
@@ -81,7 +78,6 @@ def learn(
     second[node + 1] += ((target - second[node + 1]) * share) >> 14
 
 
-@inner
 def decide(model: Model, data: Bytes, bit: int, slot: int, where: Contexts) -> int:
     """Code a decision, then let the model learn."""
     one, other = model.weights[where[ONE], slot], model.weights[where[OTHER], slot]
@@ -92,7 +88,6 @@ def decide(model: Model, data: Bytes, bit: int, slot: int, where: Contexts) -> i
     return bit
 
 
-@inner
 def code_error(model: Model, data: Bytes, error: int, where: Contexts) -> int:
     """Code by how far an integer misses its rounded mean, and return it."""
     if decide(model, data, 1 if error != 0 else 0, 0, where) == 0:
@@ -111,7 +106,6 @@ def code_error(model: Model, data: Bytes, error: int, where: Contexts) -> int:
     return -size if far ^ where[DOWN] ^ 1 else size
 
 
-@inner
 def bucket_of(size: int) -> int:
     """The buckets are 1, 2, 3, 4, 5-6, 7-8, 9-12, 13-16, 17-24, 25-32, 33-48 and all above."""
     if size < 5:
@@ -120,7 +114,6 @@ def bucket_of(size: int) -> int:
     return min(2 * n - 1 + ((size - 1) >> (n - 2) & 1), N_SLOTS)
 
 
-@inner
 def code_rest(coder: Ints, data: Bytes, size: int, bucket: int, level: int) -> int:
     """Code which of its bucket a size is."""
     if bucket < 5:
@@ -142,7 +135,6 @@ def code_rest(coder: Ints, data: Bytes, size: int, bucket: int, level: int) -> i
     return FIRST_ESCAPED - 1 + rest
 
 
-@inner
 def cost_of(model: Model, error: int, where: Contexts) -> int:
     """About what ``code_error`` would take, in units of ``COST_UNIT``; nothing is changed."""
     one, other = model.weights[where[ONE]], model.weights[where[OTHER]]
@@ -170,7 +162,6 @@ def cost_of(model: Model, error: int, where: Contexts) -> int:
     return int(total)
 
 
-@inner
 def mixed_chance(coder: Ints, mixer: int, contexts: tuple[int, int, int]) -> int:
     """The probability with which ``mixing.mixed`` would code a 1."""
     dot, at = 0, mixing.WEIGHTS + 3 * mixer

@@ -13,9 +13,9 @@ import numpy as np
 from mcz.codecs.posewave import head_kernels as head
 from mcz.codecs.posewave.contact_plan import START_UNITS
 from mcz.codecs.posewave.head_kernels import code_number
-from mcz.codecs.posewave.skeleton_plan import Floats
-from mcz.coding.mixing import ENCODING, Bytes, Ints, adaptive, mixed
-from mcz.jit import inner, kernel
+from mcz.coding.mixing import ENCODING, adaptive, mixed
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Floats, Floats2, Floats3, Ints, Ints2
 
 # What a number is about, of the contexts of ``code_number``.
 COUNT, GAP, LENGTH, START, ESCAPE = range(5)
@@ -42,22 +42,34 @@ class Learner(NamedTuple):
     ``means`` (3,) of the next move; ``scratch`` (11, 9).
     """
 
-    squares: Floats
-    products: Floats
-    weights: Floats
+    squares: Floats3
+    products: Floats2
+    weights: Floats2
     usual: Floats
-    sizes: Floats
-    features: Floats
+    sizes: Floats2
+    features: Floats2
     means: Floats
-    scratch: Floats
+    scratch: Floats2
 
 
-# Of a point, frame by frame: ``stands`` (n_frames,), 1 in the first frame of a contact, 2 in the
-# others; ``starts`` (n_frames, 3), how far the contact begins from the decoded place, in
-# ``START_UNITS`` of a step, and ``moves`` (n_frames, 3), displacements from there, in steps.
-Track = tuple[Ints, Ints, Ints]
-# Of the point that another follows: ``stands``, and how far it is shifted, (n_frames, 3).
-Leader = tuple[Ints, Floats]
+class Track(NamedTuple):
+    """The contacts of a point, frame by frame.
+
+    ``stands`` (n_frames,) is 1 in the first frame of a contact, 2 in the others; ``starts``
+    (n_frames, 3), how far the contact begins from the decoded place, in ``START_UNITS`` of a step;
+    ``moves`` (n_frames, 3), displacements from there, in steps.
+    """
+
+    stands: Ints
+    starts: Ints2
+    moves: Ints2
+
+
+class Leader(NamedTuple):
+    """The point that another follows: ``stands``, and how far it is shifted, (n_frames, 3)."""
+
+    stands: Ints
+    shifts: Floats2
 
 
 @kernel
@@ -65,11 +77,11 @@ def code_point(
     state: Ints,
     data: Bytes,
     learner: Learner,
-    places: Floats,
+    places: Floats2,
     step: float,
     contacts: Track,
     leader: Leader,
-    wanted: Floats,
+    wanted: Floats2,
     radii: Floats,
 ) -> int:
     """Code the contacts of a point, in place; -1, or the frame where one is impossible.
@@ -78,13 +90,13 @@ def code_point(
     displacements, and ``radii`` (n_frames,) are in length units. Of displacements an encoder
     chooses what is cheap among what is no farther than ``radii`` from ``wanted``.
     """
-    stands, starts, moves = contacts
+    stands, starts, moves = contacts.stands, contacts.starts, contacts.moves
     n_frames, before = len(stands), 0
     place = np.zeros((n_frames + 2, 3))
     for f in range(n_frames + 2):
         for i in range(3):
             place[f, i] = places[f, i] / step
-    goals, anchor = np.zeros(wanted.shape), np.zeros(3)
+    goals, anchor = np.zeros((len(wanted), 3)), np.zeros(3)
     for f in range(len(wanted)):
         for i in range(3):
             goals[f, i] = wanted[f, i] / step
@@ -125,7 +137,6 @@ def code_point(
     return -1
 
 
-@inner
 def _next_first(stands: Ints, before: int) -> int:
     first = before
     while stands[first] != 1:
@@ -133,7 +144,6 @@ def _next_first(stands: Ints, before: int) -> int:
     return first
 
 
-@inner
 def _length(stands: Ints, first: int) -> int:
     length = 1
     while first + length < len(stands) and stands[first + length] == 2:
@@ -141,7 +151,6 @@ def _length(stands: Ints, first: int) -> int:
     return length
 
 
-@inner
 def _code_start(state: Ints, data: Bytes, move: Ints) -> int:
     """Code the displacement that a contact begins with."""
     moved = 1 if move[0] != 0 or move[1] != 0 or move[2] != 0 else 0
@@ -154,7 +163,6 @@ def _code_start(state: Ints, data: Bytes, move: Ints) -> int:
     return 0
 
 
-@inner
 def _code_move(state: Ints, data: Bytes, learner: Learner, last: Ints, move: Ints) -> int:
     """Code a displacement after the ``last`` in place; 1 where it is too large."""
     other, odd = 0.0, 0
@@ -177,7 +185,6 @@ def _code_move(state: Ints, data: Bytes, learner: Learner, last: Ints, move: Int
     return 0
 
 
-@inner
 def _nearest(value: float, axis: int, odd: int) -> int:
     """The integer next to ``value``; of y and z that which is odd or even as x is."""
     if axis == 0:
@@ -185,17 +192,15 @@ def _nearest(value: float, axis: int, odd: int) -> int:
     return 2 * int(np.floor((value - odd) * 0.5 + 0.5)) + odd
 
 
-@inner
 def _limit(value: float) -> float:
     return min(max(value, -FARTHEST), FARTHEST)
 
 
-@inner
 def _note_features(
     learner: Learner,
-    places: Floats,
+    places: Floats2,
     anchor: Floats,
-    moves: Ints,
+    moves: Ints2,
     first: int,
     t: int,
 ) -> None:
@@ -214,10 +219,9 @@ def _note_features(
         features[axis, 6] = _limit(anchor[axis] + moves[at - 1, axis] - places[at, axis])
 
 
-@inner
 def _note_leader(learner: Learner, leader: Leader, at: int, step: float) -> None:
     """How the shift of a point changes that this one hangs from, and what it was."""
-    stands, shifts = leader
+    stands, shifts = leader.stands, leader.shifts
     features = learner.features
     for axis in range(3):
         features[axis, 7], features[axis, 8] = 0.0, 0.0
@@ -226,7 +230,6 @@ def _note_leader(learner: Learner, leader: Leader, at: int, step: float) -> None
             features[axis, 8] = _limit(shifts[at - 1, axis] / step - features[axis, 6])
 
 
-@inner
 def _expect(learner: Learner, axis: int, features: Floats) -> float:
     mean = 0.0
     for i in range(N_FEATURES):
@@ -234,7 +237,6 @@ def _expect(learner: Learner, axis: int, features: Floats) -> float:
     return _limit(mean)
 
 
-@inner
 def _learn(learner: Learner, axis: int, features: Floats, moved: float) -> None:
     """Weights of least squares, drawn to the usual ones."""
     rest = _limit(moved)
@@ -250,8 +252,7 @@ def _learn(learner: Learner, axis: int, features: Floats, moved: float) -> None:
         learner.weights[axis, i] += learner.usual[i]
 
 
-@inner
-def _solve(squares: Floats, products: Floats, found: Floats, scratch: Floats) -> None:
+def _solve(squares: Floats2, products: Floats, found: Floats, scratch: Floats2) -> None:
     """(squares + ridge) found = products, by L D L'; row 9 of ``scratch`` has D."""
     for i in range(N_FEATURES):
         for k in range(i + 1):
@@ -275,7 +276,6 @@ def _solve(squares: Floats, products: Floats, found: Floats, scratch: Floats) ->
         found[i] = entry
 
 
-@inner
 def _choose(learner: Learner, before: Ints, wanted: Floats, radius: float, chosen: Ints) -> None:
     """The displacement near ``wanted`` that the expected one makes cheapest."""
     best = -1.0
@@ -296,7 +296,6 @@ def _choose(learner: Learner, before: Ints, wanted: Floats, radius: float, chose
             chosen[0], chosen[1], chosen[2] = x, y, z
 
 
-@inner
 def _class_of(size: float) -> int:
     """0 to 15, about two to an octave of a mean magnitude."""
     found, limit = 0, 0.1
@@ -306,7 +305,6 @@ def _class_of(size: float) -> int:
     return found
 
 
-@inner
 def _code_residual(
     state: Ints, data: Bytes, residual: int, sizes: Floats, other: float, side: int
 ) -> int:

@@ -6,8 +6,9 @@ first use only.
 
 from __future__ import annotations
 
-from mcz.coding.mixing import Bytes, Ints, adaptive, number
-from mcz.jit import inner, kernel
+from mcz.coding.mixing import adaptive, number
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Ints
 
 # First context of each kind of bit; each has one of every class of channel and one more.
 MAX_LENGTH = 40  # bits of a number
@@ -39,7 +40,6 @@ def code_head(
     return 0
 
 
-@inner
 def code_number(state: Ints, data: Bytes, first: int, own: int, value: int) -> int:
     """Code an integer: how many bits it has, in unary, the bits after the first, its sign.
 

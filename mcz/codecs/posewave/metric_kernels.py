@@ -12,11 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mcz.codecs.posewave.pose_kernels import gather_inertia, place_joints
-from mcz.codecs.posewave.skeleton_plan import MAX_PATH, PLAIN, Floats, Plan
-from mcz.jit import inner, kernel
-
-Row = tuple[Floats, Floats]  # (MAX_PATH, width): entries of G, last 1 / D; and of L
+from mcz.codecs.posewave.pose_kernels import Lanes, gather_inertia, lanes_of, place_joints
+from mcz.codecs.posewave.skeleton_plan import PLAIN, Plan
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Floats2, Floats3
 
 LANES = 8
 GREATEST = 2.0**120  # of entries of the metric, whose products then stay finite
@@ -33,42 +32,37 @@ def factor(plan: Plan, values: Floats) -> Floats:
         raise ValueError(f"poses of shape {values.shape} for {plan.n_channels} channels")
     found = np.empty((len(values), plan.n_entries))
     if len(values) == 1:
-        factor_one(plan, values, found)
+        factor_one(plan, lanes_of(plan, 1), values, found)
     else:
-        factor_batches(plan, values, found, LANES)
+        factor_batches(plan, lanes_of(plan, LANES), values, found, LANES)
     return found
 
 
 @kernel
-def factor_batches(plan: Plan, values: Floats, factors: Floats, lanes: int) -> None:
+def factor_batches(plan: Plan, batch: Lanes, values: Floats2, factors: Floats2, lanes: int) -> None:
     """Fill ``factors`` (n_poses, n_entries); ``lanes`` is ``LANES``."""
-    factor_rows(plan, values, factors, LANES, lanes)
+    factor_rows(plan, batch, values, factors, LANES, lanes)
 
 
 @kernel
-def factor_one(plan: Plan, values: Floats, factors: Floats) -> None:
+def factor_one(plan: Plan, batch: Lanes, values: Floats2, factors: Floats2) -> None:
     """The same of poses one by one."""
-    factor_rows(plan, values, factors, 1, 1)
+    factor_rows(plan, batch, values, factors, 1, 1)
 
 
-@inner
-def factor_rows(plan: Plan, values: Floats, factors: Floats, width: int, lanes: int) -> None:
+def factor_rows(
+    plan: Plan, batch: Lanes, values: Floats2, factors: Floats2, width: int, lanes: int
+) -> None:
     n_poses, n_entries = factors.shape
-    n_joints, n_turns, n_kept = len(plan.parents), len(plan.turns), len(plan.joints)
-    angles, cosines = np.empty((n_turns, width)), np.empty((n_turns, width))
-    axes, origins = np.empty((n_joints + 1, 9, width)), np.empty((n_joints + 1, 3, width))
-    motions, inertia = np.zeros((n_kept, 6, width)), np.empty((n_joints, 10, width))
-    scratch, force = np.empty((9, width)), np.empty((6, width))
-    lanes_of = angles, cosines, scratch, axes, origins, motions
-    one = np.empty((MAX_PATH, width)), np.empty((MAX_PATH, width))
-    other = np.empty((MAX_PATH, width)), np.empty((MAX_PATH, width))
-    entries, pivots = np.empty((n_entries, width)), np.empty(n_kept * width)
-    for batch in range((n_poses + width - 1) // width):
-        first = batch * width
-        place_joints(plan, values, first, lanes_of, lanes)
+    n_kept = len(plan.joints)
+    axes, origins, motions, inertia = batch.axes, batch.origins, batch.motions, batch.inertia
+    force, entries, pivots = batch.force, batch.entries, batch.pivots
+    for batch_number in range((n_poses + width - 1) // width):
+        first = batch_number * width
+        place_joints(plan, values, first, batch, lanes)
         gather_inertia(plan, axes, origins, inertia, lanes)
         _measure(plan, motions, inertia, force, entries, lanes)
-        _eliminate(plan, entries, one, other, pivots, width, lanes)
+        _eliminate(plan, batch, entries, pivots, width, lanes)
         for at in range(n_kept * width):
             pivots[at] = inverse_root(pivots[at])
         for number in range(n_kept):
@@ -80,9 +74,8 @@ def factor_rows(plan: Plan, values: Floats, factors: Floats, width: int, lanes: 
                 factors[first + p, at] = entries[at, p]
 
 
-@inner
 def _measure(
-    plan: Plan, motions: Floats, inertia: Floats, force: Floats, entries: Floats, lanes: int
+    plan: Plan, motions: Floats3, inertia: Floats3, force: Floats2, entries: Floats2, lanes: int
 ) -> None:
     """The entries of the metric G: what the force that moves one channel does along another."""
     for number in range(len(plan.joints)):
@@ -105,8 +98,7 @@ def _measure(
                 )
 
 
-@inner
-def _force(inertia: Floats, motion: Floats, force: Floats, lanes: int) -> None:
+def _force(inertia: Floats2, motion: Floats2, force: Floats2, lanes: int) -> None:
     for p in range(lanes):
         m, a, b, c = inertia[0, p], inertia[1, p], inertia[2, p], inertia[3, p]
         x, y, z = motion[0, p], motion[1, p], motion[2, p]
@@ -121,9 +113,8 @@ def _force(inertia: Floats, motion: Floats, force: Floats, lanes: int) -> None:
         force[5, p] = m * w + (x * b - y * a)
 
 
-@inner
 def _eliminate(
-    plan: Plan, entries: Floats, one: Row, other: Row, pivots: Floats, width: int, lanes: int
+    plan: Plan, batch: Lanes, entries: Floats2, pivots: Floats, width: int, lanes: int
 ) -> None:
     """Entries of G to those of L, from the last channel to the first, without any new entry.
 
@@ -131,29 +122,36 @@ def _eliminate(
     both is read and written once.
     """
     starts, path = plan.starts, plan.path
+    own, shares, own_2, shares_2 = batch.own, batch.shares, batch.own_2, batch.shares_2
     number = len(plan.joints) - 1
     while number >= 0:
         start, above = starts[number], starts[number + 1] - starts[number] - 1
-        _take_pivot(plan, entries, number, one, pivots[number * width :], lanes)
+        _take_pivot(plan, entries, number, own, shares, pivots[number * width :], lanes)
         if above > 0 and path[start + above - 1] == number - 1:
             number -= 1
             above -= 1
-            _subtract(entries, starts[number], above, one, lanes)
-            _take_pivot(plan, entries, number, other, pivots[number * width :], lanes)
+            _subtract(entries, starts[number], above, own, shares, lanes)
+            _take_pivot(plan, entries, number, own_2, shares_2, pivots[number * width :], lanes)
             for i in range(above):
-                _subtract_both(entries, starts[path[start + i]], i, one, other, lanes)
+                _subtract_both(
+                    entries, starts[path[start + i]], i, own, shares, own_2, shares_2, lanes
+                )
         else:
             for i in range(above):
-                _subtract(entries, starts[path[start + i]], i, one, lanes)
+                _subtract(entries, starts[path[start + i]], i, own, shares, lanes)
         number -= 1
 
 
-@inner
 def _take_pivot(
-    plan: Plan, entries: Floats, number: int, row: Row, pivots: Floats, lanes: int
+    plan: Plan,
+    entries: Floats2,
+    number: int,
+    own: Floats2,
+    shares: Floats2,
+    pivots: Floats,
+    lanes: int,
 ) -> None:
     """Note a row of G and its pivot, and make it a row of L."""
-    own, shares = row
     start, above = plan.starts[number], plan.starts[number + 1] - plan.starts[number] - 1
     added = plan.regularization[number]
     least = 0.5 * added
@@ -168,27 +166,32 @@ def _take_pivot(
             entries[start + i, p] = shares[i, p]
 
 
-@inner
-def _subtract(entries: Floats, top: int, i: int, row: Row, lanes: int) -> None:
+def _subtract(
+    entries: Floats2, top: int, i: int, own: Floats2, shares: Floats2, lanes: int
+) -> None:
     """Take off the row of channel i of a path, which starts at ``top``, what is ``row``'s."""
-    own, shares = row
     for k in range(i + 1):
         for p in range(lanes):
             entries[top + k, p] -= shares[i, p] * own[k, p]
 
 
-@inner
-def _subtract_both(entries: Floats, top: int, i: int, one: Row, other: Row, lanes: int) -> None:
+def _subtract_both(
+    entries: Floats2,
+    top: int,
+    i: int,
+    own: Floats2,
+    shares: Floats2,
+    own_2: Floats2,
+    shares_2: Floats2,
+    lanes: int,
+) -> None:
     """``_subtract`` of ``one``, then of ``other``."""
-    own, shares = one
-    own_2, shares_2 = other
     for k in range(i + 1):
         for p in range(lanes):
             left = entries[top + k, p] - shares[i, p] * own[k, p]
             entries[top + k, p] = left - shares_2[i, p] * own_2[k, p]
 
 
-@inner
 def inverse_root(value: float) -> float:
     """1 / root(value) for 2^-102 to 2^121, exact to about 1e-15: octaves first, then Newton."""
     value = value * LIFT

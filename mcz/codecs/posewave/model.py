@@ -28,12 +28,11 @@ from mcz.codecs.posewave.state import (
     N_SMALL_MIXERS,
     N_TAPS,
     USUAL,
-    Floats,
-    Ints,
     Model,
 )
 from mcz.coding import mixing
 from mcz.coding.logistic import rate_table, squash_table, stretch_table
+from mcz.kernels.types import Floats, Ints
 
 N_SECOND = 33
 START_ENERGY = 500.0

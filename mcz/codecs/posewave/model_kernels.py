@@ -61,13 +61,12 @@ from mcz.codecs.posewave.state import (
     SIDE_3,
     SIDE_4,
     USUAL,
-    Floats,
-    Ints,
     Model,
 )
 from mcz.coding import mixing
-from mcz.coding.mixing import Bytes, adaptive, mixed
-from mcz.jit import inner, kernel
+from mcz.coding.mixing import adaptive, mixed
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 
 UNIT = 4096.0  # a mean is a multiple of 1 / UNIT
 MOST_MEAN = float(1 << 31)
@@ -85,12 +84,12 @@ def begin_level(model: Model, level: int) -> None:
 def code_rows(
     model: Model,
     data: Bytes,
-    q: Ints,
-    y: Floats,
-    means: Floats,
-    here: Floats,
-    parent: Floats,
-    grand: Floats,
+    q: Ints2,
+    y: Floats2,
+    means: Floats2,
+    here: Floats2,
+    parent: Floats2,
+    grand: Floats2,
     level: int,
     first: int,
     last: int,
@@ -154,7 +153,6 @@ def code_rows(
     return -1
 
 
-@inner
 def code_exponent(coder: Ints, data: Bytes, exponent: int, earlier: int) -> int:
     """Code by how many octaves a row is finer; ``earlier`` is that of the row before."""
     at, found = C_EXPONENT + MAX_EXPONENT * earlier, 0
@@ -165,9 +163,8 @@ def code_exponent(coder: Ints, data: Bytes, exponent: int, earlier: int) -> int:
     return found
 
 
-@inner
 def flag_contexts(
-    model: Model, here: Floats, parent: Floats, level: int, row: int
+    model: Model, here: Floats2, parent: Floats2, level: int, row: int
 ) -> tuple[int, int, int]:
     """Three contexts for whether a row is live: which around it are, and how large they are."""
     n, last = len(model.classes), len(parent) - 1
@@ -188,16 +185,15 @@ def flag_contexts(
     )
 
 
-@inner
 def is_live(
     model: Model,
     data: Bytes,
-    q: Ints,
-    y: Floats,
-    means: Floats,
-    here: Floats,
-    parent: Floats,
-    grand: Floats,
+    q: Ints2,
+    y: Floats2,
+    means: Floats2,
+    here: Floats2,
+    parent: Floats2,
+    grand: Floats2,
     level: int,
     row: int,
     lam: float,
@@ -237,16 +233,15 @@ def is_live(
     return some and cost + lam * float(saved) / COST_UNIT < energy
 
 
-@inner
 def code_row(
     model: Model,
     data: Bytes,
     q: Ints,
     y: Floats,
     means: Floats,
-    here: Floats,
-    parent: Floats,
-    grand: Floats,
+    here: Floats2,
+    parent: Floats2,
+    grand: Floats2,
     level: int,
     row: int,
     lam: float,
@@ -350,8 +345,7 @@ def code_row(
     return cost
 
 
-@inner
-def learn_from_row(model: Model, here: Floats, level: int, row: int) -> None:
+def learn_from_row(model: Model, here: Floats2, level: int, row: int) -> None:
     """Let all predictions learn from a coded row; one with large values counts for less."""
     n, blocks, width = len(model.classes), len(model.columns), len(model.timely)
     values = here[row + 3, width:]
@@ -371,7 +365,6 @@ def learn_from_row(model: Model, here: Floats, level: int, row: int) -> None:
     learn_in_time(model, values, level, row, share)
 
 
-@inner
 def choose(model: Model, y: float, rounded: int, where: Contexts, lam: float) -> tuple[int, float]:
     """The integer next to ``y``, or 0, whose square error and bits cost least, and their cost."""
     y = min(max(y, -2.0 * MAX_INDEX), 2.0 * MAX_INDEX)

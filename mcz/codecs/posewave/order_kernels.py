@@ -12,20 +12,17 @@ is left: 1 for a switch, then whole turns about x, y and z.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.codecs.posewave.arc import arc
 from mcz.codecs.posewave.turns import Rule, sine_cosine
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.kernels import kernel
+from mcz.kernels.types import FloatColumns, Floats, Floats2, IntColumns, Ints
 
 LATE = 0.75  # of a turn: so far from the source an encoder tells a turn
 
 
 @kernel
-def turn_over(angles: Floats, given: Ints, wanted: Ints, rule: Rule) -> None:
+def turn_over(angles: Floats2, given: Ints, wanted: Ints, rule: Rule) -> None:
     """Angles of the sequence ``given`` to those of ``wanted``, in place: the first solution."""
     m = np.empty(9)
     i, j, k = wanted[0], wanted[1], wanted[2]
@@ -46,7 +43,6 @@ def turn_over(angles: Floats, given: Ints, wanted: Ints, rule: Rule) -> None:
         row[k] = arc(up, cosine * m[4 * j] + sine * m[3 * k + j], rule)
 
 
-@inner
 def _rotate(m: Floats, j: int, k: int, sine: float, cosine: float) -> None:
     for i in (0, 3, 6):
         one, other = m[i + j], m[i + k]
@@ -54,7 +50,6 @@ def _rotate(m: Floats, j: int, k: int, sine: float, cosine: float) -> None:
         m[i + k] = other * cosine - one * sine
 
 
-@inner
 def whole_turns(step: float, full: float) -> float:
     """As ``mcz.angles.turns``."""
     ratio = step / full
@@ -62,19 +57,16 @@ def whole_turns(step: float, full: float) -> float:
     return count if ratio >= 0.0 else -count
 
 
-@inner
 def off(step: float, full: float) -> float:
     """The size of a step, less whole turns."""
     return abs(step - full * whole_turns(step, full))
 
 
-@inner
 def other(value: float, p: int, half: float) -> float:
     """The p-th angle of the second solution from that of the first, and the other way round."""
     return half - value if p == 1 else value + half
 
 
-@inner
 def is_nearer(row: Floats, before: Floats, sequence: Ints, full: float) -> bool:
     """Whether the second solution of ``row`` is nearer to the first of the row ``before``."""
     one = two = 0.0
@@ -86,7 +78,7 @@ def is_nearer(row: Floats, before: Floats, sequence: Ints, full: float) -> bool:
 
 
 @kernel
-def follow(angles: Floats, sequence: Ints, full: float, told: Ints) -> None:
+def follow(angles: Floats2, sequence: Ints, full: float, told: IntColumns) -> None:
     """First solutions to angles that go on from row to row, in place."""
     before, last, turns = np.zeros(3), np.zeros(3), np.zeros(3)
     second = False
@@ -110,7 +102,12 @@ def follow(angles: Floats, sequence: Ints, full: float, told: Ints) -> None:
 
 @kernel
 def tell_switches(
-    angles: Floats, source: Floats, sequence: Ints, full: float, price: float, told: Ints
+    angles: Floats2,
+    source: FloatColumns,
+    sequence: Ints,
+    full: float,
+    price: float,
+    told: IntColumns,
 ) -> None:
     """Fill ``told`` with the switches that bring first solutions ``angles`` near to ``source``.
 
@@ -143,7 +140,7 @@ def tell_switches(
 
 
 @kernel
-def tell_turns(angles: Floats, source: Floats, full: float, told: Ints) -> None:
+def tell_turns(angles: Floats2, source: FloatColumns, full: float, told: IntColumns) -> None:
     """Fill ``told`` with the turns that bring ``angles`` as followed near to ``source``."""
     for axis in range(3):
         turns = 0.0

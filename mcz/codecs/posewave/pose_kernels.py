@@ -8,19 +8,65 @@ knows how far apart rows are. For one frame alone both are known.
 
 from __future__ import annotations
 
-from mcz.codecs.posewave.skeleton_plan import QUATERNION, VECTOR, Floats, Plan
+from typing import NamedTuple
+
+import numpy as np
+
+from mcz.codecs.posewave.skeleton_plan import MAX_PATH, QUATERNION, VECTOR, Plan
 from mcz.codecs.posewave.turns import BEYOND, sine_cosine
 from mcz.codecs.posewave.whole_turn_kernels import turn_by_quaternion, turn_by_vector
-from mcz.jit import inner
-
-# Angles, then sines, (n_turns, width); cosines, likewise; scratch (9, width); ``axes``
-# (n_joints + 1, 9, width) and ``origins`` (n_joints + 1, 3, width), of which 0 is what roots hang
-# from; ``motions`` (n_kept, 6, width), what one unit of a channel does.
-Lanes = tuple[Floats, Floats, Floats, Floats, Floats, Floats]
+from mcz.kernels.types import Floats, Floats2, Floats3
 
 
-@inner
-def take_values(columns: Floats, column: int, first: int, values: Floats, lanes: int) -> None:
+class Lanes(NamedTuple):
+    """Room to work on ``width`` poses at a time.
+
+    ``sines`` (n_turns, width), angles first; ``cosines``, likewise; ``scratch`` (9, width);
+    ``axes`` (n_joints + 1, 9, width) and ``origins`` (n_joints + 1, 3, width), of which 0 is what
+    roots hang from; ``motions`` (n_kept, 6, width), what one unit of a channel does. Of the metric:
+    ``inertia`` (n_joints, 10, width) and ``force`` (6, width); ``own`` and ``shares``
+    (MAX_PATH, width), entries of G, last 1 / D, and of L, and the same of a second row;
+    ``entries`` (n_entries, width) and ``pivots`` (n_kept * width,).
+    """
+
+    sines: Floats2
+    cosines: Floats2
+    scratch: Floats2
+    axes: Floats3
+    origins: Floats3
+    motions: Floats3
+    inertia: Floats3
+    force: Floats2
+    own: Floats2
+    shares: Floats2
+    own_2: Floats2
+    shares_2: Floats2
+    entries: Floats2
+    pivots: Floats
+
+
+def lanes_of(plan: Plan, width: int) -> Lanes:
+    """Room for ``width`` poses of a skeleton."""
+    n_joints, n_turns, n_kept = len(plan.parents), len(plan.turns), len(plan.joints)
+    return Lanes(
+        sines=np.empty((n_turns, width)),
+        cosines=np.empty((n_turns, width)),
+        scratch=np.empty((9, width)),
+        axes=np.empty((n_joints + 1, 9, width)),
+        origins=np.empty((n_joints + 1, 3, width)),
+        motions=np.zeros((n_kept, 6, width)),
+        inertia=np.empty((n_joints, 10, width)),
+        force=np.empty((6, width)),
+        own=np.empty((MAX_PATH, width)),
+        shares=np.empty((MAX_PATH, width)),
+        own_2=np.empty((MAX_PATH, width)),
+        shares_2=np.empty((MAX_PATH, width)),
+        entries=np.empty((plan.n_entries, width)),
+        pivots=np.empty(n_kept * width),
+    )
+
+
+def take_values(columns: Floats2, column: int, first: int, values: Floats, lanes: int) -> None:
     """What a column has in the frames from ``first`` on; after the last, the last again."""
     last = len(columns) - 1
     for p in range(lanes):
@@ -28,11 +74,10 @@ def take_values(columns: Floats, column: int, first: int, values: Floats, lanes:
         values[p] = value if abs(value) < BEYOND else 0.0
 
 
-@inner
-def place_joints(plan: Plan, columns: Floats, first: int, batch: Lanes, lanes: int) -> None:
+def place_joints(plan: Plan, columns: Floats2, first: int, batch: Lanes, lanes: int) -> None:
     """Place the joints of the frames from ``first`` on; ``columns`` (n_frames, n_channels)."""
-    axes, origins = batch[3], batch[4]
-    _take_turns(plan, columns, first, batch[0], batch[1], lanes)
+    axes, origins = batch.axes, batch.origins
+    _take_turns(plan, columns, first, batch.sines, batch.cosines, lanes)
     for p in range(lanes):
         for i in range(9):
             axes[0, i, p] = 1.0 if i % 4 == 0 else 0.0
@@ -45,9 +90,8 @@ def place_joints(plan: Plan, columns: Floats, first: int, batch: Lanes, lanes: i
         _turn(plan, joint, batch, lanes)
 
 
-@inner
 def _take_turns(
-    plan: Plan, columns: Floats, first: int, angles: Floats, cosines: Floats, lanes: int
+    plan: Plan, columns: Floats2, first: int, angles: Floats2, cosines: Floats2, lanes: int
 ) -> None:
     for turn in range(len(plan.turns)):
         take_values(columns, plan.turns[turn, 1], first, angles[turn], lanes)
@@ -56,8 +100,7 @@ def _take_turns(
                 angles[turn, p], cosines[turn, p] = sine_cosine(angles[turn, p], plan.rule)
 
 
-@inner
-def _hang(above: Floats, origin: Floats, arm: Floats, own: Floats, lanes: int) -> None:
+def _hang(above: Floats2, origin: Floats2, arm: Floats, own: Floats2, lanes: int) -> None:
     x, y, z = arm[0], arm[1], arm[2]
     for i in range(3):
         for p in range(lanes):
@@ -65,10 +108,9 @@ def _hang(above: Floats, origin: Floats, arm: Floats, own: Floats, lanes: int) -
             own[i, p] = origin[i, p] + way
 
 
-@inner
-def _move(plan: Plan, joint: int, columns: Floats, first: int, batch: Lanes, lanes: int) -> None:
+def _move(plan: Plan, joint: int, columns: Floats2, first: int, batch: Lanes, lanes: int) -> None:
     """Move a joint by its position channels; a root stays where it is."""
-    _, _, scratch, axes, origins, motions = batch
+    scratch, axes, origins, motions = batch.scratch, batch.axes, batch.origins, batch.motions
     above, origin = axes[plan.parents[joint] + 1], origins[joint + 1]
     for move in range(plan.move_starts[joint], plan.move_starts[joint + 1]):
         column, number = plan.moves[move]
@@ -90,10 +132,10 @@ def _move(plan: Plan, joint: int, columns: Floats, first: int, batch: Lanes, lan
                     motions[number, 3 + i, p] = scratch[i, p]
 
 
-@inner
 def _turn(plan: Plan, joint: int, batch: Lanes, lanes: int) -> None:
     """Turn a joint by its channels, from the outermost to the innermost."""
-    sines, _, own, axes, origins, motions = batch
+    sines, own, motions = batch.sines, batch.scratch, batch.motions
+    axes, origins = batch.axes, batch.origins
     origin = origins[joint + 1]
     _change(axes[plan.parents[joint] + 1], plan.changes[joint], own, lanes)
     turn, stop = plan.turn_starts[joint], plan.turn_starts[joint + 1]
@@ -113,10 +155,10 @@ def _turn(plan: Plan, joint: int, batch: Lanes, lanes: int) -> None:
             axes[joint + 1, i, p] = own[i, p]
 
 
-@inner
-def _turn_about(plan: Plan, turn: int, batch: Lanes, origin: Floats, lanes: int) -> None:
+def _turn_about(plan: Plan, turn: int, batch: Lanes, origin: Floats2, lanes: int) -> None:
     """Turn a joint's axes about one of them, and note what the channel does."""
-    sines, cosines, own, _, _, motions = batch
+    sines, cosines = batch.sines, batch.cosines
+    own, motions = batch.scratch, batch.motions
     axis, number = plan.turns[turn, 0], plan.turns[turn, 2]
     if number >= 0:
         _note_turn(own, axis, plan.rule.radians, origin, motions[number], lanes)
@@ -128,8 +170,7 @@ def _turn_about(plan: Plan, turn: int, batch: Lanes, origin: Floats, lanes: int)
         _mix(own, 0, 1, sines[turn], cosines[turn], lanes)
 
 
-@inner
-def _change(above: Floats, change: Floats, own: Floats, lanes: int) -> None:
+def _change(above: Floats2, change: Floats2, own: Floats2, lanes: int) -> None:
     for i in range(3):
         for k in range(3):
             x, y, z = change[0, k], change[1, k], change[2, k]
@@ -139,9 +180,8 @@ def _change(above: Floats, change: Floats, own: Floats, lanes: int) -> None:
                 )
 
 
-@inner
 def _note_turn(
-    axes: Floats, axis: int, radians: float, origin: Floats, motion: Floats, lanes: int
+    axes: Floats2, axis: int, radians: float, origin: Floats2, motion: Floats2, lanes: int
 ) -> None:
     """What one unit of a rotation does: the turn, and how it moves what is at the root."""
     for p in range(lanes):
@@ -155,8 +195,7 @@ def _note_turn(
         motion[5, p] = a * y - b * x
 
 
-@inner
-def _mix(axes: Floats, j: int, k: int, sines: Floats, cosines: Floats, lanes: int) -> None:
+def _mix(axes: Floats2, j: int, k: int, sines: Floats, cosines: Floats, lanes: int) -> None:
     for p in range(lanes):
         sine, cosine = sines[p], cosines[p]
         for i in range(3):
@@ -165,8 +204,9 @@ def _mix(axes: Floats, j: int, k: int, sines: Floats, cosines: Floats, lanes: in
             axes[3 * i + k, p] = other * cosine - one * sine
 
 
-@inner
-def gather_inertia(plan: Plan, axes: Floats, origins: Floats, inertia: Floats, lanes: int) -> None:
+def gather_inertia(
+    plan: Plan, axes: Floats3, origins: Floats3, inertia: Floats3, lanes: int
+) -> None:
     """Fill ``inertia`` (n_joints, 10, width) with all that a joint moves, about its root."""
     n_joints = len(plan.parents)
     for joint in range(n_joints):
@@ -180,8 +220,9 @@ def gather_inertia(plan: Plan, axes: Floats, origins: Floats, inertia: Floats, l
                     inertia[parent, i, p] += inertia[joint, i, p]
 
 
-@inner
-def _own_inertia(mass: Floats, axes: Floats, origin: Floats, inertia: Floats, lanes: int) -> None:
+def _own_inertia(
+    mass: Floats, axes: Floats2, origin: Floats2, inertia: Floats2, lanes: int
+) -> None:
     m, mx, my, mz = mass[0], mass[1], mass[2], mass[3]
     xx, yy, zz, xy, xz, yz = mass[4], mass[5], mass[6], mass[7], mass[8], mass[9]
     for p in range(lanes):

@@ -17,10 +17,9 @@ from mcz.codecs.posewave.state import (
     TAP_NEXT,
     TAP_PARENT,
     USUAL,
-    Floats,
     Model,
 )
-from mcz.jit import inner
+from mcz.kernels.types import Floats, Floats2
 
 MEMORY = 0.996  # what a live row leaves of what earlier ones have taught
 NOISE = 0.1  # variance that each live row adds to that of a channel
@@ -29,7 +28,6 @@ CARRIED = 40.0  # rows at most that the coarser levels count for
 TAP_MEMORY, TAP_RATE, MOST_TAP = 0.98, 0.012, 2.0
 
 
-@inner
 def begin_prediction(model: Model, level: int) -> None:
     """Let a level start from what the coarser one has taught; the first one knows nothing."""
     seen = model.seen
@@ -47,8 +45,7 @@ def begin_prediction(model: Model, level: int) -> None:
         seen[0] = CARRIED
 
 
-@inner
-def predict_in_time(model: Model, here: Floats, parent: Floats, level: int, row: int) -> None:
+def predict_in_time(model: Model, here: Floats2, parent: Floats2, level: int, row: int) -> None:
     """Fill ``timely``: what rows before, and those of the coarser level, say of the values."""
     timely, sources = model.timely, model.sources
     width, last = len(timely), len(parent) - 1
@@ -65,7 +62,6 @@ def predict_in_time(model: Model, here: Floats, parent: Floats, level: int, row:
             timely[c] += tap * source[c]
 
 
-@inner
 def learn_in_time(model: Model, values: Floats, level: int, row: int, share: float) -> None:
     """Let the taps learn from what they missed; ``timely`` is used up."""
     timely, sources, usual = model.timely, model.sources, model.features[USUAL]
@@ -87,7 +83,6 @@ def learn_in_time(model: Model, values: Floats, level: int, row: int, share: flo
         taps[k] = min(max(tap, -MOST_TAP), MOST_TAP)
 
 
-@inner
 def total_of(values: Floats) -> float:
     """The sum of values, a multiple of ``LANES`` of them; they are folded, and used up."""
     for start in range(LANES, len(values), LANES):
@@ -103,7 +98,6 @@ def total_of(values: Floats) -> float:
     return float(values[0] + values[1] + (values[2] + values[3]))
 
 
-@inner
 def spread(means: Floats, column: Floats, miss: float) -> None:
     """Add to the means of later channels of a block what the miss of one says of them.
 
@@ -114,8 +108,7 @@ def spread(means: Floats, column: Floats, miss: float) -> None:
         means[c] += column[c] * miss
 
 
-@inner
-def take_in(columns: Floats, variances: Floats, rest: Floats, size: int, share: float) -> None:
+def take_in(columns: Floats2, variances: Floats, rest: Floats, size: int, share: float) -> None:
     """Add what was missed in time, ``rest``, to L D L', of which ``columns`` has the columns of L.
 
     One step of Bennett's update for each channel. ``rest`` is used up.

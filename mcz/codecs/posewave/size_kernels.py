@@ -19,11 +19,9 @@ from mcz.codecs.posewave.state import (
     ROW_BEFORE,
     ROW_PARENT,
     USUAL,
-    Floats,
-    Ints,
     Model,
 )
-from mcz.jit import inner
+from mcz.kernels.types import Floats, Floats2, Ints
 
 OF_ROWS = (
     *(BEFORE_1, BEFORE_2, BEFORE_3, GRAND, PARENT, PARENT_NEXT, PARENT_LAST),
@@ -36,16 +34,14 @@ LEVEL_RATE, OWN_RATE, CHANNELS = 0.016, 0.032, 62
 USUAL_RATE = 0.06
 
 
-@inner
 def log_of(logs: Ints, value: float) -> int:
     """About 6 log2(1 + 4 value), 0 <= value < 2^32, at most 95."""
     x = int(value * 16.0)
     return int(logs[x & 1023] if x < 1024 else logs[min(x >> 6, 1023)] + 36)
 
 
-@inner
 def gather_magnitudes(
-    model: Model, here: Floats, parent: Floats, grand: Floats, level: int, row: int
+    model: Model, here: Floats2, parent: Floats2, grand: Floats2, level: int, row: int
 ) -> None:
     """Fill the features that earlier rows have, and ``sizes`` by them alone."""
     features, n = model.features, len(model.classes)
@@ -71,7 +67,6 @@ def gather_magnitudes(
             two[c] += own[c] * source[c]
 
 
-@inner
 def learn_sizes(model: Model, level: int, magnitudes: Floats) -> None:
     """Let the weights of both sizes learn from a coded row, and what is usual."""
     features, n = model.features, len(model.classes)

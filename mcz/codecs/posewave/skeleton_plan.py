@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from mcz.codecs.posewave.orders import KEPT, SEQUENCES
 from mcz.codecs.posewave.turns import BEYOND, RULES, Rule, sine_cosine
+from mcz.kernels.types import Floats, Floats2, Floats3, Ints, Ints2
 from mcz.kinematics.points import points_of
 from mcz.motion import (
     ANGLE_KINDS,
@@ -29,8 +30,6 @@ from mcz.motion import (
 )
 from mcz.skeleton import first_columns
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]  # rows
 Turn = tuple[int, int, int]  # axis, column, number among the kept
@@ -62,13 +61,13 @@ class Plan(NamedTuple):
     """
 
     parents: Ints
-    changes: Floats
-    arms: Floats
-    masses: Floats
-    moves: Ints
-    directions: Floats
+    changes: Floats3
+    arms: Floats2
+    masses: Floats2
+    moves: Ints2
+    directions: Floats2
     move_starts: Ints
-    turns: Ints
+    turns: Ints2
     turn_starts: Ints
     joints: Ints
     starts: Ints

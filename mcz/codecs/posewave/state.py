@@ -7,11 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
+from mcz.kernels.types import Floats, Floats2, Floats3, Ints, Ints3
 
 N_LEVELS = 6
 MAX_INDEX = 1 << 30
@@ -58,8 +54,8 @@ class Model(NamedTuple):
     coder: Ints
     classes: Ints
     slots: Ints
-    weights: Ints
-    second: Ints
+    weights: Ints3
+    second: Ints3
     at: Ints
     inputs: Ints
     stretch: Ints
@@ -68,15 +64,15 @@ class Model(NamedTuple):
     trust: Ints
     logs: Ints
     costs: Ints
-    columns: Floats
-    variances: Floats
+    columns: Floats3
+    variances: Floats2
     seen: Floats
     means: Floats
-    taps: Floats
-    tap_energy: Floats
+    taps: Floats2
+    tap_energy: Floats2
     timely: Floats
-    sources: Floats
-    level_weights: Floats
-    own_weights: Floats
-    features: Floats
-    sizes: Floats
+    sources: Floats2
+    level_weights: Floats2
+    own_weights: Floats2
+    features: Floats2
+    sizes: Floats2

@@ -11,8 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.jit import inner
-
 Floats = NDArray[np.float64]
 
 BEYOND = 2.0**40  # a value of this magnitude or more counts as 0
@@ -41,7 +39,6 @@ SINE = tuple(1.0 / (k * (k + 1.0)) for k in (12.0, 10.0, 8.0, 6.0, 4.0, 2.0))
 COSINE = tuple(1.0 / (k * (k + 1.0)) for k in (13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0))
 
 
-@inner
 def sine_cosine(angle: float, rule: Rule) -> tuple[float, float]:
     """Of an angle in the unit of ``rule``; one of 2^40 or more, or NaN, counts as 0."""
     angle = angle if abs(angle) < BEYOND else 0.0

@@ -58,6 +58,7 @@ class Walk:
         self.kept = np.flatnonzero(kept)
         self.metric = Metric(header, skeleton, kept, first)
         self.poses = self.approx = np.zeros((0, len(self.kept)))
+        self.lanes = kernels().lanes_of(self.metric.plan, 1)
         self.course = kernels().course_of(first, self.kept, header.greatest[self.kept])
 
     def copy(self) -> Walk:
@@ -88,7 +89,7 @@ class Walk:
         factor = self.metric.empty()
         self.approx = np.empty((len(rows), len(self.kept)))
         for m, row in enumerate(rows):
-            kernels().next_factor(self.metric.plan, course, factor)
+            kernels().next_factor(self.metric.plan, self.lanes, course, factor)
             wanted = self.metric.into(factor, (row - course.expected)[None]) / steps[m]
             kernels().take_row(self.metric.plan, course, factor, code(m, wanted) * steps[m])
             self.approx[m] = course.pose[0, self.kept]
@@ -97,7 +98,7 @@ class Walk:
         """Level 0 from all of its rows in the metric, in steps."""
         self.approx = np.empty((len(rows), len(self.kept)))
         scaled = rows * self.steps(level, exponents)
-        kernels().take_rows(self.metric.plan, self.course, scaled, self.approx)
+        kernels().take_rows(self.metric.plan, self.lanes, self.course, scaled, self.approx)
 
     def code_details(self, level: int, code: Code, rows: Floats, exponents: Ints) -> None:
         """A level of details, all rows at once: ``code`` gives what a decoder will have."""

@@ -6,8 +6,8 @@ SPEC.md, "Pose metric", is normative. Arrays end in an axis of lanes, as those o
 
 from __future__ import annotations
 
-from mcz.codecs.posewave.skeleton_plan import Floats, Plan
-from mcz.jit import inner
+from mcz.codecs.posewave.skeleton_plan import Plan
+from mcz.kernels.types import Floats2, Floats3
 
 LONGEST = 256.0  # the square of a vector's length in radians from which on it counts as 0
 LEAST = 2.0**-100  # the square of a quaternion's length below which it turns nothing
@@ -19,7 +19,6 @@ THIRD = tuple(1.0 / (k * (k + 1.0)) for k in (18.0, 16.0, 14.0, 12.0, 10.0, 8.0,
 SIXTH = 0.16666666666666666
 
 
-@inner
 def exponential(square: float) -> tuple[float, float, float]:
     """sin t / t, (1 - cos t) / t^2 and (t - sin t) / t^3 of t^2, which is below 256.
 
@@ -44,9 +43,14 @@ def exponential(square: float) -> tuple[float, float, float]:
     return a, b, c
 
 
-@inner
 def turn_by_vector(
-    plan: Plan, turn: int, parts: Floats, own: Floats, origin: Floats, motions: Floats, lanes: int
+    plan: Plan,
+    turn: int,
+    parts: Floats2,
+    own: Floats2,
+    origin: Floats2,
+    motions: Floats3,
+    lanes: int,
 ) -> None:
     """Turn ``own``, a joint's axes, by the rotation vector whose parts are from ``turn`` on."""
     radians = plan.rule.radians
@@ -74,9 +78,14 @@ def turn_by_vector(
             own[i + 2, p] = (b * xz + a * y) * d + (b * yz - a * x) * e + (1.0 - b * (xx + yy)) * f
 
 
-@inner
 def turn_by_quaternion(
-    plan: Plan, turn: int, parts: Floats, own: Floats, origin: Floats, motions: Floats, lanes: int
+    plan: Plan,
+    turn: int,
+    parts: Floats2,
+    own: Floats2,
+    origin: Floats2,
+    motions: Floats3,
+    lanes: int,
 ) -> None:
     """Turn ``own``, a joint's axes, by the quaternion whose parts are from ``turn`` on."""
     for p in range(lanes):
@@ -99,14 +108,13 @@ def turn_by_quaternion(
             own[row + 2, p] = (xz + j * w) * d + (yz - i * w) * e + (1.0 - (xx + yy)) * f
 
 
-@inner
 def _note(
-    own: Floats,
+    own: Floats2,
     u: float,
     v: float,
     w: float,
-    origin: Floats,
-    motions: Floats,
+    origin: Floats2,
+    motions: Floats3,
     number: int,
     p: int,
 ) -> None:

@@ -7,9 +7,7 @@ first use only.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.coding.mixing import Bytes, Ints
 from mcz.coding.space_kernels import (
     MAX_INDEX,
     N_SETS,
@@ -20,21 +18,20 @@ from mcz.coding.space_kernels import (
     coefficient_of,
     index_of,
 )
-from mcz.jit import kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 
 __all__ = ["N_SETS", "TRACK_SIZE", "add_frames", "code_frames", "quantize_frames"]
-
-Floats = NDArray[np.float64]
 
 
 @kernel
 def code_frames(
     state: Ints,
     data: Bytes,
-    indices: Ints,
+    indices: Ints2,
     starts: Ints,
     lengths: Ints,
-    tracks: Ints,
+    tracks: Ints2,
     first: int,
 ) -> int:
     """Code ``indices`` (frames, n_rows) in place; return the frame of a fault, or -1.
@@ -50,7 +47,7 @@ def code_frames(
 
 
 @kernel
-def add_frames(out: Floats, values: Floats, indices: Ints, transform: Transform) -> None:
+def add_frames(out: Floats2, values: Floats, indices: Ints2, transform: Transform) -> None:
     """Write frames, (frames, n_channels), from their coefficients (frames, n_rows).
 
     ``values`` (n_channels,) is the frame before, and becomes the last.
@@ -63,11 +60,11 @@ def add_frames(out: Floats, values: Floats, indices: Ints, transform: Transform)
 
 @kernel
 def quantize_frames(
-    indices: Ints,
-    frames: Floats,
+    indices: Ints2,
+    frames: Floats2,
     values: Floats,
     transform: Transform,
-    analysis: Floats,
+    analysis: Floats2,
     threshold: float,
 ) -> int:
     """Fill ``indices`` (frames, n_rows) with what makes ``frames`` of the frames before them.

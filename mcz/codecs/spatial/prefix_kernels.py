@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from mcz.coding.bitio import WRITING, plain
 from mcz.coding.huffman import DIRECT, MAX_LENGTH
-from mcz.coding.mixing import Bytes, Ints
 from mcz.coding.residuals import bits
-from mcz.jit import inner, kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Ints, Ints2
 
 MAX_INDEX = 1 << 40
 FAULT = -1
@@ -22,7 +22,7 @@ CODES, LENGTHS, SYMBOLS, FIRSTS, COUNTS, ENTRIES, TABLE_ROWS = range(7)
 
 @kernel
 def code_vectors(
-    coder: Ints, data: Bytes, rows: Ints, starts: Ints, gaps: Ints, values: Ints
+    coder: Ints, data: Bytes, rows: Ints2, starts: Ints, gaps: Ints2, values: Ints2
 ) -> int:
     """Code ``rows`` (n_rows, n) in place; return the row of a fault, or -1.
 
@@ -35,8 +35,7 @@ def code_vectors(
     return -1
 
 
-@inner
-def _code_vector(coder: Ints, data: Bytes, row: Ints, gaps: Ints, values: Ints) -> int:
+def _code_vector(coder: Ints, data: Bytes, row: Ints, gaps: Ints2, values: Ints2) -> int:
     n, count = len(row), 0
     for value in row:
         count += 1 if value != 0 else 0
@@ -59,8 +58,7 @@ def _code_vector(coder: Ints, data: Bytes, row: Ints, gaps: Ints, values: Ints) 
     return 0
 
 
-@inner
-def _code_integer(coder: Ints, data: Bytes, value: int, table: Ints) -> int:
+def _code_integer(coder: Ints, data: Bytes, value: int, table: Ints2) -> int:
     """Code the class of an integer, then the bits that the class leaves open; FAULT if none."""
     symbol = value
     if value >= DIRECT:
@@ -73,8 +71,7 @@ def _code_integer(coder: Ints, data: Bytes, value: int, table: Ints) -> int:
     return (2 | symbol & 1) << more | plain(coder, data, value, more)  # PREFIX-01
 
 
-@inner
-def _code_symbol(coder: Ints, data: Bytes, symbol: int, table: Ints) -> int:
+def _code_symbol(coder: Ints, data: Bytes, symbol: int, table: Ints2) -> int:
     if coder[WRITING]:
         plain(coder, data, table[CODES, symbol], table[LENGTHS, symbol])
         return symbol

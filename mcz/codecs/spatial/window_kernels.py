@@ -7,20 +7,17 @@ encoder and decoder. Imported on first use only.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.coding.mixing import Bytes, Ints
 from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
 from mcz.coding.space_kernels import FIRSTS, LENGTHS, MAX_INDEX, OTHERS, Transform
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 
 BLOCK_FRAMES = 256  # at a time, so that sums stay near the processor
 
 
 @kernel
-def code_window(state: Ints, data: Bytes, rows: Ints, starts: Ints, lengths: Ints) -> int:
+def code_window(state: Ints, data: Bytes, rows: Ints2, starts: Ints, lengths: Ints) -> int:
     """Code ``rows`` (n_rows, n_frequencies) in place; return the row of a fault, or -1.
 
     ``starts`` has the first row of each matrix, and n_rows. ``lengths`` (n_rows,) is filled with
@@ -60,7 +57,6 @@ def code_window(state: Ints, data: Bytes, rows: Ints, starts: Ints, lengths: Int
     return -1
 
 
-@inner
 def _length(row: Ints) -> int:
     n = len(row)
     while n > 0 and row[n - 1] == 0:
@@ -68,7 +64,6 @@ def _length(row: Ints) -> int:
     return n
 
 
-@inner
 def _code_row(state: Ints, data: Bytes, row: Ints, length: int, above: Ints, side: Ints) -> int:
     """Code the first ``length`` coefficients of a row; 1 where that is impossible."""
     last = before = side_1 = side_2 = 0
@@ -96,7 +91,7 @@ def _code_row(state: Ints, data: Bytes, row: Ints, length: int, above: Ints, sid
 
 
 @kernel
-def synthesize_courses(out: Floats, entries: Floats, cosines: Floats) -> None:
+def synthesize_courses(out: Floats2, entries: Floats2, cosines: Floats2) -> None:
     """Add to ``out`` (n_courses, frames) the cosines times ``entries`` (n_courses, n_cosines)."""
     for k in range(len(out)):
         for j in range(entries.shape[1]):
@@ -108,10 +103,10 @@ def synthesize_courses(out: Floats, entries: Floats, cosines: Floats) -> None:
 
 @kernel
 def synthesize(
-    out: Floats,
-    rows: Ints,
+    out: Floats2,
+    rows: Ints2,
     lengths: Ints,
-    temporal: Floats,
+    temporal: Floats2,
     transform: Transform,
     mean: Floats,
 ) -> None:
@@ -121,17 +116,12 @@ def synthesize(
     """
     vectors, starts, columns, step, weights = transform
     n_points = vectors.shape[1]
-    most = np.empty((n_points + 1, BLOCK_FRAMES))
+    sums = np.empty((n_points + 1, BLOCK_FRAMES))
     for begin in range(0, len(out), BLOCK_FRAMES):
         size = min(BLOCK_FRAMES, len(out) - begin)
-        part, sums, course = (
-            temporal[:, begin : begin + size],
-            most[:, :size],
-            most[n_points, :size],
-        )
         for m in range(len(starts) - 1):
             a, b = starts[m], starts[m + 1]
-            _sums(sums, course, rows[a:b], lengths[a:b], part, vectors[a:b])
+            _sums(sums, begin, size, rows[a:b], lengths[a:b], temporal, vectors[a:b])
             for j in range(n_points):
                 c = columns[m, j]
                 weight, start = weights[c], mean[c]  # WIND-15
@@ -139,15 +129,21 @@ def synthesize(
                     out[begin + f, c] = start + (sums[j, f] * step) * weight  # WIND-13
 
 
-@inner
 def _sums(
-    sums: Floats, course: Floats, rows: Ints, lengths: Ints, temporal: Floats, vectors: Floats
+    sums: Floats2,
+    begin: int,
+    n_frames: int,
+    rows: Ints2,
+    lengths: Ints,
+    temporal: Floats2,
+    vectors: Floats2,
 ) -> None:
-    """Write the points of one matrix, (n_points, frames), before step, weight and mean.
+    """Write the points of one matrix in ``n_frames`` frames, before step, weight and mean.
 
-    ``course`` (frames,) is of one row at a time.
+    ``sums`` (n_points + 1, BLOCK_FRAMES) has room for one row of coefficients behind the points.
     """
-    n_points, n_frames = vectors.shape[1], temporal.shape[1]
+    n_points = vectors.shape[1]
+    course = sums[n_points]
     for j in range(n_points):
         sums[j] = 0.0
     for r in range(len(rows)):  # WIND-13
@@ -158,7 +154,7 @@ def _sums(
             if rows[r, k] != 0:
                 index = float(rows[r, k])
                 for f in range(n_frames):
-                    course[f] = course[f] + index * temporal[k, f]
+                    course[f] = course[f] + index * temporal[k, begin + f]
         for j in range(n_points):
             entry = vectors[r, j]
             for f in range(n_frames):

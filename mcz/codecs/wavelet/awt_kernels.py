@@ -9,17 +9,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from mcz.kernels import kernel
+from mcz.kernels.types import Floats, Ints
 
 MASK = (1 << 31) - 1  # a Lehmer generator: the same numbers on every machine
 
 
-@inner
 def following(seed: int) -> int:
     return seed * 48271 % MASK
 

@@ -6,15 +6,14 @@ serves encoder and decoder. Imported on first use only.
 
 from __future__ import annotations
 
-from mcz.coding.mixing import Bytes, Ints
 from mcz.coding.residuals import FAULT, bits, clamp, code_residual, side_of
-from mcz.jit import inner, kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, IntColumns, Ints
 
 MAX_INDEX = 1 << 40  # of a coefficient: sums of neighbors then stay far below 2^53
 OWN = 0, 0  # a stream has contexts and mixers of its own
 
 
-@inner
 def expected(values: Ints, at: int, predictor: int) -> int:
     """An approximation from those before it, by one of the four predictors."""
     step = values[at - 1] - values[at - 2] if at > 1 else 0
@@ -56,7 +55,7 @@ def code_approximations(
 
 @kernel
 def code_details(
-    state: Ints, data: Bytes, values: Ints, count: int, coarser: Ints, shift: int, least: int
+    state: Ints, data: Bytes, values: Ints, count: int, coarser: IntColumns, shift: int, least: int
 ) -> int:
     """Code values[:count] in place; return the index of a fault or -1.
 

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz import jit
+from mcz.kernels import lacks_compiled_kernels
 from mcz.numbers import Grid, GridKind
 from mcz.numbers.magnitudes import POWERS
 from mcz.numbers.tokens import TENS
@@ -35,7 +35,7 @@ def of_products(codes: Ints, unit: float, shifts: int, grid: Grid) -> Ints:
 
     codes = np.ascontiguousarray(codes)
     out = np.full(len(codes), own.PRINTED)
-    all_printed = jit.lacks_compiler() and bool((np.abs(codes) < EXACT).all())
+    all_printed = lacks_compiled_kernels() and bool((np.abs(codes) < EXACT).all())
     if all_printed or own.fill(codes, unit, shifts, TENS, POWERS, grid.digits, out):
         printed = out == own.PRINTED
         few, places = np.unique(codes[printed], return_inverse=True)  # often small ones

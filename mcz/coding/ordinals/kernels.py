@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from mcz.coding import residuals
-from mcz.coding.mixing import Bytes, Ints, mixed, number
+from mcz.coding.mixing import mixed, number
 from mcz.coding.residuals import FAULT, bits, clamp, code_residual
-from mcz.jit import inner, kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Ints, Ints2
 
 # Columns of ``plan``, one row a coded channel.
 BASE, DIGITS, DROP, TOP, SCALE, FROM_LAST, N_TAPS, TAPS = range(8)
@@ -38,13 +39,11 @@ MAX_STEPS_LENGTH = 12
 ZERO_CLASS = 1 << 62
 
 
-@inner
 def beside(value: int, scale: int) -> int:
     """How large ``value`` is beside ``scale``, in octaves, 0 to 7."""
     return clamp(bits(value) - bits(scale) + 3, 0, 7)
 
 
-@inner
 def predict(plan: Ints, track: Ints) -> int:
     total = 16  # LOSS-24
     for tap in range(plan[N_TAPS]):
@@ -52,7 +51,6 @@ def predict(plan: Ints, track: Ints) -> int:
     return (track[LAST] if plan[FROM_LAST] else 0) + (total >> 5)
 
 
-@inner
 def remember(track: Ints, flow: Ints, value: int, predicted: int) -> None:
     """Take in a coded value."""
     difference = clamp(value - track[LAST], -MAX_DIFFERENCE, MAX_DIFFERENCE)  # LOSS-24
@@ -69,7 +67,6 @@ def remember(track: Ints, flow: Ints, value: int, predicted: int) -> None:
     track[SIDE_1] = 0 if error == 0 else 1 if error > 0 else 2
 
 
-@inner
 def code_error(
     state: Ints,
     data: Bytes,
@@ -85,7 +82,6 @@ def code_error(
     return code_residual(state, data, error, negative, scales, near, sides, RESIDUALS)
 
 
-@inner
 def code_class(
     state: Ints, data: Bytes, own: int, zero: int, size: int, fast: int, slow: int, base: Ints
 ) -> int:
@@ -118,7 +114,6 @@ def code_class(
     return guess + 1 + steps if greater else guess - 1 - steps
 
 
-@inner
 def code_steps(state: Ints, data: Bytes, steps: int, greater: int, rf: int, rs: int) -> int:
     """Code how far beyond its neighbor a class is; -1 where that is too far."""
     length = bits(max(steps, 0))
@@ -134,7 +129,6 @@ def code_steps(state: Ints, data: Bytes, steps: int, greater: int, rf: int, rs: 
     return at if at < 2 else 1 << (at - 1) | number(state, data, steps, at - 1)
 
 
-@inner
 def code_plain(
     state: Ints, data: Bytes, ordinal: int, predicted: int, plan: Ints, track: Ints, flow: Ints
 ) -> int:
@@ -151,7 +145,6 @@ def code_plain(
     return int(value << plan[DROP]) | number(state, data, ordinal, plan[DROP])  # LOSS-25
 
 
-@inner
 def code_scaled(
     state: Ints,
     data: Bytes,
@@ -201,7 +194,6 @@ def code_scaled(
     return -1 - magnitude if negative else magnitude
 
 
-@inner
 def code_ordinal(
     state: Ints,
     data: Bytes,
@@ -210,7 +202,7 @@ def code_ordinal(
     plan: Ints,
     track: Ints,
     flow: Ints,
-    powers: Ints,
+    powers: Ints2,
 ) -> int:
     """Code an ordinal against what is ``predicted``; return it, or set BAD."""
     if plan[BASE] == 0:
@@ -222,7 +214,6 @@ def code_ordinal(
     return found
 
 
-@inner
 def code_sign(
     state: Ints, data: Bytes, negative: int, predicted: int, own: int, track: Ints, powers: Ints
 ) -> int:
@@ -236,7 +227,6 @@ def code_sign(
     return 1 if (predicted < 0) != (other == 1) else 0
 
 
-@inner
 def to_mantissa(size: int, shift: int, low: int, high: int, powers: Ints) -> int:
     """A predicted size in fixed point as a mantissa: size / base^shift within low to high."""
     if shift >= 0:
@@ -248,7 +238,6 @@ def to_mantissa(size: int, shift: int, low: int, high: int, powers: Ints) -> int
     return clamp(size * powers[-shift], low, high)
 
 
-@inner
 def from_mantissa(mantissa: int, shift: int, powers: Ints) -> int:
     """A mantissa in fixed point: mantissa * base^shift, halves up."""
     if shift >= 0:
@@ -258,7 +247,6 @@ def from_mantissa(mantissa: int, shift: int, powers: Ints) -> int:
     return int((mantissa + powers[-shift] // 2) // powers[-shift])  # LOSS-27
 
 
-@inner
 def to_scale(track: Ints, shift: int, powers: Ints) -> tuple[int, int]:
     """The scales of a channel in units of its mantissa."""
     if shift >= 0:
@@ -269,7 +257,7 @@ def to_scale(track: Ints, shift: int, powers: Ints) -> tuple[int, int]:
 
 
 @kernel
-def code_rows(state: Ints, data: Bytes, ordinals: Ints, plans: Ints, powers: Ints) -> int:
+def code_rows(state: Ints, data: Bytes, ordinals: Ints2, plans: Ints2, powers: Ints2) -> int:
     """Code all rows of (n_rows, n_channels) ordinals in place; return the row of a fault or -1.
 
     ``powers`` has the powers of 2 in row 0 and those of 10 in row 1.

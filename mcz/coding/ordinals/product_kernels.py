@@ -5,14 +5,9 @@ SPEC.md, "Value to ordinal", is normative. Imported on first use only.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mcz.jit import kernel, truncated
+from mcz.kernels import kernel, truncated
+from mcz.kernels.types import Floats, Ints
 from mcz.numbers.ordinal_kernels import decimal, magnitude_of
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
 
 EXACT = 1 << 53  # up to which quotients of floats are right
 PRINTED = 1 << 62  # no ordinal: the decimal of such a product is to be printed

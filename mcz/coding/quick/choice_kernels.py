@@ -6,7 +6,6 @@ Nothing here is normative: any plan decodes.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcz.coding.quick.kernels import (
     BASE,
@@ -21,14 +20,12 @@ from mcz.coding.quick.kernels import (
     SCALE,
     TAPS,
     TOP,
-    Ints,
     clamp,
     settle,
 )
 from mcz.coding.quick.record_kernels import record_column, spread_column
-from mcz.jit import bit_length, inner, kernel
-
-Floats = NDArray[np.float64]
+from mcz.kernels import bit_length, kernel
+from mcz.kernels.types import Floats, Floats2, Ints, Ints2
 
 FIXED = 4  # predictors of no fitted tap
 FIRST_ROWS = 12  # that the first scale is a mean of
@@ -40,8 +37,7 @@ RIDGE = 1e-9
 MOST = 0x7FFFFFFFFFFFFFFF
 
 
-@inner
-def survey(ordinals: Ints, plan: Ints, max_top: int, powers: Ints) -> None:
+def survey(ordinals: Ints, plan: Ints, max_top: int, powers: Ints2) -> None:
     """Note drop, top and depth; numbers that classes cannot hold become plain ones."""
     greatest = used = 0
     least = MOST
@@ -69,7 +65,6 @@ def survey(ordinals: Ints, plan: Ints, max_top: int, powers: Ints) -> None:
         plan[DROP] = max(0, bit_length(greatest) - BINARY_WIDTH)
 
 
-@inner
 def set_fixed(plan: Ints, order: int) -> None:
     """Polynomials of order 0 to 2 through the last values; 3: nothing is expected."""
     plan[FROM_LAST] = 0 if order == 3 else 1
@@ -81,15 +76,13 @@ def set_fixed(plan: Ints, order: int) -> None:
         plan[TAPS], plan[TAPS + 1] = 2 * TAP_UNIT, -TAP_UNIT
 
 
-@inner
 def quarters(value: int) -> int:
     """About 4 log2 of a positive number: four times the bits of an error that is so large."""
     length = bit_length(value) - 1
     return 4 * length + (4 * value >> length & 3)
 
 
-@inner
-def choose(values: Ints, steps: Ints, plan: Ints, normal: Floats, taps: Floats) -> None:
+def choose(values: Ints, steps: Ints, plan: Ints, normal: Floats2, taps: Floats) -> None:
     """Note the predictor of ``values`` whose errors, in ``steps``, take the fewest bits."""
     fitted = fit(values, plan, normal, taps)
     tap0, tap1, tap2, tap3 = plan[TAPS], plan[TAPS + 1], plan[TAPS + 2], plan[TAPS + 3]
@@ -125,7 +118,6 @@ def choose(values: Ints, steps: Ints, plan: Ints, normal: Floats, taps: Floats) 
         set_fixed(plan, order)
 
 
-@inner
 def first_scale(values: Ints, plan: Ints) -> int:
     """About the mean error in the first rows but one, as a byte of quarters of an octave."""
     last = d0 = d1 = d2 = d3 = total = 0
@@ -147,8 +139,7 @@ def first_scale(values: Ints, plan: Ints) -> int:
     return scale
 
 
-@inner
-def solve(normal: Floats) -> bool:
+def solve(normal: Floats2) -> bool:
     """Solve the equations ``normal`` (MAX_TAPS, MAX_TAPS + 1) in place; the last column is it."""
     for i in range(MAX_TAPS):
         if not normal[i, i] > 0:
@@ -164,8 +155,7 @@ def solve(normal: Floats) -> bool:
     return True
 
 
-@inner
-def fit(values: Ints, plan: Ints, normal: Floats, taps: Floats) -> bool:
+def fit(values: Ints, plan: Ints, normal: Floats2, taps: Floats) -> bool:
     """Note the taps of nearly the least absolute error; False where there are none."""
     n = len(values)
     if n < 8 * MAX_TAPS:
@@ -193,8 +183,7 @@ def fit(values: Ints, plan: Ints, normal: Floats, taps: Floats) -> bool:
     return True
 
 
-@inner
-def weigh(values: Ints, scale: float, spread: float, normal: Floats, taps: Floats) -> None:
+def weigh(values: Ints, scale: float, spread: float, normal: Floats2, taps: Floats) -> None:
     """Fill ``normal`` with the equations, rows weighted by how far ``taps`` are off there.
 
     ``spread`` is about what they are off, 0 for rows that all weigh 1; that of this round is left
@@ -238,7 +227,7 @@ def weigh(values: Ints, scale: float, spread: float, normal: Floats, taps: Float
 
 @kernel
 def plan_columns(
-    columns: Ints, max_tops: Ints, plans: Ints, powers: Ints, scales: Ints, records: Ints
+    columns: Ints2, max_tops: Ints, plans: Ints2, powers: Ints2, scales: Ints, records: Ints2
 ) -> None:
     """Choose how each of ``columns`` (channels, rows) is coded, and note what is coded.
 
@@ -261,7 +250,7 @@ def plan_columns(
 
 
 @kernel
-def record_columns(columns: Ints, plans: Ints, powers: Ints, records: Ints) -> None:
+def record_columns(columns: Ints2, plans: Ints2, powers: Ints2, records: Ints2) -> None:
     """Note what is coded of ``columns`` by ``plans`` as they are."""
     n_rows = columns.shape[1]
     spread = np.zeros((3, n_rows), np.int64)

@@ -25,10 +25,9 @@ from mcz.coding.quick.kernels import (
     TAPS,
     TOP,
     UNIT,
-    Bytes,
-    Ints,
 )
-from mcz.jit import inner, kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Ints, Ints2
 
 OWN_FORM = 128  # in kind: form and drop are in the stream
 MULTIPLES, PRODUCTS, COUNTS = 32, 33, 34  # forms: integers that are multiplied by a unit
@@ -43,7 +42,6 @@ MOST = 0x7FFFFFFFFFFFFFFF
 ENDS, BAD_KIND, BAD_CONSTANT, BAD_FORM, BAD_TOP, BAD_TAPS, BAD_SCALE, BAD_BITS = range(8)
 
 
-@inner
 def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:
     """A varint below 2^53 and the offset behind it; -1 where there is none."""
     value = shift = 0
@@ -59,7 +57,6 @@ def varint(data: Bytes, at: int, end: int) -> tuple[int, int]:
     return 0, -1
 
 
-@inner
 def set_form(head: Ints, form: int, drop: int) -> bool:
     """Note base and digits of a form; False for one that there is not."""
     head[DROP] = drop
@@ -74,7 +71,6 @@ def set_form(head: Ints, form: int, drop: int) -> bool:
     return True
 
 
-@inner
 def read_constant(data: Bytes, at: int, end: int, size: int, head: Ints) -> int:
     """Note a constant of so many bytes; the offset behind it, -1 where there is none."""
     if size > 8 or at + size > end or (size and data[at + size - 1] == 0):
@@ -87,14 +83,12 @@ def read_constant(data: Bytes, at: int, end: int, size: int, head: Ints) -> int:
     return at + size
 
 
-@inner
 def most_classes(form: int) -> int:
     return MAX_TOP_10 if form < 16 else MAX_TOP_24 if form == 88 else MAX_TOP_53
 
 
-@inner
 def read_coded(
-    data: Bytes, at: int, end: int, kind: int, form: int, head: Ints, powers: Ints
+    data: Bytes, at: int, end: int, kind: int, form: int, head: Ints, powers: Ints2
 ) -> tuple[int, int]:
     """Note the head of a coded channel: the offset behind it, or a fault below 0; and what."""
     drop = 0
@@ -161,9 +155,8 @@ def read_coded(
     return at, 0
 
 
-@inner
 def read_head(
-    data: Bytes, at: int, end: int, form: int, head: Ints, powers: Ints
+    data: Bytes, at: int, end: int, form: int, head: Ints, powers: Ints2
 ) -> tuple[int, int]:
     """Note the head of a channel: the offset behind it, or -1; and what is wrong."""
     if at >= end:
@@ -185,7 +178,7 @@ def read_head(
 
 @kernel
 def read_ends(
-    data: Bytes, at: int, end: int, forms: Ints, heads: Ints, ends: Ints, powers: Ints
+    data: Bytes, at: int, end: int, forms: Ints, heads: Ints2, ends: Ints, powers: Ints2
 ) -> int:
     """Note the heads of a stream and where each ends. Returns a fault or -1."""
     for n in range(len(heads)):

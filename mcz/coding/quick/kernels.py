@@ -8,14 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mcz.jit import bit_length, inlined, inner, truncated
-
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
+from mcz.kernels import bit_length, truncated
+from mcz.kernels.types import Bytes, Floats, Ints, Ints2
 
 MAX_TAPS = 4
 # Columns of plans, one row a channel: what its head says,
@@ -62,16 +56,14 @@ class Tables(NamedTuple):
     symbols: Bytes
     frequencies: Ints
     scales: Ints
-    powers: Ints  # of 2 in row 0, of 10 in row 1
+    powers: Ints2  # of 2 in row 0, of 10 in row 1
 
 
-@inner
 def quotient(a: int, b: int) -> int:
     """``a // b`` of numbers that are not negative, quicker where floats are exact."""
     return truncated(float(a) / float(b)) if a < EXACT else a // b
 
 
-@inlined
 def divided(a: int, unit: int, inverse: float) -> int:
     """``a // unit`` of numbers that are not negative, ``inverse`` being 1 / unit."""
     found = truncated(float(a) * inverse)
@@ -79,12 +71,10 @@ def divided(a: int, unit: int, inverse: float) -> int:
     return found - 1 if rest < 0 else found + 1 if rest >= unit else found
 
 
-@inlined
 def clamp(value: int, low: int, high: int) -> int:
     return min(max(value, low), high)
 
 
-@inlined
 def eight_bytes(data: Bytes, at: int) -> int:
     """The number of 64 bits that the bytes from ``at`` on are, the first one the greatest."""
     k = at & WORD
@@ -93,13 +83,11 @@ def eight_bytes(data: Bytes, at: int) -> int:
     return high | mid | int(data[k + 6]) << 8 | int(data[k + 7])
 
 
-@inlined
 def window(data: Bytes, i: int) -> int:
     """At least 56 bits from bit ``i`` on: ``data`` is a number whose last byte is the lowest."""
     return eight_bytes(data, len(data) - 8 - (i >> 3)) >> (int(i) & 7)
 
 
-@inlined
 def bits_at(data: Bytes, i: int, n: int) -> int:
     """``n`` bits, at most 63, from bit ``i`` on."""
     if n > 56:
@@ -109,8 +97,7 @@ def bits_at(data: Bytes, i: int, n: int) -> int:
     return found
 
 
-@inner
-def from_mantissa(mantissa: int, shift: int, row: int, powers: Ints) -> int:
+def from_mantissa(mantissa: int, shift: int, row: int, powers: Ints2) -> int:
     """A mantissa in fixed point: mantissa * base^shift, halves up."""
     if shift >= 0:
         return int(mantissa * powers[row, shift])
@@ -118,8 +105,7 @@ def from_mantissa(mantissa: int, shift: int, row: int, powers: Ints) -> int:
     return 0 if unit > 2 * mantissa else quotient(mantissa + unit // 2, unit)
 
 
-@inner
-def class_of(size: int, own: int, plan: Ints, powers: Ints) -> int:
+def class_of(size: int, own: int, plan: Ints, powers: Ints2) -> int:
     """The class of a size, by digits, not below the lowest and 1; the search begins at ``own``."""
     row, least = plan[ROW], plan[LEAST]
     own = max(own, least, 1)
@@ -130,8 +116,7 @@ def class_of(size: int, own: int, plan: Ints, powers: Ints) -> int:
     return own
 
 
-@inner
-def settle(plan: Ints, powers: Ints) -> None:
+def settle(plan: Ints, powers: Ints2) -> None:
     """Fill in what follows from the head of a coded channel."""
     base = plan[BASE]
     plan[ROW] = 1 if base == 10 else 0
@@ -144,8 +129,7 @@ def settle(plan: Ints, powers: Ints) -> None:
     plan[LIMIT] = powers[plan[ROW], plan[WIDTH]] - 1 if base else MAX_PLAIN
 
 
-@inner
-def enter_class(size: int, plan: Ints, track: Ints, powers: Ints) -> None:
+def enter_class(size: int, plan: Ints, track: Ints, powers: Ints2) -> None:
     """Note the class of a predicted size in ``track``."""
     own = class_of(size, track[OWN], plan, powers)
     row, shift = plan[ROW], own - plan[DIGITS]
@@ -156,8 +140,7 @@ def enter_class(size: int, plan: Ints, track: Ints, powers: Ints) -> None:
     track[OFFSET] = 1 + (own - plan[LEAST]) * plan[PER_CLASS] - plan[LOW]
 
 
-@inner
-def of_rank(rank: int, plan: Ints, powers: Ints) -> tuple[int, int, bool]:
+def of_rank(rank: int, plan: Ints, powers: Ints2) -> tuple[int, int, bool]:
     """Of a rank: value in fixed point, ordinal, and whether there is such a one."""
     minus = rank >> 63
     magnitude = rank ^ minus
@@ -172,8 +155,7 @@ def of_rank(rank: int, plan: Ints, powers: Ints) -> tuple[int, int, bool]:
     return (value ^ minus) - minus, ordinal ^ minus, k <= plan[DEPTH]  # FAST-10
 
 
-@inner
-def first_value(data: Bytes, i: int, plan: Ints, powers: Ints) -> tuple[int, int, int, bool]:
+def first_value(data: Bytes, i: int, plan: Ints, powers: Ints2) -> tuple[int, int, int, bool]:
     """Decode the first value of a channel: (next bit, value in fixed point, ordinal, all right)."""
     n = bits_at(data, i, LENGTH_BITS)
     i += LENGTH_BITS
@@ -192,7 +174,6 @@ def first_value(data: Bytes, i: int, plan: Ints, powers: Ints) -> tuple[int, int
     return i + plan[DROP], rank, ordinal, -MAX_PLAIN <= rank < MAX_PLAIN  # FAST-11
 
 
-@inlined
 def next_value(
     data: Bytes,
     tables: Tables,

@@ -27,15 +27,14 @@ from mcz.coding.quick.kernels import (
     TABLE,
     TABLE_BITS,
     TAPS,
-    Bytes,
-    Ints,
     Tables,
     clamp,
     class_of,
     from_mantissa,
     quotient,
 )
-from mcz.jit import bit_length, inner, kernel
+from mcz.kernels import bit_length, kernel
+from mcz.kernels.types import Bytes, Ints, Ints2
 
 # Columns of ``records``, one row a value.
 CONTEXT, SYMBOL, N_RAW, RAW, N_DROPPED, DROPPED = range(6)  # of FAR and more the length is added
@@ -44,8 +43,7 @@ MAX_VALUE_SIZE = 12  # bytes of bits beside a symbol
 NEW = -1  # context of a first value, whose symbol is its length
 
 
-@inner
-def expected_of(size: int, own: int, plan: Ints, powers: Ints) -> int:
+def expected_of(size: int, own: int, plan: Ints, powers: Ints2) -> int:
     """The magnitude of the rank that is nearest to ``size``, whose class is ``own``."""
     row, shift = plan[ROW], own - plan[DIGITS]
     if size < powers[row, own - 1]:
@@ -58,8 +56,7 @@ def expected_of(size: int, own: int, plan: Ints, powers: Ints) -> int:
     return int(1 + (own - plan[LEAST]) * plan[PER_CLASS] + mantissa - plan[LOW])
 
 
-@inner
-def spread_column(ordinals: Ints, plan: Ints, powers: Ints, spread: Ints) -> None:
+def spread_column(ordinals: Ints, plan: Ints, powers: Ints2, spread: Ints2) -> None:
     """Fill ``spread`` (3, n_rows): ranks, values in fixed point, and the size of a step there."""
     drop, per_class = plan[DROP], plan[PER_CLASS]
     for t in range(len(ordinals)):
@@ -82,8 +79,7 @@ def spread_column(ordinals: Ints, plan: Ints, powers: Ints, spread: Ints) -> Non
         spread[2, t] = step
 
 
-@inner
-def record_column(ordinals: Ints, spread: Ints, plan: Ints, powers: Ints, records: Ints) -> None:
+def record_column(ordinals: Ints, spread: Ints2, plan: Ints, powers: Ints2, records: Ints2) -> None:
     """Fill ``records`` with what is coded."""
     base, drop, from_last, f = plan[BASE], plan[DROP], plan[FROM_LAST], plan[SCALE] << 4
     limit, own = plan[LIMIT], 0
@@ -130,7 +126,6 @@ def record_column(ordinals: Ints, spread: Ints, plan: Ints, powers: Ints, record
         records[t, DROPPED] = ordinals[t] & ((1 << drop) - 1)
 
 
-@inner
 def put(data: Bytes, i: int, value: int, n: int) -> int:
     """Append ``n`` bits to ``data``, which is 0 behind bit ``i``; the bit behind them."""
     end = i + n
@@ -142,8 +137,7 @@ def put(data: Bytes, i: int, value: int, n: int) -> int:
     return end
 
 
-@inner
-def write_bits(records: Ints, data: Bytes) -> int:
+def write_bits(records: Ints2, data: Bytes) -> int:
     """Write all that is no symbol to ``data``, which is 0; how many bits there are."""
     i = 0
     for t in range(len(records)):
@@ -159,8 +153,7 @@ def write_bits(records: Ints, data: Bytes) -> int:
     return i
 
 
-@inner
-def write_words(records: Ints, tables: Tables, words: Ints) -> tuple[int, int]:
+def write_words(records: Ints2, tables: Tables, words: Ints) -> tuple[int, int]:
     """Code the symbols: the state, and how many ``words`` follow it, the last of them first."""
     x, at = LEAST_STATE, 0
     for t in range(len(records) - 1, -1, -1):
@@ -178,7 +171,7 @@ def write_words(records: Ints, tables: Tables, words: Ints) -> tuple[int, int]:
 
 @kernel
 def write_records(
-    records: Ints, ends: Ints, tables: Tables, words: Ints, data: Bytes, sizes: Ints
+    records: Ints2, ends: Ints, tables: Tables, words: Ints, data: Bytes, sizes: Ints2
 ) -> None:
     """Code the records of groups, which end at ``ends``.
 

@@ -22,9 +22,6 @@ from mcz.coding.quick.kernels import (
     RESTS,
     SCALE,
     TRACK_SIZE,
-    Bytes,
-    Floats,
-    Ints,
     Tables,
     bits_at,
     clamp,
@@ -32,7 +29,8 @@ from mcz.coding.quick.kernels import (
     next_value,
     settle,
 )
-from mcz.jit import inner, kernel
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints, Ints2
 
 # Of a lane, which decodes one stream after the other: the state, or 0; the offset of the next head
 # or word; the next bit, and the first one; where the stream ends; its first channel, the next one
@@ -59,12 +57,11 @@ class Streams(NamedTuple):
 class Rows(NamedTuple):
     """What is decoded, (rows, channels); ``rests``: what is to be added, perhaps no columns."""
 
-    ordinals: Ints
-    rests: Ints
+    ordinals: Ints2
+    rests: Ints2
 
 
-@inner
-def read_own_head(data: Bytes, flow: Ints, form: int, plan: Ints, powers: Ints) -> int:
+def read_own_head(data: Bytes, flow: Ints, form: int, plan: Ints, powers: Ints2) -> int:
     """Read the next head of a stream; -1, or what is wrong with it."""
     at, fault = read_head(data, flow[AT], flow[END], form, plan, powers)
     if at < 0:
@@ -75,7 +72,6 @@ def read_own_head(data: Bytes, flow: Ints, form: int, plan: Ints, powers: Ints) 
     return -1
 
 
-@inner
 def start_values(data: Bytes, flow: Ints) -> bool:
     """Read the state behind the heads; whether it is one."""
     at = flow[AT]
@@ -85,7 +81,6 @@ def start_values(data: Bytes, flow: Ints) -> bool:
     return x >= LEAST_STATE  # FAST-07
 
 
-@inner
 def ends_well(data: Bytes, flow: Ints) -> bool:
     """Whether a stream that is decoded has neither words nor bits left."""
     if flow[X] == 0:  # nor had it any
@@ -100,7 +95,6 @@ def ends_well(data: Bytes, flow: Ints) -> bool:
     return whole and started
 
 
-@inner
 def read_channel(
     streams: Streams,
     tables: Tables,
@@ -109,7 +103,7 @@ def read_channel(
     track: Ints,
     inverse: Floats,
     n: int,
-    out: Ints,
+    out: Ints2,
 ) -> bool:
     """Decode a channel of a stream to column ``n`` of ``out``; False where that fails."""
     data, column = streams.data, out[:, n]
@@ -132,15 +126,14 @@ def read_channel(
     return good
 
 
-@inner
 def read_two(
     streams: Streams,
     tables: Tables,
-    plans: Ints,
-    flows: Ints,
-    tracks: Ints,
-    inverses: Floats,
-    out: Ints,
+    plans: Ints2,
+    flows: Ints2,
+    tracks: Ints2,
+    inverses: Floats2,
+    out: Ints2,
 ) -> int:
     """Decode the next channels of both lanes, as ``read_channel`` does; the lane that fails, or -1.
 
@@ -197,9 +190,8 @@ def read_two(
     return -1 if good_b else 1
 
 
-@inner
 def open_stream(
-    streams: Streams, group: int, plans: Ints, powers: Ints, flow: Ints, out: Ints
+    streams: Streams, group: int, plans: Ints2, powers: Ints2, flow: Ints, out: Ints2
 ) -> int:
     """Read the heads of a stream and fill in its constants.
 
@@ -225,16 +217,15 @@ def open_stream(
     return -1
 
 
-@inner
 def close_stream(
     streams: Streams,
     tables: Tables,
-    plans: Ints,
+    plans: Ints2,
     rest: Ints,
     flow: Ints,
     track: Ints,
     inverse: Floats,
-    rests: Ints,
+    rests: Ints2,
 ) -> int:
     """Decode the rests of a stream whose channels are decoded: a channel that fails, or -1."""
     for n in range(flow[FIRST], flow[STOP]):
@@ -247,7 +238,7 @@ def close_stream(
 
 
 @kernel
-def read_streams(streams: Streams, plans: Ints, rows: Rows, tables: Tables) -> tuple[int, int]:
+def read_streams(streams: Streams, plans: Ints2, rows: Rows, tables: Tables) -> tuple[int, int]:
     """Decode streams: fill ``plans`` and ``rows.ordinals``, all but copies.
 
     Returns channel and fault, or -1 -1. To add rests is left to the caller; ``NO_ROOM`` says that

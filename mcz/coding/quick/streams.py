@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz import jit
 from mcz.coding.ordinals.choices import Lattice, base_and_digits, max_top
 from mcz.coding.ordinals.counts import parse_law
 from mcz.coding.ordinals.degrees import of_products
@@ -29,6 +28,7 @@ from mcz.coding.ordinals.heads import (
 from mcz.coding.ordinals.streams import constant_head, in_units
 from mcz.coding.ordinals.units import of_multiples
 from mcz.errors import FormatError
+from mcz.kernels import lacks_compiled_kernels
 from mcz.numbers import Grid, GridKind
 from mcz.schema import varint
 
@@ -259,7 +259,7 @@ def parse_streams(
 
 def _read(streams: Any, plans: Ints, rows: Any) -> tuple[int, int]:
     """The streams decoded, compiled or in the quickest plain Python: see ``read_streams``."""
-    if jit.lacks_compiler():
+    if lacks_compiled_kernels():
         from mcz.coding.quick import plain
 
         return plain.read_streams(streams, plans, rows)

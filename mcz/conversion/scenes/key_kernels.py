@@ -9,19 +9,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mcz.jit import inner, kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bytes = NDArray[np.uint8]
+from mcz.kernels import kernel
+from mcz.kernels.types import Bytes, Floats, Floats2, Ints
 
 STRAIGHT = 1e-12  # square of the distance of two quaternions between which all is linear
 
 
 @kernel
-def choose(times: Floats, exact: Floats, rounded: Floats, limits: Floats, kept: Bytes) -> None:
+def choose(times: Floats, exact: Floats2, rounded: Floats2, limits: Floats, kept: Bytes) -> None:
     """Mark in ``kept`` (n_frames,) which frames become keys: from each the farthest that will do.
 
     ``exact`` (n_frames, 3 or 4) is what is wanted, ``rounded`` what a key has; ``limits``
@@ -50,11 +46,10 @@ def choose(times: Floats, exact: Floats, rounded: Floats, limits: Floats, kept: 
         kept[first] = 1
 
 
-@inner
 def _fits(
     times: Floats,
-    exact: Floats,
-    rounded: Floats,
+    exact: Floats2,
+    rounded: Floats2,
     limits: Floats,
     first: int,
     last: int,
@@ -78,7 +73,6 @@ def _fits(
     return True
 
 
-@inner
 def _angle(one: Floats, other: Floats, width: int) -> float:
     """Of quaternions the angle between them, 0 where linear will do; -1 beyond 90 degrees."""
     if width == 3:
@@ -98,7 +92,6 @@ def _angle(one: Floats, other: Floats, width: int) -> float:
     return 2.0 * angle
 
 
-@inner
 def _between(
     one: Floats, other: Floats, width: int, angle: float, share: float, out: Floats
 ) -> None:
@@ -117,7 +110,7 @@ def _between(
 
 
 @kernel
-def fill(times: Floats, frames: Ints, keys: Floats, first: int, key: int, out: Floats) -> None:
+def fill(times: Floats, frames: Ints, keys: Floats2, first: int, key: int, out: Floats2) -> None:
     """Write to ``out`` (n, 3 or 4) what keys make of the frames from ``first`` on.
 
     ``frames`` (n_keys,) and ``keys`` (n_keys, 3 or 4); key number ``key`` is the last one that is
@@ -145,12 +138,12 @@ def fill(times: Floats, frames: Ints, keys: Floats, first: int, key: int, out: F
 
 @kernel
 def hang(
-    above_turns: Floats,
-    above_places: Floats,
-    turns: Floats,
-    shifts: Floats,
-    out_turns: Floats,
-    out_places: Floats,
+    above_turns: Floats2,
+    above_places: Floats2,
+    turns: Floats2,
+    shifts: Floats2,
+    out_turns: Floats2,
+    out_places: Floats2,
 ) -> None:
     """Where a node is in the world, from where its parent is and how it hangs there.
 

@@ -17,7 +17,7 @@ from bpy.props import (
 from bpy_extras.io_utils import ImportHelper
 
 import mcz
-from mcz.jit import lacks_compiler
+from mcz.kernels import lacks_compiled_kernels
 
 from .clips import SUFFIXES, Wanted, found, loaded
 from .scenes import Settings, put
@@ -128,9 +128,9 @@ class ImportMCZ(bpy.types.Operator, ImportHelper):
 
 
 def tell_what_is_slow(layout: Any) -> None:
-    """A line where loops are not compiled."""
-    if lacks_compiler():
-        layout.label(text="Without llvmlite all but 'fast' takes long", icon="INFO")
+    """Say so where kernels are not compiled."""
+    if lacks_compiled_kernels():
+        layout.label(text="Without compiled kernels all but 'fast' takes long", icon="INFO")
 
 
 def bring(

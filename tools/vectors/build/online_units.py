@@ -20,7 +20,6 @@ from mcz.codecs.online.units import Unit, build_units
 from mcz.coding import mixing
 from mcz.coding.residuals import N_CONTEXTS, N_MIXERS, code_residual
 from mcz.coding.start import start_states
-from mcz.jit import kernel
 from tools.vectors.build import spatial_clips
 from tools.vectors.build.spatial_clips import FRAME, Ints, waves
 
@@ -105,17 +104,14 @@ def header(plan: Plan, **parts: bytes) -> bytes:
 # Streams
 
 
-@kernel
 def _adaptive(state: Ints, data: Any, bit: int, context: int) -> int:
     return mixing.adaptive(state, data, bit, context)
 
 
-@kernel
 def _number(state: Ints, data: Any, value: int, n: int) -> int:
     return mixing.number(state, data, value, n)
 
 
-@kernel
 def _residual(
     state: Ints, data: Any, value: int, scales: tuple[int, int], near: int, sides: Any, which: int
 ) -> int:

@@ -21,7 +21,6 @@ from mcz.coding.residuals import bits, code_residual, side_of
 from mcz.coding.start import start_states
 from mcz.coding.streams import code
 from mcz.container import payloads
-from mcz.jit import kernel
 from mcz.motion import Motion
 from mcz.schema import build, parse, varint
 from tools.vectors.build.edits import Edit, stream, swap
@@ -80,7 +79,6 @@ def _code(plan: Plan, state: Ints, data: NDArray[np.uint8], table: Ints) -> int:
     return int(windows.code_window(state, data, table, starts, np.zeros(len(table), np.int64)))
 
 
-@kernel
 def _code_longer_row(state: Ints, data: Any, row: Ints, n: int) -> bool:
     """Code the only row of a window of ``n`` frequencies, all of ``row`` as its length."""
     length = len(row)
@@ -98,7 +96,6 @@ def _code_longer_row(state: Ints, data: Any, row: Ints, n: int) -> bool:
     return True
 
 
-@kernel
 def _code_longer_frame(state: Ints, data: Any, row: Ints) -> bool:
     """Code the only frame, a fresh one of one matrix, all of ``row`` as its length."""
     code_residual(state, data, len(row), 0, (0, 0), 0, (0, 0, 0), (0, 0))

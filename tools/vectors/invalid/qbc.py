@@ -18,7 +18,6 @@ from mcz.codecs.parameters import SCALED
 from mcz.coding.mixing import mixed
 from mcz.coding.residuals import bits, code_residual
 from mcz.container import payloads
-from mcz.jit import kernel
 from mcz.numbers import Grid, GridKind
 from mcz.schema import build, varint
 from tools.vectors.build import curve_clips
@@ -328,7 +327,6 @@ def _power(point: int) -> str:
     return "2^40 + 1" if point > 0 else "-2^40 - 1"
 
 
-@kernel
 def _code_long_way(
     state: curve_clips.Ints, data: Any, left: int, length: int, error: int, scale: int
 ) -> bool:

@@ -12,7 +12,6 @@ import numpy as np
 
 from mcz.codecs.basis_models import Basis
 from mcz.coding.residuals import code_residual
-from mcz.jit import kernel
 from tools.vectors.build.edits import Edit, plus, stream
 from tools.vectors.build.files import Broken, rehash
 from tools.vectors.build.spatial_clips import (
@@ -95,7 +94,6 @@ def _coefficients(shelf: Broken, name: str) -> None:
         shelf.add(case, spec, f"{purpose}.", _with(plan, said))
 
 
-@kernel
 def _code_length(state: Ints, data: Any, length: int, expected: int, near: int) -> bool:
     """Code the first length of a stream."""
     code_residual(state, data, length, 0, (16 * expected, 16 * expected), near, (0, 0, 0), (0, 0))

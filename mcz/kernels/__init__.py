@@ -1,0 +1,133 @@
+"""Kernels: hot loops in Python, compiled by Cython when the package is built.
+
+A kernel is a function of numbers, arrays and NamedTuples of both (``types``), with all functions
+that it calls. The build declares their types in C and compiles them (``tools/kernels``); the same
+source runs as plain Python, 50 to 500 times slower, where nothing was compiled or where a source
+has changed since. SPEC.md's integers are of 64 bits and wrap around; Python's do not, and no kernel
+relies on more.
+
+``MCZ_LOOPS`` in the environment chooses: ``compiled``; ``checked``, compiled with an IndexError for
+an index out of range, for tests; ``sanitized``, for fuzzing; ``interpreted``, plain Python.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import warnings
+from collections.abc import Callable
+from functools import cache, wraps
+from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import ParamSpec, TypeVar, cast
+
+from mcz.kernels.units import UNIT_OF
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+MODES = COMPILED, CHECKED, SANITIZED, INTERPRETED = (
+    "compiled",
+    "checked",
+    "sanitized",
+    "interpreted",
+)
+MODE = os.environ.get("MCZ_LOOPS") or COMPILED
+if MODE not in MODES:
+    raise ValueError(f"MCZ_LOOPS={MODE}: one of {', '.join(MODES)}")
+PACKAGE = Path(__file__).parents[1]
+SLOW = "kernels run as plain Python, 50 to 500 times slower: "
+
+
+def kernel(function: Callable[P, T]) -> Callable[P, T]:
+    """``function`` as Python calls it: compiled where it can be."""
+    if MODE == INTERPRETED:
+        return function
+    unit, fault = _unit(UNIT_OF[function.__module__])
+    if unit is None:
+        return _interpreted(function, fault)
+    name = f"{function.__module__.removeprefix('mcz.').replace('.', '_')}__{function.__name__}"
+    compiled = cast(Callable[P, T], getattr(unit, f"call_{name}"))
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> T:
+        return compiled(*args, **kwargs)
+
+    return call
+
+
+def _interpreted(function: Callable[P, T], fault: str) -> Callable[P, T]:
+    """``function`` as plain Python; says once how slow that is."""
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> T:
+        import numpy as np
+
+        _warn(SLOW + fault)
+        with np.errstate(all="ignore"):  # compiled, numbers wrap and overflow silently
+            return function(*args, **kwargs)
+
+    return call
+
+
+@cache
+def lacks_compiled_kernels() -> bool:
+    """Whether kernels run as plain Python though none asked for that: some work has another way."""
+    return MODE != INTERPRETED and any(_unit(name)[0] is None for name in set(UNIT_OF.values()))
+
+
+@cache
+def _unit(name: str) -> tuple[ModuleType | None, str]:
+    """A compiled module, or None and why there is none."""
+    folder = PACKAGE / "kernels" / MODE
+    files = (folder / (name + suffix) for suffix in EXTENSION_SUFFIXES)
+    path = next((file for file in files if file.is_file()), None)
+    if path is None:
+        return None, "no compiled ones are installed"
+    full = f"mcz.kernels.{MODE}.{name}"
+    loader = ExtensionFileLoader(full, str(path))
+    spec = spec_from_file_location(full, path, loader=loader)
+    assert spec is not None
+    module = module_from_spec(spec)
+    loader.exec_module(module)
+    changed = changed_source(module.SOURCES)
+    if changed:
+        return None, f"mcz/{changed} is newer than its compiled form; build it anew"
+    return module, ""
+
+
+def changed_source(digests: dict[str, str]) -> str:
+    """The first of the sources that differs from what was compiled, or nothing.
+
+    ``digests``: SHA-256 of files in the package. A file that is not there changes nothing.
+    """
+    for path, digest in digests.items():
+        try:
+            found = _digest(PACKAGE / path)
+        except OSError:
+            continue
+        if found != digest:
+            return path
+    return ""
+
+
+@cache
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@cache
+def _warn(text: str) -> None:
+    warnings.warn(text, RuntimeWarning, stacklevel=3)
+
+
+def bit_length(value: int) -> int:
+    """Bits of ``value`` >= 0 without leading zeros."""
+    return int(value).bit_length()
+
+
+def truncated(value: float) -> int:
+    """``int(value)``, quicker than that, of values below 2^63 in size."""
+    return int(value)

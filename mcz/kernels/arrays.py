@@ -1,0 +1,47 @@
+"""The door of kernels: arrays as compiled kernels take them, whatever arrays are given."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Moved = list[tuple[NDArray[Any], NDArray[Any]]]  # what was given, what was taken for it
+SOUND = 0x1 | 0x100  # flags of an array: contiguous, aligned
+WRITEABLE = 0x400
+
+
+def fit(
+    given: Any, dtype: np.dtype[Any], rank: int, dense: bool, is_written: bool, moved: Moved
+) -> NDArray[Any]:
+    """``given`` with this dtype and number of axes, aligned, contiguous where ``dense``.
+
+    It is copied where it is not so. A copy of an array that the kernel writes is noted in
+    ``moved``, for ``restore``. Raises TypeError for other dtypes, ValueError for another number of
+    axes and for a read-only array that is to be written.
+    """
+    if type(given) is np.ndarray and given.dtype is dtype:
+        wanted = SOUND | WRITEABLE if is_written else SOUND
+        if given.flags.num & wanted == wanted and given.ndim == rank:
+            return given.view(np.uint8) if dtype.kind == "b" else given
+    array = np.asarray(given)
+    if array.ndim != rank:
+        raise ValueError(f"an array of {array.ndim} axes where a kernel has {rank}")
+    if array.dtype.newbyteorder("=") != dtype:
+        raise TypeError(f"an array of {array.dtype} where a kernel has {dtype}")
+    if is_written and not array.flags.writeable:
+        raise ValueError("a kernel writes to this array, which is read-only")
+    flags = array.flags
+    if not (flags.aligned and array.dtype.isnative and (flags.c_contiguous or not dense)):
+        copy = np.array(array, dtype=dtype, order="C")
+        if is_written:
+            moved.append((array, copy))
+        array = copy
+    return array.view(np.uint8) if dtype.kind == "b" else array
+
+
+def restore(moved: Moved) -> None:
+    """Write what a kernel has written to copies to the arrays that were given."""
+    for given, copy in moved:
+        given[...] = copy

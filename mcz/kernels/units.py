@@ -1,0 +1,62 @@
+"""The extension modules that kernels are compiled to, by family; each has what its kernels call."""
+
+from __future__ import annotations
+
+UNITS: dict[str, tuple[str, ...]] = {
+    "fast": (
+        "mcz.coding.quick.choice_kernels",
+        "mcz.coding.quick.head_kernels",
+        "mcz.coding.quick.record_kernels",
+        "mcz.coding.quick.stream_kernels",
+    ),
+    "best": (
+        "mcz.coding.mixing",
+        "mcz.coding.ordinals.kernels",
+        "mcz.codecs.table_kernels",
+        "mcz.codecs.lossless.best_kernels",
+    ),
+    "numbers": (
+        "mcz.coding.ordinals.product_kernels",
+        "mcz.formats.text_kernels",
+        "mcz.numbers.kernels",
+        "mcz.numbers.ordinal_kernels",
+        "mcz.numbers.value_kernels",
+    ),
+    "curves": (
+        "mcz.codecs.curves.fit_kernels",
+        "mcz.codecs.curves.kernels",
+        "mcz.codecs.pca.kernels",
+    ),
+    "online": ("mcz.codecs.online.kernels",),
+    "spatial": (
+        "mcz.codecs.spatial.lsdt_frame_kernels",
+        "mcz.codecs.spatial.prefix_kernels",
+        "mcz.codecs.spatial.window_kernels",
+        "mcz.transforms.lsdt_kernels",
+    ),
+    "wavelets": (
+        "mcz.codecs.wavelet.awt_kernels",
+        "mcz.codecs.wavelet.kernels",
+        "mcz.transforms.dwt_kernels",
+        "mcz.transforms.lifting_kernels",
+    ),
+    "metric": (
+        "mcz.codecs.posewave.apply_kernels",
+        "mcz.codecs.posewave.contact_kernels",
+        "mcz.codecs.posewave.course_kernels",
+        "mcz.codecs.posewave.metric_kernels",
+        "mcz.codecs.posewave.order_kernels",
+    ),
+    "rows": (
+        "mcz.codecs.posewave.displacement_kernels",
+        "mcz.codecs.posewave.head_kernels",
+        "mcz.codecs.posewave.model_kernels",
+    ),
+    "motion": (
+        "mcz.conversion.scenes.key_kernels",
+        "mcz.kinematics.single_kernels",
+        "mcz.recovery.kernels",
+        "mcz.transforms.post_filter_kernels",
+    ),
+}
+UNIT_OF = {module: unit for unit, modules in UNITS.items() for module in modules}

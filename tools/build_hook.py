@@ -1,0 +1,83 @@
+"""What hatchling does beside copying files: the page of ``mcz view``, and kernels compiled.
+
+The page has to be built before; a build without it fails, but for ``MCZ_BUILD_WITHOUT_VIEWER=1``.
+
+``MCZ_BUILD`` says how kernels are built: ``compiled``, ``checked`` and ``sanitized`` as
+``mcz.kernels`` has them, and the build fails where that cannot be done; ``interpreted``, not at
+all. By default they are compiled, by the compiler of Zig where there is no other, and left out
+where none can be had: the package then works, and says how slow it is.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+PAGE = "tools/viewer/dist/viewer.html"
+PLACES = {"wheel": "mcz/viewing/viewer.html", "sdist": PAGE}
+WITHOUT = "MCZ_BUILD_WITHOUT_VIEWER"
+MODE = os.environ.get("MCZ_BUILD", "")
+SLOW = "kernels are not compiled and run 50 to 500 times slower"
+
+
+class Hook(BuildHookInterface):  # type: ignore[type-arg]
+    def dependencies(self) -> list[str]:
+        """Zig, where there is no compiler and Zig can be fetched."""
+        if self.target_name != "wheel" or MODE == "interpreted" or self._compiling().compiler():
+            return []
+        return ["ziglang"] if can_fetch("ziglang") else []
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Add the page and the kernels. Raises SystemExit without the page."""
+        if version != "editable" and not os.environ.get(WITHOUT):
+            if not Path(self.root, PAGE).is_file():
+                raise SystemExit(
+                    f"{PAGE} is not built: (cd tools/viewer && npm ci && npm run build), "
+                    f"or set {WITHOUT}=1 to leave the viewer out"
+                )
+            build_data["force_include"][PAGE] = PLACES[self.target_name]
+        if self.target_name == "wheel" and MODE != "interpreted":
+            self._add_kernels(version, build_data)
+
+    def _add_kernels(self, version: str, build_data: dict[str, Any]) -> None:
+        mode = MODE or "compiled"
+        inside = f"mcz/kernels/{mode}"
+        where = inside if version == "editable" else f"build/{inside}"
+        try:
+            made = self._compiling().build(Path(self.root, where), mode)
+        except (OSError, subprocess.CalledProcessError) as fault:
+            if MODE:
+                raise
+            self.app.display_warning(f"{SLOW}: {fault}")
+            return
+        build_data["pure_python"], build_data["infer_tag"] = False, True
+        if version != "editable":
+            build_data["force_include"].update({str(p): f"{inside}/{p.name}" for p in made})
+
+    def _compiling(self) -> Any:
+        if self.root not in sys.path:
+            sys.path.insert(0, self.root)
+        from tools.kernels import compiling
+
+        return compiling
+
+
+def can_fetch(name: str) -> bool:
+    """Whether pip finds a package; nothing is installed."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}  # pip's own is outside
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "pip", "index", "versions", name],
+            env=environment,
+            capture_output=True,
+            timeout=60,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0

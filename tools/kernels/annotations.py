@@ -1,0 +1,113 @@
+"""Types of kernels: what an annotation is in C."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+
+
+class KernelError(Exception):
+    """A kernel that is written in more than can be declared."""
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A number; ``c`` is its type in C."""
+
+    name: str
+    c: str
+
+
+INT, FLOAT = Scalar("int", "long long"), Scalar("float", "double")
+BOOL, NOTHING = Scalar("bool", "bint"), Scalar("None", "int")
+
+
+@dataclass(frozen=True)
+class Array:
+    """A memoryview; ``dense``: its last axis is contiguous."""
+
+    item: str
+    rank: int
+    dense: bool = True
+
+    def c(self, *, written: bool) -> str:
+        """The type in Cython."""
+        axes = [":"] * self.rank
+        if self.dense:
+            axes[-1] = "::1"
+        return f"{'' if written else 'const '}{ITEMS[self.item][0]}[{', '.join(axes)}]"
+
+
+ITEMS = {  # type in C, number that an item is
+    "int64": ("long long", INT),
+    "float64": ("double", FLOAT),
+    "uint8": ("unsigned char", INT),
+    "bool": ("unsigned char", BOOL),
+}
+
+
+@dataclass(frozen=True)
+class Tuple:
+    """Numbers side by side."""
+
+    items: tuple[Scalar, ...]
+
+    @property
+    def c(self) -> str:
+        return f"({', '.join(item.c for item in self.items)})"
+
+
+@dataclass(frozen=True)
+class Record:
+    """A NamedTuple: a struct where all fields are numbers, otherwise an extension class."""
+
+    name: str  # with its module
+    fields: tuple[tuple[str, Type], ...]
+
+    @property
+    def c(self) -> str:
+        return self.name
+
+    @property
+    def is_struct(self) -> bool:
+        return all(isinstance(type_, Scalar) for _, type_ in self.fields)
+
+
+Type = Scalar | Array | Tuple | Record
+SCALARS = {"int": INT, "float": FLOAT, "bool": BOOL, "None": NOTHING}
+ARRAYS: dict[str, Type] = {
+    "Ints": Array("int64", 1),
+    "Ints2": Array("int64", 2),
+    "Ints3": Array("int64", 3),
+    "IntColumn": Array("int64", 1, dense=False),
+    "IntColumns": Array("int64", 2, dense=False),
+    "FlagColumn": Array("bool", 1, dense=False),
+    "Floats": Array("float64", 1),
+    "Floats2": Array("float64", 2),
+    "Floats3": Array("float64", 3),
+    "Floats4": Array("float64", 4),
+    "FloatColumn": Array("float64", 1, dense=False),
+    "FloatColumns": Array("float64", 2, dense=False),
+    "Bytes": Array("uint8", 1),
+    "Bytes2": Array("uint8", 2),
+    "Flags": Array("bool", 1),
+    "Flags2": Array("bool", 2),
+}
+
+
+def simple_type(node: ast.expr) -> Type | None:
+    """The type of an annotation that names no other module's; None of another."""
+    if isinstance(node, ast.Constant) and node.value is None:
+        return NOTHING
+    if isinstance(node, ast.Name):
+        return SCALARS.get(node.id) or ARRAYS.get(node.id)
+    if (
+        isinstance(node, ast.Subscript)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == "tuple"
+    ):
+        nodes = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        items = tuple(map(simple_type, nodes))
+        if all(isinstance(item, Scalar) for item in items):
+            return Tuple(items)  # type: ignore[arg-type]
+    return None

@@ -1,0 +1,125 @@
+"""Compile units: Python to Cython (``unit``), Cython to C, C to an extension module."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import runpy
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+from concurrent.futures import ThreadPoolExecutor
+from importlib.util import find_spec
+from pathlib import Path
+
+from tools.kernels.source import ROOT
+from tools.kernels.unit import Unit
+
+HERE = Path(__file__).parent
+SCRATCH = ROOT / "build" / "kernels"
+UNITS: dict[str, tuple[str, ...]] = runpy.run_path(str(ROOT / "mcz/kernels/units.py"))["UNITS"]
+DIRECTIVES = {
+    "language_level": 3,
+    "cdivision": True,
+    "initializedcheck": False,
+    "wraparound": False,
+    "auto_pickle": False,
+    "show_performance_hints": False,
+}
+# Wrapping integers and products that are not fused with sums are part of what SPEC.md says.
+EXACT = ["-fwrapv", "-ffp-contract=off"]
+FLAGS = {
+    "compiled": ["-O3"],
+    "checked": ["-O1", "-DMCZ_CHECKED"],
+    "sanitized": ["-O1", "-g", "-DMCZ_CHECKED", "-fsanitize=address,undefined"],
+}
+
+
+def compiler() -> list[str] | None:
+    """The command of a C compiler: that of ``CC``, one on the path, or Zig's, or None."""
+    if given := os.environ.get("CC"):
+        return shlex.split(given)
+    for name in ("gcc", "clang", "cc"):
+        if path := shutil.which(name):
+            return [path]
+    return [sys.executable, "-m", "ziglang", "cc"] if find_spec("ziglang") else None
+
+
+def build(folder: Path, mode: str, units: list[str] | None = None) -> list[Path]:
+    """Compile units, all by default, into ``folder``, as many at a time as there are processors.
+
+    Raises CalledProcessError where a compiler fails, FileNotFoundError where there is none.
+    """
+    command = compiler()
+    if command is None:
+        raise FileNotFoundError("there is no C compiler")
+    folder.mkdir(parents=True, exist_ok=True)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        jobs = [pool.submit(_build_unit, u, folder, mode, command) for u in units or UNITS]
+        return [job.result() for job in jobs]
+
+
+def _build_unit(name: str, folder: Path, mode: str, command: list[str]) -> Path:
+    """Compile one unit where its text or the compiler changed."""
+    text = Unit(UNITS[name], checked=mode != "compiled").text()
+    suffix = sysconfig.get_config_var("EXT_SUFFIX")
+    arguments = [*command, *_flags(mode)]
+    key = hashlib.sha256("\0".join([text, suffix, *arguments, *_own_sources()]).encode())
+    scratch = SCRATCH / key.hexdigest()[:32]
+    made = scratch / (name + suffix)
+    if not made.is_file():
+        scratch.mkdir(parents=True, exist_ok=True)
+        pyx = scratch / f"{name}.pyx"
+        pyx.write_text(text)
+        _run([sys.executable, "-m", "tools.kernels.compiling", str(pyx), mode])
+        c, part = pyx.with_suffix(".c"), made.with_suffix(f".{os.getpid()}.part")
+        _run([*arguments, str(c), "-o", str(part), *_libraries()])
+        part.replace(made)
+    target = folder / made.name
+    part = target.with_suffix(f".{os.getpid()}.part")
+    shutil.copyfile(made, part)
+    part.replace(target)  # a process may have the old one loaded
+    return target
+
+
+def _own_sources() -> list[str]:
+    return [path.read_text() for path in sorted(HERE.glob("arithmetic.h"))]
+
+
+def _flags(mode: str) -> list[str]:
+    link = ["-bundle", "-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-shared"]
+    position = [] if sys.platform == "win32" else ["-fPIC"]
+    includes = [f"-I{HERE}", f"-I{sysconfig.get_path('include')}"]
+    return [*link, *position, *EXACT, *FLAGS[mode], "-DNDEBUG", "-w", *includes]
+
+
+def _libraries() -> list[str]:
+    if sys.platform != "win32":
+        return ["-lm"]
+    number = f"{sys.version_info.major}{sys.version_info.minor}"
+    return [f"-L{Path(sys.base_prefix, 'libs')}", f"-lpython{number}"]
+
+
+def _run(command: list[str]) -> None:
+    """Run a command; what it prints goes with the error of one that fails."""
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.stderr.write(done.stdout + done.stderr)
+        done.check_returncode()
+
+
+def translate(path: str, mode: str) -> int:
+    """Translate a module in Cython to C; the number of errors."""
+    from Cython.Compiler import Options
+    from Cython.Compiler.Main import CompilationOptions, compile
+
+    Options.buffer_max_dims = 5  # makes what a memoryview takes as an argument a third as large
+    directives = {**DIRECTIVES, "boundscheck": mode != "compiled"}
+    options = CompilationOptions(compiler_directives=directives)
+    return int(compile(path, options).num_errors)
+
+
+if __name__ == "__main__":
+    sys.exit(translate(*sys.argv[1:]) > 0)
