@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import struct
 import warnings
 from collections.abc import Callable
 from functools import cache, wraps
@@ -80,22 +81,41 @@ def lacks_compiled_kernels() -> bool:
 
 @cache
 def _unit(name: str) -> tuple[ModuleType | None, str]:
+    return load_unit(PACKAGE / "kernels" / MODE, name)
+
+
+def load_unit(folder: Path, name: str) -> tuple[ModuleType | None, str]:
     """A compiled module, or None and why there is none."""
-    folder = PACKAGE / "kernels" / MODE
     files = (folder / (name + suffix) for suffix in EXTENSION_SUFFIXES)
     path = next((file for file in files if file.is_file()), None)
     if path is None:
         return None, "no compiled ones are installed"
-    full = f"mcz.kernels.{MODE}.{name}"
+    full = f"mcz.kernels.{folder.name}.{name}"
     loader = ExtensionFileLoader(full, str(path))
     spec = spec_from_file_location(full, path, loader=loader)
     assert spec is not None
-    module = module_from_spec(spec)
-    loader.exec_module(module)
+    try:
+        if _is_cut(path):
+            raise ImportError("the file is cut")
+        module = module_from_spec(spec)
+        loader.exec_module(module)
+    except ImportError as error:
+        return None, f"{path.name} cannot be loaded: {error}"
     changed = changed_source(module.SOURCES)
     if changed:
         return None, f"mcz/{changed} is newer than its compiled form; build it anew"
     return module, ""
+
+
+def _is_cut(path: Path) -> bool:
+    """Whether an ELF file lacks its end: the loader would stop the process, not raise."""
+    with path.open("rb") as file:
+        head = file.read(64)
+    if head[:5] != b"\x7fELF\x02" or len(head) < 64:  # other loaders look at the size
+        return False
+    (start,) = struct.unpack_from("<Q", head, 40)
+    size, count = struct.unpack_from("<2H", head, 58)
+    return bool(path.stat().st_size < start + size * count)
 
 
 def changed_source(digests: dict[str, str]) -> str:

@@ -13,7 +13,8 @@ def main() -> None:
     parser.add_argument("mode", nargs="?", choices=FLAGS, default="compiled")
     parser.add_argument("units", nargs="*", metavar="unit", help=", ".join(UNITS))
     given = parser.parse_args()
-    for path in build(ROOT / "mcz" / "kernels" / given.mode, given.mode, given.units or None):
+    units = {name: UNITS[name] for name in given.units or UNITS}
+    for path in build(ROOT / "mcz" / "kernels" / given.mode, given.mode, units):
         print(path.relative_to(ROOT))
 
 

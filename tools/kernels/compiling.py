@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from importlib.util import find_spec
 from pathlib import Path
@@ -47,8 +48,10 @@ def compiler() -> list[str] | None:
     return [sys.executable, "-m", "ziglang", "cc"] if find_spec("ziglang") else None
 
 
-def build(folder: Path, mode: str, units: list[str] | None = None) -> list[Path]:
-    """Compile units, all by default, into ``folder``, as many at a time as there are processors.
+def build(folder: Path, mode: str, units: Mapping[str, tuple[str, ...]] = UNITS) -> list[Path]:
+    """Compile units into ``folder``, as many at a time as there are processors.
+
+    ``units``: the modules of each, by its name.
 
     Raises CalledProcessError where a compiler fails, FileNotFoundError where there is none.
     """
@@ -57,24 +60,27 @@ def build(folder: Path, mode: str, units: list[str] | None = None) -> list[Path]
         raise FileNotFoundError("there is no C compiler")
     folder.mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = [pool.submit(_build_unit, u, folder, mode, command) for u in units or UNITS]
+        jobs = [pool.submit(_build_unit, u, units[u], folder, mode, command) for u in units]
         return [job.result() for job in jobs]
 
 
-def _build_unit(name: str, folder: Path, mode: str, command: list[str]) -> Path:
+def _build_unit(
+    name: str, modules: tuple[str, ...], folder: Path, mode: str, command: list[str]
+) -> Path:
     """Compile one unit where its text or the compiler changed."""
-    text = Unit(UNITS[name], checked=mode != "compiled").text()
+    text = Unit(modules, checked=mode != "compiled").text()
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
     arguments = [*command, *_flags(mode)]
     key = hashlib.sha256("\0".join([text, suffix, *arguments, *_own_sources()]).encode())
     scratch = SCRATCH / key.hexdigest()[:32]
     made = scratch / (name + suffix)
     if not made.is_file():
-        scratch.mkdir(parents=True, exist_ok=True)
-        pyx = scratch / f"{name}.pyx"
+        own = scratch / str(os.getpid())  # another process may build the same
+        own.mkdir(parents=True, exist_ok=True)
+        pyx = own / f"{name}.pyx"
         pyx.write_text(text)
         _run([sys.executable, "-m", "tools.kernels.compiling", str(pyx), mode])
-        c, part = pyx.with_suffix(".c"), made.with_suffix(f".{os.getpid()}.part")
+        c, part = pyx.with_suffix(".c"), own / made.name
         _run([*arguments, str(c), "-o", str(part), *_libraries()])
         part.replace(made)
     target = folder / made.name

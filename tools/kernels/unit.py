@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+from os.path import relpath
+from pathlib import Path
 from typing import Any
 
 from tools.kernels.annotations import ITEMS, NOTHING, Array, Record, Scalar, Tuple, Type
@@ -125,7 +127,7 @@ class Unit:
     def _digests(self) -> dict[str, str]:
         """SHA-256 of each source, by its path in the package."""
         return {
-            where.path.relative_to(ROOT / "mcz").as_posix(): hashlib.sha256(
+            Path(relpath(where.path, ROOT / "mcz")).as_posix(): hashlib.sha256(
                 where.path.read_bytes()
             ).hexdigest()
             for where in self._all_sources()
