@@ -61,7 +61,8 @@ class Tuple:
 class Record:
     """A NamedTuple: a struct where all fields are numbers, otherwise an extension class."""
 
-    name: str  # with its module
+    name: str
+    module: str
     fields: tuple[tuple[str, Type], ...]
 
     @property

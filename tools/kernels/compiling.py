@@ -69,7 +69,7 @@ def _build_unit(
 ) -> Path:
     """Compile one unit where its text or the compiler changed."""
     text = Unit(modules, checked=mode != "compiled").text()
-    suffix = sysconfig.get_config_var("EXT_SUFFIX")
+    suffix = str(sysconfig.get_config_var("EXT_SUFFIX"))
     arguments = [*command, *_flags(mode)]
     key = hashlib.sha256("\0".join([text, suffix, *arguments, *_own_sources()]).encode())
     scratch = SCRATCH / key.hexdigest()[:32]

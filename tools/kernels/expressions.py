@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import hashlib
 import math
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,7 +24,7 @@ from tools.kernels.annotations import (
     Tuple,
     Type,
 )
-from tools.kernels.source import Source, is_constant, mangled
+from tools.kernels.source import Source, is_constant, mangled, source
 
 Root = str | tuple[str, str]  # what an array is a part of: a variable, or a record's field
 Typed = tuple[str, Type]
@@ -75,11 +76,12 @@ class Effects:
 class Expressions:
     """Translates the expressions of one function."""
 
-    def __init__(self, source: Source, node: ast.FunctionDef) -> None:
-        self.source, self.node = source, node
+    def __init__(self, where: Source, node: ast.FunctionDef) -> None:
+        self.source, self.node = where, node
         self.types: dict[str, Type] = {}
         self.needed: list[tuple[Source, str]] = []  # functions that are called
         self.tables: dict[str, tuple[Any, ...]] = {}  # constant tuples that are looped over
+        self.modules = {where.name}  # that its text depends on
         self.effects = Effects()
         assigned = (n for n in ast.walk(node) if isinstance(n, ast.Name))
         self.own = {n.id for n in assigned if isinstance(n.ctx, ast.Store)}
@@ -105,16 +107,25 @@ class Expressions:
         if isinstance(node, ast.Constant):
             return node.value if is_constant(node.value) else None
         if isinstance(node, ast.Name) and node.id not in self.own:
-            return self.source.constants.get(node.id)
+            return self._constant(self.source, node.id)
         if isinstance(node, ast.Attribute) and ast.unparse(node) == "np.inf":
             return math.inf
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            place = self.source.find_in(node.value.id, node.attr)
-            return None if place is None else place[0].constants.get(place[1])
+            module, original = self.source.imported.get(node.value.id, ("", "other"))
+            return None if original else self._constant(source(module), node.attr)
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             operand = self.fixed(node.operand)
             return -operand if isinstance(operand, int | float) else None
         return None
+
+    def _constant(self, where: Source, name: str) -> Any:
+        """The constant that a name stands for in a module; notes where that comes from."""
+        found = where.constant(name)
+        if found is not None:
+            defined = where.find(name)
+            self.modules |= {where.name, where.imported.get(name, (where.name, ""))[0]}
+            self.modules |= {defined[0].name} if defined else set()
+        return found
 
     def _literal(self, node: ast.expr, value: Any) -> Typed:
         if isinstance(value, bool):
@@ -191,7 +202,7 @@ class Expressions:
         if any(isinstance(value, tuple | str) for value in values):
             raise self.error(node, "is no tuple of numbers")
         type_ = FLOAT if any(isinstance(value, float) for value in values) else INT
-        name = f"table_{abs(hash(values)):x}"
+        name = f"table_{hashlib.sha256(repr(values).encode()).hexdigest()[:12]}"
         self.tables[name] = values
         return name, type_
 
@@ -293,8 +304,8 @@ class Expressions:
             return f"({one} if {self.truth(node.test)} else {other})", type_
         (one, type_), (other, type_2) = self.number(node.body), self.number(node.orelse)
         type_ = self.common([type_, type_2])
-        casts = f"<{type_.c}>"
-        return f"({casts}{one} if {self.truth(node.test)} else {casts}{other})", type_
+        cast = f"<{type_.c}>"
+        return f"({cast}{one} if {self.truth(node.test)} else {cast}{other})", type_
 
     def of_Call(self, node: ast.Call) -> Typed:  # noqa: N802
         if node.keywords or any(isinstance(item, ast.Starred) for item in node.args):

@@ -16,8 +16,7 @@ from tools.kernels.annotations import (
     Tuple,
     Type,
 )
-from tools.kernels.expressions import COMPARISONS as COMPARISONS
-from tools.kernels.expressions import Expressions, Root, Typed
+from tools.kernels.expressions import Expressions, Root
 from tools.kernels.source import Source, mangled
 
 DTYPES = {"np.int64": "int64", "np.float64": "float64", "np.uint8": "uint8", "np.bool_": "bool"}
@@ -34,6 +33,8 @@ class Function(Expressions):
             if argument.annotation is None:
                 raise self.error(argument, "has no type")
             type_ = source.type_of(argument.annotation)
+            named = source.imported.get(ast.unparse(argument.annotation))
+            self.modules |= {named[0]} if named else set()
             self.parameters.append((argument.arg, type_))
             self.types[argument.arg] = type_
         if self.node.returns is None:
@@ -229,7 +230,6 @@ class Function(Expressions):
         if isinstance(type_, Array):
             name = self.temporary(type_, root)
             self.line(f"{name} = {text}")
-            self.line(f"mcz_same({into}.shape[0], {name}.shape[0])") if False else None
             text = name + index
         for axis, name in enumerate(axes):
             self.line(f"{'    ' * axis}for {name} in range({into}.shape[{axis}]):")
@@ -314,6 +314,3 @@ def spelled(type_: Type, written: bool) -> str:
 
 def _is_allocation(node: ast.expr) -> bool:
     return isinstance(node, ast.Call) and ast.unparse(node.func) in ("np.zeros", "np.empty")
-
-
-__all__ = ["Function", "Record", "Typed", "spelled"]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import ast
-import types
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
-from tools.kernels.annotations import ARRAYS, KernelError, Record, Type, simple_type
+from tools.kernels.annotations import KernelError, Record, Type, simple_type
 
 ROOT = Path(__file__).parents[2]
 DECORATOR = "kernel"  # of functions that Python calls
@@ -43,6 +44,7 @@ class Source:
             if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "mcz":
                 for alias in node.names:
                     self._import(alias.asname or alias.name, node.module or "", alias.name)
+        self.needed: set[str] = set()  # modules that its constants come from
         self._constants: dict[str, Any] | None = None
 
     def _import(self, name: str, module: str, original: str) -> None:
@@ -88,31 +90,56 @@ class Source:
             for n in self.classes[name].body
             if isinstance(n, ast.AnnAssign)
         ]
-        return Record(mangled(self.name, name), tuple(fields))
+        return Record(mangled(self.name, name), self.name, tuple(fields))
+
+    def constant(self, name: str) -> Any:
+        """The number, or tuple of numbers, that a name stands for here, or None."""
+        place = self.find(name)
+        return None if place is None else place[0].constants.get(place[1])
 
     @property
     def constants(self) -> dict[str, Any]:
-        """Numbers, and tuples of numbers, that names of this module stand for."""
+        """Numbers, and tuples of numbers, that this module assigns to names."""
         if self._constants is None:
             self._constants = {}  # of modules that import each other
             names: dict[str, Any] = {}
-            for name, (module, original) in self.imported.items():
-                if name in ARRAYS:
-                    continue
-                there = source(module).constants
-                if not original:
-                    names[name] = types.SimpleNamespace(**there)
-                elif original in there:
-                    names[name] = there[original]
             for node in self.tree.body:
-                if isinstance(node, ast.Assign | ast.AnnAssign):
-                    try:
-                        exec(compile(ast.Module([node], []), str(self.path), "exec"), names)
-                    except Exception:  # no constant: an array, a table, an alias of a type
-                        continue
-            names.pop("__builtins__", None)
+                if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+                    self._evaluate(node, node.value, names)
             self._constants = {name: value for name, value in names.items() if is_constant(value)}
         return self._constants
+
+    def _evaluate(self, node: ast.stmt, value: ast.expr, names: dict[str, Any]) -> None:
+        """Add what an assignment of the module assigns to ``names``, if that is a constant."""
+        known = dict(names)
+        used = {n.id for n in ast.walk(value) if isinstance(n, ast.Name)} & self.imported.keys()
+        for name in used:
+            module, original = self.imported[name]
+            there = source(module)
+            known[name] = (
+                there.constant(original) if original else SimpleNamespace(**there.constants)
+            )
+        try:
+            exec(compile(ast.Module([node], []), str(self.path), "exec"), known)
+        except Exception:  # no constant: an array, a table, an alias of a type
+            return
+        found = {name: known[name] for name in known.keys() - names.keys() - used}
+        if any(is_constant(item) for item in found.values()):
+            self.needed |= {self.imported[name][0] for name in used}
+        names.update((name, item) for name, item in found.items() if name != "__builtins__")
+
+
+def sources_behind(modules: Iterable[str]) -> list[Source]:
+    """These modules, and those that their constants come from."""
+    found: dict[str, Source] = {}
+    rest = list(modules)
+    while rest:
+        name = rest.pop()
+        if name not in found:
+            found[name] = source(name)
+            found[name].constants  # noqa: B018 - finds what they need
+            rest += found[name].needed
+    return [found[name] for name in sorted(found)]
 
 
 def is_constant(value: object) -> bool:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import hashlib
+from hashlib import sha256
 from os.path import relpath
 from pathlib import Path
 from typing import Any
 
-from tools.kernels.annotations import ITEMS, NOTHING, Array, Record, Scalar, Tuple, Type
+from tools.kernels.annotations import NOTHING, Array, Record, Scalar, Tuple, Type
 from tools.kernels.expressions import Root
 from tools.kernels.functions import Function, spelled
-from tools.kernels.source import ROOT, Source, mangled, source
+from tools.kernels.source import ROOT, Source, mangled, source, sources_behind
 
 HEAD = """# Written by tools/kernels from the sources that SOURCES names.
 from numpy import dtype, empty, zeros
@@ -50,7 +50,6 @@ class Unit:
         self.checked = checked
         self.functions: dict[str, Function] = {}
         self.records: dict[str, Record] = {}
-        self.sources: dict[str, Source] = {}
         self.entries = [
             (source(module), name)
             for module in modules
@@ -69,7 +68,6 @@ class Unit:
         full = mangled(where.name, name)
         if full in self.functions:
             return
-        self.sources[where.name] = where
         function = Function(where, name)
         for record in (type_ for type_ in function.types.values() if isinstance(type_, Record)):
             self._add_record(record)
@@ -125,24 +123,15 @@ class Unit:
         return "\n".join(parts)
 
     def _digests(self) -> dict[str, str]:
-        """SHA-256 of each source, by its path in the package."""
+        """SHA-256 of each source that the text depends on, by its path in the package."""
+        modules = {record.module for record in self.records.values()}
+        for function in self.functions.values():
+            modules |= function.modules
+        paths = [where.path for where in sources_behind(modules)]
+        package = ROOT / "mcz"
         return {
-            Path(relpath(where.path, ROOT / "mcz")).as_posix(): hashlib.sha256(
-                where.path.read_bytes()
-            ).hexdigest()
-            for where in self._all_sources()
+            Path(relpath(p, package)).as_posix(): sha256(p.read_bytes()).hexdigest() for p in paths
         }
-
-    def _all_sources(self) -> list[Source]:
-        """The modules of functions, records and constants."""
-        found = dict(self.sources)
-        before = -1
-        while before != (before := len(found)):
-            for where in list(found.values()):
-                for module, _ in where.imported.values():
-                    if module.startswith("mcz.") and not module.startswith("mcz.kernels"):
-                        found[module] = source(module)
-        return [found[name] for name in sorted(found)]
 
     def _tables(self) -> str:
         tables: dict[str, tuple[Any, ...]] = {}
@@ -161,7 +150,7 @@ class Unit:
 
     def _record(self, record: Record) -> str:
         if record.is_struct:
-            fields = [f"    {type_.c} {name}" for name, type_ in record.fields]  # type: ignore
+            fields = [f"    {type_.c} {name}" for name, type_ in record.fields]
             made = [f"    found.{name} = given.{name}" for name, _ in record.fields]
             return "\n".join(
                 [
@@ -232,6 +221,3 @@ class Unit:
         if result != NOTHING:
             lines.append("    return result")
         return "\n".join([*lines, ""])
-
-
-__all__ = ["ITEMS", "Unit"]
