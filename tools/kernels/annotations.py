@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from dataclasses import dataclass
 
 
@@ -76,24 +77,19 @@ class Record:
 
 Type = Scalar | Array | Tuple | Record
 SCALARS = {"int": INT, "float": FLOAT, "bool": BOOL, "None": NOTHING}
-ARRAYS: dict[str, Type] = {
-    "Ints": Array("int64", 1),
-    "Ints2": Array("int64", 2),
-    "Ints3": Array("int64", 3),
-    "IntColumn": Array("int64", 1, dense=False),
-    "IntColumns": Array("int64", 2, dense=False),
-    "FlagColumn": Array("bool", 1, dense=False),
-    "Floats": Array("float64", 1),
-    "Floats2": Array("float64", 2),
-    "Floats3": Array("float64", 3),
-    "Floats4": Array("float64", 4),
-    "FloatColumn": Array("float64", 1, dense=False),
-    "FloatColumns": Array("float64", 2, dense=False),
-    "Bytes": Array("uint8", 1),
-    "Bytes2": Array("uint8", 2),
-    "Flags": Array("bool", 1),
-    "Flags2": Array("bool", 2),
-}
+PREFIXES = {"Int": "int64", "Float": "float64", "Byte": "uint8", "Flag": "bool"}
+NAME = re.compile(r"(Int|Float|Byte|Flag)(?:s([2-9]?)|(Columns?))")  # as mcz.kernels.types has them
+
+
+def array_type(name: str) -> Array | None:
+    """The array that a name stands for: ``Ints``, ``Floats3``, ``IntColumn``, ``FloatColumns``."""
+    found = NAME.fullmatch(name)
+    if found is None:
+        return None
+    item, axes, column = PREFIXES[found[1]], found[2], found[3]
+    if column:
+        return Array(item, 2 if column == "Columns" else 1, dense=False)
+    return Array(item, int(axes or 1))
 
 
 def simple_type(node: ast.expr) -> Type | None:
@@ -101,7 +97,7 @@ def simple_type(node: ast.expr) -> Type | None:
     if isinstance(node, ast.Constant) and node.value is None:
         return NOTHING
     if isinstance(node, ast.Name):
-        return SCALARS.get(node.id) or ARRAYS.get(node.id)
+        return SCALARS.get(node.id) or array_type(node.id)
     if (
         isinstance(node, ast.Subscript)
         and isinstance(node.value, ast.Name)
