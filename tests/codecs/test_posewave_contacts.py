@@ -19,7 +19,7 @@ import mcz
 from mcz.codecs import by_name
 from mcz.codecs.posewave.contact_choice import choose_contacts, parse_runs, runs_of
 from mcz.codecs.posewave.contact_keeper import Keeper, Outcome, Piece
-from mcz.codecs.posewave.contact_kernels import LEANING, STANDING, aim, correct, place
+from mcz.codecs.posewave.contact_kernels import LEANING, STANDING, aim, correct, lanes_of, place
 from mcz.codecs.posewave.contact_plan import MOST_STEPS, Contacts, Held, make_held, parse_contacts
 from mcz.codecs.posewave.contacts import decode_contacts
 from mcz.codecs.posewave.rows import Stream
@@ -219,9 +219,10 @@ def shifted(
     """How far points have come, (n_points, n_frames, 3); ``values`` are corrected."""
     n = len(held.joints), len(values)
     before, after = np.empty((*n, 3)), np.empty((*n, 3))
-    place(plan, held, values, before)
-    correct(plan, held, values, np.full(n, kind), np.broadcast_to(shifts, (*n, 3)).copy(), 4)
-    place(plan, held, values, after)
+    place(plan, held, lanes_of(plan, 1), values, before)
+    wanted = np.broadcast_to(shifts, (*n, 3)).copy()
+    correct(plan, held, lanes_of(plan, 1), values, np.full(n, kind), wanted, 4)
+    place(plan, held, lanes_of(plan, 1), values, after)
     return after - before
 
 
@@ -255,10 +256,11 @@ def test_points_that_lean_give_way() -> None:
     """A foot and its own toe that cannot both be where they are asked to."""
     plan, held, values = leg(20.0, (3, 0), (4, 0))
     before, after = np.empty((2, 1, 3)), np.empty((2, 1, 3))
-    place(plan, held, values, before)
+    place(plan, held, lanes_of(plan, 1), values, before)
     shifts = np.array([[[0.1, 0.1, 0.1]], [[0.0, 0.0, 0.0]]])
-    correct(plan, held, values, np.array([[STANDING], [LEANING]]), shifts, 4)
-    place(plan, held, values, after)
+    active = np.array([[STANDING], [LEANING]])
+    correct(plan, held, lanes_of(plan, 1), values, active, shifts, 4)
+    place(plan, held, lanes_of(plan, 1), values, after)
     assert np.allclose((after - before)[0], shifts[0], atol=1e-7)
 
 
