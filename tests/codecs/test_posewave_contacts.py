@@ -22,6 +22,7 @@ from mcz.codecs.posewave.contact_keeper import Keeper, Outcome, Piece
 from mcz.codecs.posewave.contact_kernels import LEANING, STANDING, aim, correct, lanes_of, place
 from mcz.codecs.posewave.contact_plan import MOST_STEPS, Contacts, Held, make_held, parse_contacts
 from mcz.codecs.posewave.contacts import decode_contacts
+from mcz.codecs.posewave.displacement_kernels import Track
 from mcz.codecs.posewave.rows import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan, make_plan
 from mcz.coding.mixing import SQUASH
@@ -269,7 +270,7 @@ def test_shifts_come_and_go() -> None:
     starts, moves = np.zeros((2, 15, 3), np.int64)
     starts[3], starts[8], moves[4] = (16, 0, 0), (0, 16, 0), (1, -1, 3)
     shifts, active = np.zeros((15, 3)), np.zeros(15, np.int64)
-    aim(np.zeros((15, 3)), (stands, starts, moves), 2.0, 4, shifts, active)
+    aim(np.zeros((15, 3)), Track(stands, starts, moves), 2.0, 4, shifts, active)
     assert active.tolist() == [1, 1, 1, 2, 2, 1, 1, 1, 2, 1, 1, 1, 1, 0, 0]
     assert np.allclose(shifts[:5, 0], [0.8, 1.2, 1.6, 2.0, 4.0])
     assert np.allclose(shifts[4:9, 0], [4.0, 3.0, 2.0, 1.0, 0.0])  # of 3 frames, not of 4
