@@ -17,7 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import MotionError
-from mcz.kinematics.rotation_vectors import matrices_of_vectors, spins_of_vectors
+from mcz.kinematics.rotation_vectors import (
+    matrices_of_quaternions,
+    matrices_of_vectors,
+    spins_of_vectors,
+)
 from mcz.motion import (
     ANGLE_KINDS,
     POSITION_KINDS,
@@ -278,14 +282,7 @@ class Chain:
         two = 2.0 / square
         changes = ((-x, -y, -z), (w, z, -y), (-z, w, x), (y, -x, w))
         spins += [along(axes, np.stack(vector) * two) for vector in changes]
-        matrix = np.stack(
-            [
-                np.stack([1 - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y)]),
-                np.stack([two * (x * y + w * z), 1 - two * (x * x + z * z), two * (y * z - w * x)]),
-                np.stack([two * (x * z - w * y), two * (y * z + w * x), 1 - two * (x * x + y * y)]),
-            ]
-        )
-        return times(axes, matrix)
+        return times(axes, matrices_of_quaternions(parts))
 
 
 IDENTITY: Floats = np.eye(3)[:, :, None]

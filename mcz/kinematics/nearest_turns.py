@@ -6,7 +6,11 @@ import numpy as np
 
 from mcz.kinematics.chain import Floats, Link, turned
 from mcz.kinematics.euler import ORDERS, euler_angles
-from mcz.kinematics.rotation_vectors import continuous, vectors_of_quaternions
+from mcz.kinematics.rotation_vectors import (
+    continuous,
+    quaternions_of_matrices,
+    vectors_of_quaternions,
+)
 
 STARTS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
 SWEEPS = 12
@@ -62,30 +66,8 @@ def centered(angles: Floats) -> Floats:
 
 
 def quaternions_of(turns: Floats) -> Floats:
-    """The quaternions (w, x, y, z), (4, F), of rotation matrices."""
-    # The greatest of the four candidates is never small.
-    t = turns
-    squares = np.stack(
-        [
-            1 + t[0, 0] + t[1, 1] + t[2, 2],
-            1 + t[0, 0] - t[1, 1] - t[2, 2],
-            1 - t[0, 0] + t[1, 1] - t[2, 2],
-            1 - t[0, 0] - t[1, 1] + t[2, 2],
-        ]
-    )
-    wx, wy, wz = t[2, 1] - t[1, 2], t[0, 2] - t[2, 0], t[1, 0] - t[0, 1]
-    xy, xz, yz = t[1, 0] + t[0, 1], t[0, 2] + t[2, 0], t[2, 1] + t[1, 2]
-    rows = np.array(
-        [
-            [squares[0], wx, wy, wz],
-            [wx, squares[1], xy, xz],
-            [wy, xy, squares[2], yz],
-            [wz, xz, yz, squares[3]],
-        ]
-    )
-    best = squares.argmax(axis=0)
-    parts = rows[best, :, np.arange(t.shape[2])].T
-    parts = parts / np.sqrt((parts * parts).sum(axis=0))
+    """The quaternions (w, x, y, z), (4, F), of rotation matrices, each near the one before."""
+    parts = quaternions_of_matrices(turns)
     signs = np.where((parts[:, 1:] * parts[:, :-1]).sum(axis=0) < 0, -1.0, 1.0)
     signs = np.cumprod(np.concatenate([np.where(parts[0, :1] < 0, -1.0, 1.0), signs]))
     result: Floats = parts * signs

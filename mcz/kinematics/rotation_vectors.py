@@ -1,6 +1,7 @@
-"""Rotation vectors: an axis times an angle, the exponential map, and the way back.
+"""Rotation vectors, an axis times an angle: the exponential map, quaternions, and the way back.
 
-Vectors are (3, F) in radians, matrices (3, 3, F), active, for column vectors.
+Vectors are (3, F) in radians, quaternions (w, x, y, z), (4, F), matrices (3, 3, F), active, for
+column vectors.
 """
 
 from __future__ import annotations
@@ -55,6 +56,50 @@ def _combined(vectors: Floats, first: Floats, second: Floats, angle: Floats) -> 
         out[i, j], out[j, i] = mixed - turn, mixed + turn
     out[:, :, ~np.isfinite(angle)] = np.nan
     return out
+
+
+def matrices_of_quaternions(quaternions: Floats) -> Floats:
+    """The rotations, (3, 3, F), of quaternions of any length but 0."""
+    w, x, y, z = quaternions
+    two = 2.0 / (quaternions * quaternions).sum(axis=0)
+    return np.stack(
+        [
+            np.stack([1 - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y)]),
+            np.stack([two * (x * y + w * z), 1 - two * (x * x + z * z), two * (y * z - w * x)]),
+            np.stack([two * (x * z - w * y), two * (y * z + w * x), 1 - two * (x * x + y * y)]),
+        ]
+    )
+
+
+def quaternions_of_matrices(turns: Floats) -> Floats:
+    """Quaternions of length 1, (4, F), whose greatest part is positive.
+
+    F. L. Markley 2008, "Unit quaternion from rotation matrix": each row of 4 q q' is q times one of
+    its parts, and the row of the greatest part is never small.
+    """
+    t = turns
+    squares = np.stack(
+        [
+            1 + t[0, 0] + t[1, 1] + t[2, 2],
+            1 + t[0, 0] - t[1, 1] - t[2, 2],
+            1 - t[0, 0] + t[1, 1] - t[2, 2],
+            1 - t[0, 0] - t[1, 1] + t[2, 2],
+        ]
+    )
+    wx, wy, wz = t[2, 1] - t[1, 2], t[0, 2] - t[2, 0], t[1, 0] - t[0, 1]
+    xy, xz, yz = t[1, 0] + t[0, 1], t[0, 2] + t[2, 0], t[2, 1] + t[1, 2]
+    rows = np.array(
+        [
+            [squares[0], wx, wy, wz],
+            [wx, squares[1], xy, xz],
+            [wy, xy, squares[2], yz],
+            [wz, xz, yz, squares[3]],
+        ]
+    )
+    best = squares.argmax(axis=0)
+    parts = rows[best, :, np.arange(t.shape[2])].T
+    result: Floats = parts / np.sqrt((parts * parts).sum(axis=0))
+    return result
 
 
 def vectors_of_quaternions(quaternions: Floats) -> Floats:

@@ -1,21 +1,28 @@
-"""Rotation matrices to other representations and back. SciPy does all but the plain ones.
+"""Rotation matrices to other representations and back, with the conventions of SciPy.
 
 Matrices are (..., 3, 3), active, for column vectors. What is NaN stays NaN.
 """
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcz.errors import OptionError
-from mcz.kinematics.chain import Floats
+from mcz.kinematics.chain import IDENTITY, Floats, turned
+from mcz.kinematics.rotation_vectors import (
+    matrices_of_quaternions,
+    matrices_of_vectors,
+    quaternions_of_matrices,
+    vectors_of_quaternions,
+)
 
 # What each representation adds to the shape of an array of rotations.
 FORMS = {"matrix": (3, 3), "quat": (4,), "rotvec": (3,), "6d": (6,), "euler": (3,)}
+
+LOCKED = 1e-7  # radians from gimbal lock within which the third Euler angle is 0
 
 
 def check_form(form: str) -> None:
@@ -51,22 +58,49 @@ def from_matrices(matrices: Floats, form: str, order: str = "XYZ") -> Floats:
     known = np.isfinite(flat).all(axis=(1, 2))
     out = np.full((len(flat), *FORMS[form]), np.nan)
     if known.any():
-        out[known] = _scipy(flat if known.all() else flat[known], form, order)
+        out[known] = _converted(flat if known.all() else flat[known], form, order)
     shaped = out.reshape(*matrices.shape[:-2], *FORMS[form])
     return continuous(shaped) if form == "quat" else shaped
 
 
-def _scipy(matrices: Floats, form: str, order: str) -> Floats:
-    from scipy.spatial.transform import Rotation
-
-    turns: Any = Rotation.from_matrix(matrices)
+def _converted(matrices: Floats, form: str, order: str) -> Floats:
+    """Finite matrices (n, 3, 3) as quaternions, rotation vectors or Euler angles."""
+    quaternions = quaternions_of_matrices(np.moveaxis(matrices, 0, 2))
     if form == "quat":
-        return np.asarray(turns.as_quat(scalar_first=True))
+        return quaternions.T
     if form == "rotvec":
-        return np.asarray(turns.as_rotvec())
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # gimbal lock: one angle of many is as good
-        return np.asarray(turns.as_euler(order))
+        return vectors_of_quaternions(quaternions).T
+    return _euler_angles(quaternions, order)
+
+
+def _euler_angles(quaternions: Floats, order: str) -> Floats:
+    """Euler angles, (n, 3), of quaternions of length 1, (4, n), first to last of ``order``.
+
+    E. Bernardes and S. Viollet 2022, "Quaternion to Euler angles conversion: A direct, general and
+    computationally efficient method". The second angle is in [0, pi] where the first axis is also
+    the last, else in [-pi/2, pi/2]; the others are in [-pi, pi]. In gimbal lock the third is 0.
+    """
+    turning = order.isupper()  # about axes that turn along: as about fixed ones, reversed
+    i, j, k = ("xyz".index(letter) for letter in (order.lower()[::-1] if turning else order))
+    proper = i == k
+    k = 3 - i - j if proper else k
+    sign = (i - j) * (j - k) * (k - i) // 2
+    w, x, y, z = quaternions[0], *(quaternions[1 + axis] for axis in (i, j, k))
+    a, b, c, d = (w, x, y, sign * z) if proper else (w - y, x + sign * z, y + w, sign * z - x)
+    half_sum, half_difference = np.arctan2(b, a), np.arctan2(d, c)
+    second = 2 * np.arctan2(np.hypot(c, d), np.hypot(a, b))
+    ends = [half_sum - half_difference, half_sum + half_difference]
+    low, high = second <= LOCKED, np.pi - second <= LOCKED
+    first, third = (1, 0) if turning else (0, 1)
+    ends[first][low] = 2 * half_sum[low]
+    ends[first][high] = (2 if turning else -2) * half_difference[high]
+    ends[third][low | high] = 0.0
+    if not proper:
+        ends[1] *= sign
+        second -= np.pi / 2
+    for angles in ends:
+        angles -= 2 * np.pi * np.rint(angles / (2 * np.pi))
+    return np.stack([ends[first], second, ends[third]], axis=1)
 
 
 def to_matrices(values: NDArray[Any], form: str, order: str = "XYZ") -> Floats:
@@ -86,22 +120,31 @@ def to_matrices(values: NDArray[Any], form: str, order: str = "XYZ") -> Floats:
     flat = values.reshape(-1, *tail)
     if form == "6d":
         return _from_6d(flat).reshape(*lead, 3, 3)
+    if form == "euler":
+        check_order(order)
     known = np.isfinite(flat).all(axis=1)
     if form == "quat":
-        known &= np.einsum("ij,ij->i", flat, flat) > 0
+        known &= flat.any(axis=1)
     out = np.full((len(flat), 3, 3), np.nan)
     if known.any():
-        from scipy.spatial.transform import Rotation
-
+        parts = flat[known].T
         if form == "quat":
-            turns: Any = Rotation.from_quat(flat[known], scalar_first=True)
+            turns = matrices_of_quaternions(parts / np.abs(parts).max(axis=0))
         elif form == "rotvec":
-            turns = Rotation.from_rotvec(flat[known])
+            turns = matrices_of_vectors(parts)
         else:
-            check_order(order)
-            turns = Rotation.from_euler(order, flat[known])
-        out[known] = turns.as_matrix()
+            turns = _matrices_of_euler_angles(parts, order)
+        out[known] = np.moveaxis(turns, 2, 0)
     return out.reshape(*lead, 3, 3)
+
+
+def _matrices_of_euler_angles(angles: Floats, order: str) -> Floats:
+    """The rotations, (3, 3, n), by angles (3, n)."""
+    steps = list(zip(order.lower(), angles, strict=True))  # about fixed axes: as turned, reversed
+    turns = IDENTITY
+    for letter, angle in steps if order.isupper() else reversed(steps):
+        turns = turned(turns, "xyz".index(letter), angle)
+    return turns
 
 
 def _from_6d(flat: Floats) -> Floats:
@@ -138,12 +181,12 @@ def continuous(quaternions: Floats) -> Floats:
 
 def slerp(first: Floats, second: Floats, share: Floats) -> Floats:
     """Matrices (n, 3, 3) a ``share``, (n,), of the shortest way from ``first`` to ``second``."""
-    from scipy.spatial.transform import Rotation
-
     out = np.full(first.shape, np.nan)
     known = np.isfinite(first).all(axis=(1, 2)) & np.isfinite(second).all(axis=(1, 2))
     if known.any():
-        start: Any = Rotation.from_matrix(first[known])
-        way = (start.inv() * Rotation.from_matrix(second[known])).as_rotvec()
-        out[known] = (start * Rotation.from_rotvec(way * share[known, None])).as_matrix()
+        start = first[known]
+        way = np.swapaxes(start, 1, 2) @ second[known]
+        vectors = vectors_of_quaternions(quaternions_of_matrices(np.moveaxis(way, 0, 2)))
+        part = np.moveaxis(matrices_of_vectors(vectors * share[known]), 2, 0)
+        out[known] = start @ part
     return out
