@@ -25,6 +25,7 @@ GROUND = {
     "checks",
     "displays",
     "errors",
+    "extras",
     "indexing",
     "schema",
     "numbers",
@@ -42,6 +43,7 @@ ALLOWED = {
     "errors": set(),
     "arguments": {"errors"},
     "checks": {"errors"},
+    "extras": {"errors"},
     "indexing": {"errors"},
     "schema": {"errors"},
     "numbers": {"brief", "checks", "errors", "schema"},
@@ -104,7 +106,7 @@ ALLOWED = {
 KERNELS = {"kernels"}  # their decorator and types: any layer's kernels may use them
 
 BANNED_CONSTRUCTS = {"GreedyRange", "Enum", "Flag", "Padding", "VarInt", "Compressed"}
-HEAVY = {"construct", "rich", "fsspec", "pywt", "scipy", "matplotlib", "PIL", "av"}
+HEAVY = {"construct", "fsspec", "pywt", "matplotlib", "PIL", "av"}
 HEAVY |= {"xarray", "rerun"}
 
 

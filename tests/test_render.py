@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import mcz
+from mcz import extras
 from mcz.cli.common import run
 from mcz.cli.main import cli
 from mcz.errors import MczError, MotionError, OptionError
@@ -322,9 +323,9 @@ def test_what_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     def none(name: str) -> Any:
         raise ImportError(name)
 
-    monkeypatch.setattr(libraries, "import_module", none)
-    for name in ("a.mp4", "a.png"):
-        with pytest.raises(OptionError, match="matplotlib.*mcz\\[plot\\]"):
+    monkeypatch.setattr(extras, "import_module", none)
+    for name, extra in {"a.mp4": "render", "a.gif": "plot", "a.png": "plot"}.items():
+        with pytest.raises(OptionError, match=rf"mcz\[{extra}\]"):
             mcz.render(smooth(8), tmp_path / name)
     with pytest.raises(OptionError, match=r"av \(PyAV\).*mcz\[render\]"):
         libraries.library("av")

@@ -7,10 +7,10 @@ from typing import Any
 
 from mcz.conversion import convert
 from mcz.errors import MotionError, OptionError
+from mcz.extras import import_extra
 from mcz.formats import FORMATS
 from mcz.formats.c3d_layout import FORMAT, OUTPUTS_FORMAT
 from mcz.motion import Motion
-from mcz.tables.labelled import imported
 
 
 def from_c3d(reader: Any, *, name: str = "motion") -> Motion:
@@ -42,7 +42,7 @@ def to_c3d(motion: Motion) -> Any:
     ``to_writer`` is for who goes on to change it. Raises MotionError where c3d cannot read that
     file, and as ``mcz.convert(motion, "c3d")`` does.
     """
-    c3d, data = imported("c3d", "c3d"), c3d_bytes(motion)
+    c3d, data = import_extra("c3d", "c3d"), c3d_bytes(motion)
     try:
         return c3d.Reader(io.BytesIO(data))
     except Exception as error:  # it raises whatever its parser met, AssertionError among others

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from mcz.adapters.c3d import c3d_bytes, for_c3d
 from mcz.errors import MotionError, OptionError
+from mcz.extras import import_extra
 from mcz.formats import FORMATS
 from mcz.motion import Motion, Signal
 from mcz.reading.recording import ANALOG, recording
-from mcz.tables.labelled import imported
 
 Held = dict[str, tuple[NDArray[np.float64], NDArray[np.bool_]]]
 OUTPUTS = "outputs"  # the signal of what models gave, which ezc3d has among the points
@@ -56,7 +56,7 @@ def to_ezc3d(motion: Motion) -> Any:
     binary64; ezc3d writes them as binary32. Gaps are NaN. Raises MotionError where ezc3d cannot
     read that file, and as ``mcz.convert(motion, "c3d")`` does.
     """
-    ezc3d = imported("ezc3d", "ezc3d")
+    ezc3d = import_extra("ezc3d", "ezc3d")
     plain = for_c3d(motion)
     data = c3d_bytes(plain)
     with tempfile.TemporaryDirectory() as folder:

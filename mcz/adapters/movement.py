@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from mcz.clock import Timeline, numbers_or_rows
 from mcz.errors import OptionError
+from mcz.extras import import_extra
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton, frame_rate_of
 from mcz.numbers import Grid, GridKind
 from mcz.poses import point_names, positions
 from mcz.reading.source_files import with_facts
-from mcz.tables.labelled import imported
 from mcz.units import UNIT_CM
 
 Floats = NDArray[np.float64]
@@ -34,7 +34,7 @@ def to_movement(motion: Motion, *, unit: str | None = None) -> Any:
     called ``individual:keypoint`` are individuals, where all of these have the same keypoints;
     otherwise there is one, called as the motion. Raises as ``mcz.positions`` does.
     """
-    xarray = imported("xarray", "xarray")
+    xarray = import_extra("xarray", "xarray")
     names = point_names(motion.skeleton)
     individuals, keypoints = _grid_of(names, motion.name)
     shape = (motion.n_frames, len(individuals), len(keypoints))

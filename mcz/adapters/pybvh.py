@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mcz.conversion.hierarchy import is_bvh, to_bvh
 from mcz.errors import MotionError, OptionError
+from mcz.extras import import_extra
 from mcz.formats.rates import frame_rate
 from mcz.motion import (
     POSITION_KINDS,
@@ -24,7 +25,6 @@ from mcz.motion import (
     check_poses,
 )
 from mcz.reading.source_files import with_facts
-from mcz.tables.labelled import imported
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +70,7 @@ def to_pybvh(motion: Motion) -> Any:
     joints of BVH first, as ``mcz.convert`` does it. Raises MotionError where pybvh cannot hold it:
     gaps, several roots, joints that change their place, markers, signals beside the motion.
     """
-    pybvh = imported("pybvh", "pybvh")
+    pybvh = import_extra("pybvh", "pybvh")
     check_poses(motion.name, motion.signals[0])
     tree = _Tree(motion)
     order = list(tree.depth_first())

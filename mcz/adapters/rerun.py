@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mcz.clock import numbers_or_rows
 from mcz.errors import MotionError
+from mcz.extras import import_extra
 from mcz.kinematics.chain import Floats
 from mcz.kinematics.points import listed_points, point_set
 from mcz.motion import Motion, Skeleton
@@ -20,7 +21,6 @@ from mcz.poses.moving import Moving, scale_to, values_of
 from mcz.reading.clip import Clip
 from mcz.reading.recording import recording as recording_of
 from mcz.tables.files import channel_names, channel_units
-from mcz.tables.labelled import imported
 
 APPLICATION = "mcz"
 BLOCK = 2**19  # numbers that are worked on at a time: what bounds the memory
@@ -45,7 +45,7 @@ def to_rerun(moving: Moving, recording: Any = None, *, entity: str | None = None
     (``save``, ``spawn``) memory is bounded. Returns the recording. Raises MotionError where there
     is nothing to log.
     """
-    rerun = imported("rerun", "rerun")
+    rerun = import_extra("rerun", "rerun")
     if recording is None:
         recording = rerun.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
     _Log(rerun, recording, moving, moving.name if entity is None else entity).all()
@@ -57,8 +57,8 @@ def view_of(moving: Moving, entity: str) -> Any:
 
     Residuals are there, and not shown: there are as many as points.
     """
-    blueprint = imported("rerun.blueprint", "rerun")
-    log = _Log(imported("rerun", "rerun"), None, moving, entity)
+    blueprint = import_extra("rerun.blueprint", "rerun")
+    log = _Log(import_extra("rerun", "rerun"), None, moving, entity)
     origin = str(log.path())
     figure = [blueprint.Spatial3DView(origin=origin, name=entity)] if log.figure else []
     curves = [

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mcz.cli.common import Exit, Failure, about, check_new, echo, plural, print_json
+from mcz.extras import import_extra
 
 if TYPE_CHECKING:
     from mcz.motion import Motion
@@ -60,9 +61,8 @@ def _recording() -> Any:
     import uuid
 
     from mcz.adapters.rerun import APPLICATION
-    from mcz.tables.labelled import imported
 
-    rerun = imported("rerun", "rerun")
+    rerun = import_extra("rerun", "rerun")
     return rerun.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()))
 
 
@@ -100,7 +100,6 @@ def _log(shelf: Shelf, recording: Any, options: dict[str, Any]) -> tuple[list[di
     """What was logged, and how many clips could not be."""
     from mcz.adapters.rerun import to_rerun, view_of
     from mcz.errors import MczError
-    from mcz.tables.labelled import imported
 
     rows: list[dict[str, Any]] = []
     views: list[Any] = []
@@ -122,7 +121,7 @@ def _log(shelf: Shelf, recording: Any, options: dict[str, Any]) -> tuple[list[di
     if unknown:
         shelf.say(f"{plural(unknown, 'clip')}: which axis points up is unknown; --up says it")
     if views:
-        blueprint = imported("rerun.blueprint", "rerun")
+        blueprint = import_extra("rerun.blueprint", "rerun")
         arranged = blueprint.Grid if len(views) <= MOST_BESIDE else blueprint.Tabs
         recording.send_blueprint(blueprint.Blueprint(arranged(*views), collapse_panels=True))
     return rows, failed

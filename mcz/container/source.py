@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 
 from mcz.container.locks import is_locked
 from mcz.errors import AccessError, MczError, OptionError, TruncatedError
+from mcz.extras import import_extra
 
 
 class ByteSource:
@@ -210,15 +211,26 @@ def _remote_stream(target: str) -> Any:
         from mcz.container.http import HttpFile
 
         return HttpFile(target)
-    import fsspec
-
+    fs, path = file_system(target)
     try:
-        fs, path = fsspec.core.url_to_fs(target)
         return fs.open(path, "rb", cache_type="none")  # an option of the file, not of its store
-    except (ValueError, ImportError) as error:  # no such protocol, or not installed
-        raise OptionError(f"{target}: {error}") from None
     except Exception as error:  # each file system has its own errors
         raise _no_access(target, error) from None
+
+
+def file_system(url: str) -> tuple[Any, str]:
+    """The file system of fsspec that has ``url``, and the path in it.
+
+    Raises OptionError where fsspec, or what it needs for the protocol, is not installed.
+    """
+    fsspec = import_extra("fsspec", "remote", purpose=url)
+    try:
+        fs, path = fsspec.core.url_to_fs(url)
+    except (ValueError, ImportError) as error:  # no such protocol, or not installed
+        raise OptionError(f"{url}: {error}") from None
+    except Exception as error:  # each file system has its own errors
+        raise _no_access(url, error) from None
+    return fs, str(path)
 
 
 def _no_access(name: str, error: Exception) -> AccessError:

@@ -11,6 +11,7 @@ from typing import Any
 from uuid import uuid4
 
 from mcz.errors import MczError, OptionError, WorkerError
+from mcz.extras import import_extra
 from mcz.jobs import Answer
 from mcz.threads import limited
 
@@ -125,11 +126,7 @@ def connected(client: Any) -> Iterator[Any]:
 
     None: the client that the process has. Raises OptionError where there is none, or no Dask.
     """
-    try:
-        import distributed
-    except ImportError:
-        raise OptionError("Dask is not installed; pip install 'mcz[dask]'") from None
-    dask: Any = distributed  # which has types in part
+    dask = import_extra("distributed", "dask", package="Dask")
     try:
         if isinstance(client, str):
             with dask.Client(client) as made:

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from mcz.container.limits import Profile
+from mcz.container.source import file_system
 from mcz.editing.coded_parts import Ask, Part, coded
 from mcz.editing.folders import files_below, size_of
 from mcz.editing.outcomes import Outcome
@@ -71,14 +72,9 @@ def listed(root: str, target: Any) -> tuple[list[Found], list[Outcome]]:
 
 
 def _opened(url: str) -> tuple[Any, str]:
-    """The file system of a URL and the path in it; raises OptionError."""
-    import fsspec
-
-    try:
-        fs, path = fsspec.core.url_to_fs(url)
-    except (ValueError, ImportError) as error:  # no such protocol, or not installed
-        raise OptionError(f"{url}: {error}") from None
-    return fs, str(path).rstrip("/")
+    """The file system of a URL and the path of its folder in it; raises OptionError."""
+    fs, path = file_system(url)
+    return fs, path.rstrip("/")
 
 
 def skeletons_beside(name: str, skeletons: list[str]) -> tuple[str, ...]:

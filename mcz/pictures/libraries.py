@@ -5,10 +5,9 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from typing import Any
 
-from mcz.errors import OptionError
+from mcz.extras import import_extra
 
 EXTRAS = {"matplotlib": "plot", "PIL": "plot", "av": "render"}
 PACKAGES = {"PIL": "pillow", "av": "av (PyAV)"}
@@ -16,15 +15,8 @@ PACKAGES = {"PIL": "pillow", "av": "av (PyAV)"}
 
 def library(name: str) -> Any:
     """The module ``name``; OptionError that names the extra of mcz where it is not installed."""
-    package = name.partition(".")[0]
-    try:
-        return import_module(name)
-    except ImportError as error:
-        called = PACKAGES.get(package, package)
-        extra = EXTRAS[package]
-        raise OptionError(
-            f"this picture needs {called}, which is not installed (pip install 'mcz[{extra}]')"
-        ) from error
+    top = name.partition(".")[0]
+    return import_extra(name, EXTRAS[top], package=PACKAGES.get(top, top), purpose="this picture")
 
 
 def new_figure(width: int, height: int, **options: Any) -> Any:

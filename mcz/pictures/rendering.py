@@ -30,8 +30,8 @@ FILMS = {".gif": Fraction(25), ".mp4": Fraction(30), ".webm": Fraction(30)}
 STILLS = (".png", ".svg")
 NEEDED = {
     ".gif": ("matplotlib", "PIL"),
-    ".mp4": ("matplotlib", "av"),
-    ".webm": ("matplotlib", "av"),
+    ".mp4": ("av", "matplotlib"),  # the extra that has av has both
+    ".webm": ("av", "matplotlib"),
 }
 USUAL_RATE = Fraction(120)  # frames a second where nobody says: that of CMU's AMC files
 SIZE, SIZE_OF_GIF = (640, 640), (480, 480)

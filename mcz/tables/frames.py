@@ -7,11 +7,12 @@ from typing import Any
 from numpy.typing import NDArray
 
 from mcz.errors import OptionError
+from mcz.extras import import_extra
 from mcz.motion import Motion, Signal
 from mcz.poses import accelerations, point_names, positions, rotations, velocities
 from mcz.skeleton import Joints
 from mcz.tables.files import channel_names
-from mcz.tables.labelled import COMPONENTS, imported, row_times
+from mcz.tables.labelled import COMPONENTS, row_times
 
 PLACES = {"positions": positions, "velocities": velocities, "accelerations": accelerations}
 
@@ -33,7 +34,7 @@ def to_pandas(
     "lfoot.x"; of channels and signals always texts. What is invalid is NaN. Raises OptionError for
     another ``what``, and as ``mcz.positions``.
     """
-    pandas = imported("pandas", "pandas")
+    pandas = import_extra("pandas", "pandas")
     signals = {signal.name: signal for signal in motion.signals[1:]}
     if what in PLACES:
         array = PLACES[what](motion, joints, unit=unit)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mcz.clock import is_time, numbers_or_rows
 from mcz.errors import MotionError, OptionError
+from mcz.extras import import_extra
 from mcz.motion import Motion, Signal
 from mcz.poses import point_names, positions, rotations
 from mcz.tables.files import channel_names, channel_units
@@ -19,16 +20,6 @@ COMPONENTS = {
     "6d": ("rotation", ["xx", "yx", "zx", "xy", "yy", "zy"]),
     "euler": ("rotation", ["X", "Y", "Z"]),
 }
-
-
-def imported(name: str, extra: str) -> Any:
-    """The module of an extra; raises OptionError where it is not installed."""
-    from importlib import import_module
-
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise OptionError(f"{name} is not installed (pip install 'mcz[{extra}]')") from error
 
 
 def to_xarray(
@@ -45,7 +36,7 @@ def to_xarray(
     """
     if form not in COMPONENTS:
         raise OptionError(f"rotations as {form!r}: one of {', '.join(COMPONENTS)}")
-    xarray = imported("xarray", "xarray")
+    xarray = import_extra("xarray", "xarray")
     skeleton, main = motion.skeleton, motion.signals[0]
     numbers = numbers_or_rows(motion.frame_numbers, motion.n_frames)
     variables: dict[str, Any] = {

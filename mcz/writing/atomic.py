@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 
 from mcz.container.locks import is_abandoned, lock
 from mcz.container.scan import scan
-from mcz.container.source import ByteSource
+from mcz.container.source import ByteSource, file_system
 from mcz.errors import AccessError, ExistsError, OptionError
 from mcz.writing.inputs import refuse_inputs
 
@@ -85,12 +85,7 @@ def rereadable(stream: BinaryIO) -> Iterator[BinaryIO]:
 
 @contextmanager
 def _remote(target: str, force: bool) -> Iterator[BinaryIO]:
-    import fsspec
-
-    try:
-        fs, path = fsspec.core.url_to_fs(target)
-    except (ValueError, ImportError) as error:  # no such protocol, or not installed
-        raise OptionError(f"{target}: {error}") from None
+    fs, path = file_system(target)
     if not force and fs.exists(path):
         raise ExistsError(f"{target} exists; use force to replace it")
     with fs.transaction, fs.open(path, "wb") as stream:
