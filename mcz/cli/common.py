@@ -43,7 +43,7 @@ class Exit(IntEnum):
 
     FINE = 0
     BAD_INPUT = 1  # a file is missing, unreadable, refused or not what it should be
-    USAGE = 2  # an unknown option or value, or a target that exists and no --force
+    USAGE = 2  # an unknown option or value, a missing extra, a target that exists and no --force
     NOT_VERIFIED = 3  # verify or info --validate found something wrong
     SALVAGED = 4  # --salvage wrote what could be read, and something was lost
     INTERRUPTED = 130
@@ -54,7 +54,7 @@ EXIT_CODES = """\b
 Exit codes:
   0  fine
   1  bad input: a file is missing, unreadable, damaged or refused
-  2  wrong usage, or the target exists and --force is not given
+  2  wrong usage, a package is missing, or the target exists and --force is not given
   3  verification failed
   4  salvaged: what could be read was written, and something was lost
   130  interrupted

@@ -9,7 +9,9 @@ from __future__ import annotations
 import io
 import json
 import re
+import shutil
 import sys
+import unicodedata
 from typing import Any, BinaryIO
 
 import click
@@ -21,8 +23,44 @@ from mcz.errors import AccessError, OptionError
 ENCODING, KEPT = "utf-8", "surrogateescape"  # of text that is printed as bytes
 
 
+class StatusLine:
+    """A line on the terminal of standard error that goes when anything else is printed."""
+
+    def __init__(self) -> None:
+        self._width = 0  # columns of the line that is shown
+
+    def show(self, text: str) -> None:
+        """Show ``text``, as much of it as fits, in place of the line before."""
+        room, width, shown = shutil.get_terminal_size().columns - 1, 0, ""
+        for letter in printable(text):
+            width += columns_of(letter)
+            if width > room:
+                width -= columns_of(letter)
+                break
+            shown += letter
+        click.echo(f"\r{shown}{' ' * (self._width - width)}", err=True, nl=False)
+        self._width = width
+
+    def remove(self) -> None:
+        """Put the cursor where the line began, and blanks where it was."""
+        if self._width:
+            click.echo(f"\r{' ' * self._width}\r", err=True, nl=False)
+            self._width = 0
+
+
+STATUS = StatusLine()
+
+
+def columns_of(letter: str) -> int:
+    """How many columns of a terminal a printable letter takes."""
+    if unicodedata.combining(letter):
+        return 0
+    return 2 if unicodedata.east_asian_width(letter) in "WF" else 1
+
+
 def echo(*lines: str) -> None:
     """Print lines on standard output."""
+    STATUS.remove()
     for line in lines:
         click.echo(printable(line))
 
@@ -43,11 +81,13 @@ def is_terminal() -> bool:
 
 def say(message: str) -> None:
     """Print one line on standard error."""
+    STATUS.remove()
     click.echo(f"mcz: {printable(' '.join(message.split()))}", err=True)
 
 
 def say_json(document: Any) -> None:
     """Print ``document`` as one line of JSON on standard error."""
+    STATUS.remove()
     click.echo(json_text(document, indent=None), err=True)
 
 
@@ -70,6 +110,7 @@ def json_text(document: Any, indent: int | None = 2) -> str:
 
 def print_json(document: Any) -> None:
     """Print ``document`` as one JSON document with sorted layout but kept key order."""
+    STATUS.remove()
     click.echo(json_text(document))
 
 

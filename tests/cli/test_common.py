@@ -16,6 +16,7 @@ from mcz.cli.common import OUT_OF_MEMORY, Exit, Failure, about, run, table, writ
 from mcz.cli.lazy import OTHER_NAMES
 from mcz.cli.main import COMMANDS, cli
 from mcz.cli.progress import Progress
+from mcz.cli.terminal import say
 from mcz.errors import ChecksumError, MczError, OptionError
 from tests.motions import smooth
 
@@ -87,14 +88,37 @@ def test_progress_shows_on_a_terminal(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("mcz.cli.progress.PATIENCE", 0.0)
+    monkeypatch.setattr("mcz.cli.progress.INTERVAL", 0.0)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-    monkeypatch.setenv("TERM", "xterm")
-    shown: list[Any] = []
+    monkeypatch.setenv("COLUMNS", "40")
     with Progress() as progress:
         progress(1, 2, "walk")
-        shown.append(progress.bar.tasks[0].description)
-    assert shown == ["walk"]
-    capsys.readouterr()
+        line = "[############------------]  50% walk"
+        assert capsys.readouterr().err == f"\r{line}"
+        say("a note")
+        assert capsys.readouterr().err == f"\r{' ' * len(line)}\rmcz: a note\n"
+        progress(2, 2, "a run of three hours")
+        assert capsys.readouterr().err == f"\r[{'#' * 24}] 100% a run o"
+        progress(3, 2, "\u6b69\u304f\u6b69\u304f\u6b69")
+        assert capsys.readouterr().err == f"\r[{'#' * 24}] 100% \u6b69\u304f\u6b69 "
+    assert capsys.readouterr().err == f"\r{' ' * 38}\r"
+    with Progress():
+        pass
+    assert capsys.readouterr().err == ""
+
+
+def test_progress_waits_for_a_second_of_work(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [5.0]
+    monkeypatch.setattr("mcz.cli.progress.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with Progress() as progress:
+        seen = []
+        for now[0] in (5.9, 6.0, 6.05, 6.15):
+            progress(1, 2, "walk")
+            seen.append(bool(capsys.readouterr().err))
+    assert seen == [False, True, False, True]
 
 
 def test_errors_are_json_where_it_is_asked_for(

@@ -188,20 +188,16 @@ def test_binary_data_are_not_printed_on_a_terminal(hostile: Path) -> None:
     assert b"binary data are not printed on a terminal" in shown
 
 
-def test_progress_shows_names_as_they_are_meant(monkeypatch: pytest.MonkeyPatch) -> None:
-    progress = Progress()
-    shown: list[str] = []
-
-    class Bar:
-        def update(self, task: object, *, completed: int, total: int, description: str) -> None:
-            shown.append(description)
-
-    progress._wanted, progress._started, progress.bar = True, -1e9, Bar()
-    progress(1, 2, f"[/red]{STEERING}")
-    assert not steers(shown[0])
-    from rich.text import Text
-
-    assert Text.from_markup(shown[0]).plain.startswith("[/red]")
+def test_progress_shows_names_as_they_are_meant(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mcz.cli.progress.PATIENCE", 0.0)
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with Progress() as progress:
+        progress(1, 2, f"[/red]{STEERING}")
+        shown = capsys.readouterr().err
+    assert shown.startswith("\r") and " [/red]" in shown
+    assert not steers(shown[1:])
 
 
 def test_csv_names_are_found_again_in_csv(
