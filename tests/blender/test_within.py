@@ -1,7 +1,7 @@
 """The add-on in Blender itself: ``MCZ_BPY`` lists Pythons that have ``bpy``, as in .ci/full.
 
 The zip is unpacked, or installed, and what it bundles is all of MCZ that is there. Where
-``MCZ_BPY_WHEELS`` names a folder of wheels, such as llvmlite, the zip bundles them, too.
+``MCZ_BPY_WHEELS`` names a folder of wheels of MCZ, the zip has their compiled kernels.
 """
 
 from __future__ import annotations
@@ -35,9 +35,7 @@ pytestmark = [
 def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The zip, and beside it what it holds: ``addons/mcz_blender``, its wheels in ``wheels``."""
     folder = tmp_path_factory.mktemp("addon")
-    wheels = Path(WHEELS).glob("*.whl") if WHEELS else ()
-    more = {path.name: path.read_bytes() for path in wheels}
-    _, data = build.built(more, "linux-x64" if more else None)
+    _, data = build.build_zip(build.wheels_in(Path(WHEELS)) if WHEELS else ())
     (folder / "addon.zip").write_bytes(data)
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         archive.extractall(folder / "addons/mcz_blender")
@@ -50,7 +48,8 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ran(python: str, package: Path, script: Path, *words: Any, **more: str) -> str:
     """What a script printed, with the bundled package alone on its path."""
     environment = {**os.environ, "PYTHONPATH": str(package / "wheels"), **more}
-    environment.pop("VIRTUAL_ENV", None)
+    for name in ("VIRTUAL_ENV", "MCZ_LOOPS"):
+        environment.pop(name, None)
     command = [python, script, *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -69,11 +68,27 @@ def options(**given: Any) -> list[str]:
     return [word for name, value in given.items() for word in ("--option", f"{name}={value}")]
 
 
-def test_with_numpy_alone(python: str, package: Path, samples: Path, tmp_path: Path) -> None:
-    """What Blender has is enough to read and to write, without anything but ``mcz`` bundled."""
-    with zipfile.ZipFile(io.BytesIO(build.mcz_wheel()[1])) as wheel:
-        wheel.extractall(tmp_path / "wheels")
-    (tmp_path / "addons").symlink_to(package / "addons")
+KERNELS = """
+import mcz, mcz.kernels
+print(mcz.__file__, mcz.kernels.lacks_compiled_kernels())
+"""
+
+
+def test_the_kernels_that_it_has(python: str, package: Path, tmp_path: Path) -> None:
+    """Compiled ones exactly where a wheel of this Python was bundled."""
+    script = tmp_path / "kernels.py"
+    script.write_text(KERNELS, "utf-8")
+    path, lacks = ran(python, package, script).split()
+    assert path.startswith(str(package)) and lacks == str(not WHEELS)
+
+
+def test_with_plain_python(python: str, samples: Path, tmp_path: Path) -> None:
+    """Blender's Python and NumPy are enough to read and to write."""
+    folder, data = tmp_path / "wheels", build.build_zip()[1]
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        archive.extractall(tmp_path / "addons/mcz_blender")
+    with zipfile.ZipFile(io.BytesIO(build.mcz_wheel({})[1])) as wheel:
+        wheel.extractall(folder)
     mcz.encode(samples / "walk.bvh", tmp_path / "walk.mcz")
     words = "export", tmp_path / "walk.mcz", tmp_path / "out.mcz"
     found = check(python, tmp_path, *words)
@@ -108,7 +123,7 @@ def test_options(python: str, package: Path, samples: Path, given: dict[str, Any
     check(python, package, "import", samples / "walk.bvh", *options(**given))
 
 
-@pytest.mark.skipif(not WHEELS, reason="without llvmlite these take minutes")
+@pytest.mark.skipif(not WHEELS, reason="without compiled kernels these take minutes")
 @pytest.mark.parametrize("codec", ["best", "lossy"])
 def test_codecs(python: str, package: Path, samples: Path, tmp_path: Path, codec: str) -> None:
     """A lossy file is as near as was asked for: 0.3 cm of 1 m."""
@@ -166,6 +181,15 @@ try:
     bpy.ops.export_anim.mcz(filepath=out, clip_name="three")
 except RuntimeError as error:
     assert "cannot all be 'three'" in str(error), error
+
+bpy.context.scene.frame_end = 10**6
+try:
+    bpy.ops.export_anim.mcz(filepath=out, codec="lossy")
+except RuntimeError as error:
+    assert "hours, and Blender waits for it" in str(error), error
+    assert "tick Export Anyway (accepts_slow) to export" in str(error), error
+else:
+    raise AssertionError("not warned")
 
 # What is drawn: without a window, onto a layout that only remembers.
 from unittest.mock import MagicMock
@@ -241,4 +265,4 @@ def test_a_clip_of_a_real_archive(python: str, package: Path, data: Path, tmp_pa
     archive = tmp_path / "runs.mcz"
     mcz.pack(data / "other/bandai-namco", archive)
     chosen = options(clip="dataset-2_run_normal_016", step=2)
-    assert check(python, package, "import", archive, *chosen)["loaded"] in ([], ["llvmlite"])
+    assert check(python, package, "import", archive, *chosen)["loaded"] == []

@@ -22,7 +22,7 @@ from mcz.sample import acclaim_walk, bvh_walk, marker_walk
 from tests.blender.clips import stretching_arm
 from tests.skeletons import skeletons, values_for
 from tools.blender import build
-from tools.blender.mcz_blender import clips, placing, solving, spaces
+from tools.blender.mcz_blender import clips, durations, placing, solving, spaces
 
 UPS = st.sampled_from("xyz")
 FACTS = solving.Facts("walk", Fraction(120), 2.5, "y", 40.0, 9, 9)
@@ -239,19 +239,95 @@ def test_coarse_clips(tmp_path: Path) -> None:
     assert len(fine.numbers) == 240 and fine.notes == ("clip 'walk' has resolutions 0 to 0",)
 
 
+def zip_members(data: bytes) -> dict[str, bytes]:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
 def test_the_zip() -> None:
     """The same bytes twice, a manifest that names what is there, and the version of the package."""
-    name, data = build.built({}, "linux-x64")
-    assert (name, data) == build.built({}, "linux-x64")
-    assert name == f"mcz-blender-{mcz.__version__}-linux-x64.zip"
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        held = set(archive.namelist())
-        manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
-        wheel = archive.read(f"wheels/mcz-{mcz.__version__}-py3-none-any.whl")
-    assert {"__init__.py", "importing.py", "LICENSE"} <= held
-    assert manifest["version"] == mcz.__version__ and manifest["platforms"] == ["linux-x64"]
-    assert {f"./{name}" for name in held if name.endswith(".whl")} == set(manifest["wheels"])
+    name, data = build.build_zip()
+    assert (name, data) == build.build_zip()
+    assert name == f"mcz-blender-{mcz.__version__}.zip"
+    members = zip_members(data)
+    manifest = tomllib.loads(members["blender_manifest.toml"].decode())
+    assert {"__init__.py", "importing.py", "LICENSE"} <= set(members)
+    assert manifest["version"] == mcz.__version__ and "platforms" not in manifest
+    assert manifest["wheels"] == [f"./{name}" for name in members if name.endswith(".whl")]
     assert len(manifest["tagline"]) <= 64 and manifest["permissions"]
-    with zipfile.ZipFile(io.BytesIO(wheel)) as package:
-        assert {"mcz/__init__.py", "mcz/annex/registry.json"} <= set(package.namelist())
-        assert not [name for name in package.namelist() if name.endswith((".pyc", ".html"))]
+    package = zip_members(members[f"wheels/mcz-{mcz.__version__}-py3-none-any.whl"])
+    assert {"mcz/__init__.py", "mcz/annex/registry.json"} <= set(package)
+    unwanted = (".pyc", ".html", ".so", ".pyd")
+    assert not [name for name in package if name.endswith(unwanted)]
+
+
+def wheel_with(path: Path, *modules: str, **sources: bytes) -> Path:
+    """A wheel of this tree with compiled modules of these names, and with changed sources."""
+    files = zip_members(build.mcz_wheel({name: name.encode() for name in modules})[1])
+    files |= {f"mcz/{name}.py": data for name, data in sources.items()}
+    path.write_bytes(build.zipped(files))
+    return path
+
+
+def test_compiled_kernels_of_several_platforms_are_in_one_wheel(tmp_path: Path) -> None:
+    """Each Python finds its own by the suffix; only kernels come of the wheels."""
+    linux = "mcz/kernels/compiled/fast.cpython-311-x86_64-linux-gnu.so"
+    windows = "mcz/kernels/compiled/fast.cp311-win_amd64.pyd"
+    checked = "mcz/kernels/checked/fast.cp311-win_amd64.pyd"
+    wheel_with(tmp_path / "mcz-0.9.0-cp311-cp311-linux_x86_64.whl", linux)
+    wheel_with(tmp_path / "mcz-0.9.0-cp311-cp311-win_amd64.whl", windows, checked)
+    (tmp_path / "numpy-1.24.4-cp311-cp311-win_amd64.whl").write_bytes(b"")
+    members = zip_members(build.build_zip(build.wheels_in(tmp_path))[1])
+    (wheel,) = (data for name, data in members.items() if name.endswith(".whl"))
+    package = zip_members(wheel)
+    assert package[linux] == linux.encode() and package[windows] == windows.encode()
+    assert checked not in package
+    record = package[f"mcz-{mcz.__version__}.dist-info/RECORD"].decode()
+    assert f"{linux},sha256=" in record and f"{windows},sha256=" in record
+
+
+def test_wheels_that_cannot_be_bundled(tmp_path: Path) -> None:
+    module = "mcz/kernels/compiled/fast.cpython-311-darwin.so"
+    first = wheel_with(tmp_path / "mcz-1.whl", module)
+    second = wheel_with(tmp_path / "mcz-2.whl", module)
+    with pytest.raises(
+        build.WheelError, match=f"mcz-2.whl and a wheel before it both have {module}"
+    ):
+        build.build_zip([first, second])
+    with pytest.raises(build.WheelError, match="mcz-3.whl has no compiled kernels"):
+        build.build_zip([wheel_with(tmp_path / "mcz-3.whl")])
+    other = wheel_with(tmp_path / "mcz-4.whl", module, version=b"VERSION = '0.1'")
+    with pytest.raises(
+        build.WheelError, match=r"mcz-4.whl was not built .*: mcz/version.py differs"
+    ):
+        build.build_zip([other])
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(build.WheelError, match="empty has no wheels of mcz"):
+        build.wheels_in(tmp_path / "empty")
+
+
+@pytest.mark.parametrize("lacking", [False, True])
+def test_a_slow_export_is_announced(monkeypatch: pytest.MonkeyPatch, lacking: bool) -> None:
+    """With how long it may take, in words, where that is over a minute."""
+    monkeypatch.setattr(durations, "lacks_compiled_kernels", lambda: lacking)
+    n_values = 2783 * 62
+    assert durations.slow_warning("fast", n_values) == ""
+    assert durations.slow_warning("lossy", 0) == ""
+    warning = durations.slow_warning("lossy", n_values if lacking else 100 * n_values)
+    assert warning == (
+        "Without compiled kernels this export takes up to 12 minutes, and Blender waits for it; "
+        "with codec Fast, 4 seconds"
+        if lacking
+        else "This export takes up to 21 minutes, and Blender waits for it; "
+        "with codec Fast, 13 seconds"
+    )
+    assert bool(durations.slow_warning("best", n_values)) == lacking
+    assert durations.slow_warning("fast", 10**9).endswith("Blender waits for it")
+
+
+def test_durations_in_words() -> None:
+    given = [0.0, 1.0, 1.5, 120.0, 121.0, 7200.0, 7201.0]
+    assert [durations.in_words(seconds) for seconds in given] == [
+        *("1 second", "1 second", "2 seconds", "120 seconds"),
+        *("3 minutes", "120 minutes", "3 hours"),
+    ]

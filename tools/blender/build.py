@@ -1,10 +1,12 @@
-"""The add-on as one zip that Blender installs: the same bytes from the same tree.
+"""The add-on as one zip that Blender installs: the same bytes from the same inputs.
 
-    python tools/blender/build.py [--wheels DIR] [--platform linux-x64] [--out dist]
+    python tools/blender/build.py [--wheels DIR] [--out dist]
 
 It holds the add-on's modules, and ``mcz`` as a wheel, which needs nothing but Blender's NumPy.
-``--wheels`` adds those of a folder, such as llvmlite, with which loops are compiled; they are of
-one platform, which ``--platform`` names.
+``--wheels`` names a folder of wheels of this tree, each for a Python and a platform; their compiled
+kernels are added to the one wheel. Of several wheels of one name and version Blender takes the last
+by file name, 4.2 whatever their Python; so there is one wheel, in which Python finds the modules of
+its own by their suffix, or none and runs kernels as plain Python.
 """
 
 from __future__ import annotations
@@ -15,49 +17,86 @@ import hashlib
 import io
 import re
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 ADDON = Path(__file__).with_name("mcz_blender")
-PLATFORMS = ("linux-x64", "macos-arm64", "macos-x64", "windows-arm64", "windows-x64")
+KERNELS = "mcz/kernels/compiled/"
+BUILT_IN_PLACE = ("compiled", "checked", "sanitized")  # folders of mcz/kernels, of one machine
 BEFORE_ALL = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can state
 WHEEL = b"Wheel-Version: 1.0\nGenerator: mcz\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
 
 
+class WheelError(Exception):
+    """A wheel whose compiled kernels cannot be bundled."""
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--wheels", type=Path, help="a folder of further wheels")
-    parser.add_argument("--platform", choices=PLATFORMS, help="the one that those are for")
+    parser.add_argument("--wheels", type=Path, help="a folder of wheels of mcz, for their kernels")
     parser.add_argument("--out", type=Path, default=ROOT / "dist", help="the folder of the zip")
-    asked = parser.parse_args()
-    more = {path.name: path.read_bytes() for path in sorted((asked.wheels or Path()).glob("*.whl"))}
-    name, data = built(more if asked.wheels else {}, asked.platform)
-    asked.out.mkdir(parents=True, exist_ok=True)
-    path = asked.out / name
+    given = parser.parse_args()
+    try:
+        name, data = build_zip(wheels_in(given.wheels) if given.wheels else ())
+    except WheelError as error:
+        parser.error(str(error))
+    given.out.mkdir(parents=True, exist_ok=True)
+    path = given.out / name
     path.write_bytes(data)
     print(f"{path}: {len(data):,} bytes")
 
 
-def built(more: Mapping[str, bytes], platform: str | None = None) -> tuple[str, bytes]:
-    """The name of the zip and its bytes."""
-    wheels = dict([mcz_wheel(), *more.items()])
+def wheels_in(folder: Path) -> list[Path]:
+    """The wheels of mcz in a folder; raises WheelError where there are none."""
+    wheels = sorted(folder.glob("mcz-*.whl"))
+    if not wheels:
+        raise WheelError(f"{folder} has no wheels of mcz")
+    return wheels
+
+
+def build_zip(wheels: Iterable[Path] = ()) -> tuple[str, bytes]:
+    """Return the name of the zip and its bytes, with the compiled kernels of ``wheels``.
+
+    Raises WheelError.
+    """
+    name, wheel = mcz_wheel(compiled_kernels(wheels))
     files = {path.relative_to(ADDON).as_posix(): path.read_bytes() for path in ADDON.rglob("*.py")}
     manifest = (ADDON / "blender_manifest.toml").read_text("utf-8")
-    files["blender_manifest.toml"] = completed(manifest, sorted(wheels), platform).encode()
+    listed = f'\nwheels = ["./wheels/{name}"]\n\n['
+    files["blender_manifest.toml"] = manifest.replace("\n[", listed, 1).encode()
     files["LICENSE"] = (ROOT / "LICENSE").read_bytes()
-    files |= {f"wheels/{name}": data for name, data in wheels.items()}
-    end = f"-{platform}" if platform else ""
-    return f"mcz-blender-{version()}{end}.zip", zipped(files)
+    files[f"wheels/{name}"] = wheel
+    return f"mcz-blender-{version()}.zip", zipped(files)
 
 
-def completed(manifest: str, wheels: list[str], platform: str | None) -> str:
-    """The manifest, with what this zip holds, before its first table."""
-    listed = "".join(f'  "./wheels/{name}",\n' for name in wheels)
-    lines = f"wheels = [\n{listed}]\n"
-    if platform:
-        lines += f'platforms = ["{platform}"]\n'
-    return manifest.replace("\n[", f"\n{lines}\n[", 1)
+def compiled_kernels(wheels: Iterable[Path]) -> dict[str, bytes]:
+    """Return the compiled kernels of wheels, by name in the package.
+
+    Raises WheelError for a wheel without any, one whose sources are not those of this tree, and two
+    wheels with modules of one name, as those of both processors of macOS have.
+    """
+    found: dict[str, bytes] = {}
+    for path in wheels:
+        with zipfile.ZipFile(path) as wheel:
+            names = wheel.namelist()
+            modules = [n for n in names if n.startswith(KERNELS) and not n.endswith("/")]
+            if not modules:
+                raise WheelError(f"{path.name} has no compiled kernels")
+            for name in names:
+                if name.startswith("mcz/") and name.endswith(".py"):
+                    _check_source(path.name, name, wheel.read(name))
+            twice = sorted(found.keys() & set(modules))
+            if twice:
+                raise WheelError(f"{path.name} and a wheel before it both have {twice[0]}")
+            found |= {name: wheel.read(name) for name in modules}
+    return found
+
+
+def _check_source(wheel: str, name: str, data: bytes) -> None:
+    own = ROOT / name
+    if not own.is_file() or own.read_bytes() != data:
+        raise WheelError(f"{wheel} was not built from this tree: {name} differs")
 
 
 def version() -> str:
@@ -68,14 +107,18 @@ def version() -> str:
     return found[1]
 
 
-def mcz_wheel() -> tuple[str, bytes]:
-    """The package of this tree; without the page of ``mcz view``, which Blender has no use for."""
+def mcz_wheel(kernels: Mapping[str, bytes]) -> tuple[str, bytes]:
+    """The package of this tree with compiled kernels; Blender has no use for the viewer's page."""
     package = ROOT / "mcz"
+    left_out = {package / "kernels" / mode for mode in BUILT_IN_PLACE}
     paths = [
-        path for path in package.rglob("*") if path.is_file() and "__pycache__" not in path.parts
+        path
+        for path in package.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts and path.parent not in left_out
     ]
     files = {path.relative_to(ROOT).as_posix(): path.read_bytes() for path in paths}
     files = {name: data for name, data in files.items() if not name.endswith((".pyc", ".html"))}
+    files |= kernels
     about = f"Metadata-Version: 2.1\nName: mcz\nVersion: {version()}\nLicense: Apache-2.0\n"
     folder = f"mcz-{version()}.dist-info"
     files |= {f"{folder}/METADATA": about.encode(), f"{folder}/WHEEL": WHEEL}

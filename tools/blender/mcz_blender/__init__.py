@@ -1,6 +1,7 @@
 """MCZ in Blender: an add-on that imports and exports ``.mcz``, and imports what MCZ converts.
 
-``clips`` opens files, ``placing`` turns a motion into bones and keys (both without Blender);
+``clips`` opens files, ``placing`` turns a motion into bones and keys, ``durations`` estimates how
+long an export takes (all without Blender);
 ``armatures``, ``markers`` and ``actions`` make them in Blender; ``recording`` is the way back;
 ``importing``, ``exporting`` and ``panels`` are what the user sees.
 """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,16 @@ from bpy_extras.io_utils import ExportHelper
 
 import mcz
 
+from .durations import slow_warning
 from .importing import AXES, UNITS, mcz_line, tell_what_is_slow
-from .recording import KEEP, Terms, recorded, things_of
+from .recording import KEEP, Terms, most_values, recorded, things_of
 
 CODECS = [
     ("fast", "Fast", "Lossless on the grid of the decimals below; read fastest"),
     ("best", "Best", "Lossless on the grid of the decimals below; fewest bytes, slow"),
     ("lossy", "Lossy", "No joint farther off than the greatest error below"),
 ]
+LINE = 44  # characters of a line of the panel
 RANGES = [
     ("scene", "Scene", "The scene's range of frames"),
     ("action", "Action", "From the first to the last key of the action"),
@@ -52,6 +55,11 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
     )
     up: EnumProperty(name="Up", items=[(KEEP, "Keep", "As imported, otherwise z"), *AXES])
     frames: EnumProperty(name="Frames", items=RANGES, default="scene")
+    accepts_slow: BoolProperty(
+        name="Export Anyway",
+        description="Export even if it takes over a minute",
+        options={"SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -66,6 +74,12 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
         shown = ("max_error_cm",) if self.codec == "lossy" else ()
         for name in (*shown, "angle_decimals", "length_decimals", "unit", "up", "frames"):
             layout.prop(self, name)
+        warning = warning_of(self, context)
+        if warning:
+            box = layout.box()
+            for line in textwrap.wrap(warning, LINE):
+                box.label(text=line)
+            box.prop(self, "accepts_slow")
         tell_what_is_slow(layout)
 
     def execute(self, context: Any) -> set[str]:
@@ -73,6 +87,9 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
         things = things_of(context)
         manager.progress_begin(0, 1000)
         try:
+            warning = "" if self.accepts_slow else warning_of(self, context)
+            if warning:
+                raise mcz.OptionError(f"{warning}; tick Export Anyway (accepts_slow) to export")
             if self.clip_name and len(things) > 1:
                 raise mcz.OptionError(f"{len(things)} clips cannot all be {self.clip_name!r}")
             motions = []
@@ -81,7 +98,7 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
                 def step(share: float, number: int = number) -> None:
                     manager.progress_update(round(1000 * (number + share) / len(things)))
 
-                terms = self._terms(context, thing, markers)
+                terms = terms_of(self, context, thing, markers)
                 motions.append(recorded(context, thing, markers, terms, step))
             self._write(motions, Path(bpy.path.abspath(self.filepath)))
         except mcz.MczError as error:
@@ -91,14 +108,6 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
             manager.progress_end()
         self.report({"INFO"}, f"{len(motions)} exported")
         return {"FINISHED"}
-
-    def _terms(self, context: Any, thing: Any, markers: list[Any]) -> Terms:
-        first, last = context.scene.frame_start, context.scene.frame_end
-        data = (markers[0] if markers else thing).animation_data
-        if self.frames == "action" and data and data.action:
-            first, last = (round(frame) for frame in data.action.frame_range)
-        decimals = self.angle_decimals, self.length_decimals
-        return Terms(first, last, self.clip_name, self.unit, self.up, *decimals)
 
     def _write(self, motions: list[mcz.Motion], target: Path) -> None:
         """All of them, or none: several, and those that are added, are written aside first."""
@@ -116,6 +125,25 @@ class ExportMCZ(bpy.types.Operator, ExportHelper):
                 mcz.append(parts, target)
             else:
                 mcz.merge(parts, target, force=True)
+
+
+def terms_of(operator: Any, context: Any, thing: Any, markers: list[Any]) -> Terms:
+    """The frames and facts that an export of ``thing`` is set to."""
+    first, last = context.scene.frame_start, context.scene.frame_end
+    data = (markers[0] if markers else thing).animation_data
+    if operator.frames == "action" and data and data.action:
+        first, last = (round(frame) for frame in data.action.frame_range)
+    decimals = operator.angle_decimals, operator.length_decimals
+    return Terms(first, last, operator.clip_name, operator.unit, operator.up, *decimals)
+
+
+def warning_of(operator: Any, context: Any) -> str:
+    """A warning where the export of what is selected takes over a minute, or nothing."""
+    n_values = 0
+    for thing, markers in things_of(context):
+        frames = terms_of(operator, context, thing, markers).frames
+        n_values += most_values(thing, markers, len(frames))
+    return slow_warning(operator.codec, n_values)
 
 
 def register() -> None:

@@ -59,6 +59,14 @@ def things_of(context: Any) -> list[tuple[Any, list[Any]]]:
     return found
 
 
+def most_values(thing: Any, markers: list[Any], n_frames: int) -> int:
+    """An estimate, rather too high, of how many numbers ``recorded`` finds."""
+    if markers:
+        return 3 * len(markers) * n_frames
+    joints = [bone for bone in thing.data.bones if END not in bone or JOINT in bone]
+    return 3 * (len(joints) + 1) * n_frames  # the root moves, the others turn
+
+
 def _in_order(markers: Iterable[Any]) -> list[Any]:
     """Markers as they were imported, others after them by name."""
     return sorted(markers, key=lambda marker: (marker.get(ORDER, sys.maxsize), marker.name))
