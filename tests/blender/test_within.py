@@ -182,6 +182,7 @@ try:
 except RuntimeError as error:
     assert "cannot all be 'three'" in str(error), error
 
+from bl_ext.user_default.mcz_blender import durations
 bpy.context.scene.frame_end = 10**6
 try:
     bpy.ops.export_anim.mcz(filepath=out, codec="lossy")
@@ -190,6 +191,18 @@ except RuntimeError as error:
     assert "tick Export Anyway (accepts_slow) to export" in str(error), error
 else:
     raise AssertionError("not warned")
+bpy.context.scene.frame_end = 240
+durations.SHORT = 0.0  # every export is a slow one
+try:
+    export("walk")
+except RuntimeError as error:
+    assert "Export Anyway" in str(error), error
+else:
+    raise AssertionError("not warned")
+export("walk", clip_name="slow", accepts_slow=True)
+with mcz.open(out) as file:
+    assert [clip.name for clip in file] == ["slow"]
+bpy.ops.object.select_all(action="SELECT")
 
 # What is drawn: without a window, onto a layout that only remembers.
 from unittest.mock import MagicMock
