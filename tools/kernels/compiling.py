@@ -71,7 +71,8 @@ def _build_unit(
     text = Unit(modules, checked=mode != "compiled").text()
     suffix = str(sysconfig.get_config_var("EXT_SUFFIX"))
     arguments = [*command, *_flags(mode)]
-    key = hashlib.sha256("\0".join([text, suffix, *arguments, *_own_sources()]).encode())
+    identity = [_full_name(name, mode), text, suffix, *arguments, *_own_sources()]
+    key = hashlib.sha256("\0".join(identity).encode())
     scratch = SCRATCH / key.hexdigest()[:32]
     made = scratch / (name + suffix)
     if not made.is_file():
@@ -88,6 +89,11 @@ def _build_unit(
     shutil.copyfile(made, part)
     part.replace(target)  # a process may have the old one loaded
     return target
+
+
+def _full_name(unit: str, mode: str) -> str:
+    """The name of a module in Python: without its package it would take that of another's."""
+    return f"mcz.kernels.{mode}.{unit}"
 
 
 def _own_sources() -> list[str]:
@@ -124,7 +130,7 @@ def translate(path: str, mode: str) -> int:
     Options.buffer_max_dims = 5  # makes what a memoryview takes as an argument a third as large
     directives = {**DIRECTIVES, "boundscheck": mode != "compiled"}
     options = CompilationOptions(compiler_directives=directives)
-    return int(compile(path, options).num_errors)
+    return int(compile(path, options, _full_name(Path(path).stem, mode)).num_errors)
 
 
 if __name__ == "__main__":
