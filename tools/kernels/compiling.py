@@ -12,6 +12,7 @@ import sys
 import sysconfig
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -59,18 +60,18 @@ def build(folder: Path, mode: str, units: Mapping[str, tuple[str, ...]] = UNITS)
     if command is None:
         raise FileNotFoundError("there is no C compiler")
     folder.mkdir(parents=True, exist_ok=True)
+    arguments = [*command, *_flags(mode)]  # before there are threads: sysconfig is made for one
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = [pool.submit(_build_unit, u, units[u], folder, mode, command) for u in units]
+        jobs = [pool.submit(_build_unit, u, units[u], folder, mode, arguments) for u in units]
         return [job.result() for job in jobs]
 
 
 def _build_unit(
-    name: str, modules: tuple[str, ...], folder: Path, mode: str, command: list[str]
+    name: str, modules: tuple[str, ...], folder: Path, mode: str, arguments: list[str]
 ) -> Path:
     """Compile one unit where its text or the compiler changed."""
     text = Unit(modules, checked=mode != "compiled").text()
-    suffix = str(sysconfig.get_config_var("EXT_SUFFIX"))
-    arguments = [*command, *_flags(mode)]
+    suffix = EXTENSION_SUFFIXES[0]
     identity = [_full_name(name, mode), text, suffix, *arguments, *_own_sources()]
     key = hashlib.sha256("\0".join(identity).encode())
     scratch = SCRATCH / key.hexdigest()[:32]
