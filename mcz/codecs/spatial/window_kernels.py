@@ -152,10 +152,10 @@ def _sums(
         course[:] = 0.0
         for k in range(lengths[r]):
             if rows[r, k] != 0:
-                index = float(rows[r, k])
+                index, wave = float(rows[r, k]), temporal[k, begin : begin + n_frames]
                 for f in range(n_frames):
-                    course[f] = course[f] + index * temporal[k, begin + f]
+                    course[f] = course[f] + index * wave[f]
         for j in range(n_points):
-            entry = vectors[r, j]
+            entry, total = vectors[r, j], sums[j]
             for f in range(n_frames):
-                sums[j, f] = sums[j, f] + entry * course[f]  # WIND-13
+                total[f] = total[f] + entry * course[f]  # WIND-13
