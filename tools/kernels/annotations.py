@@ -18,6 +18,9 @@ class Scalar:
     name: str
     c: str
 
+    def __str__(self) -> str:
+        return self.name
+
 
 INT, FLOAT = Scalar("int", "long long"), Scalar("float", "double")
 BOOL, NOTHING = Scalar("bool", "bint"), Scalar("None", "int")

@@ -83,6 +83,7 @@ class Expressions:
         self.tables: dict[str, tuple[Any, ...]] = {}  # constant tuples that are looped over
         self.modules = {where.name}  # that its text depends on
         self.effects = Effects()
+        self.called: dict[ast.AST, str] = {}  # the function of each call
         assigned = (n for n in ast.walk(node) if isinstance(n, ast.Name))
         self.own = {n.id for n in assigned if isinstance(n.ctx, ast.Store)}
         self.own |= {argument.arg for argument in node.args.args}
@@ -195,7 +196,7 @@ class Expressions:
         if isinstance(index, int):
             return self._literal(node, values[index])
         name, type_ = self.table(node, values)
-        return f"{name}[{self.expr(node.slice)[0]}]", type_
+        return f"{name}[mcz_index({self.int_of(node.slice)}, {len(values)})]", type_
 
     def table(self, node: ast.expr, values: tuple[Any, ...]) -> tuple[str, Scalar]:
         """The name and item type of a constant array in C."""
@@ -227,6 +228,8 @@ class Expressions:
     def _index(self, node: ast.expr) -> str:
         if not isinstance(node, ast.Slice):
             fixed = self.fixed(node)
+            if isinstance(fixed, int) and fixed < 0:
+                raise self.error(node, "an index counts from the front")
             return str(fixed) if isinstance(fixed, int) else self.int_of(node)
         if node.step is not None:
             raise self.error(node, "slices have no steps")
@@ -289,11 +292,16 @@ class Expressions:
         return f"({' '.join(texts)})", BOOL
 
     def of_BoolOp(self, node: ast.BoolOp) -> Typed:  # noqa: N802
-        parts = [f"({self.truth(value)})" for value in node.values]
-        return f"({(' and ' if isinstance(node.op, ast.And) else ' or ').join(parts)})", BOOL
+        for value in node.values:
+            if self.expr(value)[1] != BOOL:
+                raise self.error(value, "is no bool")
+        return self.truth(node), BOOL
 
     def truth(self, node: ast.expr) -> str:
         """A condition; of what is no truth itself, whether it is not 0."""
+        if isinstance(node, ast.BoolOp):
+            parts = [f"({self.truth(value)})" for value in node.values]
+            return f"({(' and ' if isinstance(node.op, ast.And) else ' or ').join(parts)})"
         text, type_ = self.number(node)
         return text if type_ == BOOL else f"({text} != 0)"
 
@@ -363,6 +371,7 @@ class Expressions:
         ]
         full = mangled(where.name, name)
         self.effects.calls.append((full, roots))
+        self.called[node] = full
         if called.returns is None:
             raise self.error(node, "does not say what it returns")
         return f"{full}({', '.join(texts)})", where.type_of(called.returns)
@@ -370,7 +379,7 @@ class Expressions:
     def converted(self, node: ast.AST, text: str, given: Type, wanted: Type) -> str:
         """The text of a value where another type is wanted; arrays only lose what is known."""
         if isinstance(given, Scalar) and isinstance(wanted, Scalar):
-            if wanted == FLOAT or given != FLOAT:
+            if _widens(given, wanted):
                 return text
         elif isinstance(given, Array) and isinstance(wanted, Array):
             if given == wanted or (given.dense and given == Array(wanted.item, wanted.rank)):
@@ -378,12 +387,18 @@ class Expressions:
         elif isinstance(given, Tuple) and isinstance(wanted, Tuple):
             pairs = list(zip(given.items, wanted.items, strict=False))
             if len(given.items) == len(wanted.items) and all(
-                one == other or other == FLOAT or one != FLOAT for one, other in pairs
+                _widens(one, other) for one, other in pairs
             ):
                 return text
         elif given == wanted:
             return text
         raise self.error(node, f"is {given}, not {wanted}")
+
+
+def _widens(given: Scalar, wanted: Scalar) -> bool:
+    """Whether each number of one type is one of the other, too."""
+    known = given in RANKED and wanted in RANKED
+    return given == wanted or (known and RANKED.index(given) < RANKED.index(wanted))
 
 
 BUILTINS = {"min", "max", "abs", "len", "int", "float", "bit_length", "truncated"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from typing import Any
 
 from tools.kernels.annotations import (
@@ -40,6 +41,8 @@ class Function(Expressions):
         if self.node.returns is None:
             raise self.error(self.node.args, "does not say what it returns")
         self.returns = source.type_of(self.node.returns)
+        if not isinstance(self.returns, Scalar | Tuple):
+            raise self.error(self.node.returns, "is returned by no kernel")
         self.lines: list[str] = []
         self.depth = 1
         self.n_temporaries = 0
@@ -112,6 +115,10 @@ class Function(Expressions):
         self._assign_all(node.targets, node.value)
 
     def do_AugAssign(self, node: ast.AugAssign) -> None:  # noqa: N802
+        if any(
+            isinstance(n, ast.Call) and ast.unparse(n.func) != "len" for n in ast.walk(node.target)
+        ):
+            raise self.error(node, "calls a function in a target, which C leaves open how often")
         load = ast.parse(ast.unparse(node.target), mode="eval").body
         text, type_ = self.binary(node, node.op, self.number(load), self.number(node.value))
         self._assign(node.target, text, type_, None)
@@ -300,6 +307,16 @@ class Function(Expressions):
         self.depth -= 1
         self._indented(node.body)
 
+    def unordered(self) -> Iterator[tuple[ast.AST, list[str]]]:
+        """Expressions with calls in several operands, whose order C leaves open; the calls."""
+        for node in ast.walk(self.node):
+            called = [
+                [self.called[n] for n in ast.walk(part) if n in self.called]
+                for part in _operands(node)
+            ]
+            if sum(map(bool, called)) > 1:
+                yield node, [name for names in called for name in names]
+
     def declarations(self, written: set[Root]) -> list[str]:
         """The types of variables that are no parameters."""
         own = {name for name, _ in self.parameters}
@@ -310,6 +327,19 @@ class Function(Expressions):
 def spelled(type_: Type, written: bool) -> str:
     """The type in Cython."""
     return type_.c(written=written) if isinstance(type_, Array) else type_.c
+
+
+def _operands(node: ast.AST) -> list[ast.expr]:
+    """The parts of an expression, or of an assignment, that C computes in any order."""
+    if isinstance(node, ast.BinOp):
+        return [node.left, node.right]
+    if isinstance(node, ast.Compare):
+        return [node.left, *node.comparators]
+    if isinstance(node, ast.Call):
+        return node.args
+    if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Tuple):
+        return node.slice.elts
+    return [node.value, *node.targets] if isinstance(node, ast.Assign) else []
 
 
 def _is_allocation(node: ast.expr) -> bool:

@@ -7,14 +7,15 @@ from os.path import relpath
 from pathlib import Path
 from typing import Any
 
-from tools.kernels.annotations import NOTHING, Array, Record, Scalar, Tuple, Type
+from tools.kernels.annotations import INT, NOTHING, Array, Record, Scalar, Tuple, Type
 from tools.kernels.expressions import Root
 from tools.kernels.functions import Function, spelled
 from tools.kernels.source import ROOT, Source, mangled, source, sources_behind
 
 HEAD = """# Written by tools/kernels from the sources that SOURCES names.
+from operator import index
 from numpy import dtype, empty, zeros
-from mcz.kernels.arrays import fit, restore
+from mcz.kernels.arrays import fit, items, restore
 
 cdef extern from "arithmetic.h" nogil:
     long long mcz_divide(long long a, long long b)
@@ -42,6 +43,19 @@ cdef object int64_ = dtype("int64"), float64_ = dtype("float64")
 cdef object uint8_ = dtype("uint8"), bool_ = dtype("bool")
 """
 
+# An index of a constant table; those of arrays are Cython's to check.
+INDEX = """
+cdef extern from "arithmetic.h" nogil:
+    long long mcz_index(long long at, long long size)
+"""
+CHECKED_INDEX = """
+cdef inline long long mcz_index(long long at, long long size) except -1 nogil:
+    if at < 0 or at >= size:
+        with gil:
+            raise IndexError("an index is out of the range of a table")
+    return at
+"""
+
 
 class Unit:
     """The text of a module in Cython, for all kernels of ``modules``."""
@@ -61,6 +75,7 @@ class Unit:
         self.written: dict[str, set[Root]] = {}
         self.fields: set[Root] = set()
         self._spread_writes()
+        self._check_order()
         self.raising = self._raising()
 
     def _add(self, where: Source, name: str) -> None:
@@ -102,6 +117,18 @@ class Unit:
     def _is_field_written(self, roots: set[Root]) -> bool:
         return any(isinstance(root, tuple) and root in self.fields for root in roots)
 
+    def _check_order(self) -> None:
+        """Refuse expressions that depend on which of several calls comes first."""
+        for function in self.functions.values():
+            for node, called in function.unordered():
+                if any(map(self._writes, called)):
+                    raise function.error(node, "C leaves open which call comes first")
+
+    def _writes(self, name: str) -> bool:
+        """Whether a function writes to arrays that it is given."""
+        parameters = {parameter for parameter, _ in self.functions[name].parameters}
+        return any(isinstance(r, tuple) or r in parameters for r in self.written[name])
+
     def _raising(self) -> set[str]:
         """The functions in which an exception can be raised."""
         if self.checked:
@@ -123,7 +150,12 @@ class Unit:
 
     def text(self) -> str:
         """The whole module."""
-        parts = [HEAD, self._tables(), f"SOURCES = {self._digests()!r}\n"]
+        parts = [
+            HEAD,
+            CHECKED_INDEX if self.checked else INDEX,
+            self._tables(),
+            f"SOURCES = {self._digests()!r}\n",
+        ]
         parts += [self._record(record) for record in self.records.values()]
         parts += [self._function(name) for name in self.functions]
         parts += [self._door(where, name) for where, name in self.entries]
@@ -158,7 +190,10 @@ class Unit:
     def _record(self, record: Record) -> str:
         if record.is_struct:
             fields = [f"    {type_.c} {name}" for name, type_ in record.fields]
-            made = [f"    found.{name} = given.{name}" for name, _ in record.fields]
+            made = [
+                f"    found.{name} = {self._taken(f'given.{name}', type_, False)}"
+                for name, type_ in record.fields
+            ]
             return "\n".join(
                 [
                     f"cdef struct {record.name}:",
@@ -186,7 +221,9 @@ class Unit:
             return f"fit({text}, {type_.item}_, {type_.rank}, {dense}, {is_written}, moved)"
         if isinstance(type_, Record):
             return f"of_{type_.name}({text})" if type_.is_struct else f"{type_.name}({text}, moved)"
-        return text
+        if isinstance(type_, Tuple):
+            return f"items({text}, {tuple(item == INT for item in type_.items)})"
+        return f"index({text})" if type_ == INT else text
 
     def _signature(self, function: Function) -> str:
         written = self.written[function.name]
