@@ -9,6 +9,7 @@ import ast
 import builtins
 import hashlib
 import math
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -79,14 +80,15 @@ class Expressions:
     def __init__(self, where: Source, node: ast.FunctionDef) -> None:
         self.source, self.node = where, node
         self.types: dict[str, Type] = {}
+        self.shared: dict[str, str] = {}  # fields of records, by the variables that name them
         self.needed: list[tuple[Source, str]] = []  # functions that are called
         self.tables: dict[str, tuple[Any, ...]] = {}  # constant tuples that are looped over
         self.modules = {where.name}  # that its text depends on
         self.effects = Effects()
         self.called: dict[ast.AST, str] = {}  # the function of each call
-        assigned = (n for n in ast.walk(node) if isinstance(n, ast.Name))
-        self.own = {n.id for n in assigned if isinstance(n.ctx, ast.Store)}
-        self.own |= {argument.arg for argument in node.args.args}
+        stored = [n for n in ast.walk(node) if isinstance(n, ast.Name)]
+        self.stores = Counter(n.id for n in stored if isinstance(n.ctx, ast.Store))
+        self.own = self.stores.keys() | {argument.arg for argument in node.args.args}
 
     def error(self, node: ast.AST, fault: str) -> KernelError:
         line = getattr(node, "lineno", self.node.lineno)
@@ -156,7 +158,7 @@ class Expressions:
     def of_Name(self, node: ast.Name) -> Typed:  # noqa: N802
         if node.id not in self.types:
             raise self.error(node, "is no number here")
-        return node.id, self.types[node.id]
+        return self.shared.get(node.id, node.id), self.types[node.id]
 
     def of_Tuple(self, node: ast.Tuple) -> Typed:  # noqa: N802
         texts, types = zip(*map(self.expr, node.elts), strict=True)

@@ -198,7 +198,16 @@ class Function(Expressions):
             self.types[name] = type_
         if isinstance(type_, Array) and root is not None:
             self.effects.aliases.setdefault(name, set()).add(root)
+            if isinstance(root, tuple) and self.stores[name] == 1 and self._is_parameter(text):
+                self.shared[name] = text  # a memoryview of its own would cost two atomic steps
+                return
         self.line(f"{name} = {self.converted(node, text, type_, self.types[name])}")
+
+    def _is_parameter(self, text: str) -> bool:
+        """Whether a text is a field of a record that was given, not a part of that field."""
+        name, *fields = text.split(".")
+        given = name in dict(self.parameters) and name not in self.stores
+        return given and all(field.isidentifier() for field in fields)
 
     def _unpack(self, target: ast.Tuple, text: str, type_: Type, root: Root | None) -> None:
         if isinstance(type_, Tuple):
@@ -320,7 +329,7 @@ class Function(Expressions):
     def declarations(self, written: set[Root]) -> list[str]:
         """The types of variables that are no parameters."""
         own = {name for name, _ in self.parameters}
-        names = (name for name in self.types if name not in own)
+        names = (name for name in self.types if name not in own | self.shared.keys())
         return [f"    cdef {spelled(self.types[name], name in written)} {name}" for name in names]
 
 
