@@ -15,6 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from tools.fuzz import sanitizers
 from tools.fuzz.targets import TARGETS
 
 ROOT = Path(__file__).parents[2]
@@ -87,7 +88,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--runs", type=int, default=-1, help="inputs of each target at most")
     parser.add_argument("--seed", type=int, default=1, help="of the mutations")
     parser.add_argument("--most-seeds", type=int, default=10**6, help="files to begin with")
-    parser.add_argument("--plain", action="store_true", help="run compiled loops as they stand")
+    loops = parser.add_mutually_exclusive_group()
+    loops.add_argument("--plain", action="store_true", help="run compiled loops as they stand")
+    loops.add_argument("--sanitized", action="store_true", help="run them under ASan and UBSan")
     parser.add_argument("--corpus", type=Path, help="folder that keeps what reaches new code")
     parser.add_argument("--findings", type=Path, default=Path("fuzz-findings"))
     parser.add_argument("--json", type=Path, help="file for the figures")
@@ -127,10 +130,12 @@ def _run(
     }
     words = [str(word) for pair in options.items() for word in pair]
     words += ["--plain"] if given.plain else []
+    words += ["--sanitized"] if given.sanitized else []
     command = [sys.executable, "-m", "tools.fuzz.worker", name, *words]
     log = findings / f"{name}.log"
+    env = sanitizers.environment() if given.sanitized else None
     with open(log, "ab") as errors:
-        done = subprocess.run(command, cwd=ROOT, stdout=errors, stderr=errors, check=False)
+        done = subprocess.run(command, cwd=ROOT, env=env, stdout=errors, stderr=errors, check=False)
     _add(outcome, figures, log)
     outcome.deaths += done.returncode != 0
     return done.returncode == 0

@@ -19,20 +19,25 @@ HANG = 150  # seconds of wall time after which libFuzzer ends the process, in a 
 
 def main() -> None:
     given = _parser().parse_args()
-    # An index out of bounds then raises in compiled loops, too, instead of reading what is there.
-    os.environ["MCZ_LOOPS"] = "interpreted" if given.plain else "checked"
+    if not given.sanitized:
+        # An index out of bounds then raises in compiled loops, too.
+        os.environ["MCZ_LOOPS"] = "interpreted" if given.plain else "checked"
     import atheris
 
     _import_instrumented(atheris, plain=given.plain)
+    from mcz.kernels import MODE, lacks_compiled_kernels
     from tools.fuzz.guard import Record, limit_memory, limit_time
     from tools.fuzz.targets import TARGETS
 
+    if lacks_compiled_kernels():
+        sys.exit(f"kernels are not compiled, or have changed: python -m tools.kernels {MODE}")
     target = TARGETS[given.target]
     seeds = _chosen(target.seeds(), given)
     for data in list(seeds.values())[:: 1 + len(seeds) // WARM]:
         _try(target.check, data)  # what is compiled and cached now is not charged to an input
     record = Record(target.name, given.findings, given.figures)
-    limit_memory()
+    if not given.sanitized:  # AddressSanitizer reserves far more than it uses, and limits itself
+        limit_memory()
     limit_time()
 
     def check(data: bytes) -> None:
@@ -55,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--most-seeds", type=int, default=10**6)
     parser.add_argument("--plain", action="store_true")
+    parser.add_argument("--sanitized", action="store_true")
     return parser
 
 

@@ -1,4 +1,4 @@
-"""Compile units: Python to Cython (``unit``), Cython to C, C to an extension module."""
+"""Compile units: Python to Cython (``unit``), to C (``translating``), to an extension module."""
 
 from __future__ import annotations
 
@@ -11,96 +11,108 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tempfile
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import find_spec
 from pathlib import Path
 
+import Cython
+
 from tools.kernels.source import ROOT
 from tools.kernels.unit import Unit
 
 HERE = Path(__file__).parent
-SCRATCH = ROOT / "build" / "kernels"
+KEPT = ROOT / "build" / "kernels"
+SUFFIX = EXTENSION_SUFFIXES[0]
 UNITS: dict[str, tuple[str, ...]] = runpy.run_path(str(ROOT / "mcz/kernels/units.py"))["UNITS"]
-DIRECTIVES = {
-    "language_level": 3,
-    "cdivision": True,
-    "initializedcheck": False,
-    "wraparound": False,
-    "auto_pickle": False,
-    "show_performance_hints": False,
-}
 # Wrapping integers and products that are not fused with sums are part of what SPEC.md says.
 EXACT = ["-fwrapv", "-ffp-contract=off"]
+SANITIZERS = "address,undefined,float-cast-overflow"
 FLAGS = {
     "compiled": ["-O3"],
     "checked": ["-O1", "-DMCZ_CHECKED"],
-    "sanitized": ["-O1", "-g", "-DMCZ_CHECKED", "-fsanitize=address,undefined"],
+    "sanitized": ["-O1", "-g", f"-fsanitize={SANITIZERS}"],  # unchecked: they see what is left
 }
 
 
 def compiler() -> list[str] | None:
-    """The command of a C compiler: that of ``CC``, one on the path, or Zig's, or None."""
+    """The command of a C compiler: that of ``CC``, one on the path that works, Zig's, or None."""
     if given := os.environ.get("CC"):
         return shlex.split(given)
     for name in ("gcc", "clang", "cc"):
-        if path := shutil.which(name):
+        if (path := shutil.which(name)) and _works([path]):
             return [path]
     return [sys.executable, "-m", "ziglang", "cc"] if find_spec("ziglang") else None
 
 
-def build(folder: Path, mode: str, units: Mapping[str, tuple[str, ...]] = UNITS) -> list[Path]:
+def _works(command: list[str]) -> bool:
+    """Whether a compiler has headers and a linker: some systems have the one without the other."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "try.c").write_text("#include <math.h>\ndouble f(double a){return sin(a);}\n")
+        words = [*command, "-shared", "-fPIC", "try.c", "-o", "try.so", "-lm"]
+        done = subprocess.run(words, cwd=folder, capture_output=True, check=False)
+        return done.returncode == 0
+
+
+def has_headers() -> bool:
+    """Whether Python can be extended: on Debian its headers are a package of their own."""
+    return Path(sysconfig.get_path("include"), "Python.h").is_file()
+
+
+def build(
+    folder: Path, mode: str, units: Mapping[str, tuple[str, ...]] = UNITS, kept: Path = KEPT
+) -> list[Path]:
     """Compile units into ``folder``, as many at a time as there are processors.
 
-    ``units``: the modules of each, by its name.
+    ``units``: the modules of each, by its name. ``kept``: the folder of earlier builds, which are
+    copied where nothing has changed.
 
     Raises CalledProcessError where a compiler fails, FileNotFoundError where there is none.
     """
     command = compiler()
     if command is None:
         raise FileNotFoundError("there is no C compiler")
+    if not has_headers():
+        raise FileNotFoundError("there is no Python.h")
+    arguments = [*command, *_flags(mode)]
+    version = _run([*command, "--version"], ROOT).partition("\n")[0]
     folder.mkdir(parents=True, exist_ok=True)
-    arguments = [*command, *_flags(mode)]  # before there are threads: sysconfig is made for one
+
+    def build_unit(name: str) -> Path:
+        text = Unit(units[name], checked=mode == "checked").text()
+        full = f"mcz.kernels.{mode}.{name}"  # other packages have a "numbers"
+        made = kept / _key(full, text, version) / (name + SUFFIX)
+        if not made.is_file():
+            _compile(text, made, [full, mode], arguments)
+        part = folder / f"{made.name}.{os.getpid()}.part"
+        shutil.copyfile(made, part)
+        part.replace(folder / made.name)  # a process may have the old one loaded
+        return folder / made.name
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = [pool.submit(_build_unit, u, units[u], folder, mode, arguments) for u in units]
-        return [job.result() for job in jobs]
+        return list(pool.map(build_unit, units))
 
 
-def _build_unit(
-    name: str, modules: tuple[str, ...], folder: Path, mode: str, arguments: list[str]
-) -> Path:
-    """Compile one unit where its text or the compiler changed."""
-    unit = Unit(modules, checked=mode != "compiled")
-    text = unit.text()
-    suffix = EXTENSION_SUFFIXES[0]
-    identity = [_full_name(name, mode), text, suffix, *arguments, *_own_sources()]
-    key = hashlib.sha256("\0".join(identity).encode())
-    scratch = SCRATCH / key.hexdigest()[:32]
-    made = scratch / (name + suffix)
-    if not made.is_file():
-        own = scratch / str(os.getpid())  # another process may build the same
-        own.mkdir(parents=True, exist_ok=True)
-        pyx = own / f"{name}.pyx"
-        pyx.write_text(text)
-        _run([sys.executable, "-m", "tools.kernels.compiling", str(pyx), mode, str(unit.axes)])
-        c, part = pyx.with_suffix(".c"), own / made.name
-        _run([*arguments, str(c), "-o", str(part), *_libraries()])
-        part.replace(made)
-    target = folder / made.name
-    part = target.with_suffix(f".{os.getpid()}.part")
-    shutil.copyfile(made, part)
-    part.replace(target)  # a process may have the old one loaded
-    return target
+def _key(*given: str) -> str:
+    """A name for everything that an extension module depends on."""
+    parts = [*given, SUFFIX, Cython.__version__, (HERE / "arithmetic.h").read_text()]
+    parts += [(HERE / f"{name}.py").read_text() for name in ("compiling", "translating")]
+    parts.append(sysconfig.get_path("include"))
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
-def _full_name(unit: str, mode: str) -> str:
-    """The name of a module in Python: without its package it would take that of another's."""
-    return f"mcz.kernels.{mode}.{unit}"
-
-
-def _own_sources() -> list[str]:
-    return [path.read_text() for path in sorted(HERE.glob("arithmetic.h"))]
+def _compile(text: str, made: Path, wanted: list[str], arguments: list[str]) -> None:
+    """Compile a module in Cython, in a folder of its own: others may build the same."""
+    made.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=made.parent) as folder:
+        own = Path(folder)
+        name = made.name.removesuffix(SUFFIX)
+        (own / f"{name}.pyx").write_text(text)
+        _run([sys.executable, str(HERE / "translating.py"), f"{name}.pyx", *wanted], own)
+        _run([*arguments, f"{name}.c", "-o", made.name, *_libraries()], own)
+        (own / made.name).replace(made)
 
 
 def _flags(mode: str) -> list[str]:
@@ -119,24 +131,10 @@ def _libraries() -> list[str]:
     return [f"-L{Path(sys.base_prefix, 'libs')}", f"-lpython{number}"]
 
 
-def _run(command: list[str]) -> None:
-    """Run a command; what it prints goes with the error of one that fails."""
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+def _run(command: list[str], folder: Path) -> str:
+    """The output of a command; that of one that fails goes with the error."""
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     if done.returncode:
         sys.stderr.write(done.stdout + done.stderr)
         done.check_returncode()
-
-
-def translate(path: str, mode: str, axes: str) -> int:
-    """Translate a module whose arrays have so many axes to C; the number of errors."""
-    from Cython.Compiler import Options
-    from Cython.Compiler.Main import CompilationOptions, compile
-
-    Options.buffer_max_dims = int(axes) + 1  # of 8: memoryviews are copied into each call
-    directives = {**DIRECTIVES, "boundscheck": mode != "compiled"}
-    options = CompilationOptions(compiler_directives=directives)
-    return int(compile(path, options, _full_name(Path(path).stem, mode)).num_errors)
-
-
-if __name__ == "__main__":
-    sys.exit(translate(*sys.argv[1:]) > 0)
+    return done.stdout

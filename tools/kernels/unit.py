@@ -141,13 +141,6 @@ class Unit:
                     found.add(name)
         return found
 
-    @property
-    def axes(self) -> int:
-        """The greatest number of axes of an array."""
-        types = [type_ for f in self.functions.values() for type_ in f.types.values()]
-        types += [type_ for record in self.records.values() for _, type_ in record.fields]
-        return max((type_.rank for type_ in types if isinstance(type_, Array)), default=1)
-
     def text(self) -> str:
         """The whole module."""
         parts = [
