@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from mcz import kernels
 from mcz.kernels import PACKAGE
 from mcz.kernels.units import UNIT_OF, UNITS
 from tests.kernel_builds import built_samples
@@ -172,6 +173,28 @@ def test_other_modes_are_refused(installation: Installation, word: str) -> None:
     assert done.stderr.splitlines()[-1] == (
         f"ValueError: MCZ_LOOPS={word}: one of compiled, checked, sanitized, interpreted"
     )
+
+
+def test_compiled_kernels_and_their_sources_agree() -> None:
+    """On every kernel of the package, called as it calls them."""
+    mode = MODE if kernels.MODE == kernels.INTERPRETED else kernels.MODE
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.kernel_twins"],
+        cwd=Path(__file__).parents[1],
+        env=os.environ | {"MCZ_LOOPS": mode},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    compared, differences = json.loads(done.stdout)
+    assert differences == []
+    found = set()
+    for module in UNIT_OF:
+        path = PACKAGE.parent.joinpath(*module.split(".")).with_suffix(".py")
+        names = re.findall(r"^@kernel\ndef (\w+)", path.read_text(), re.MULTILINE)
+        found |= {f"{module}.{name}" for name in names}
+    assert set(compared) == found, "kernels that nothing calls here, or that nothing calls at all"
 
 
 def test_every_kernel_is_in_a_unit() -> None:

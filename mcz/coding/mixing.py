@@ -71,7 +71,6 @@ def code(state: Ints, data: Bytes, bit: int, one: int) -> int:
     return bit
 
 
-@kernel
 def last_bytes(state: Ints) -> int:
     """How many bytes, with zeros after them, decide the bits that are still in the interval."""
     for size in range(4):  # RANGE-04

@@ -13,7 +13,6 @@ BLANK, QUOTE, COMMA, SEMICOLON = 0x20, 0x22, 0x2C, 0x3B
 MINUS, PLUS, HASH, ZERO, NINE, LF = 0x2D, 0x2B, 0x23, 0x30, 0x39, 0x0A
 
 
-@kernel
 def _is_at(text: Bytes, at: int, gaps: Bytes, start: int, stop: int) -> bool:
     """Whether gaps[start:stop] stands at ``at``."""
     if at + stop - start > len(text):
@@ -24,7 +23,6 @@ def _is_at(text: Bytes, at: int, gaps: Bytes, start: int, stop: int) -> bool:
     return True
 
 
-@kernel
 def _token_end(text: Bytes, at: int, cells: int) -> int:
     if cells == WORDS:
         while at < len(text) and text[at] > BLANK:
@@ -38,7 +36,6 @@ def _token_end(text: Bytes, at: int, cells: int) -> int:
     return at
 
 
-@kernel
 def _blanks(text: Bytes, at: int) -> int:
     """How many 0x20 stand at ``at``."""
     start = at
@@ -47,7 +44,6 @@ def _blanks(text: Bytes, at: int) -> int:
     return at - start
 
 
-@kernel
 def _number(text: Bytes, start: int, stop: int) -> int:
     """The plain decimal integer text[start:stop]; -1 where it is anything else."""
     if stop == start or stop - start > 15 or (text[start] == ZERO and stop > start + 1):
@@ -60,7 +56,6 @@ def _number(text: Bytes, start: int, stop: int) -> int:
     return value
 
 
-@kernel
 def _begins_frame(text: Bytes, at: int) -> bool:
     """Whether the next thing at ``at`` is a line with one integer, or the end."""
     while at < len(text) and text[at] <= BLANK:
@@ -77,7 +72,6 @@ def _begins_frame(text: Bytes, at: int) -> bool:
     return at == len(text) or text[at] == LF
 
 
-@kernel
 def _match_token(text: Bytes, at: int, width: int, cells: int) -> tuple[int, int, int]:
     """Start and stop of the token at ``at`` and the offset after its padding; start -1: none.
 
@@ -103,7 +97,6 @@ def _match_token(text: Bytes, at: int, width: int, cells: int) -> tuple[int, int
     return (at, stop, stop + pad) if _blanks(text, stop) >= pad else fail
 
 
-@kernel
 def _match_row(
     text: Bytes, at: int, items: Items, start: Ints, stop: Ints, cells: int
 ) -> tuple[int, int]:
@@ -163,7 +156,6 @@ def match_rows(
     return row, at
 
 
-@kernel
 def _pad(first: int, size: int, width: int) -> int:
     """Blanks beside a token of ``size`` bytes that begins with ``first``."""
     if width == 1:

@@ -85,7 +85,6 @@ def scan(
         fields[token, 0], fields[token, 1], fields[token, 2] = mantissa, power, shape
 
 
-@kernel
 def _exponent(text: Bytes, at: int, end: int) -> tuple[int, int]:
     """The number after the ``e`` at ``at``, and bits of the shape."""
     if text[at] != 101 and text[at] != 69:
@@ -156,7 +155,6 @@ def match(
     return misses
 
 
-@kernel
 def _length(mantissa: int) -> int:
     """Decimal digits of ``mantissa``, 0 for 0."""
     length = 0
@@ -166,7 +164,6 @@ def _length(mantissa: int) -> int:
     return length
 
 
-@kernel
 def _general(mantissa: int, power: int, digits: int) -> int:
     """Magnitude of d.ddd * 10^power among the numbers of ``digits`` digits; -1 if there is none."""
     if mantissa == 0 or digits > 15:
@@ -183,7 +180,6 @@ def _general(mantissa: int, power: int, digits: int) -> int:
     return (power + 307) * 9 * block + 1 + mantissa - block
 
 
-@kernel
 def _scaled(mantissa: int, shift: int, limit: int) -> int:
     """``mantissa * 10^shift``, limit + 1 if it is greater than limit."""
     for _ in range(shift):
@@ -195,7 +191,6 @@ def _scaled(mantissa: int, shift: int, limit: int) -> int:
     return min(mantissa, limit + 1)
 
 
-@kernel
 def _scientific(mantissa: int, power: int, shape: int, places: int, flags: int) -> bool:
     """Whether a token with an exponent is in the one form that is printed."""
     size = abs(power)
@@ -211,7 +206,6 @@ def _scientific(mantissa: int, power: int, shape: int, places: int, flags: int) 
     )
 
 
-@kernel
 def _positional(
     mantissa: int, shape: int, places: int, decimals: int, trim: int, flags: int
 ) -> bool:
@@ -276,7 +270,6 @@ def write(
         offsets[i + 1] = at
 
 
-@kernel
 def _digits(mantissa: int, count: int, fraction: int, flags: int, out: Bytes, at: int) -> int:
     """Print ``mantissa * 10^-fraction`` without sign or exponent; return where it ends."""
     integers = count - fraction
@@ -301,7 +294,6 @@ def _digits(mantissa: int, count: int, fraction: int, flags: int, out: Bytes, at
     return end
 
 
-@kernel
 def _power(power: int, flags: int, out: Bytes, at: int) -> int:
     """Print ``e``, sign and digits of an exponent; return where it ends."""
     out[at] = 69 if flags & _UPPER else 101

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,9 +18,8 @@ from mcz.codecs.lossless.echoes import Echo, build_echoes, find_echoes
 from mcz.coding.ordinals.streams import plan_stream
 from mcz.errors import FormatError
 from mcz.motion import Signal
-from mcz.numbers import Grid, GridKind
+from mcz.numbers import Grid
 from tests.codecs.lossy import saved
-from tests.codecs.test_interpreted import canonical_sha256
 from tests.codecs.test_lossless import GRIDS, columns
 from tests.motions import motions, smooth
 
@@ -208,32 +203,6 @@ def test_a_replaced_joint_comes_back() -> None:
     again = saved("best", source, segment_frames=40)
     with mcz.open(again) as file:
         np.testing.assert_array_equal(file.only_clip().read(), values)
-
-
-def test_interpreted(tmp_path: Path) -> None:
-    """Plain Python gives the bits that machine code gives, of numbers near the ends of floats."""
-    rng = np.random.default_rng(11)
-    values = np.round(rng.normal(size=(40, 4)).cumsum(axis=0), 4)
-    values[20:22, 1] = 2.0**51 // 10**4
-    values[:, 3] = np.round(values[:, 0] * 2, 4)
-    bones = mcz.Skeleton((mcz.Joint("m", channels=tuple(mcz.Channel("", c) for c in "abcd")),))
-    grids = (Grid(GridKind.FIXED, 4),) * 3 + (Grid(GridKind.BINARY64),)
-    path = tmp_path / "clip.mcz"
-    path.write_bytes(saved("best", mcz.Motion(bones, (Signal(values, grids),))))
-    program = (
-        "import sys; from pathlib import Path\n"
-        "from tests.codecs.test_interpreted import canonical_sha256\n"
-        "print(canonical_sha256(Path(sys.argv[1])))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(path)],
-        cwd=Path(__file__).parents[2],
-        env={**os.environ, "MCZ_LOOPS": "interpreted"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == canonical_sha256(path)
 
 
 @st.composite

@@ -1,0 +1,208 @@
+"""Call kernels as the package does, and each again as plain Python.
+
+``python -m tests.kernel_twins`` prints a line of JSON: how often each kernel was compared, and the
+calls that differed. It replaces ``mcz.kernels.kernel`` before any module has used it, hence a
+process of its own.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import mcz
+from mcz import kernels
+from mcz.codecs import CODECS
+from mcz.coding.ordinals.counts import BINARY32, Law
+from mcz.formats import bvh
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
+from mcz.numbers import Grid, GridKind
+from mcz.sample import bvh_walk
+from tests.codecs.lossy import markers, rough, saved
+from tests.motions import smooth
+
+VECTORS = Path(__file__).parents[1] / "conformance" / "vectors" / "valid"
+SECONDS = 0.4  # that one kernel runs as plain Python, together
+calls: Counter[str] = Counter()
+compared: Counter[str] = Counter()
+spent: dict[str, float] = defaultdict(float)
+differences: list[str] = []
+compiled_kernel = kernels.kernel
+plain = threading.local()  # ``runs`` while a plain function runs, with plain ones below it
+
+
+def twin(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A kernel that compares what is compiled with ``function``."""
+    name = f"{function.__module__}.{function.__name__}"
+    compiled = compiled_kernel(function)
+
+    @wraps(function)
+    def call(*arguments: Any) -> Any:
+        if getattr(plain, "runs", False):
+            return function(*arguments)
+        calls[name] += 1
+        if calls[name].bit_count() > 1 or spent[name] > SECONDS:  # the 1st, 2nd, 4th, 8th, ...
+            return compiled(*arguments)
+        copies = tuple(map(copied, arguments))
+        answer = compiled(*arguments)
+        start = time.process_time()
+        plain.runs = True
+        try:
+            with np.errstate(all="ignore"):
+                other = function(*copies)
+        finally:
+            plain.runs = False
+        spent[name] += time.process_time() - start
+        compared[name] += 1
+        if bits((answer, arguments)) != bits((other, copies)):
+            differences.append(f"{name}: {answer} and {other}")
+        return answer
+
+    return call
+
+
+def copied(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return np.array(value, order="K")
+    if isinstance(value, tuple):
+        items = list(map(copied, value))
+        return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
+    return value
+
+
+def bits(value: Any) -> Any:
+    """What is compared of answers and arrays: every bit, but that every NaN is one."""
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind == "f":
+            value = np.where(np.isnan(value), np.nan, value)
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, tuple):
+        return tuple(map(bits, value))
+    if isinstance(value, float):
+        return "nan" if value != value else float(value).hex()
+    return value if value is None else int(value)
+
+
+def decode_vectors() -> None:
+    """Decode the smallest conformance vectors, of which each codec has many."""
+    for folder in sorted(VECTORS.iterdir()):
+        files = sorted(folder.rglob("*.mcz"), key=lambda path: (path.stat().st_size, path.name))
+        files = files[:: max(1, len(files) // 25)] + sorted(folder.glob("products-*.mcz"))
+        for path in files:
+            with mcz.open(path) as file:
+                for clip in file.clips.values():
+                    clip.read()
+
+
+OPTIONS: dict[str, tuple[dict[str, Any], ...]] = {
+    "qbc": ({}, {"breaks": "fewest"}),
+    "awt": ({"iterations": 50}, {"iterations": 50, "distortion": "sampled"}),
+}
+
+
+def near_limits() -> Motion:
+    """Numbers near the ends of floats."""
+    values = np.round(np.random.default_rng(11).normal(size=(40, 4)).cumsum(axis=0), 4)
+    values[20:22, 1] = 2.0**51 // 10**4
+    values[:, 3] = np.round(values[:, 0] * 2, 4)
+    bones = Skeleton((Joint("m", channels=tuple(Channel("", c) for c in "abcd")),))
+    grids = (Grid(GridKind.FIXED, 4),) * 3 + (Grid(GridKind.BINARY64),)
+    return Motion(bones, (Signal(values, grids),))
+
+
+def encode_clips() -> None:
+    """Encode a few frames with every codec, and decode them."""
+    clips = smooth(40), rough(30, 1), markers(40), near_limits()
+    for codec in CODECS.values():
+        for motion in clips:
+            for options in OPTIONS.get(codec.name, ({},)):
+                try:
+                    data = saved(codec.name, motion, **options)
+                except mcz.MczError:  # some take no gaps, or markers alone
+                    continue
+                with mcz.open(data) as file:
+                    file.only_clip().read()
+
+
+def encode_counts() -> None:
+    """Encode what a converter counted, but for a few numbers that its law is off."""
+    counts = 32768 + np.random.default_rng(3).integers(-40, 41, 300).cumsum()
+    ordinals = Law(10 / 65535, -0.31).ordinals(counts)
+    ordinals[::7] += 1
+    signal = Signal(BINARY32.values(ordinals)[:, None], (BINARY32,))
+    skeleton = Skeleton((Joint("plate", channels=(Channel("", "force", "V"),)),))
+    saved("fast", Motion(skeleton, (signal,)))
+
+
+def encode_walk() -> None:
+    """The sample as its codec for poses takes it, and the rest that kernels do with poses."""
+    walk = bvh_walk().cut(0, 24)
+    walk = replace(walk, skeleton=replace(walk.skeleton, unit_cm=1.0))
+    data = saved("posewave", walk)
+    with mcz.open(data) as file:
+        file.only_clip().read()
+    mcz.positions(walk)
+    mcz.positions(walk, frames=(0, 3))
+    mcz.to_glb(walk, key_error_mm=1.0)
+    mcz.to_usda(walk)
+    mcz.post_filter(markers(40))
+
+
+def stream_frames() -> None:
+    """Frames that are coded one by one."""
+    walk = bvh_walk().cut(0, 6)
+    for codec in ("online", "posewave"):
+        parts = mcz.stream_encode(
+            iter(walk.values), walk.skeleton, codec=codec, params={"step": 0.5}, unit="cm"
+        )
+        for _ in mcz.stream_decode(io.BytesIO(b"".join(parts))):
+            pass
+
+
+def edit_files(folder: Path) -> None:
+    """A text file to the byte, joints of a clip, and a damaged file that is repaired."""
+    (folder / "texts").mkdir()
+    (folder / "texts" / "walk.bvh").write_bytes(bvh.write(bvh_walk().cut(0, 24)))
+    whole, bad = folder / "whole.mcz", folder / "bad.mcz"
+    mcz.pack(folder / "texts", whole, archive=True)
+    mcz.unpack(whole, folder / "again")
+    vector = VECTORS / "fast" / "groups-channel.mcz"
+    first = mcz.read(vector).skeleton.joints[0]
+    mcz.extract(vector, folder / "part.mcz", joints=[first.name])
+    mcz.protect(whole, 0.2)
+    data = bytearray(whole.read_bytes())
+    data[2000:2050] = bytes(50)
+    bad.write_bytes(data)
+    mcz.repair(bad, folder / "repaired.mcz")
+
+
+def main() -> None:
+    kernels.kernel = twin
+    loaded = [name for name in sys.modules if name in kernels.UNIT_OF]
+    assert not loaded, loaded
+    assert kernels.MODE != kernels.INTERPRETED
+    assert not kernels.lacks_compiled_kernels()
+    decode_vectors()
+    encode_clips()
+    encode_counts()
+    encode_walk()
+    stream_frames()
+    with tempfile.TemporaryDirectory() as folder:
+        edit_files(Path(folder))
+    print(json.dumps([compared, differences]))
+
+
+if __name__ == "__main__":
+    main()
