@@ -1,9 +1,7 @@
 """Compiled: poses of a batch of frames, and the composite inertia of every joint.
 
 SPEC.md, "Pose metric", is normative. Arrays end in an axis of ``width`` lanes, one a frame, and
-every innermost loop goes over ``lanes``, which is the same number: that one is known only when the
-loop runs, so that LLVM makes vectors of it; the other is known when it is compiled, so that LLVM
-knows how far apart rows are. For one frame alone both are known.
+every innermost loop goes over ``lanes``, which is the same number: compilers make vectors of it.
 """
 
 from __future__ import annotations
@@ -162,7 +160,7 @@ def _turn_about(plan: Plan, turn: int, batch: Lanes, origin: Floats2, lanes: int
     axis, number = plan.turns[turn, 0], plan.turns[turn, 2]
     if number >= 0:
         _note_turn(own, axis, plan.rule.radians, origin, motions[number], lanes)
-    if axis == 0:  # LLVM makes vectors only where it knows which columns these are
+    if axis == 0:  # vectors are made only where it is known which columns these are
         _mix(own, 1, 2, sines[turn], cosines[turn], lanes)
     elif axis == 1:
         _mix(own, 2, 0, sines[turn], cosines[turn], lanes)
