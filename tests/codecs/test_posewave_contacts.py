@@ -135,6 +135,7 @@ def test_two_points_of_a_foot() -> None:
     assert errors_cm(motion, coded.read(), runs).max() <= TOLERANCE
 
 
+@pytest.mark.real
 @pytest.mark.parametrize("name", ["16_02", "05_01"])
 def test_real_clips(name: str, data: Path) -> None:
     motion = amc(data, name)
@@ -156,6 +157,7 @@ def test_real_clips(name: str, data: Path) -> None:
     assert off.mean() < before.mean() and off.max() <= 1.25 * before.max()
 
 
+@pytest.mark.real
 def test_a_straight_leg_is_not_bent(data: Path) -> None:
     """Of this clip a knee once went out by centimeters."""
     motion = mcz.read(data / "cmu/bvh/05_01.bvh", unit="in")
