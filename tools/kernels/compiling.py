@@ -31,7 +31,7 @@ UNITS: dict[str, tuple[str, ...]] = runpy.run_path(str(ROOT / "mcz/kernels/units
 EXACT = ["-fwrapv", "-ffp-contract=off"]
 SANITIZERS = "address,undefined,float-cast-overflow"
 FLAGS = {
-    "compiled": ["-O3"],
+    "compiled": ["-O3", "-g0"],  # Zig would add 4 times as much of what debuggers want
     "checked": ["-O1", "-DMCZ_CHECKED"],
     "sanitized": ["-O1", "-g", f"-fsanitize={SANITIZERS}"],  # unchecked: they see what is left
 }
