@@ -18,15 +18,126 @@
         ├── LimitError       they ask for more than the reader is willing to give
         └── LostFrameError   they need a frame that did not come
 
-A message says where (file, chunk, offset, line) and shows the value that was found. What is no
-error but should be known is a warning: SkeletonWarning, ContactWarning.
+An error has fields, see ``MczError``; ``str(error)`` is made of them. Code that knows more of the
+place adds it on the way out, by ``error.add`` or ``error_context``. What is no error but should be
+known is a warning: SkeletonWarning, ContactWarning.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from enum import StrEnum
+from typing import TYPE_CHECKING, ClassVar, TypedDict
+
+if TYPE_CHECKING:
+    from typing import Unpack
+
+Value = str | int | float
+
+
+class Hint(StrEnum):
+    """The way out of an error, as a code; ``PYTHON_HINTS`` words it for calls of this package."""
+
+    FORCE = "force"
+    UNIT = "unit"
+    RATE = "rate"
+
+
+PYTHON_HINTS: Mapping[Hint, str] = {
+    Hint.FORCE: "use force to replace it",
+    Hint.UNIT: "give the unit (unit=)",
+    Hint.RATE: "give the rate (rate=)",
+}
+
+
+class Fields(TypedDict, total=False):
+    """Fields of an error as keywords; one that is None is not given."""
+
+    path: str | None
+    clip: str | None
+    line: int | None
+    offset: int | None
+    where: str | None
+    value: Value | None
+    hint: Hint | None
+
 
 class MczError(Exception):
-    """Base of all errors of this package; catching it catches every one of them."""
+    """Base of all errors of this package; catching it catches every one of them.
+
+    ``message`` tells what is wrong. The other fields are None where they are not known:
+
+    ``path``    the file, as the caller named it
+    ``clip``    the name of the clip or motion
+    ``line``    the line of a text, counted from 1
+    ``offset``  the byte of a file; in an MCZ file where the chunk at fault begins
+    ``where``   the structure and the field within the file or the clip
+    ``value``   the value that is refused
+    ``hint``    the way out, a ``Hint``
+    """
+
+    path: str | None = None
+    clip: str | None = None
+    line: int | None = None
+    offset: int | None = None
+    where: str | None = None
+    value: Value | None = None
+    hint: Hint | None = None
+    _shows_offset: ClassVar[bool] = True
+
+    def __init__(self, *message: str, **fields: Unpack[Fields]) -> None:
+        super().__init__(*message)
+        self.add(**fields)
+
+    @property
+    def message(self) -> str:
+        """The text without the other fields."""
+        return str(self.args[-1]) if self.args else ""
+
+    @property
+    def fields(self) -> Fields:
+        """The fields that are known."""
+        known: Fields = {}
+        for name in Fields.__annotations__:
+            if (value := getattr(self, name)) is not None:
+                known[name] = value  # type: ignore[literal-required]
+        return known
+
+    def add(self, **fields: Unpack[Fields]) -> None:
+        """Add fields that are not known yet; ``where`` goes in front of what is known of it."""
+        inner = self.where
+        for name, value in fields.items():
+            if value is not None and getattr(self, name) is None:
+                setattr(self, name, value)
+        if inner is not None and (outer := fields.get("where")) is not None:
+            self.where = f"{outer}: {inner}"
+
+    def describe(self, hints: Mapping[Hint, str] = PYTHON_HINTS, *, with_path: bool = True) -> str:
+        """The message and its fields as one text; ``hints`` words the hint."""
+        places = (
+            self.path if with_path else None,
+            None if self.clip is None else f"clip {self.clip!r}",
+            None if self.line is None else f"line {self.line}",
+            f"offset {self.offset}" if self._shows_offset and self.offset is not None else None,
+            self.where,
+            self.message,
+        )
+        text = ": ".join(place for place in places if place)
+        return text if self.hint is None else f"{text}; {hints[self.hint]}"
+
+    def __str__(self) -> str:
+        return self.describe()
+
+
+@contextmanager
+def error_context(**fields: Unpack[Fields]) -> Iterator[None]:
+    """Add ``fields`` to each error of this package that leaves the block."""
+    try:
+        yield
+    except MczError as error:
+        error.add(**fields)
+        raise
 
 
 class MotionError(MczError):
@@ -52,11 +163,9 @@ class OutOfRangeError(OptionError, IndexError):
 class UnknownNameError(OptionError, KeyError):
     """A name that means no clip, or several."""
 
-    __str__ = Exception.__str__  # KeyError would show the message in quotes
-
 
 class SourceError(MczError):
-    """A source file cannot be parsed; the message names the line or the offset."""
+    """A source file cannot be parsed; ``line`` or ``offset`` is where."""
 
 
 class WorkerError(MczError):
@@ -66,10 +175,10 @@ class WorkerError(MczError):
 class FormatError(MczError):
     """Bytes that are not a valid MCZ file, chunk or payload.
 
-    ``offset`` is where the chunk at fault begins, None where that is not known.
+    ``where`` names a chunk along with its offset, so that the text says ``offset`` no second time.
     """
 
-    offset: int | None = None
+    _shows_offset = False
 
 
 class TruncatedError(FormatError):
@@ -79,8 +188,10 @@ class TruncatedError(FormatError):
     everything up to it can be read with ``salvage=True``.
     """
 
-    def __init__(self, message: str, last_foot: int | None = None) -> None:
-        super().__init__(message)
+    def __init__(
+        self, *message: str, last_foot: int | None = None, **fields: Unpack[Fields]
+    ) -> None:
+        super().__init__(*message, **fields)
         self.last_foot = last_foot
 
 
