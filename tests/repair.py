@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import struct
+import tracemalloc
 import zlib
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import mcz
@@ -98,6 +100,16 @@ def use(data: bytes, *, salvage: bool = False) -> None:
         for id_, _skeleton in file.skeletons:
             if file.skeleton(id_, with_source=True).source is not None:
                 file.skeleton_bytes(id_)
+
+
+@contextmanager
+def memory_below(most: int) -> Iterator[None]:
+    """Fail where Python objects and arrays take more bytes at a time."""
+    tracemalloc.start()
+    yield
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < most
 
 
 def flips(size: int, at_most: int, seed: int) -> Iterator[tuple[int, int]]:

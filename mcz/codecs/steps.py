@@ -19,6 +19,8 @@ def code_of(ratio: float) -> int:
     """The step code nearest to a ratio."""
     if ratio <= 0:
         return 0
+    if ratio == math.inf:
+        return 255
     guess = int(4 * math.log2(ratio)) + MIDDLE_CODE
     near = range(max(0, guess - 2), min(255, guess + 3) + 1)
     return min(

@@ -43,8 +43,7 @@ def weights_of(skeleton: Skeleton, sample: Floats, rule: str, *, unit_aware: boo
         return weights
     weights = weights * degrees
     is_position = np.array([kind in POSITION_KINDS for kind in kinds], np.bool_)
-    with np.errstate(over="ignore"):
-        lever = reach(skeleton) * math.pi / 180
+    lever = reach(skeleton) * math.pi / 180
     return np.where(is_position, weights * (lever if 0 < lever < math.inf else 1.0), weights)
 
 

@@ -246,15 +246,16 @@ def depths(skeleton: Skeleton) -> Floats:
 def reach(skeleton: Skeleton) -> float:
     """The size of a skeleton: greatest distance of a point from its root in the rest pose.
 
-    In length units; 0.0 where there is no point but roots.
+    In length units; 0.0 where there is no point but roots, infinity beyond the range of floats.
     """
     origins: list[Floats] = []
     greatest = 0.0
-    for joint in skeleton.joints:
-        origin = np.zeros(3)
-        if joint.parent >= 0:
-            origin = origins[joint.parent] + np.array(joint.offset)
-        origins.append(origin)
-        for end in (origin, *(origin + np.array(tail) for tail in joint.tails)):
-            greatest = max(greatest, float(np.sqrt(end @ end)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for joint in skeleton.joints:
+            origin = np.zeros(3)
+            if joint.parent >= 0:
+                origin = origins[joint.parent] + np.array(joint.offset)
+            origins.append(origin)
+            for end in (origin, *(origin + np.array(tail) for tail in joint.tails)):
+                greatest = max(greatest, float(np.sqrt(end @ end)))
     return greatest

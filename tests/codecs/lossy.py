@@ -120,7 +120,7 @@ class Direct:
     def __init__(
         self, codec: str, motion: Motion, *, segment_bytes: int = 2**26, **params: object
     ) -> None:
-        self.codec = by_name(codec)
+        self.codec, self.motion, self.params = by_name(codec), motion, params
         source = MemorySource(motion, 0, self.codec, segment_bytes)
         coded: Encoded = self.codec.encode(source, self.codec.options(params))
         self.header = coded.header
@@ -132,6 +132,10 @@ class Direct:
             find_model=model_finder((*coded.models, *coded.known)),
         )
         self.spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in self.segments]
+
+    def again(self, motion: Motion | None = None, **changes: Any) -> Direct:
+        """The same by other parameters, of another clip, or with less memory for a segment."""
+        return Direct(self.codec.name, motion or self.motion, **{**self.params, **changes})
 
     @property
     def n_bytes(self) -> int:

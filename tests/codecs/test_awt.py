@@ -160,14 +160,6 @@ def test_presets() -> None:
     assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)
 
 
-def test_segments_do_not_matter() -> None:
-    """What is kept is chosen of the whole clip."""
-    motion = wandering(500, ["tx", "rx", "ry"])
-    one = Direct("awt", motion, a_w=50, segment_frames=500)
-    many = Direct("awt", motion, a_w=50, segment_frames=64)
-    assert len(many.segments) == 8 and many.read().tobytes() == one.read().tobytes()
-
-
 def test_long_clips_are_analyzed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     source = source_of(wandering(700, ["tx", "rx"]))
     transform = transform_of(source.layout, "db3", 4)

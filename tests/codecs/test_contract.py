@@ -1,132 +1,437 @@
-"""The codec contract, proved by a codec with overlapping support and two resolutions."""
+"""What every codec keeps to: values near the source, parts of the whole, edits, odd clips."""
 
 from __future__ import annotations
 
+import contextlib
 import io
+import itertools
+import math
+import re
+from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import mcz
-from mcz import codecs
-from mcz.container.segments import parse_table
+from mcz.codecs import CODECS, by_name
+from mcz.motion import Channel, Joint, Motion, Signal, Skeleton, joint_columns
 from tests import overlap_codec
+from tests.codecs.cases import CASES, Case, meant, saved, small, written
+from tests.codecs.lossy import bones, clip_of, gapped, markers, wandering
 from tests.motions import smooth
 
+EVERY = pytest.mark.parametrize("name", CASES)
+FINITE = pytest.mark.parametrize("name", [n for n in CASES if n != "overlap"])
+LOSSY = pytest.mark.parametrize("name", [n for n in CASES if CASES[n].error > 1e-9])
+LOSSLESS = ("raw", "lossless", "fast", "best")
+CODEC = pytest.mark.parametrize("name", CODECS.names())
+LOSSY_CODEC = pytest.mark.parametrize("name", [n for n in CODECS.names() if n not in LOSSLESS])
 
-@pytest.fixture(autouse=True)
-def overlap(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(codecs.CODECS, overlap_codec.ID, overlap_codec.CODEC)
+
+@pytest.fixture(autouse=True, scope="module")
+def overlap() -> Iterator[None]:
+    CODECS[overlap_codec.ID] = overlap_codec.CODEC
+    yield
+    del CODECS[overlap_codec.ID]
 
 
-def encoded(motion: mcz.Motion, **params: object) -> bytes:
+def test_every_codec_has_a_case() -> None:
+    assert {case.name for case in CASES.values()} == set(CODECS.names())
+
+
+def decoded(motion: Motion, case: Case, **params: Any) -> np.ndarray:
+    with mcz.open(saved(motion, case, **params), max_decoded=2**40) as file:
+        return file.only_clip().read()
+
+
+# Values
+
+
+@EVERY
+@pytest.mark.parametrize("n_frames", [0, 1, 2, 3, 100])
+def test_values_come_back(name: str, n_frames: int) -> None:
+    case, data = CASES[name], written(name, n_frames)
+    assert mcz.verify(data) == []
+    with mcz.open(data) as file:
+        clip = file.only_clip()
+        assert (clip.codec, clip.n_frames) == (case.name, n_frames)
+        found = clip.read()
+    wanted = meant(case, smooth(n_frames))
+    assert found.shape == wanted.shape
+    assert np.abs(found - wanted).max(initial=0) <= case.error
+    assert found.size < 99 or (found == wanted).all() == case.codec.lossless or name == "overlap"
+
+
+@EVERY
+@pytest.mark.parametrize("length", [2, 7, 32])
+def test_segments_hold_what_one_would(name: str, length: int) -> None:
+    case, many = CASES[name], written(name, 100, length)
+    with mcz.open(many) as file, mcz.open(written(name, 100, 10**4)) as other:
+        clip, whole = file.only_clip(), other.only_clip().read()
+        rows = [row.header for row in clip.signals[0].rows]
+        found = clip.read()
+    assert len(rows) > 1
+    assert [row.first for row in rows] == [0, *(row.stop for row in rows[:-1])]
+    assert rows[-1].stop == 100
+    assert np.abs(found - meant(case, smooth(100))).max() <= case.error
+    if case.is_free:
+        assert found.tobytes() == whole.tobytes()
+
+
+@EVERY
+def test_the_same_clip_gives_the_same_bytes(name: str) -> None:
+    assert saved(smooth(100), CASES[name]) == written(name)
+
+
+@FINITE
+def test_segments_keep_to_the_memory_that_is_allowed(name: str) -> None:
+    """Of 40 frames, which a codec may round up to whole blocks of 16."""
+    case = CASES[name]
+    motion = markers(200, 1) if case.of_points else wandering(200, ["tx", "rx", "rz"])
+    limits = {**case.length(150), "segment_bytes": 40 * 8 * 3}
+    if case.params.get("preset") == "khan2014" and case.name == "qbc":
+        with pytest.raises(mcz.OptionError, match="delta 80 is more than the 40 frames"):
+            small(name).again(motion, **limits)
+        return
+    many = small(name).again(motion, **limits)
+    assert max(span.n_frames for span in many.spans) <= 48
+    if case.is_free:
+        assert many.read().tobytes() == small(name).again(motion).read().tobytes()
+
+
+# Parts
+
+
+@EVERY
+@settings(max_examples=12)
+@given(data=st.data())
+def test_a_part_is_what_it_is_in_the_whole(name: str, data: st.DataObject) -> None:
+    n_frames = data.draw(st.sampled_from([1, 20, 100]))
+    file_data = written(name, n_frames, data.draw(st.sampled_from([0, 2, 7, 32])))
+    with mcz.open(file_data, unverified=data.draw(st.booleans())) as file:
+        clip = file.only_clip()
+        resolution = data.draw(st.integers(0, clip.signals[0].counts.n_resolutions - 1))
+        start = data.draw(st.integers(0, n_frames))
+        stop = data.draw(st.integers(start, n_frames))
+        joints = data.draw(st.lists(st.sampled_from(clip.skeleton.addresses()), max_size=4))
+        whole = clip.read(resolution=resolution)
+        np.testing.assert_array_equal(
+            clip.read((start, stop), resolution=resolution), whole[start:stop]
+        )
+        columns = joint_columns(clip.skeleton, joints)
+        part = clip.read((start, stop), joints, resolution)
+        np.testing.assert_array_equal(part, whole[start:stop][:, columns])
+        thin = clip.read((start, stop), joints, resolution, decimate=True)
+        np.testing.assert_array_equal(thin, part[:: 2**resolution])
+
+
+@EVERY
+def test_a_part_needs_its_own_streams_alone(name: str) -> None:
+    """Of other segments, groups and finer resolutions nothing is fetched."""
+    coded, n = small(name), small(name).layout.n_resolutions
+    for segment, start, stop in ((0, 1, 3), (len(coded.spans) - 1, 18, 20)):
+        for group, resolution in itertools.product(range(len(coded.layout.groups)), range(n)):
+            asked: set[tuple[int, int, int]] = set()
+
+            def fetch(*place: int, asked: Any = asked) -> bytes:
+                asked.add(place)
+                return coded.stream(*place)
+
+            assert coded.read(start, stop, (group,), resolution, {"fetch": fetch}).size
+            assert {place[1] for place in asked} <= set(range(n - resolution))
+            assert {place[2] for place in asked} <= {group}
+            if not CASES[name].is_free and name != "overlap":
+                assert {place[0] for place in asked} <= {segment}
+
+
+@EVERY
+def test_details_that_are_not_stored_are_those_left_out(name: str) -> None:
+    coded = small(name)
+    for k in range(coded.layout.n_resolutions):
+        shorter = replace(coded.layout, n_resolutions=coded.layout.n_resolutions - k)
+        found = coded.read(changes={"layout": shorter})
+        assert found.tobytes() == coded.read(resolution=k).tobytes()
+
+
+@EVERY
+def test_resolutions_out_of_range_are_refused(name: str) -> None:
+    with mcz.open(written(name)) as file:
+        clip = file.only_clip()
+        n = clip.signals[0].counts.n_resolutions
+        with pytest.raises(mcz.OptionError, match=f"resolutions 0 to {n - 1}"):
+            clip.read(resolution=n)
+
+
+# Edits
+
+
+def extracted(data: bytes, **how: Any) -> bytes:
     out = io.BytesIO()
-    mcz.write(motion, out, codec="overlap", **params)
+    mcz.extract(data, out, **how)
+    assert mcz.verify(out.getvalue()) == []
     return out.getvalue()
 
 
-def test_decodes_to_what_was_encoded() -> None:
-    motion = smooth(47)
-    with mcz.open(encoded(motion)) as file:
-        clip = file.clips["smooth"]
-        np.testing.assert_allclose(clip.read(), motion.values, rtol=0, atol=1e-12)
-        assert clip.codec == "overlap"
+@EVERY
+@pytest.mark.parametrize("frames", [None, (31, 32), (45, 83), (7, 7)])
+def test_what_is_extracted_has_the_same_values(name: str, frames: tuple[int, int] | None) -> None:
+    case, data = CASES[name], written(name, 100, 16)
+    start, stop = frames or (0, 100)
+    with mcz.open(data) as file:
+        whole = file.only_clip()
+        n = whole.signals[0].counts.n_resolutions
+        by_joint = case.codec.grouping != "all"
+        for joints in (None, ["spine"], ["knee", "hips"]) if by_joint else (None,):
+            for k in sorted({0, min(1, n - 1), n - 1}):
+                if (frames, joints, k) == (None, None, 0):
+                    continue
+                part = extracted(data, frames=frames, joints=joints, resolution=k)
+                kept = joints and sorted(joints)
+                wanted = whole.read((start, stop), kept, k)
+                with mcz.open(part) as other:
+                    clip = other.only_clip()
+                    assert clip.read().tobytes() == wanted.tobytes()
+                    piece = clip.read((0, (stop - start) // 2))
+                    assert piece.tobytes() == wanted[: (stop - start) // 2].tobytes()
+                    assert clip.signals[0].counts.n_resolutions == n - k
+                if stop - start > 20:
+                    again = extracted(part, frames=(9, 17))
+                    with mcz.open(again) as other:
+                        assert other.only_clip().read().tobytes() == wanted[9:17].tobytes()
+    if not by_joint:
+        with pytest.raises(mcz.OptionError, match="recode"):
+            extracted(data, joints=["hips" if "hips" in whole.skeleton.addresses() else 0])
 
 
-@pytest.mark.parametrize("frames", [(0, 47), (9, 11), (19, 20), (10, 10), (46, 47), (0, 1)])
-@pytest.mark.parametrize("joints", [None, ["knee"], ["spine", "hips"], []])
-@pytest.mark.parametrize("resolution", [0, 1])
-def test_part_equals_whole(frames, joints, resolution) -> None:
-    with mcz.open(encoded(smooth(47))) as file:
-        clip = file.clips["smooth"]
-        whole = clip.read(resolution=resolution)
-        columns = [c for j in joints or [] for c in clip.skeleton.columns(clip.skeleton.find(j))]
-        if joints is None:
-            columns = list(range(10))
-        part = clip.read(frames, joints, resolution)
-        np.testing.assert_array_equal(part, whole[frames[0] : frames[1]][:, columns])
+@EVERY
+@pytest.mark.parametrize("frames", [(5, 30), (99, 100), (42, None), (8, 8)])
+def test_frames_that_are_cut_off_are_gone(name: str, frames: tuple[int, int | None]) -> None:
+    case, data = CASES[name], written(name)
+    start, stop = frames[0], frames[1] or 100
+    part = extracted(data, frames=frames, recode=True)
+    with mcz.open(data) as file, mcz.open(part) as other:
+        before, after = file.only_clip(), other.only_clip()
+        rows = [[row.header.n_frames for row in info.rows] for info in after.signals]
+        assert list(map(sum, rows)) == [stop - start]
+        assert after.codec == case.name
+        off = np.abs(after.read() - before.read()[start:stop])
+        assert off.max(initial=0) <= 2 * case.error
+        np.testing.assert_array_equal(after.frame_numbers, before.frame_numbers[start:stop])
+        if after.quality:
+            assert after.quality["cut-frames"] == f"{start}:{stop}"
 
 
-def test_lower_resolution_leaves_streams_unread() -> None:
-    data = encoded(smooth(400), length=100)
-    with mcz.open(data, unverified=True) as file:
-        clip = file.clips["smooth"]
-        row, counts = clip.signals[0].rows[0], clip.signals[0].counts
-        table = parse_table(data[row.offset : row.offset + row.size], counts)
-        detail = sum(table.lengths[table.codec(1, g)] for g in range(counts.n_groups))
-        costs = []
-        for resolution in (0, 1):
-            before = file.container.source.n_bytes
-            clip.read((0, 99), ["hips", "spine", "knee"], resolution)
-            costs.append(file.container.source.n_bytes - before)
-        assert costs[0] - costs[1] >= detail - counts.n_groups * 256
+def test_clips_of_all_codecs_are_merged(tmp_path: Path) -> None:
+    for name, case in CASES.items():
+        motion = replace(smooth(40), name=name)
+        (tmp_path / f"{name}.mcz").write_bytes(saved(motion, case))
+    mcz.merge(sorted(tmp_path.glob("*.mcz")), tmp_path / "all.mcz")
+    assert mcz.verify(tmp_path / "all.mcz") == []
+    with mcz.open(tmp_path / "all.mcz") as file:
+        assert set(file.clips) == set(CASES)
+        for name in CASES:
+            with mcz.open(tmp_path / f"{name}.mcz") as other:
+                assert file.clips[name].read().tobytes() == other.only_clip().read().tobytes()
 
 
-def test_decimate_returns_every_second_frame() -> None:
-    with mcz.open(encoded(smooth(47))) as file:
-        clip = file.clips["smooth"]
-        np.testing.assert_array_equal(
-            clip.read(resolution=1, decimate=True), clip.read(resolution=1)[::2]
-        )
+# Clips out of the ordinary
 
 
-def test_resolution_out_of_range() -> None:
-    with mcz.open(encoded(smooth())) as file, pytest.raises(mcz.OptionError, match="resolutions 0"):
-        file.clips["smooth"].read(resolution=2)
+@FINITE
+def test_masks_are_kept_and_what_lies_beneath_is_not_coded(name: str) -> None:
+    case, motion = CASES[name], replace(gapped(), frame_rate=Fraction(60))
+    mask = motion.signals[0].mask
+    with mcz.open(saved(motion, case, **case.length(40))) as file:
+        clip = file.only_clip()
+        values, found = clip.read_masked()
+        np.testing.assert_array_equal(found, mask)
+        assert np.abs(values - motion.signals[0].values)[mask].max() <= case.error
+        assert case.codec.lossless or np.abs(values).max() < 200
+        shown = clip.read((40, 70), ["RASI"])
+        np.testing.assert_array_equal(np.isnan(shown), ~mask[40:70, 3:])
 
 
-def test_lossy_hash_is_that_of_the_decoded_values() -> None:
-    data = bytearray(encoded(smooth(47)))
-    with mcz.open(bytes(data)) as file:
-        row = file.clips["smooth"].signals[0].rows[1]
-        assert file.clips["smooth"].read().shape == (47, 10)
-    data[row.offset + row.size - 1] ^= 1
-    with mcz.open(bytes(data)) as file, pytest.raises(mcz.ChecksumError):
-        file.clips["smooth"].read()
+def odd_clips() -> dict[str, Motion]:
+    kinds = ["qw", "qx", "qy", "qz", "length", "sx", "tx"]
+    tailed = Joint("root", channels=tuple(map(Channel, kinds)), tails=((0.0, 1.0, 0.0),))
+    values = 1 + 0.1 * np.sin(np.arange(60)[:, None] / 9 + np.arange(7))
+    face = Skeleton((Joint("face", channels=(Channel("", "smile", "%"), Channel("", "blink"))),))
+    far = Joint("b", 0, (1.5e308, 1.5e308, 0.0), channels=(Channel("rx"),))
+    moving = Joint("a", channels=(Channel("tx"), Channel("rx")))
+    return {
+        "no channels": Motion(Skeleton((Joint("rock"),)), (Signal(np.zeros((40, 0))),)),
+        "no joints": Motion(Skeleton(()), (Signal(np.zeros((0, 0))),)),
+        "still": clip_of(np.tile([0.0, 77.5, -123.0], (300, 1)), ["tx", "ty", "tz"]),
+        "of all kinds": Motion(Skeleton((tailed,)), (Signal(values),)),
+        "scalars": Motion(face, (Signal(values[:, :2]),)),
+        "no angle unit": Motion(bones(["tx", "rx"], ""), (Signal(values[:, :2]),)),
+        "huge offsets": Motion(Skeleton((moving, far)), (Signal(values[:, :3]),)),
+        "wide": markers(6, 100),
+        "turning": clip_of((np.arange(90.0)[:, None] * 7 + 180) % 360 - 180),
+    }
 
 
-@pytest.mark.parametrize("value", [1, "many", 2**40])
-def test_bad_parameter(value) -> None:
-    with pytest.raises(mcz.OptionError, match="length"):
-        encoded(smooth(), length=value)
+ODD = odd_clips()
+PLACELESS = ("scalars", "no angle unit", "huge offsets")  # nobody knows where their points are
 
 
-def test_unknown_parameter_names_the_known_ones() -> None:
-    with pytest.raises(mcz.OptionError, match="no parameter 'size'; it has length"):
-        encoded(smooth(), size=4)
+@EVERY
+@pytest.mark.parametrize("odd", ODD)
+def test_odd_clips(name: str, odd: str) -> None:
+    case, motion = CASES[name], replace(ODD[odd], frame_rate=Fraction(60), name=odd)
+    if case.of_points and odd in PLACELESS:
+        with pytest.raises(mcz.MotionError):
+            saved(motion, case)
+        return
+    found, wanted = decoded(motion, case), meant(case, motion)
+    assert found.shape == wanted.shape
+    assert np.abs(found - wanted).max(initial=0) <= (3 if odd == "wide" else 1) * case.error
 
 
-def test_unknown_codec_makes_only_that_clip_unsupported(monkeypatch: pytest.MonkeyPatch) -> None:
-    out = io.BytesIO()
-    from mcz.container.writer import Writer
-    from mcz.writing.clip_writer import write_clip
-
-    writer = Writer(out)
-    write_clip(writer, smooth(), codecs.by_name("raw"), {})
-    write_clip(writer, smooth(name="other"), overlap_codec.CODEC, {})
-    write_clip(writer, smooth(name="newer"), replace(codecs.by_name("raw"), version=9), {})
-    writer.finish()
-    monkeypatch.delitem(codecs.CODECS, overlap_codec.ID)
-    with mcz.open(out.getvalue()) as file:
-        assert list(file.clips) == ["smooth", "other", "newer"]
-        assert file.clips["other"].codec == "codec 251"
-        assert file.clips["smooth"].read().shape == (50, 10)
-        for name in ("other", "newer"):
-            with pytest.raises(mcz.UnsupportedError):
-                file.clips[name].read()
+@LOSSY
+def test_a_clip_of_zeros_takes_next_to_nothing(name: str) -> None:
+    motion = markers(500, 4)
+    coded = small(name).again(motion.with_values(np.zeros((500, 12))), segment_frames=512)
+    assert coded.n_bytes <= 600  # less than a bit a value
+    assert not coded.read().any()
 
 
-def test_tiny_payloads_keep_the_overhead_bound() -> None:
-    """DESIGN 3: 160 bytes, 1 byte a stream, 1 % of the payload."""
-    from mcz.reading.sizes import clip_sizes
+@FINITE
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_values_that_are_not_finite_are_refused(name: str, bad: float) -> None:
+    case = CASES[name]
+    values = np.array(markers(60, 2).values)
+    values[30, 4] = bad
+    motion = markers(60, 2).with_values(values)
+    if case.codec.lossless:
+        assert decoded(motion, case).tobytes() == values.tobytes()
+        return
+    with pytest.raises(mcz.MotionError, match=rf"{case.name}: frames? .*{'not finite'}"):
+        saved(motion, case)
 
-    motion = smooth(40)
-    values = np.zeros_like(motion.values)
-    with mcz.open(encoded(motion.with_values(values), length=40)) as file:
-        clip = file.clips["smooth"]
-        sizes = clip_sizes(file.container, clip)
-        row, counts = clip.signals[0].rows[0], clip.signals[0].counts
-        table = file.container.table(row, counts)
-        n_streams = sum(length > 0 for length in table.lengths)
-        assert sizes.overhead <= 160 + n_streams + 0.01 * sizes.payload
+
+@LOSSY
+@pytest.mark.parametrize("huge", [1e13, 1e20, 1e300, -1.7e308])
+@pytest.mark.parametrize("kind", ["rx", "tx", "length"])
+def test_huge_values_are_refused_or_coded(name: str, kind: str, huge: float) -> None:
+    case, values = CASES[name], np.ones((60, 2))
+    values[20, 1], values[21, 1] = huge, -huge
+    with contextlib.suppress(mcz.MotionError):
+        assert np.isfinite(decoded(clip_of(values, [kind, kind]), case)).all()
+
+
+@LOSSY_CODEC
+def test_what_a_lossy_signal_cannot_be(name: str) -> None:
+    params = {"domain": "channels"} if by_name(name).positions else {}
+    params |= {"step": 0.1} if name == "posewave" else {}
+    own = Signal(np.zeros((10, 2)), channels=(Channel("", "a"), Channel("", "b")))
+    for signal, words in (
+        (Signal(np.zeros((10, 2)), samples_per_frame=2), "one sample a frame"),
+        (Signal(np.zeros((10, 2), np.int64)), "integers"),
+        (own, "channels of its own"),
+    ):
+        with pytest.raises(mcz.MotionError, match=words):
+            saved(replace(clip_of(np.zeros((10, 2))), signals=(signal,)), Case(name, 0, params))
+
+
+@LOSSY_CODEC
+def test_a_c3d_comes_back_with_its_gaps_and_signals(
+    name: str, samples: Path, tmp_path: Path
+) -> None:
+    target, back = tmp_path / "walk.mcz", tmp_path / "back.c3d"
+    mcz.encode(samples / "walk.c3d", target, codec=name)
+    with mcz.open(target) as file:
+        clip = file.only_clip()
+        assert {info.codec.name for info in clip.signals[1:]} == {"lossless"}
+        back.write_bytes(clip.source_bytes())
+        stated = float(clip.quality["mean_position_error"])
+    source, again = mcz.read(samples / "walk.c3d"), mcz.read(back)
+    compared = mcz.compare(source, again)
+    assert compared.mismatched_points == 0
+    assert compared.mean_position_error == pytest.approx(stated, rel=0.05)
+    for before, after in zip(source.signals[1:], again.signals[1:], strict=True):
+        np.testing.assert_array_equal(before.values, after.values)
+
+
+@pytest.mark.long
+@LOSSY
+def test_10000_channels(name: str) -> None:
+    """Long and wide: segments stay below the limits, memory below a few of them."""
+    case, motion = CASES[name], markers(300, 3334)
+    if case.of_points or case.codec.grouping == "all":
+        return
+    with mcz.open(saved(motion, case), max_decoded=2**40) as file:
+        clip = file.only_clip()
+        assert len(clip.signals[0].rows) > 1
+        found = clip.read((100, 110))
+    assert np.abs(found - motion.values[100:110]).max() <= 9 * case.error
+
+
+# Parameters
+
+
+DIALED = [name for name in CODECS.names() if by_name(name).dial]
+
+
+@pytest.mark.parametrize("name", DIALED)
+def test_a_finer_setting_costs_more_and_errs_less(name: str) -> None:
+    dial, case, motion = by_name(name).dial, Case(name), smooth(200)
+    rising, falling = (1, 3, 6, 100), (10, 1.0, 0.1, 0.01)
+    sizes, errors = [], []
+    for setting in rising if dial.rises else falling:
+        coded = saved(motion, case, **{dial.parameter: setting})
+        with mcz.open(coded) as file:
+            errors.append(np.abs(file.only_clip().read() - meant(case, motion)).mean())
+        sizes.append(len(coded))
+    assert sizes == sorted(sizes) and errors == sorted(errors, reverse=True)
+    assert errors[-1] < errors[0] / 4
+
+
+def bad_values(range_: str) -> list[Any]:
+    """What a parameter of that range refuses, with the values next to its ends."""
+    numbers = re.fullmatch(r"(\S+) to (\S+)", range_)
+    if numbers is None:
+        return ["", "nothing", 7, [4]]
+    low, high = (float(end.replace(",", "")) for end in numbers.groups())
+    around = [low - 1 if "." not in numbers[1] else low / 2, high * 2]
+    return ["", "many", math.nan, math.inf, [4], *around, *map(str, around)]
+
+
+@CODEC
+def test_bad_parameters_are_refused_by_name(name: str) -> None:
+    codec, seen = by_name(name), 0
+    for parameter in codec.parameters:
+        if not parameter.range or "path" in parameter.range or "auto" in parameter.range:
+            continue
+        for value in bad_values(parameter.range):
+            with pytest.raises(mcz.OptionError, match=rf"^{parameter.name} |'{parameter.name}'"):
+                saved(smooth(5), Case(name), **{parameter.name: value})
+            seen += 1
+    assert seen > 5
+    with pytest.raises(mcz.OptionError, match=f"{name} has no parameter 'level'; it has"):
+        saved(smooth(5), Case(name), level=4)
+
+
+@EVERY
+def test_values_of_text_are_parsed(name: str) -> None:
+    codec, params = CASES[name].codec, CASES[name].params
+    assert codec.options({k: str(v) for k, v in params.items()}) == codec.options(params)
+
+
+@LOSSY
+def test_a_quality_record_says_how_and_how_well(name: str) -> None:
+    case, motion = CASES[name], smooth(100)
+    with mcz.open(written(name)) as file:
+        quality = file.only_clip().quality
+        found = mcz.compare(motion, file.only_clip().motion())
+    assert quality["codec"] == case.name
+    recorded = {key: quality[f"param.{key}"] for key in case.params}
+    assert case.codec.options(recorded) == case.codec.options(case.params)
+    assert float(quality["mean_position_error"]) == pytest.approx(found.mean_position_error)
+    assert "target_reached" not in quality

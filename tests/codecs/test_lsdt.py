@@ -12,7 +12,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.angles import unwrap
 from mcz.codecs import basis_models, by_name, space_choices
 from mcz.codecs.contract import Layout, Model, Request, Span, id_of
 from mcz.codecs.spatial.lsdt_frame import CODEC as FRAME
@@ -24,7 +23,6 @@ from tests.codecs.lossy import (
     bytes_of,
     clip_of,
     decoded,
-    gapped,
     markers,
     saved,
     wandering,
@@ -80,17 +78,6 @@ def test_errors_do_not_add_up(codec) -> None:
 
 
 @pytest.mark.parametrize("codec", CODECS)
-def test_a_finer_step_costs_more_and_errs_less(codec) -> None:
-    motion = markers(400, 6)
-    sizes, errors = [], []
-    for step in (0.01, 0.1, 1.0, 10.0):
-        sizes.append(bytes_of(saved(codec, motion, step=step)))
-        errors.append(float(np.abs(decoded(codec, motion, step=step) - motion.values).mean()))
-    assert sizes == sorted(sizes, reverse=True) and errors == sorted(errors)
-    assert sizes[-1] < sizes[0] / 4
-
-
-@pytest.mark.parametrize("codec", CODECS)
 @pytest.mark.parametrize("coder", ["mixed", "prefix"])
 def test_a_still_clip_is_small(codec, coder) -> None:
     """600 frames of 12 channels: a few bits a frame."""
@@ -99,14 +86,6 @@ def test_a_still_clip_is_small(codec, coder) -> None:
     found = decoded(codec, motion, step=0.01, coder=coder, domain="channels")
     assert np.abs(found - motion.values).max() < 1
     assert bytes_of(data) < (1200 if coder == "mixed" else 3000)
-
-
-@pytest.mark.parametrize("codec", CODECS)
-def test_channels_are_coded_as_they_are_asked_for(codec) -> None:
-    motion = wandering(300, ["rx", "ry", "rz", "tx", "ty"])
-    found = decoded(codec, motion, domain="channels", step=0.01)
-    meant = unwrap(motion.values, motion.skeleton)
-    assert np.abs(found - meant).max() < 5
 
 
 @pytest.mark.parametrize("codec", CODECS)
@@ -122,53 +101,6 @@ def test_a_clip_of_channels_becomes_places(codec) -> None:
 # Gaps, odd shapes, values that cannot be coded
 
 
-@pytest.mark.parametrize("codec", CODECS)
-def test_gaps_stay_and_what_lies_beneath_is_not_coded(codec) -> None:
-    motion = gapped()
-    with mcz.open(saved(codec, motion, step=0.05)) as file:
-        values, mask = file.only_clip().read_masked()
-    np.testing.assert_array_equal(mask, motion.signals[0].mask)
-    assert np.abs(values - motion.signals[0].values)[mask].max() < 1
-    assert np.isfinite(values).all() and np.abs(values).max() < 1e4
-
-
-@pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("coder", ["mixed", "prefix"])
-@pytest.mark.parametrize(("n_frames", "n_markers"), [(0, 2), (1, 1), (2, 3), (5, 0), (0, 0)])
-def test_small_clips(codec, coder, n_frames, n_markers) -> None:
-    motion = markers(n_frames, n_markers)
-    found = decoded(codec, motion, step=0.5, coder=coder)
-    assert found.shape == motion.values.shape
-    assert np.abs(found - motion.values).max(initial=0) < 2
-
-
-@pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
-def test_values_without_a_code_are_refused(codec, bad) -> None:
-    motion = markers(30, 3)
-    motion.signals[0].values[17, 4] = bad
-    with pytest.raises(mcz.MotionError):
-        saved(codec, motion, step=1e-9)
-
-
-@pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize(
-    "params",
-    [
-        {"step": 0.0},
-        {"step": -1},
-        {"threshold": 0.4},
-        {"coder": "zip"},
-        {"domain": "angles"},
-        {"virtual_markers": "maybe"},
-        {"basis": 3},
-    ],
-)
-def test_bad_parameters(codec, params) -> None:
-    with pytest.raises(mcz.OptionError):
-        saved(codec, markers(10), **params)
-
-
 def test_a_basis_that_is_not_there_or_does_not_fit(tmp_path: Path) -> None:
     with pytest.raises(mcz.AccessError):
         saved("lsdt-clip", markers(10), basis=str(tmp_path / "no.bases"))
@@ -182,17 +114,6 @@ def test_a_basis_that_is_not_there_or_does_not_fit(tmp_path: Path) -> None:
 
 
 # Segments and requests
-
-
-@given(st.sampled_from(CODECS), st.integers(1, 90), CODERS, st.data())
-def test_a_part_is_what_it_is_in_the_whole(codec, segment_frames, coder, data) -> None:
-    motion = markers(100, 3)
-    params = {"step": 0.3, "segment_frames": segment_frames, "coder": coder}
-    coded = Direct(codec, motion, **params | ({"window": 16} if codec == "lsdt-clip" else {}))
-    whole = coded.read()
-    start = data.draw(st.integers(0, 100))
-    stop = data.draw(st.integers(start, 100))
-    np.testing.assert_array_equal(coded.read(start, stop), whole[start:stop])
 
 
 def test_a_window_decodes_without_the_others() -> None:
@@ -343,43 +264,6 @@ def test_what_is_smaller_is_chosen() -> None:
 # Live
 
 
-@given(st.integers(1, 40), st.integers(1, 5), st.integers(1, 15))
-def test_frame_by_frame_gives_the_values_of_the_whole(n_frames, n_markers, every) -> None:
-    motion = markers(n_frames, n_markers)
-    params = {"step": 0.3, "basis": "cosines", "segment_frames": every}
-    whole = Direct("lsdt-frame", motion, **params)
-    assert FRAME.live is not None and FRAME.follow is not None
-    encoder = FRAME.live(replace(whole.layout, n_frames=0), FRAME.options(params))
-    decoder = FRAME.follow(encoder.header, whole.layout)
-    pushed = [encoder.push(row) for row in motion.values]
-    assert [fresh for _, fresh in pushed] == [i % every == 0 for i in range(n_frames)]
-    found = np.array([decoder.push(*packet) for packet in pushed])
-    np.testing.assert_array_equal(found, whole.read())
-    spans = [Span(i, 1, fresh=fresh) for i, (_, fresh) in enumerate(pushed)]
-    for start in {0, n_frames // 2, n_frames - 1}:
-        request = Request(start, n_frames, (0,))
-        again = FRAME.decode(
-            encoder.header, whole.layout, spans, request, lambda i, _, __: pushed[i][0]
-        )
-        np.testing.assert_array_equal(again, found[start:])
-
-
-def test_a_live_decoder_waits_for_a_fresh_start() -> None:
-    motion = markers(20, 2)
-    layout = Direct("lsdt-frame", motion, basis="cosines").layout
-    encoder = FRAME.live(layout, FRAME.options({"step": 0.3, "segment_frames": 8}))
-    pushed = [encoder.push(row) for row in motion.values]
-    decoder = FRAME.follow(encoder.header, layout)
-    with pytest.raises(mcz.FormatError, match="did not come"):
-        decoder.push(*pushed[3])
-    assert np.abs(decoder.push(*pushed[8]) - motion.values[8]).max() < 1
-    with pytest.raises(mcz.FormatError):
-        decoder.push(b"\xff" * 9, False)
-    with pytest.raises(mcz.FormatError, match="did not come"):
-        decoder.push(*pushed[9])
-    assert np.abs(decoder.push(*pushed[16]) - motion.values[16]).max() < 1
-
-
 def test_turns_of_a_frame_that_is_refused_live_are_forgotten() -> None:
     motion = clip_of(np.zeros((1, 2)), ["rx", "tx"])
     layout = Direct("lsdt-frame", motion, domain="channels").layout
@@ -404,17 +288,6 @@ def test_what_needs_all_frames_is_refused_live() -> None:
             FRAME.live(layout, FRAME.options(options))
 
 
-def test_a_missing_marker_is_held_live() -> None:
-    motion = gapped(60)
-    layout = Direct("lsdt-frame", motion, basis="cosines").layout
-    encoder = FRAME.live(layout, FRAME.options({"step": 0.1}))
-    decoder = FRAME.follow(encoder.header, layout)
-    signal = motion.signals[0]
-    for row, valid in zip(signal.values, signal.mask, strict=True):
-        found = decoder.push(*encoder.push(row, valid))
-        assert np.abs(found - row)[valid].max() < 1
-
-
 def test_a_segment_whose_forerunner_is_lost_is_refused() -> None:
     motion = markers(30, 2)
     layout = Direct("lsdt-frame", motion, basis="cosines").layout
@@ -426,45 +299,6 @@ def test_a_segment_whose_forerunner_is_lost_is_refused() -> None:
         FRAME.decode(
             encoder.header, layout, spans, Request(20, 25, (0,)), lambda i, _, __: streams[i]
         )
-
-
-# Bad bytes
-
-
-@pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("span", [Span(0, 20, 1), Span(0, 20, 0, 1)])
-def test_segments_that_bear_upon_others_are_refused(codec, span) -> None:
-    with pytest.raises(mcz.FormatError, match="bears upon"):
-        Direct(codec, markers(20)).read(changes={"spans": [span]})
-
-
-@pytest.mark.parametrize("codec", CODECS)
-@pytest.mark.parametrize("coder", ["mixed", "prefix"])
-def test_every_cut_and_bit_of_a_header_or_stream(codec, coder) -> None:
-    """Values, or one of our errors; what is cut never gives the same values."""
-    coded = Direct(codec, markers(12, 2), step=0.5, coder=coder, basis="cosines")
-    header, stream = coded.header, coded.stream(0, 0, 0)
-    for size in range(len(header)):
-        with pytest.raises(mcz.FormatError):
-            coded.read(changes={"header": header[:size]})
-    meant = coded.read()
-    for size in range(len(stream)):
-        try:
-            found = coded.read(changes=coded.with_stream((0, 0, 0), stream[:size]))
-        except mcz.FormatError:
-            continue
-        assert (found != meant).any()
-    for data, change in (
-        (header, lambda d: {"header": d}),
-        (stream, lambda d: coded.with_stream((0, 0, 0), d)),
-    ):
-        for bit in range(8 * len(data)):
-            damaged = bytearray(data)
-            damaged[bit // 8] ^= 1 << bit % 8
-            try:
-                coded.read(changes=change(bytes(damaged)))
-            except mcz.MczError:
-                continue
 
 
 # Real clips

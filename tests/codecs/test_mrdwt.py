@@ -1,14 +1,12 @@
-"""Codec 2, ``mrdwt``: round trips, parts, resolutions, odd clips, hostile bytes."""
+"""Codec 2, ``mrdwt``: bounds, wavelets, segments, options, headers, the published figures."""
 
 from __future__ import annotations
 
-import io
 import math
-import tracemalloc
 from dataclasses import replace
-from fractions import Fraction
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,130 +17,43 @@ from hypothesis import strategies as st
 import mcz
 from mcz.angles import unwrap
 from mcz.codecs import by_name
-from mcz.codecs.contract import Encoded, Layout, Request, Segment, Span
+from mcz.codecs.contract import Layout, Request, Span
 from mcz.codecs.steps import code_of, ratio_of
-from mcz.codecs.wavelet import mrdwt, streams
+from mcz.codecs.wavelet import streams
 from mcz.codecs.wavelet.shared import WAVELET_HEADER
+from mcz.codecs.weights import weights_of
 from mcz.metrics import compare
-from mcz.motion import POSITION_KINDS, Channel, Joint, Motion, Signal, Skeleton, joint_columns
-from mcz.reading.sizes import clip_sizes
+from mcz.motion import POSITION_KINDS, Motion
 from mcz.schema import build, parse
 from mcz.transforms import wavelets
 from mcz.transforms.dwt import own_range
-from mcz.writing.signal_source import MemorySource
+from tests.codecs import lossy
+from tests.codecs.lossy import amc, bones, bytes_of, clip_of, gapped, wandering
 from tests.formats.c3d_files import INTEL, SGI, made
 from tests.motions import smooth
-from tests.repair import flipped, flips, joined, parts_of, replaced, use
+from tests.repair import memory_below
 
 Array = np.ndarray
 MEMORY = 32 * 2**20
-
-
-# Clips
-
-
-def bones(kinds: list[str], angle_unit: str = "deg") -> Skeleton:
-    """A chain of joints of one channel each."""
-    joints = tuple(
-        Joint(f"j{i}", i - 1, (0.0, 2.0, 0.5) if i else (0.0, 0.0, 0.0), channels=(Channel(kind),))
-        for i, kind in enumerate(kinds)
-    )
-    return Skeleton(joints, unit_cm=2.0, angle_unit=angle_unit)
-
-
-def clip_of(values: Array, kinds: list[str] | None = None, **changes: object) -> Motion:
-    values = np.asarray(values, np.float64)
-    mask = changes.pop("mask", None)
-    skeleton = bones(kinds or ["rx"] * values.shape[1], changes.pop("angle_unit", "deg"))
-    arguments = {"frame_rate": Fraction(60), "name": "clip"} | changes
-    return Motion(skeleton, (Signal(values, mask=mask),), **arguments)
-
-
-def wandering(n_frames: int, kinds: list[str], seed: int = 0) -> Motion:
-    """Random walks smoothed a little, the rotations wrapped to -180 to 180 as files have them."""
-    random = np.random.default_rng(seed)
-    steps = random.normal(0, 4, (n_frames, len(kinds)))
-    values = np.cumsum(steps, axis=0) + random.normal(0, 100, len(kinds))
-    turns = np.array([kind[0] == "r" for kind in kinds])
-    return clip_of(np.where(turns, (values + 180) % 360 - 180, values), kinds)
-
-
-def saved(motion: Motion, **params: object) -> bytes:
-    out = io.BytesIO()
-    mcz.write(motion, out, codec="mrdwt", **params)
-    return out.getvalue()
-
-
-def decoded(motion: Motion, **params: object) -> Array:
-    with mcz.open(saved(motion, **params), max_decoded=2**40) as file:
-        return file.only_clip().read()
-
-
 KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx", "length"]), min_size=1, max_size=4)
 NAMES = st.sampled_from(["haar", "db2", "db3", "db8", "sym4", "bior4.4", "coif1"])
 FRAMES = st.one_of(st.integers(1, 20), st.integers(1, 200))
-SETTINGS = st.fixed_dictionaries(
-    {
-        "wavelet": NAMES,
-        "N": st.integers(0, 5),
-        "preset": st.sampled_from(["default", "khan2016"]),
-        "threshold_rule": st.sampled_from(["sensitivity", "depth", "flat"]),
-        "T_g": st.sampled_from([0.001, 0.2, 3.0, 40.0]),
-        "Q": st.sampled_from([0, 1, 3]),
-    }
-)
 
 
-# A codec without a container
+def saved(motion: Motion, **params: object) -> bytes:
+    return lossy.saved("mrdwt", motion, **params)
 
 
-@cache
-def registered(name: str) -> wavelets.Wavelet:
-    return wavelets.by_name(name)[1]
+def decoded(motion: Motion, **params: object) -> Array:
+    return lossy.decoded("mrdwt", motion, **params)
 
 
-class Direct:
+class Direct(lossy.Direct):
     """A clip coded and decoded by the codec alone."""
 
-    def __init__(self, motion: Motion, **params: object) -> None:
-        codec = by_name("mrdwt")
-        source = MemorySource(motion, 0, codec, 2**26)
-        coded: Encoded = codec.encode(source, codec.options(params))
-        self.header = coded.header
-        self.segments: list[Segment] = list(coded.segments)
-        self.layout: Layout = replace(source.layout, n_resolutions=coded.n_resolutions)
-        self.spans = [Span(s.first, s.n_frames, s.lead, s.tail, s.fresh) for s in self.segments]
+    def __init__(self, motion: Motion, **params: Any) -> None:
+        super().__init__("mrdwt", motion, **params)
         self.fields = parse(WAVELET_HEADER, self.header, "header")
-
-    def stream(self, segment: int, resolution: int, group: int) -> bytes:
-        return self.segments[segment].streams[resolution * len(self.layout.groups) + group]
-
-    def read(
-        self,
-        start: int = 0,
-        stop: int | None = None,
-        groups: tuple[int, ...] | None = None,
-        resolution: int = 0,
-        **changes: object,
-    ) -> Array:
-        request = Request(
-            start,
-            self.layout.n_frames if stop is None else stop,
-            tuple(range(len(self.layout.groups))) if groups is None else groups,
-            resolution,
-        )
-        given = {
-            "header": self.header,
-            "layout": self.layout,
-            "spans": self.spans,
-            "fetch": self.stream,
-        } | changes
-        found = by_name("mrdwt").decode(
-            given["header"], given["layout"], given["spans"], request, given["fetch"]
-        )
-        assert found.shape == (request.stop - request.start, len(request.groups))
-        assert np.isfinite(found).all()
-        return found
 
     def coefficients(self, channel: int) -> list[Array]:
         """All bands of a channel, the coarsest first, put together from the streams."""
@@ -165,6 +76,27 @@ class Direct:
                 inward = np.sign(band) / 16 if place and coding.scaled else 0
                 whole[place].append((band - inward) * size)
         return [np.concatenate(parts) for parts in whole]
+
+
+@cache
+def small() -> Direct:
+    params = {"T_g": 1.0, "N": 2, "wavelet": "db2", "segment_frames": 12}
+    return Direct(wandering(20, ["tx", "rx"]), **params)
+
+
+def outcome(coded: Direct, **changes: object) -> str:
+    try:
+        coded.read(changes=changes)
+        coded.read(3, 9, (1,), changes=changes)
+    except mcz.MczError as error:
+        assert str(error)
+        return type(error).__name__
+    return "decoded"
+
+
+@cache
+def registered(name: str) -> wavelets.Wavelet:
+    return wavelets.by_name(name)[1]
 
 
 # Errors are bounded
@@ -248,50 +180,6 @@ def test_step_codes_ascend_and_128_is_one() -> None:
 # A part is the same as in the whole
 
 
-@given(FRAMES, KINDS, SETTINGS, st.one_of(st.none(), st.integers(1, 90)), st.data())
-def test_part_equals_whole(n_frames, kinds, settings, segment_frames, data) -> None:
-    motion = wandering(n_frames, kinds)
-    extra = {} if segment_frames is None else {"segment_frames": segment_frames}
-    coded = Direct(motion, **settings, **extra)
-    resolution = data.draw(st.integers(0, coded.layout.n_resolutions - 1))
-    whole = coded.read(resolution=resolution)
-    for _ in range(3):
-        start = data.draw(st.integers(0, n_frames))
-        stop = data.draw(st.integers(start, n_frames))
-        groups = tuple(data.draw(st.lists(st.integers(0, len(kinds) - 1), unique=True)))
-        part = coded.read(start, stop, groups, resolution)
-        assert part.tobytes() == np.ascontiguousarray(whole[start:stop][:, groups]).tobytes()
-
-
-@given(FRAMES, KINDS, SETTINGS, st.integers(1, 90))
-def test_segments_do_not_matter(n_frames, kinds, settings, segment_frames) -> None:
-    """Thresholds and steps are those of the clip, and analysis sees beyond a segment."""
-    motion = wandering(n_frames, kinds)
-    one = Direct(motion, **settings, segment_frames=n_frames)
-    many = Direct(motion, **settings, segment_frames=segment_frames)
-    unit = 1 << many.fields.levels
-    length = -(-segment_frames // unit) * unit
-    assert len(one.segments) == 1
-    assert len(many.segments) == (1 if segment_frames >= n_frames else -(-n_frames // length))
-    assert many.read().tobytes() == one.read().tobytes()
-
-
-@given(st.integers(1, 150), SETTINGS, st.integers(1, 40), st.data())
-def test_public_reader_gives_parts_of_the_whole(n_frames, settings, segment_frames, data) -> None:
-    motion = smooth(n_frames)
-    with mcz.open(saved(motion, **settings, segment_frames=segment_frames)) as file:
-        clip = file.only_clip()
-        n_resolutions = clip.signals[0].counts.n_resolutions
-        resolution = data.draw(st.integers(0, n_resolutions - 1))
-        start = data.draw(st.integers(0, n_frames))
-        stop = data.draw(st.integers(start, n_frames))
-        joints = data.draw(st.lists(st.sampled_from(["hips", "spine", "fixed", "knee"])))
-        columns = joint_columns(motion.skeleton, joints)
-        whole = clip.read(resolution=resolution)
-        part = clip.read((start, stop), joints, resolution)
-        np.testing.assert_array_equal(part, whole[start:stop][:, columns])
-
-
 def test_a_long_clip_is_cut_into_segments_by_size() -> None:
     """Noise fills 64 KiB soon: segments get shorter, the values stay those of one segment."""
     random = np.random.default_rng(3)
@@ -302,13 +190,6 @@ def test_a_long_clip_is_cut_into_segments_by_size() -> None:
     assert [s.lead for s in many.segments[:1]] == [0]
     assert all(s.lead == min(s.first, 8 * 15) for s in many.segments)
     assert many.read().tobytes() == one.read().tobytes()
-
-
-def test_memory_limits_of_a_segment_are_kept() -> None:
-    codec = by_name("mrdwt")
-    source = MemorySource(clip_of(np.zeros((500, 3))), 0, codec, 24 * 50)
-    coded = codec.encode(source, codec.options({}))
-    assert {segment.n_frames for segment in coded.segments} <= {*range(1, 65)}
 
 
 # Resolutions
@@ -329,124 +210,26 @@ def test_decoded_values_are_those_of_pywavelets() -> None:
                 np.testing.assert_allclose(found[:, channel], meant, rtol=0, atol=1e-9)
 
 
-@given(FRAMES, KINDS, SETTINGS, st.integers(1, 90), st.data())
-def test_a_resolution_is_that_with_zeros(n_frames, kinds, settings, segment_frames, data) -> None:
-    """The finest k details left out, stored as zeros, and not in the file at all."""
-    coded = Direct(wandering(n_frames, kinds), **settings, segment_frames=segment_frames)
+@given(FRAMES, KINDS, NAMES, st.integers(0, 5), st.integers(1, 90), st.data())
+def test_a_resolution_is_that_with_zeros(n_frames, kinds, wavelet, N, length, data) -> None:
+    """The finest k details left out, and stored as zeros."""
+    motion = wandering(n_frames, kinds)
+    coded = Direct(motion, T_g=0.2, wavelet=wavelet, N=N, segment_frames=length)
     n = coded.layout.n_resolutions
     k = data.draw(st.integers(0, n - 1))
-    found = coded.read(resolution=k)
-    empty = coded.read(fetch=lambda s, r, g: b"" if r >= n - k else coded.stream(s, r, g))
-    np.testing.assert_array_equal(found, empty)
-    shorter = replace(coded.layout, n_resolutions=n - k)
-    assert coded.read(layout=shorter).tobytes() == found.tobytes()
-
-
-def test_a_lower_resolution_fetches_no_finer_streams() -> None:
-    coded = Direct(wandering(200, ["rx", "tx"]), segment_frames=50)
-    asked = []
 
     def fetch(segment: int, resolution: int, group: int) -> bytes:
-        asked.append((resolution, group))
-        return coded.stream(segment, resolution, group)
+        return b"" if resolution >= n - k else coded.stream(segment, resolution, group)
 
-    coded.read(60, 70, (1,), 2, fetch=fetch)
-    assert {resolution for resolution, _ in asked} == {0, 1, 2}
-    assert {group for _, group in asked} == {1}
-
-
-@pytest.mark.parametrize("resolution", [0, 1, 4])
-@pytest.mark.parametrize("frames", [None, (0, 60), (90, 170), (150, 210), (205, None)])
-@pytest.mark.parametrize("joints", [None, ["spine"], ["knee", "hips"]])
-def test_what_is_extracted_has_the_same_values(resolution, frames, joints) -> None:
-    if (resolution, frames, joints) == (0, None, None):
-        return  # nothing to extract
-    data = saved(smooth(210), segment_frames=32)
-    out = io.BytesIO()
-    mcz.extract(data, out, resolution=resolution, frames=frames, joints=joints)
-    start, stop = frames or (0, 210)
-    with mcz.open(data) as whole, mcz.open(out.getvalue()) as part:
-        kept = ["hips", "spine", "fixed", "knee"] if joints is None else sorted(joints)
-        meant = whole.only_clip().read((start, stop or 210), kept, resolution)
-        clip = part.only_clip()
-        assert clip.read().tobytes() == meant.tobytes()
-        assert clip.read((3, 5)).tobytes() == meant[3:5].tobytes()
-        assert clip.signals[0].counts.n_resolutions == 5 - resolution
+    np.testing.assert_array_equal(coded.read(resolution=k), coded.read(changes={"fetch": fetch}))
 
 
 # Clips out of the ordinary
 
 
-@pytest.mark.parametrize("n_frames", [0, 1, 2, 3])
-@pytest.mark.parametrize("settings", [{}, {"preset": "khan2016"}, {"Q": 3, "T_g": 0, "N": 9}])
-def test_few_frames(n_frames: int, settings: dict[str, object]) -> None:
-    motion = wandering(n_frames, ["tx", "rx"])
-    found = decoded(motion, **settings)
-    assert found.shape == (n_frames, 2)
-    if "Q" in settings:
-        np.testing.assert_allclose(found, unwrap(motion.values, motion.skeleton), atol=0.01)
-
-
 def test_many_levels_of_one_frame() -> None:
     found = decoded(clip_of([[5.0]]), preset="khan2016", N=16, Q=6, T_g=0)
     assert found[0, 0] == pytest.approx(5.0, abs=1e-3)
-
-
-@pytest.mark.parametrize("preset", ["default", "khan2016"])
-def test_constant_and_zero_channels(preset: str) -> None:
-    values = np.tile([0.0, 77.5, -123.0], (300, 1))
-    motion = clip_of(values)
-    found = decoded(motion, preset=preset, T_g=0.1)
-    np.testing.assert_allclose(found, values, atol=0.3)
-    assert not found[:, 0].any()
-    coded = Direct(motion, preset=preset)
-    assert all(not stream for segment in coded.segments for stream in segment.streams[3:])
-    assert not coded.segments[0].streams[0]
-
-
-def test_all_zero_clips_have_empty_streams() -> None:
-    coded = Direct(clip_of(np.zeros((5000, 7))))
-    assert not any(map(any, (segment.streams for segment in coded.segments)))
-    assert not coded.read().any()
-
-
-def test_no_channels_at_all() -> None:
-    motion = Motion(Skeleton((Joint("rock"),)), (Signal(np.zeros((40, 0))),), name="still")
-    assert decoded(motion).shape == (40, 0)
-    assert decoded(motion, preset="khan2016").shape == (40, 0)
-
-
-def test_joints_without_channels_read_as_nothing() -> None:
-    with mcz.open(saved(smooth(60))) as file:
-        assert file.only_clip().read(joints=["fixed"]).shape == (60, 0)
-
-
-def gapped(n_frames: int = 100) -> Motion:
-    """Two markers of which the second is away at both ends and twice between."""
-    joints = tuple(
-        Joint(name, channels=tuple(map(Channel, POSITION_KINDS))) for name in ("LASI", "RASI")
-    )
-    values = 100 + np.cumsum(np.random.default_rng(1).normal(0, 2, (n_frames, 6)), axis=0)
-    mask = np.ones(values.shape, bool)
-    for start, stop in ((0, 5), (30, 31), (44, 61), (97, n_frames)):
-        mask[start:stop, 3:] = False
-    values = np.where(mask, values, np.nan)
-    values[50, 4] = 1e300  # what lies beneath a mask is not coded
-    return Motion(Skeleton(joints, unit_cm=0.1), (Signal(values, mask=mask),), name="markers")
-
-
-@pytest.mark.parametrize("settings", [{}, {"preset": "khan2016"}, {"segment_frames": 16}])
-def test_masks_are_kept_and_gaps_are_filled(settings: dict[str, object]) -> None:
-    motion = gapped()
-    mask = motion.signals[0].mask
-    with mcz.open(saved(motion, Q=4, T_g=0.001, **settings)) as file:
-        values, found = file.only_clip().read_masked()
-        np.testing.assert_array_equal(found, mask)
-        assert np.isfinite(values).all()
-        np.testing.assert_allclose(values[mask], motion.signals[0].values[mask], atol=0.05)
-        assert np.abs(values[~mask]).max() < 200
-        shown = file.only_clip().read((40, 70), ["RASI"])
-        np.testing.assert_array_equal(np.isnan(shown), ~mask[40:70, 3:])
 
 
 def test_gaps_are_filled_by_straight_lines() -> None:
@@ -468,39 +251,6 @@ def test_a_marker_that_is_never_there() -> None:
     with mcz.open(saved(motion)) as file:
         assert np.isnan(file.only_clip().read()[:, 3:]).all()
         assert not file.only_clip().read_masked()[0][:, 3:].any()
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_values_that_are_not_finite_are_refused(bad: float) -> None:
-    values = np.zeros((600, 2))
-    values[300, 1] = bad
-    with pytest.raises(mcz.MotionError, match="mrdwt: frames 0:600 hold a value that is not"):
-        saved(clip_of(values))
-    with pytest.raises(mcz.MotionError, match="frames 288:304"):
-        saved(clip_of(values), segment_frames=16)
-
-
-@pytest.mark.parametrize("huge", [1e20, 1e300, 1.7e308, -1.7e308])
-@pytest.mark.parametrize("kind", ["rx", "tx", "sx", "length"])
-@pytest.mark.parametrize("settings", [{}, {"preset": "khan2016"}, {"Q": 15, "T_g": 0}])
-def test_huge_values_are_refused(huge: float, kind: str, settings: dict[str, object]) -> None:
-    values = np.ones((60, 2))
-    values[20, 1], values[21, 1] = huge, -huge
-    with pytest.raises(mcz.MotionError, match="beyond|exceeds"):
-        saved(clip_of(values, [kind, kind]), **settings)
-
-
-def test_huge_offsets_do_no_harm() -> None:
-    """The reach of a skeleton may overflow: its positions then have thresholds of their own."""
-    joints = (
-        Joint("a", channels=(Channel("tx"), Channel("rx"))),
-        Joint("b", 0, (1.5e308, 1.5e308, 0.0), channels=(Channel("rx"),)),
-    )
-    values = wandering(50, ["tx", "rx", "rx"]).values
-    motion = Motion(Skeleton(joints), (Signal(values),), name="far")
-    for rule in ("flat", "depth"):
-        coded = Direct(motion, threshold_rule=rule)
-        np.testing.assert_allclose(coded.read(), unwrap(values, motion.skeleton), atol=3)
 
 
 def test_details_up_to_the_limit_are_coded() -> None:
@@ -543,31 +293,6 @@ def test_bands_of_any_integers(data) -> None:
         np.testing.assert_array_equal(band, meant[:n])
 
 
-def test_500_channels() -> None:
-    motion = wandering(64, ["tx", "ry", "rz", "rx"] * 125)
-    coded = Direct(motion, T_g=0.5)
-    whole = coded.read()
-    assert whole.shape == (64, 500)
-    assert coded.read(10, 20, (499, 0)).tobytes() == whole[10:20][:, [499, 0]].tobytes()
-    with mcz.open(saved(motion, T_g=0.5)) as file:
-        np.testing.assert_array_equal(file.only_clip().read(), whole)
-
-
-@pytest.mark.long
-def test_10000_channels() -> None:
-    """Long and wide: segments stay below the limits, memory below a few of them."""
-    joints = tuple(
-        Joint(f"p{i}", channels=tuple(map(Channel, POSITION_KINDS))) for i in range(3334)
-    )
-    values = np.cumsum(np.random.default_rng(0).normal(0, 1, (300, 10_002)), axis=0)
-    motion = Motion(Skeleton(joints, unit_cm=1.0), (Signal(values),), name="wide")
-    with mcz.open(saved(motion, T_g=0.02), max_decoded=2**40) as file:
-        clip = file.only_clip()
-        assert len(clip.signals[0].rows) > 1
-        part = clip.read((100, 110))
-        np.testing.assert_allclose(part, values[100:110], atol=1)
-
-
 def test_radians_are_coded_like_degrees() -> None:
     motion = wandering(200, ["rx", "ry", "rz"])
     for rule in ("flat", "depth", "sensitivity"):
@@ -582,40 +307,6 @@ def test_radians_are_coded_like_degrees() -> None:
         np.testing.assert_allclose(found, degrees.read(), atol=1.5 * error)
         sizes = [sum(len(t) for s in c.segments for t in s.streams) for c in (degrees, radians)]
         assert sizes[0] == pytest.approx(sizes[1], rel=0.05)
-
-
-@pytest.mark.parametrize("rule", ["flat", "depth", "sensitivity"])
-def test_angles_of_an_unknown_unit_stay_as_they_are(rule: str) -> None:
-    motion = wandering(120, ["tx", "rx", "ry"])
-    motion = clip_of(motion.values, ["tx", "rx", "ry"], angle_unit="")
-    found = decoded(motion, threshold_rule=rule, T_g=0.1)
-    np.testing.assert_allclose(found, motion.values, atol=3)
-
-
-def test_rotations_come_back_unwrapped() -> None:
-    values = (np.arange(300.0)[:, None] * 7 + 180) % 360 - 180
-    found = decoded(clip_of(values), T_g=0.01)
-    np.testing.assert_allclose(found[:, 0], np.arange(300.0) * 7, atol=0.5)
-    quality = mcz.open(saved(clip_of(values), T_g=0.01)).only_clip().quality
-    assert float(quality["mse"]) < 0.01 < float(quality["mse_raw"])
-
-
-def test_plain_scalars_are_coded() -> None:
-    joints = (Joint("face", channels=(Channel("", "smile", "%"), Channel("", "blink"))),)
-    values = wandering(100, ["sx", "sx"]).values
-    motion = Motion(Skeleton(joints), (Signal(values),), name="face")
-    np.testing.assert_allclose(decoded(motion, T_g=0.01), values, atol=0.2)
-
-
-def test_quaternions_and_lengths_are_coded() -> None:
-    kinds = ["qw", "qx", "qy", "qz", "length", "sx"]
-    joints = (
-        Joint("root", channels=tuple(map(Channel, kinds)), tails=((0.0, 1.0, 0.0),)),
-        Joint("end", 0, (0.0, 1.0, 0.0)),
-    )
-    values = 1 + 0.1 * np.sin(np.arange(100)[:, None] / 9 + np.arange(6))
-    motion = Motion(Skeleton(joints), (Signal(values),), name="mixed")
-    np.testing.assert_allclose(decoded(motion, T_g=0.01), values, atol=0.2)
 
 
 @pytest.mark.parametrize("size", [2, 4])
@@ -652,51 +343,7 @@ def test_c3d_keeps_gaps_that_only_nan_marks(tmp_path: Path, processor: int) -> N
     assert compare(original, again).mismatched_points == 0
 
 
-def test_c3d_of_the_sample(samples: Path, tmp_path: Path) -> None:
-    target, back = tmp_path / "walk.mcz", tmp_path / "back.c3d"
-    mcz.encode(samples / "walk.c3d", target, codec="mrdwt")
-    with mcz.open(target) as file:
-        back.write_bytes(file.only_clip().source_bytes())
-        stated = float(file.only_clip().quality["mean_position_error"])
-    comparison = compare(mcz.read(samples / "walk.c3d"), mcz.read(back))
-    assert comparison.mismatched_points == 0
-    assert comparison.mean_position_error == pytest.approx(stated, rel=0.05)
-
-
-def test_what_a_lossy_signal_cannot_be() -> None:
-    motion = clip_of(np.zeros((10, 2)))
-    with pytest.raises(mcz.MotionError, match="one sample a frame"):
-        saved(replace(motion, signals=(Signal(np.zeros((10, 2)), samples_per_frame=2),)))
-    own = Signal(np.zeros((10, 2)), channels=(Channel("", "a"), Channel("", "b")))
-    with pytest.raises(mcz.MotionError, match="channels of its own"):
-        saved(replace(motion, signals=(own,)))
-    with pytest.raises(mcz.MotionError, match="integers"):
-        saved(replace(motion, signals=(Signal(np.zeros((10, 2), np.int64)),)))
-
-
 # Parameters
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        *(("T_g", v) for v in (-1, -1e-9, 2.0**20 + 1, "much", math.nan, math.inf, None)),
-        *(("Q", v) for v in (-1, 16, "two", 1.5, math.nan, None)),
-        *(("N", v) for v in (-1, 17, "all", 2.5, [4])),
-        *(("wavelet", v) for v in ("", "db0", "db38", "morl", 3, None, "bior4,4")),
-        *(("threshold_rule", v) for v in ("", "Depth", "none", 1, None)),
-        *(("preset", v) for v in ("", "khan", "khan2014", None)),
-        *(("segment_frames", v) for v in (0, -5, 2**40 + 1, "all", math.inf)),
-    ],
-)
-def test_bad_parameters_are_refused_by_name(name: str, value: object) -> None:
-    with pytest.raises(mcz.OptionError, match=f"^{name} |'{name}'"):
-        saved(smooth(20), **{name: value})
-
-
-def test_unknown_parameters_are_refused() -> None:
-    with pytest.raises(mcz.OptionError, match="mrdwt has no parameter 'level'; it has preset, T_g"):
-        saved(smooth(20), level=4)
 
 
 @pytest.mark.parametrize("T_g", [0, 0.0, 1e-35])
@@ -711,12 +358,6 @@ def test_thresholds_beyond_the_range_of_integers(decimals: int) -> None:
     assert not decoded(clip_of(np.zeros((50, 2))), T_g=2.0**20, Q=decimals).any()
     with pytest.raises(mcz.MotionError, match="exceeds"):
         saved(smooth(50), T_g=2.0**20, Q=decimals)
-
-
-def test_values_of_text_are_parsed() -> None:
-    given = {"T_g": "0.5", "Q": "2", "N": "3", "segment_frames": "16", "wavelet": "db3"}
-    plain = {"T_g": 0.5, "Q": 2, "N": 3, "segment_frames": 16, "wavelet": "db3"}
-    assert saved(smooth(60), **given) == saved(smooth(60), **plain)
 
 
 def test_presets() -> None:
@@ -747,116 +388,21 @@ def test_default_levels_fit_the_clip() -> None:
 
 def test_thresholds_by_depth() -> None:
     """Eq. 2 of Khan 2016: sqrt(log2(d + 2)), d the share of the greatest depth."""
-    from mcz.codecs.weights import weights_of
-
     found = weights_of(bones(["rx"] * 5), np.zeros((1, 5)), "depth", unit_aware=False)
     np.testing.assert_allclose(found, [math.sqrt(math.log2(d / 4 + 2)) for d in range(5)])
-
-
-def test_quality_record_says_how() -> None:
-    with mcz.open(saved(smooth(60), T_g=0.5, wavelet="db2")) as file:
-        quality = file.only_clip().quality
-        found = compare(smooth(60), file.only_clip().motion())
-    assert quality["codec"] == "mrdwt"
-    assert (quality["param.T_g"], quality["param.wavelet"]) == ("0.5", "db2")
-    assert float(quality["mean_position_error"]) == pytest.approx(found.mean_position_error)
-    assert "target_reached" not in quality
 
 
 # Hostile bytes
 
 
-SMALL: dict[str, dict[str, object]] = {
-    "default": {"T_g": 1.0, "N": 2, "wavelet": "db2", "segment_frames": 12},
-    "decimals": {"T_g": 1.0, "Q": 1, "N": 2, "wavelet": "db2", "segment_frames": 12},
-    "inline": {"T_g": 1.0, "N": 1, "wavelet": "coif1"},
-}
-
-
-@cache
-def small(which: str) -> Direct:
-    return Direct(wandering(20, ["tx", "rx"]), **SMALL[which])
-
-
-def outcome(coded: Direct, **changes: object) -> str:
-    try:
-        coded.read(**changes)
-        coded.read(3, 9, (1,), **changes)
-    except mcz.MczError as error:
-        assert str(error)
-        return type(error).__name__
-    return "decoded"
-
-
-@pytest.fixture
-def bounded() -> object:
-    """Fails a test whose Python objects and arrays take more than ``MEMORY`` at a time."""
-    small("default").read()  # what is loaded once does not count
-    tracemalloc.start()
-    yield
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < MEMORY
-
-
-def streams_of(coded: Direct) -> list[tuple[int, int, int]]:
-    """(segment, resolution, group) of every stream."""
-    n_groups, n = len(coded.layout.groups), coded.layout.n_resolutions
-    return [
-        (s, r, g) for s in range(len(coded.segments)) for r in range(n) for g in range(n_groups)
-    ]
-
-
-def exchanged(coded: Direct, where: tuple[int, int, int], data: bytes) -> dict[str, object]:
-    return {"fetch": lambda s, r, g: data if (s, r, g) == where else coded.stream(s, r, g)}
-
-
-@pytest.mark.parametrize("which", SMALL)
-def test_every_prefix_of_a_stream(which: str) -> None:
-    """What is cut may spell another band, of just that many bytes; what is added never does."""
-    coded = small(which)
-    for where in streams_of(coded):
-        data = coded.stream(*where)
-        for size in range(1, len(data)):
-            outcome(coded, **exchanged(coded, where, data[:size]))
-        outcome(coded, **exchanged(coded, where, b""))
-        for more in (b"\0", b"\xff", bytes(99)) if data else ():
-            assert outcome(coded, **exchanged(coded, where, data + more)) == "FormatError"
-
-
-@pytest.mark.parametrize("which", SMALL)
-def test_every_bit_of_a_stream(which: str) -> None:
-    coded = small(which)
-    for where in streams_of(coded):
-        data = coded.stream(*where)
-        for byte, bit in flips(len(data), 10**9, seed=0):
-            outcome(coded, **exchanged(coded, where, flipped(data, byte, bit)))
-
-
-@pytest.mark.parametrize("which", SMALL)
-def test_every_prefix_and_bit_of_a_header(which: str, bounded: None) -> None:
-    coded = small(which)
-    for size in range(len(coded.header)):
-        assert outcome(coded, header=coded.header[:size]) in ("FormatError", "TruncatedError")
-    assert outcome(coded, header=coded.header + b"\0") == "FormatError"
-    for byte, bit in flips(len(coded.header), 10**9, seed=0):
-        outcome(coded, header=flipped(coded.header, byte, bit))
-
-
-@given(st.data())
-def test_streams_of_any_bytes(data) -> None:
-    coded = small(data.draw(st.sampled_from(sorted(SMALL))))
-    where = data.draw(st.sampled_from(streams_of(coded)))
-    outcome(coded, **exchanged(coded, where, data.draw(st.binary(max_size=40))))
-
-
-def test_random_streams_of_many_coefficients(bounded: None) -> None:
+def test_random_streams_of_many_coefficients() -> None:
     """The greatest integers that bits can spell, summed by every predictor."""
     coded = Direct(clip_of(np.cumsum(np.ones((4000, 1)), axis=0)), T_g=1.0, segment_frames=4000)
     random = np.random.default_rng(5)
-    for form in range(256):
-        data = bytes([form, 128, 2]) + random.integers(0, 256, 200, "u1").tobytes()
-        outcome(coded, **exchanged(coded, (0, 0, 0), data))
+    with memory_below(MEMORY):
+        for form in range(256):
+            data = bytes([form, 128, 2]) + random.integers(0, 256, 200, "u1").tobytes()
+            outcome(coded, **coded.with_stream((0, 0, 0), data))
 
 
 def with_header(coded: Direct, **changes: object) -> bytes:
@@ -877,9 +423,10 @@ def with_header(coded: Direct, **changes: object) -> bytes:
         ({"unit": 2.0**-100}, ("decoded",)),
     ],
 )
-def test_crafted_headers(changes, expected, bounded: None) -> None:
-    coded = small("default")
-    assert outcome(coded, header=with_header(coded, **changes)) in expected
+def test_crafted_headers(changes, expected) -> None:
+    coded = small()
+    with memory_below(MEMORY):
+        assert outcome(coded, header=with_header(coded, **changes)) in expected
 
 
 def raw_header(**changes: object) -> bytes:
@@ -893,13 +440,6 @@ def raw_header(**changes: object) -> bytes:
     start = bytes([changes.get("wavelet", 0 if taps else 2)]) + packed
     tail = bytes([changes.get("levels", 2), 20, changes.get("decimals", 255 if unit else 1)])
     return start + tail + unit + bytes(changes.get("least", b"\x01"))
-
-
-def test_raw_headers_are_as_the_schema_has_them() -> None:
-    coded = small("default")
-    assert outcome(coded, header=raw_header(unit=1.25)) == "decoded"
-    good = (0.5, 0.5, 0.5, 0.5)
-    assert outcome(coded, header=raw_header(unit=1.25, taps=good)) == "decoded"
 
 
 @pytest.mark.parametrize(
@@ -922,10 +462,10 @@ def test_raw_headers_are_as_the_schema_has_them() -> None:
     ],
 )
 def test_bad_headers_are_refused(changes: dict[str, object]) -> None:
-    assert outcome(small("default"), header=raw_header(**changes)) == "FormatError"
+    assert outcome(small(), header=raw_header(**changes)) == "FormatError"
 
 
-def test_the_greatest_that_a_header_allows_is_finite(bounded: None) -> None:
+def test_the_greatest_that_a_header_allows_is_finite() -> None:
     """64 taps of 16, 16 levels, the greatest unit, step and coefficient."""
     levels, taps = 16, 64
     fields = {
@@ -942,29 +482,32 @@ def test_the_greatest_that_a_header_allows_is_finite(bounded: None) -> None:
     layout = Layout(1000, ((0,),), n_resolutions=1)
     stream = bytes([streams.CONSTANT, 255]) + b"\x80\x80\x80\x80\x80\x40"  # 2^40, zigzag
     request = Request(0, 1000, (0,))
-    found = by_name("mrdwt").decode(
-        header, layout, [Span(0, 1000)], request, lambda s, r, g: stream
-    )
+    with memory_below(MEMORY):
+        found = by_name("mrdwt").decode(
+            header, layout, [Span(0, 1000)], request, lambda s, r, g: stream
+        )
     assert np.isfinite(found).all() and found.max() > 1e30
 
 
-def test_frames_that_no_segment_holds_are_not_allocated(bounded: None) -> None:
-    coded = small("default")
+def test_frames_that_no_segment_holds_are_not_allocated() -> None:
+    coded = small()
     far = {
         "header": with_header(coded, coded_frames=2**50),
         "layout": replace(coded.layout, n_frames=2**50),
         "spans": [Span(0, 12), Span(12, 2**50 - 32, 6), Span(2**50 - 20, 20, 6)],
         "fetch": lambda *_: b"",
     }
-    assert not coded.read(2**50 - 20, 2**50, **far).any()
-    assert not coded.read(0, 12, **far).any()
+    with memory_below(MEMORY):
+        assert not coded.read(2**50 - 20, 2**50, changes=far).any()
+        assert not coded.read(0, 12, changes=far).any()
 
 
 def test_a_cut_file_refuses_what_it_no_longer_holds() -> None:
-    coded = small("default")
+    coded = small()
+    cut = {"spans": coded.spans[:1]}
     with pytest.raises(mcz.FormatError, match="need approximations up to"):
-        coded.read(0, 12, spans=coded.spans[:1])
-    assert coded.read(0, 4, spans=coded.spans[:1]).tobytes() == coded.read(0, 4).tobytes()
+        coded.read(0, 12, changes=cut)
+    assert coded.read(0, 4, changes=cut).tobytes() == coded.read(0, 4).tobytes()
 
 
 @pytest.mark.parametrize(
@@ -981,44 +524,7 @@ def test_a_cut_file_refuses_what_it_no_longer_holds() -> None:
 )
 def test_segments_that_do_not_fit(spans: list[Span], words: str) -> None:
     with pytest.raises(mcz.FormatError, match=words):
-        small("default").read(spans=spans)
-
-
-def test_layouts_that_do_not_fit() -> None:
-    coded = small("default")
-    for changes in (
-        {"samples_per_frame": 2},
-        {"n_resolutions": 4},
-        {"groups": ((0, 1),)},
-    ):
-        assert outcome(coded, layout=replace(coded.layout, **changes)) == "FormatError"
-
-
-@pytest.mark.parametrize("which", ["default", "decimals"])
-def test_files_with_repaired_checksums(which: str) -> None:
-    """The public reader, extract and salvage, behind every checksum."""
-    data = saved(wandering(20, ["tx", "rx"]), **SMALL[which])
-    use(data)
-    parts = parts_of(data)
-    for number, (chunk, payload) in enumerate(parts):
-        at_most = 100 if chunk.type in (b"DATA", b"CLIP") else 10
-        for byte, bit in flips(len(payload), at_most, seed=number):
-            file_outcome(joined(replaced(parts, number, flipped(payload, byte, bit))))
-        for size in range(0, len(payload), max(1, len(payload) // 10)):
-            file_outcome(joined(replaced(parts, number, payload[:size])))
-
-
-def file_outcome(data: bytes) -> None:
-    try:
-        use(data)
-        for resolution in (0, 1):
-            mcz.extract(data, io.BytesIO(), frames=(4, 9), resolution=resolution)
-    except mcz.MczError as error:
-        assert str(error)
-    try:
-        use(data, salvage=True)
-    except mcz.MczError as error:
-        assert str(error)
+        small().read(changes={"spans": spans})
 
 
 # The published figures
@@ -1035,21 +541,6 @@ PUBLISHED = {  # T_g: rms_coordinate_error of the published implementation, CR o
     50: (0.2567, 76.9),
 }
 SIZE_OF_17_10 = 2_214_137
-
-
-def amc(data: Path, name: str) -> Motion:
-    from mcz.reading.read import read
-
-    subject = name.split("_", maxsplit=1)[0]
-    asf = data / "cmu" / "asf" / f"{subject}.asf"
-    return read(data / "cmu" / "amc" / f"{name}.amc", skeleton=asf if asf.exists() else None)
-
-
-def bytes_of(data: bytes) -> int:
-    """Payload and overhead."""
-    with mcz.open(data) as file:
-        sizes = clip_sizes(file.container, file.only_clip())
-    return sizes.payload + sizes.overhead
 
 
 @pytest.mark.real
@@ -1089,21 +580,3 @@ def test_defaults_need_fewer_bytes_than_the_preset(data: Path) -> None:
         assert float(file.only_clip().quality["mean_position_error_cm"]) <= limit
     print(f"preset {bytes_of(published)} bytes, defaults {bytes_of(own)} at {limit:.3f} cm")
     assert bytes_of(own) < 0.75 * bytes_of(published)
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("name", ["05_01", "10_03"])
-def test_parts_of_a_real_clip(data: Path, name: str) -> None:
-    stored = saved(amc(data, name))
-    with mcz.open(stored) as file:
-        clip = file.only_clip()
-        for resolution in (0, 2):
-            whole = clip.read(resolution=resolution)
-            part = clip.read((100, 140), ["root", "head"], resolution)
-            columns = joint_columns(clip.skeleton, ["root", "head"])
-            np.testing.assert_array_equal(part, whole[100:140][:, columns])
-
-
-def test_the_table_of_codecs_has_it() -> None:
-    assert by_name("mrdwt") is mrdwt.CODEC
-    assert not mrdwt.CODEC.lossless and mrdwt.CODEC.domain == "values"

@@ -20,7 +20,7 @@ from mcz.codecs.online.choices import gaussian, laplacian, rates
 from mcz.codecs.online.units import INTRA, LTR, STR, Unit, build_units, parse_units
 from mcz.errors import LostFrameError
 from mcz.writing.signal_source import MemorySource
-from tests.codecs.lossy import Direct, amc, bytes_of, decoded, gapped, markers, saved
+from tests.codecs.lossy import Direct, amc, gapped, markers
 
 ONLINE = by_name("online")
 PRESETS = ("default", "mod", "rc", "rca")
@@ -69,34 +69,12 @@ def test_errors_do_not_add_up(n_frames, n_markers, preset, coder, order, gof, pe
     ]
 
 
-@pytest.mark.parametrize("preset", PRESETS)
-@pytest.mark.parametrize(("n_frames", "n_markers"), [(0, 3), (1, 1), (2, 1), (5, 0)])
-def test_small_clips(preset, n_frames, n_markers) -> None:
-    motion = markers(n_frames, n_markers) if n_markers else markers(n_frames, 1)
-    if not n_markers:
-        signal = replace(motion.signals[0], values=np.zeros((n_frames, 0)), grids=())
-        bare = replace(motion.skeleton, joints=(replace(motion.skeleton.joints[0], channels=()),))
-        motion = replace(motion, skeleton=bare, signals=(signal,))
-    found = Direct("online", motion, **params_of(preset)).read()
-    assert found.shape == motion.values.shape
-
-
 def test_gaps_stay_and_what_lies_beneath_is_not_coded() -> None:
     motion = gapped()
     coded = Direct("online", motion, step=0.5)
     mask = motion.signals[0].mask
     assert np.abs(coded.read() - motion.values)[mask].max() < 2
     assert sum(len(unit.data) for unit in units_of(coded)) < 2000
-
-
-@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan, 1e300])
-def test_values_without_a_code_are_refused(bad) -> None:
-    motion = markers(10, 2)
-    values = motion.values.copy()
-    values[7, 3] = bad
-    motion = replace(motion, signals=(replace(motion.signals[0], values=values),))
-    with pytest.raises(mcz.MotionError):
-        Direct("online", motion, step=0.5)
 
 
 @pytest.mark.parametrize(
@@ -125,17 +103,6 @@ def test_a_rate_needs_a_frame_rate() -> None:
 
 
 # Parts
-
-
-@settings(max_examples=settings.default.max_examples // 2)  # two codings of 60 frames each
-@given(st.integers(1, 25), st.integers(0, 3), st.sampled_from([1, 30, 1200]), st.data())
-def test_a_part_is_what_it_is_in_the_whole(gof, period, segment_frames, data) -> None:
-    motion = markers(60, 2)
-    params = {"gof": gof, "intra_period": period, "segment_frames": segment_frames}
-    coded = Direct("online", motion, step=0.5, **params)
-    start = data.draw(st.integers(0, 59))
-    stop = data.draw(st.integers(start + 1, 60))
-    np.testing.assert_array_equal(coded.read(start, stop), coded.read()[start:stop])
 
 
 def test_decoding_begins_at_an_intra_coded_unit() -> None:
@@ -286,14 +253,6 @@ def test_an_intra_coded_ltr_is_never_empty(preset, rate, gof, period) -> None:
     assert error.max() < 700
 
 
-def test_the_dial_finds_a_size_and_an_error() -> None:
-    motion = markers(240, 8, unit_cm=1.0)
-    found = [saved("online", motion, target_bytes=size) for size in (3000, 6000)]
-    assert bytes_of(found[0]) <= 3000 < bytes_of(found[1]) <= 6000
-    near = decoded("online", motion, mean_error_cm=0.5) - motion.values
-    assert 0.3 < np.linalg.norm(near.reshape(240, -1, 3), axis=2).mean() <= 0.5
-
-
 # Live
 
 
@@ -368,21 +327,6 @@ def test_what_is_decoded_after_a_loss_is_right(lost, gof, period) -> None:
         ltr = able if first else ltr
 
 
-def test_bad_bytes_count_as_a_lost_frame() -> None:
-    motion = markers(40, 2)
-    encoder, decoder = live_pair(motion, step=0.5, gof=10, intra_period=2)
-    pushed = [encoder.push(row) for row in motion.values]
-    for at, packet in enumerate(pushed):
-        if at in (0, 10):
-            with pytest.raises(mcz.FormatError):
-                decoder.push(packet[0] + b"\x01", packet[1])
-        elif at < 20:
-            with pytest.raises(LostFrameError):
-                decoder.push(*packet)
-        else:
-            assert np.abs(decoder.push(*packet) - motion.values[at]).max() < 1
-
-
 def test_a_predicted_ltr_is_not_decoded_from_the_wrong_one() -> None:
     """All of a group is lost, its LTR with it: the distance tells."""
     motion = markers(60, 2)
@@ -425,27 +369,6 @@ def test_what_cannot_change_is_refused(options) -> None:
         encoder.change(parsed(options))
 
 
-def test_a_frame_that_is_refused_live_leaves_no_trace() -> None:
-    motion = markers(30, 2)
-    encoder, _ = live_pair(motion, bitrate=20.0, gof=7)
-    other, _ = live_pair(motion, bitrate=20.0, gof=7)
-    for at, row in enumerate(motion.values):
-        if at % 3 == 0:
-            for bad in (np.nan, 1e300):
-                with pytest.raises(mcz.MotionError):
-                    encoder.push(np.where(np.arange(6) == 2, bad, row))
-        assert encoder.push(row) == other.push(row)
-
-
-def test_a_missing_marker_is_held_live() -> None:
-    motion = gapped(60)
-    encoder, decoder = live_pair(motion, step=0.1)
-    signal = motion.signals[0]
-    for row, valid in zip(signal.values, signal.mask, strict=True):
-        found = decoder.push(*encoder.push(row, valid))
-        assert np.abs(found - row)[valid].max() < 1
-
-
 def test_what_needs_all_frames_is_refused_live() -> None:
     layout = Layout(0, ((0, 1, 2),), skeleton=markers(1, 1).skeleton)
     for options, words in (
@@ -475,42 +398,6 @@ def test_units_survive(rows, distance) -> None:
     assert parse_units("online", stream, n_frames) == units
     with pytest.raises(mcz.FormatError):
         parse_units("online", stream, n_frames + 1)
-
-
-@pytest.mark.parametrize("span", [Span(0, 20, 1), Span(0, 20, 0, 1)])
-def test_segments_that_bear_upon_others_are_refused(span) -> None:
-    with pytest.raises(mcz.FormatError, match="bears upon"):
-        Direct("online", markers(20), step=0.5).read(changes={"spans": [span]})
-
-
-@pytest.mark.parametrize("coder", ["mixed", "golomb"])
-@pytest.mark.parametrize("order", ["apart", "reordered"])
-def test_every_cut_and_bit_of_a_header_or_stream(coder, order) -> None:
-    """Values, or one of our errors; what is cut never gives the same values."""
-    params = {"coder": coder, "order": order, "gof": 5, "intra_period": 2, "basis": "cosines"}
-    coded = Direct("online", markers(12, 2), step=0.5, **params)
-    header, stream = coded.header, coded.stream(0, 0, 0)
-    for size in range(len(header)):
-        with pytest.raises(mcz.FormatError):
-            coded.read(changes={"header": header[:size]})
-    meant = coded.read()
-    for size in range(len(stream)):
-        try:
-            found = coded.read(changes=coded.with_stream((0, 0, 0), stream[:size]))
-        except mcz.FormatError:
-            continue
-        assert (found != meant).any()
-    for data, change in (
-        (header, lambda d: {"header": d}),
-        (stream, lambda d: coded.with_stream((0, 0, 0), d)),
-    ):
-        for bit in range(8 * len(data)):
-            damaged = bytearray(data)
-            damaged[bit // 8] ^= 1 << bit % 8
-            try:
-                coded.read(changes=change(bytes(damaged)))
-            except mcz.MczError:
-                continue
 
 
 # Real clips

@@ -178,21 +178,6 @@ def test_the_greatest_values_are_finite() -> None:
     assert np.isfinite(found).all() and found[0, 0] > 1e30
 
 
-@pytest.mark.parametrize(
-    "span", [Span(0, 20, 1), Span(0, 20, 0, 1), Span(0, 20, 0, 0, fresh=False)]
-)
-def test_segments_that_bear_upon_others_are_refused(span: Span) -> None:
-    coded = Direct("pca", smooth(20))
-    with pytest.raises(mcz.FormatError, match="bears upon"):
-        coded.read(changes={"spans": [span]})
-
-
-@pytest.mark.parametrize("header", [b"", b"\x10", b"\xfe", b"\x02\x00"])
-def test_bad_headers(header: bytes) -> None:
-    with pytest.raises(mcz.FormatError):
-        Direct("pca", smooth(20)).read(changes={"header": header})
-
-
 def test_a_segment_is_read_up_to_what_is_wanted() -> None:
     """Frames behind it may be damaged."""
     coded = Direct("pca", smooth(400), Q=5, q=9)

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,9 +24,7 @@ from tests.codecs.lossy import (
     bytes_of,
     clip_of,
     decoded,
-    gapped,
     markers,
-    rough,
     saved,
     wandering,
 )
@@ -90,42 +84,8 @@ def test_resolutions(levels: int) -> None:
     assert all(a <= 1.05 * b for a, b in zip(errors, errors[1:], strict=False))
 
 
-@given(data=st.data())
-def test_parts_are_those_of_the_whole(data: st.DataObject) -> None:
-    coded = _segmented()
-    start = data.draw(st.integers(0, 150))
-    stop = data.draw(st.integers(start, 150))
-    k = data.draw(st.integers(0, 3))
-    whole = coded.read(resolution=k)
-    np.testing.assert_array_equal(coded.read(start, stop, resolution=k), whole[start:stop])
-
-
 def _segmented() -> Direct:
     return Direct(NAME, wandering(150, KINDS, 3), step=0.1, levels=3, segment_frames=40)
-
-
-def test_segments_decode_by_themselves() -> None:
-    coded = _segmented()
-    assert [span.first for span in coded.spans] == [0, 40, 80, 120]
-
-    def fetch(segment: int, resolution: int, group: int) -> bytes:
-        assert segment == 2
-        return coded.stream(segment, resolution, group)
-
-    found = coded.read(80, 120, changes={"fetch": fetch})
-    np.testing.assert_array_equal(found, coded.read()[80:120])
-
-
-def test_details_that_are_not_stored_are_left_out() -> None:
-    coded = _segmented()
-    fewer = replace(coded.layout, n_resolutions=2)
-    np.testing.assert_array_equal(coded.read(changes={"layout": fewer}), coded.read(resolution=2))
-
-
-@pytest.mark.parametrize("n_frames", [1, 2, 3, 4, 5, 10])
-def test_short_clips(n_frames: int) -> None:
-    motion = wandering(n_frames, KINDS, n_frames)
-    assert mean_error_cm(motion, decoded(NAME, motion, step=0.05)) < 0.2
 
 
 def test_channels_that_stand_still_cost_nothing() -> None:
@@ -136,14 +96,6 @@ def test_channels_that_stand_still_cost_nothing() -> None:
     signals = [(Signal(v),) for v in (still, one)]
     sizes = [Direct(NAME, replace(motion, signals=s), step=0.05).n_bytes for s in signals]
     assert sizes[0] < 60 and sizes[1] < 1500
-
-
-def test_gaps_and_rough_values() -> None:
-    for motion in (gapped(), rough(300, 5)):
-        found = decoded(NAME, motion, step=0.1)
-        mask = motion.signals[0].mask
-        assert mask is not None
-        assert np.isnan(found[~mask]).all() and np.isfinite(found[mask]).all()
 
 
 def test_markers_are_points_of_their_own() -> None:
@@ -163,22 +115,6 @@ def test_angle_units(angle_unit: str) -> None:
     assert np.abs(missed).max() < {"deg": 1.0, "rad": 0.5, "": 6.0}[angle_unit]
 
 
-def test_many_channels() -> None:
-    kinds = ["rx"] * 400
-    steps = np.random.default_rng(0).normal(0, 0.3, (40, 400))
-    motion = clip_of(np.cumsum(steps, axis=0), kinds)
-    with mcz.open(saved(NAME, motion, step=1.0), max_decoded=2**30) as file:
-        assert np.isfinite(file.only_clip().read()).all()
-
-
-@pytest.mark.parametrize("value", [1e30, np.inf, np.nan])
-def test_values_that_cannot_be_coded(value: float) -> None:
-    values = np.array(wandering(20, KINDS, 1).values)
-    values[7, 3] = value
-    with pytest.raises(mcz.MotionError, match="posewave"):
-        saved(NAME, clip_of(values, KINDS), step=0.1)
-
-
 def changed(coded: Direct, **fields: Any) -> dict[str, Any]:
     header = parse(POSEWAVE_HEADER, coded.header, "header")
     return {"header": build(POSEWAVE_HEADER, {**header, **fields}, "header")}
@@ -191,22 +127,6 @@ def test_headers_that_do_not_fit(fields: dict[str, Any]) -> None:
     coded = _segmented()
     with pytest.raises(mcz.FormatError, match=f"{next(iter(fields))}"):
         coded.read(changes=changed(coded, **fields))
-
-
-@given(data=st.data())
-def test_any_change_of_a_stream_decodes_or_is_refused(data: st.DataObject) -> None:
-    coded = _segmented()
-    place = data.draw(st.sampled_from(coded.places()))
-    stream = bytearray(coded.stream(*place))
-    what = data.draw(st.sampled_from(["cut", "flip", "more"]))
-    if what == "cut" or not stream:
-        stream = stream[: data.draw(st.integers(0, max(0, len(stream) - 1)))]
-    elif what == "flip":
-        stream[data.draw(st.integers(0, len(stream) - 1))] ^= 1 << data.draw(st.integers(0, 7))
-    else:
-        stream += data.draw(st.binary(min_size=1, max_size=9))
-    with suppress(mcz.MczError):
-        coded.read(changes=coded.with_stream(place, bytes(stream)))
 
 
 def test_a_bound_is_met_by_refining_frames() -> None:
@@ -276,24 +196,7 @@ def test_a_skeleton_of_no_extent() -> None:
     assert np.isfinite(decoded(NAME, motion, step=0.1)).all()
 
 
-def test_interpreted_loops_give_the_same_bits(tmp_path: Path) -> None:
-    path = tmp_path / "clip.mcz"
-    path.write_bytes(saved(NAME, smooth(24), step=0.2, levels=2))
-    program = (
-        "import sys, mcz\n"
-        "with mcz.open(sys.argv[1]) as file: print(file.only_clip().read().tobytes().hex())"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(path)],
-        env={**os.environ, "MCZ_LOOPS": "interpreted"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    with mcz.open(path) as file:
-        assert done.stdout.strip() == file.only_clip().read().tobytes().hex()
-
-
+@pytest.mark.real
 @pytest.mark.parametrize("name", ["16_02", "49_01"])
 def test_half_of_mrdwt_at_equal_error(data: Path, name: str) -> None:
     motion = amc(data, name)

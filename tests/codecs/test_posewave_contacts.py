@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -21,11 +18,8 @@ from mcz.codecs.posewave.contact_choice import choose_contacts, parse_runs, runs
 from mcz.codecs.posewave.contact_keeper import Keeper, Outcome, Piece
 from mcz.codecs.posewave.contact_kernels import LEANING, STANDING, aim, correct, lanes_of, place
 from mcz.codecs.posewave.contact_plan import MOST_STEPS, Contacts, Held, make_held, parse_contacts
-from mcz.codecs.posewave.contacts import decode_contacts
 from mcz.codecs.posewave.displacement_kernels import Track
-from mcz.codecs.posewave.rows import Stream
 from mcz.codecs.posewave.skeleton_plan import Plan, make_plan
-from mcz.coding.mixing import SQUASH
 from mcz.errors import ContactWarning, FormatError, MotionError, OptionError
 from mcz.kinematics.points import first_points, positions_of
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
@@ -371,45 +365,6 @@ def test_hostile_bytes(seed: int) -> None:
     for extra in (b"\0", b"\1"):
         with pytest.raises(FormatError, match="contacts do not take"):
             coded.read(changes=coded.with_stream(finest, stream + extra))
-
-
-def bits_of_contacts() -> str:
-    """What a stream of contacts alone has, and what comes of it."""
-    motion = walking(60)
-    skeleton, source = motion.skeleton, np.asarray(motion.values)
-    n = skeleton.n_channels
-    plan = make_plan(skeleton, np.ones(n, np.bool_), np.full(n, 1e-4), radius=1.0)
-    runs = ("LeftFoot", 3, 20), ("LeftToe", 10, 20), ("RightFoot", 20, 40)
-    wanted = choose_contacts(skeleton, runs, 0.01, None)
-    assert wanted is not None
-    points = [Named(**point) for point in wanted.fields["points"]]
-    contacts = parse_contacts([Named(rounds=4, ramp=5, points=points)], skeleton, "test")
-    assert contacts is not None
-    held = make_held(contacts, plan, np.arange(n), np.full(n, 4.0))
-    rough = np.round(source, 0)
-    values = rough.copy()
-    stream = Stream(np.zeros(SQUASH, np.int64), 20000, None)
-    keeper = Keeper(0.01, wanted.pieces)
-    keeper.encode(contacts, plan, held, stream, source, values)
-    assert max(outcome.errors.max() for outcome in keeper.outcomes) <= 0.01
-    data = stream.finish()
-    again = Stream(np.zeros(SQUASH, np.int64), 0, data)
-    decode_contacts(contacts, plan, held, again, rough, "test")
-    assert np.array_equal(rough, values)
-    return f"{data.hex()} {values.tobytes().hex()}"
-
-
-def test_interpreted_loops_give_the_same_bits() -> None:
-    program = "from tests.codecs.test_posewave_contacts import bits_of_contacts as b; print(b())"
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=Path(__file__).parents[2],
-        env={**os.environ, "MCZ_LOOPS": "interpreted"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == bits_of_contacts()
 
 
 def test_a_file(tmp_path: Path) -> None:

@@ -93,6 +93,7 @@ def test_exact_joints_come_back_at_every_resolution(words: str) -> None:
         assert not others.size or not same_bits(others, np.delete(motion.values, columns, 1))
 
 
+@pytest.mark.real
 def test_exact_joints_of_a_file_print_as_they_did(data: Path) -> None:
     motion = amc(data, "16_02")
     coded = saved(NAME, motion, step=0.05, lossless="lfoot,hands")
@@ -238,6 +239,7 @@ def test_a_live_encoder_has_none() -> None:
         codec.live(layout, codec.options({"lossless": "spine", "levels": 0}))
 
 
+@pytest.mark.real
 def test_commands_name_exact_joints(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -14,17 +14,16 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import by_name
-from mcz.codecs.contract import Layout, Request, Span
+from mcz.codecs.contract import Layout
 from mcz.codecs.posewave.chain import Chain
 from mcz.codecs.posewave.choices import PRESETS, live_choice
 from mcz.codecs.posewave.header import parse_header
-from mcz.errors import FormatError, LostFrameError, MotionError, OptionError
+from mcz.errors import LostFrameError, OptionError
 from mcz.motion import Motion
 from mcz.writing.signal_source import MemorySource
-from tests.codecs.lossy import Array, clip_of, gapped, wandering
+from tests.codecs.lossy import Array, clip_of
 
 CODEC = by_name("posewave")
-Pushed = list[tuple[bytes, bool]]
 
 
 def turning(n_frames: int) -> Motion:
@@ -42,37 +41,6 @@ def pair(motion: Motion, **params: Any) -> tuple[Any, Any]:
     layout = replace(layout_of(motion), n_frames=0)
     encoder = CODEC.live(layout, CODEC.options(params))
     return encoder, CODEC.follow(encoder.header, layout)
-
-
-def read(header: bytes, motion: Motion, pushed: Pushed, start: int, stop: int) -> Array:
-    spans = [Span(at, 1, fresh=fresh) for at, (_, fresh) in enumerate(pushed)]
-    request = Request(start, stop, (0,))
-    return CODEC.decode(header, layout_of(motion), spans, request, lambda at, _, __: pushed[at][0])
-
-
-@given(
-    n_frames=st.integers(1, 12),
-    kinds=st.lists(st.sampled_from(["tx", "ry", "rz", "sx", "qw"]), min_size=1, max_size=7),
-    step=st.floats(1e-3, 10),
-    every=st.integers(1, 6),
-    seed=st.integers(0, 2**32 - 1),
-    data=st.data(),
-)
-@settings(max_examples=40)
-def test_a_file_of_the_segments_has_what_came_live(
-    n_frames: int, kinds: list[str], step: float, every: int, seed: int, data: Any
-) -> None:
-    motion = wandering(n_frames, kinds, seed)
-    encoder, decoder = pair(motion, step=step, segment_frames=every)
-    pushed = [encoder.push(row) for row in motion.values]
-    live = np.array([decoder.push(*packet) for packet in pushed])
-    start = data.draw(st.integers(0, n_frames))
-    stop = data.draw(st.integers(start, n_frames))
-    np.testing.assert_array_equal(read(encoder.header, motion, pushed, 0, n_frames), live)
-    np.testing.assert_array_equal(
-        read(encoder.header, motion, pushed, start, stop), live[start:stop]
-    )
-    assert [fresh for _, fresh in pushed] == [at % every == 0 for at in range(n_frames)]
 
 
 @given(cuts=st.sets(st.integers(1, 29), max_size=6), exponent=st.integers(0, 2))
@@ -116,19 +84,6 @@ def test_what_is_decoded_after_a_loss_is_right(lost: set[int], every: int) -> No
                 decoder.push(*packet)
 
 
-def test_bad_bytes_count_as_a_lost_frame() -> None:
-    motion = turning(12)
-    encoder, decoder = pair(motion, step=0.5, segment_frames=5)
-    pushed = [encoder.push(row) for row in motion.values]
-    decoder.push(*pushed[0])
-    with pytest.raises(FormatError, match="do not take"):
-        decoder.push(pushed[1][0] + b"\xff", False)
-    for at in (2, 3, 4):
-        with pytest.raises(LostFrameError):
-            decoder.push(*pushed[at])
-    assert np.isfinite(decoder.push(*pushed[5])).all()
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_preset_holds_in_every_frame(preset: str) -> None:
     motion = turning(60)
@@ -143,29 +98,6 @@ def test_a_preset_holds_in_every_frame(preset: str) -> None:
         error = mcz.compare(motion, file.clips["live"].motion(), virtual_markers=False)
     assert error.max_position_error_cm is not None
     assert error.max_position_error_cm <= PRESETS[preset] * (1 + 1e-9)
-
-
-def test_gaps_hold_what_was_there() -> None:
-    motion = gapped()
-    encoder, decoder = pair(motion, step=0.01)
-    valid = motion.signals[0].mask
-    assert valid is not None
-    before = np.zeros(6)
-    for row, known in zip(motion.values, valid, strict=True):
-        found = decoder.push(*encoder.push(row, known))
-        np.testing.assert_allclose(found, np.where(known, row, before), atol=0.3)
-        before = np.where(known, row, before)
-
-
-def test_a_frame_that_is_refused_leaves_no_trace() -> None:
-    motion = turning(6)
-    encoder, decoder = pair(motion, step=0.05)
-    for at, row in enumerate(motion.values):
-        with pytest.raises(MotionError):
-            encoder.push(np.where(np.arange(len(row)) == at, np.nan, row))
-        with pytest.raises(MotionError):
-            encoder.push(row + 1e300)
-        assert np.abs(decoder.push(*encoder.push(row)) - row).max() < 2
 
 
 @pytest.mark.parametrize(
@@ -193,14 +125,6 @@ def test_nothing_changes_while_frames_come() -> None:
     encoder, _ = pair(turning(1), step=0.1)
     with pytest.raises(OptionError, match="step cannot change"):
         encoder.change({"step": 0.2})
-
-
-def test_a_segment_that_has_nothing_before_it_is_refused() -> None:
-    motion = turning(3)
-    encoder, _ = pair(motion, step=0.1)
-    pushed = [encoder.push(row) for row in motion.values]
-    with pytest.raises(FormatError, match="goes on from a segment that is not there"):
-        read(encoder.header, motion, [(stream, False) for stream, _ in pushed], 0, 3)
 
 
 def test_a_rate_is_told() -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -346,38 +343,6 @@ def test_angles_of_whole_quarters_are_exact() -> None:
     assert quarters[:5] == quarters[4:]
     assert sine_cosine(2.0**40, RULES["deg"]) == (0, 1)
     assert sine_cosine(float("nan"), RULES["rad"]) == (0, 1)
-
-
-def bits_of_factor() -> str:
-    """Of a skeleton that has all that turns and moves: R, and rows both ways."""
-    joints = (
-        Joint("hip", -1, (1.0, 2.0, 3.0), channels=(*MOVING, *TURNING)),
-        Joint(
-            "knee", 0, (0.1, -4.0, 0.2), ((0.0, -1.0, 0.0),), (10.0, -70.0, 35.0), "ZXY", TURNING
-        ),
-        Joint("toe", 1, (0.1, -4.0, 0.2), channels=(*MOVING, Channel("sx"), *TURNING[1:])),
-    )
-    skeleton = Skeleton(joints, intrinsic=False)
-    plan, values = plan_of(skeleton), values_for(skeleton, 3)
-    found = []
-    for factors in (factor(plan, values), factor(plan, values[:1])):
-        rows = np.cos(np.arange(len(factors) * plan.n_kept, dtype=np.float64))
-        rows = rows.reshape(-1, plan.n_kept)
-        found += [factors, into(plan, factors, rows), out_of(plan, factors, rows)]
-    return b"".join(array.tobytes() for array in found).hex()
-
-
-def test_interpreted_loops_give_the_same_bits() -> None:
-    program = "from tests.codecs.test_posewave_metric import bits_of_factor as b; print(b())"
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=Path(__file__).parents[2],
-        env={**os.environ, "MCZ_LOOPS": "interpreted"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == bits_of_factor()
 
 
 EXAMPLE = [

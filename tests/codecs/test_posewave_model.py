@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -207,21 +201,3 @@ def test_buckets() -> None:
 def test_log_table() -> None:
     np.testing.assert_array_equal(log_table()[[0, 1, 2, 4, 12, 60, 1020]], [0, 1, 3, 6, 12, 24, 48])
     assert (np.diff(log_table()) >= 0).all()
-
-
-def digest() -> str:
-    streams = encode(some_levels(3, 5, 9.0), np.arange(5))
-    return hashlib.sha256(b"\0".join(streams)).hexdigest()
-
-
-def test_interpreted() -> None:
-    program = "from tests.codecs.test_posewave_model import digest\nprint(digest())"
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=Path(__file__).parents[2],
-        env={**os.environ, "MCZ_LOOPS": "interpreted"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == digest()

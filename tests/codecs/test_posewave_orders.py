@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -300,31 +297,3 @@ def test_real_clips(data: Path) -> None:
         assert np.abs(found - values).max() < 1e-7
         off = positions_of(skeleton, found) - positions_of(skeleton, values)
         assert np.abs(off).max() < 1e-9
-
-
-def bits_of_orders() -> str:
-    found = []
-    for unit in ("deg", "rad"):
-        for code, own in enumerate(SEQUENCES, 1):
-            skeleton = single(own, unit)
-            source = unwrap(wandering(unit, 40, code), skeleton)
-            for other in (code, code % 6 + 1):
-                orders = Orders([other], skeleton)
-                coded = orders.coded(source)
-                coded += np.random.default_rng(code).normal(0, 1e-3, coded.shape)
-                notes, decoded = orders.notes_and_values(source, coded)
-                found += [notes, coded.tobytes(), decoded.tobytes()]
-    return b"".join(found).hex()
-
-
-def test_interpreted_loops_give_the_same_bits() -> None:
-    program = "from tests.codecs.test_posewave_orders import bits_of_orders as b; print(b())"
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=Path(__file__).parents[2],
-        env={**os.environ, "MCZ_LOOPS": "interpreted"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == bits_of_orders()

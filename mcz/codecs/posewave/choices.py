@@ -80,7 +80,7 @@ def choose(source: SignalSource, params: Mapping[str, Any]) -> Choice:
     unit = skeleton.unit_cm
     step = default_step(skeleton) if params["step"] is None else params["step"] / (unit or 1.0)
     # With the unit unknown, a skeleton of 90 cm stands for all: only ratios follow from it.
-    step_cm = step * (unit or RADIUS_CM / PROPORTION / (reach(skeleton) or 1.0))
+    step_cm = step * (unit or RADIUS_CM / PROPORTION / _extent(skeleton))
     weights = weights_of(step_cm)
     fields = _fields(skeleton, step, step_cm)
     fields |= _plain_steps(skeleton, _spreads(sample(source, SAMPLED_FRAMES)), step_cm)
@@ -132,7 +132,7 @@ def live_choice(skeleton: Skeleton, step: float | None, bound_cm: float | None) 
             raise OptionError(f"{NAME}: step has to be given, for lengths in cm are not known")
         step = STEP_OF_BOUND * bound_cm
     own = step / (unit or 1.0)
-    step_cm = own * (unit or RADIUS_CM / PROPORTION / (reach(skeleton) or 1.0))
+    step_cm = own * (unit or RADIUS_CM / PROPORTION / _extent(skeleton))
     fields = _fields(skeleton, own, step_cm)
     fields |= _plain_steps(skeleton, np.ones(skeleton.n_channels), step_cm)
     fields |= {"start": 1, "levels": 0, "borrowing": 0}
@@ -157,7 +157,13 @@ def default_step(skeleton: Skeleton) -> float:
     """In length units: 0.5 mm where the unit is known."""
     if skeleton.unit_cm:
         return 0.05 / skeleton.unit_cm
-    return (reach(skeleton) or 1.0) / 2000
+    return _extent(skeleton) / 2000
+
+
+def _extent(skeleton: Skeleton) -> float:
+    """The reach of a skeleton; 1 where it has none, or one beyond the range of floats."""
+    extent = reach(skeleton)
+    return extent if 0 < extent < math.inf else 1.0
 
 
 def weights_of(step_cm: float) -> Weights:
@@ -189,8 +195,8 @@ def _fields(skeleton: Skeleton, step: float, step_cm: float) -> dict[str, Any]:
 def _halvings(skeleton: Skeleton, step: float, in_cm: float) -> int:
     """From the greatest steps to those with which a constant channel moves no point by a step."""
     moved = max(GREATEST_CM * in_cm, math.radians(GREATEST_DEGREES) * reach(skeleton))
-    needed = math.log2(max(moved / (SHARE_OF_CONSTANT * step), 1.0))
-    return min(max(math.ceil(needed), 6), MAX_FINE)
+    needed = min(max(moved / (SHARE_OF_CONSTANT * step), 1.0), 2.0**MAX_FINE)
+    return max(math.ceil(math.log2(needed)), 6)
 
 
 def _spreads(rows: Floats) -> Floats:
@@ -198,7 +204,8 @@ def _spreads(rows: Floats) -> Floats:
     known = np.isfinite(rows)
     n = np.maximum(known.sum(axis=0), 1)
     means = np.where(known, rows, 0.0).sum(axis=0) / n
-    found: Floats = np.sqrt((np.where(known, rows - means, 0.0) ** 2).sum(axis=0) / n)
+    with np.errstate(over="ignore"):  # values that are refused later
+        found: Floats = np.sqrt((np.where(known, rows - means, 0.0) ** 2).sum(axis=0) / n)
     return found
 
 

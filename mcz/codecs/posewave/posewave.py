@@ -103,7 +103,8 @@ def _segments(
         if lossy:
             if keeper:
                 keeper.first = first
-            levels = encode_segment(header, skeleton, values, choice.weights, own, keeper)[0]
+            with np.errstate(over="ignore"):  # of values that are refused in the end
+                levels = encode_segment(header, skeleton, values, choice.weights, own, keeper)[0]
             streams |= {(level, lossy[0]): stream for level, stream in enumerate(levels)}
         places = itertools.product(range(header.levels + 1), range(len(layout.groups)))
         return tuple(streams.get(place, b"") for place in places)
