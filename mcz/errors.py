@@ -25,6 +25,7 @@ known is a warning: SkeletonWarning, ContactWarning.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
@@ -54,12 +55,13 @@ PYTHON_HINTS: Mapping[Hint, str] = {
 class Fields(TypedDict, total=False):
     """Fields of an error as keywords; one that is None is not given."""
 
-    path: str | None
+    path: str | os.PathLike[str] | None
     clip: str | None
     line: int | None
     offset: int | None
     where: str | None
     value: Value | None
+    note: str | None
     hint: Hint | None
 
 
@@ -74,6 +76,7 @@ class MczError(Exception):
     ``offset``  the byte of a file; in an MCZ file where the chunk at fault begins
     ``where``   the structure and the field within the file or the clip
     ``value``   the value that is refused
+    ``note``    a remark that follows the message
     ``hint``    the way out, a ``Hint``
     """
 
@@ -83,6 +86,7 @@ class MczError(Exception):
     offset: int | None = None
     where: str | None = None
     value: Value | None = None
+    note: str | None = None
     hint: Hint | None = None
     _shows_offset: ClassVar[bool] = True
 
@@ -109,7 +113,7 @@ class MczError(Exception):
         inner = self.where
         for name, value in fields.items():
             if value is not None and getattr(self, name) is None:
-                setattr(self, name, value)
+                setattr(self, name, str(value) if name == "path" else value)
         if inner is not None and (outer := fields.get("where")) is not None:
             self.where = f"{outer}: {inner}"
 
@@ -124,7 +128,8 @@ class MczError(Exception):
             self.message,
         )
         text = ": ".join(place for place in places if place)
-        return text if self.hint is None else f"{text}; {hints[self.hint]}"
+        hint = None if self.hint is None else hints[self.hint]
+        return "; ".join(part for part in (text, self.note, hint) if part)
 
     def __str__(self) -> str:
         return self.describe()
@@ -217,3 +222,9 @@ class SkeletonWarning(UserWarning):
 
 class ContactWarning(UserWarning):
     """A lossy codec could not keep a point in its place as it was asked to."""
+
+
+def reason_of(error: BaseException) -> str:
+    """The words of an error of Python or of another library, on one line."""
+    words = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return " ".join(str(words).split())

@@ -61,12 +61,12 @@ def joint_errors(original: Motion, other: Motion) -> JointErrors:
     a, b = original.skeleton, other.skeleton
     for motion in (original, other):
         if motion.signals[0].channels is not None:
-            raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
+            raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     if original.signals[0].n_rows != other.signals[0].n_rows:
         raise MotionError(f"{original.n_frames} and {other.n_frames} frames")
     if has_no_lengths(a) != has_no_lengths(b):
         name = (original if has_no_lengths(a) else other).name
-        raise MotionError(f"motion {name!r}: {NO_LENGTHS}, but on the other side")
+        raise MotionError(f"{NO_LENGTHS}, but on the other side", clip=name)
     names_a, names_b = a.addresses(), b.addresses()
     pairs = pairs_of(a, b)
     both = {names_a[i].lower() for i, _ in pairs}

@@ -66,13 +66,13 @@ from mcz.source import Source as Source
 def frame_rate_of(rate: Any, name: str) -> Fraction:
     """A frame rate as a Fraction, the nearest one to a number of another kind; MotionError."""
     if isinstance(rate, (bool, np.bool_)) or np.ndim(rate):
-        raise MotionError(f"motion {name!r}: frame rate {rate!r}")
+        raise MotionError(f"frame rate {rate!r}", clip=name)
     with suppress(TypeError, ValueError, OverflowError):  # no number, NaN, infinite
         exact = isinstance(rate, Fraction)
         value: Fraction = rate if exact else Fraction(float(rate)).limit_denominator(2**52)
         if value > 0:
             return value
-    raise MotionError(f"motion {name!r}: frame rate {rate!r}")
+    raise MotionError(f"frame rate {rate!r}", clip=name)
 
 
 MOTION = {
@@ -118,18 +118,19 @@ class Motion:
         for signal in self.signals:
             if signal.channels is None and signal.n_channels != self.skeleton.n_channels:
                 raise MotionError(
-                    f"motion {self.name!r}: {signal.n_channels} columns, "
-                    f"but the skeleton has {self.skeleton.n_channels} channels"
+                    f"{signal.n_channels} columns, "
+                    f"but the skeleton has {self.skeleton.n_channels} channels",
+                    clip=self.name,
                 )
         counts = {signal.n_frames for signal in self.signals}
         if len(counts) > 1:
-            raise MotionError(f"motion {self.name!r}: signals of {sorted(counts)} frames")
+            raise MotionError(f"signals of {sorted(counts)} frames", clip=self.name)
         if self.frame_rate is not None:
             object.__setattr__(self, "frame_rate", frame_rate_of(self.frame_rate, self.name))
         if self.frame_numbers is not None and len(self.frame_numbers) != self.n_frames:
-            raise MotionError(f"motion {self.name!r}: {len(self.frame_numbers)} frame numbers")
+            raise MotionError(f"{len(self.frame_numbers)} frame numbers", clip=self.name)
         if self.number_step < 1:
-            raise MotionError(f"motion {self.name!r}: a number step of {self.number_step}")
+            raise MotionError(f"a number step of {self.number_step}", clip=self.name)
 
     @property
     def values(self) -> NDArray[np.float64]:

@@ -41,10 +41,10 @@ class Sampled(Protocol):
 def check_poses(name: str, signal: Sampled) -> None:
     """Raise MotionError where the rows of the motion signal of ``name`` are no poses of frames."""
     if signal.channels is not None:
-        raise MotionError(f"motion {name!r}: its channels are not those of its skeleton")
+        raise MotionError("its channels are not those of its skeleton", clip=name)
     if signal.samples_per_frame != 1:
         raise MotionError(
-            f"motion {name!r}: {signal.samples_per_frame} samples a frame are not one pose a frame"
+            f"{signal.samples_per_frame} samples a frame are not one pose a frame", clip=name
         )
 
 

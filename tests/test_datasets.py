@@ -225,7 +225,7 @@ def test_clips_that_do_not_go_together(odd: Path) -> None:
         with pytest.raises(mcz.OptionError, match=words):
             mcz.dataset(odd)
     mcz.write(replace(motion, frame_rate=None), odd / "b.mcz", force=True)
-    with pytest.raises(mcz.OptionError, match="b.mcz: other: its frame rate is unknown"):
+    with pytest.raises(mcz.OptionError, match="b.mcz: clip 'other': its frame rate is unknown"):
         mcz.dataset(odd, rate=30)
     assert mcz.dataset(odd, rate=30, source_rate=60).members[1].n_frames == 25
 

@@ -255,7 +255,7 @@ def test_the_live_filter_of_a_clip() -> None:
     stream = live_filter(motion.skeleton, motion.frame_rate)
     rows = motion.signals[0].masked()
     assert same(streamed(stream, rows), mcz.post_filter(motion).signals[0].masked())
-    with pytest.raises(OptionError, match="motion 'live': its frame rate"):
+    with pytest.raises(OptionError, match="clip 'live': its frame rate"):
         live_filter(motion.skeleton, None)
     with pytest.raises(MotionError):
         live_filter(acclaim_walk().skeleton, Fraction(120))

@@ -46,7 +46,7 @@ def to_c3d(motion: Motion) -> Any:
     try:
         return c3d.Reader(io.BytesIO(data))
     except Exception as error:  # it raises whatever its parser met, AssertionError among others
-        raise MotionError(f"motion {motion.name!r}: c3d cannot read it: {error}") from error
+        raise MotionError(f"c3d cannot read it: {error}", clip=motion.name) from error
 
 
 def for_c3d(motion: Motion) -> Motion:

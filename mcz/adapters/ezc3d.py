@@ -65,7 +65,7 @@ def to_ezc3d(motion: Motion) -> Any:
         try:
             made = ezc3d.c3d(str(path))
         except REFUSED as error:
-            raise MotionError(f"motion {motion.name!r}: ezc3d cannot read it: {error}") from error
+            raise MotionError(f"ezc3d cannot read it: {error}", clip=motion.name) from error
     held = _held(made, FORMATS["c3d"].read(data, motion.name))
     for signal in plain.signals:
         if signal.name in held:
@@ -73,8 +73,9 @@ def to_ezc3d(motion: Motion) -> Any:
             there, values = array[chosen], signal.masked().T
             if there.size != values.size:
                 raise MotionError(
-                    f"motion {motion.name!r}: of signal {signal.name!r} ezc3d reads {there.size} "
-                    f"numbers, and there are {values.size}"
+                    f"of signal {signal.name!r} ezc3d reads {there.size} "
+                    f"numbers, and there are {values.size}",
+                    clip=motion.name,
                 )
             array[chosen] = values.reshape(there.shape)
     return made
@@ -90,7 +91,7 @@ def _held(c3d: Any, motion: Motion) -> Held:
     places, samples = c3d["data"]["points"][:3].transpose(1, 0, 2), c3d["data"]["analogs"][0]
     if len(places) != len(is_point):
         raise MotionError(
-            f"motion {motion.name!r}: ezc3d has {len(places)} points, and the C3D {len(is_point)}"
+            f"ezc3d has {len(places)} points, and the C3D {len(is_point)}", clip=motion.name
         )
     return {
         motion.signals[0].name: (places, is_point),

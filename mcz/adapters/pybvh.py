@@ -109,9 +109,7 @@ class _Tree:
 
     def __init__(self, motion: Motion) -> None:
         if not np.isfinite(motion.values).all():
-            raise MotionError(
-                f"motion {motion.name!r}: pybvh has no gaps, and some values are none"
-            )
+            raise MotionError("pybvh has no gaps, and some values are none", clip=motion.name)
         skeleton = motion.skeleton
         in_degrees = replace(skeleton, angle_unit="deg")
         if skeleton.angle_unit == "rad" and len(motion.signals) == 1 and is_bvh(in_degrees):
@@ -123,7 +121,7 @@ class _Tree:
         self.values = np.asarray(self.motion.values, np.float64)
         self.starts = self.motion.skeleton.column_starts()
         if [joint.parent for joint in self.joints].count(-1) != 1:
-            raise MotionError(f"motion {motion.name!r}: pybvh has one root, no more and no less")
+            raise MotionError("pybvh has one root, no more and no less", clip=motion.name)
         self.offsets = [self._offset(joint) for joint in range(len(self.joints))]
 
     def depth_first(self) -> Iterator[int]:

@@ -82,7 +82,7 @@ class _Log:
         self.numbers = _numbers(moving)
         self.seconds: dict[int, Floats] = {}  # of samples, by how many a frame has
         if self.figure is None and not self.series:
-            raise MotionError(f"{moving.name!r}: neither positions nor scalars, nothing to log")
+            raise MotionError("neither positions nor scalars, nothing to log", clip=moving.name)
 
     def all(self) -> None:
         self._still()

@@ -18,7 +18,7 @@ from mcz.bags.manifests import (
     read_manifest,
     read_tags,
 )
-from mcz.errors import AccessError, OptionError
+from mcz.errors import AccessError, OptionError, reason_of
 
 VERSIONS = ("0.93", "0.94", "0.95", "0.96", "0.97", "1.0")
 KNOWN = ("md5", "sha1", "sha224", "sha256", "sha384", "sha512")
@@ -60,7 +60,7 @@ def check_bag(
     try:
         _Check(found, progress).run()
     except OSError as error:
-        raise AccessError(f"{error.filename or folder}: {error.strerror or error}") from None
+        raise AccessError(reason_of(error), path=error.filename or folder) from None
     return found
 
 

@@ -20,7 +20,13 @@ from mcz.bags.manifests import (
     tags_text,
 )
 from mcz.brief import counted
-from mcz.errors import AccessError, ExistsError, FormatError, OptionError
+from mcz.errors import (
+    AccessError,
+    ExistsError,
+    FormatError,
+    OptionError,
+    reason_of,
+)
 from mcz.reading.quick_check import quick_check
 
 SUFFIX = ".mcz"
@@ -53,7 +59,7 @@ def bag(
             tempfile.mkdtemp(prefix=f".{target.name[:48]}.", suffix=".part", dir=target.parent)
         )
     except OSError as error:
-        raise AccessError(f"{target}: {error.strerror or error}") from None
+        raise AccessError(reason_of(error), path=target) from None
     try:
         _fill(temporary, paths, lines)
         umask = os.umask(0)
@@ -66,7 +72,7 @@ def bag(
         with suppress(OSError):
             shutil.rmtree(temporary)
         if isinstance(error, OSError):
-            raise AccessError(f"{target}: {error.strerror or error}") from error
+            raise AccessError(reason_of(error), path=target) from error
         raise
     return target
 
@@ -91,9 +97,9 @@ def _check(paths: Sequence[Path]) -> None:
         if other is not path:
             raise OptionError(f"{other} and {path} would have one name in the bag")
         if set(path.name) & set("%\r\n"):  # RFC 8493 escapes them, not every tool knows
-            raise OptionError(f"{path}: tools for bags differ on names with %; rename it")
+            raise OptionError("tools for bags differ on names with %; rename it", path=path)
         if not path.is_file():
-            raise AccessError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+            raise AccessError(f"{'not a file' if path.exists() else 'no such file'}", path=path)
     for path in paths:
         if path.suffix.lower() != SUFFIX:
             continue
@@ -101,7 +107,7 @@ def _check(paths: Sequence[Path]) -> None:
         if problems:
             more = f" and {len(problems) - 1} more" if len(problems) > 1 else ""
             text = f"{counted(len(problems), 'fault')}: {problems[0].message}{more}"
-            raise FormatError(f"{path}: damaged, so not put into a bag; {text}")
+            raise FormatError(f"damaged, so not put into a bag; {text}", path=path)
 
 
 def _fill(folder: Path, paths: Sequence[Path], lines: list[tuple[str, str]]) -> None:
@@ -115,7 +121,7 @@ def _fill(folder: Path, paths: Sequence[Path], lines: list[tuple[str, str]]) -> 
         _sync(copy)
         size += copy.stat().st_size
         if _note(found, f"{PAYLOAD}/{path.name}", copy) != digests(path):
-            raise AccessError(f"{path}: it changed while it was copied")
+            raise AccessError("it changed while it was copied", path=path)
     tags = {
         DECLARATION: "BagIt-Version: 1.0\nTag-File-Character-Encoding: UTF-8\n",
         INFO: tags_text([*lines, (OXUM, f"{size}.{len(paths)}")]),

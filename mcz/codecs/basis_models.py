@@ -204,5 +204,5 @@ def read_bases(path: Path) -> Model:
     try:
         parse_bases(data)
     except FormatError as error:
-        raise FormatError(f"{path}: no bases: {error}") from None
+        raise FormatError(f"no bases: {error}", path=path) from None
     return Model(BASES, data)

@@ -34,7 +34,12 @@ from mcz.codecs.segments import skeleton_of
 from mcz.codecs.space import APART, COSINES, LEARNED, N_COORDINATES, WEIGHTED, columns_of
 from mcz.codecs.steps import code_of, ratio_of
 from mcz.codecs.weights import RULES, weights_of
-from mcz.errors import AccessError, MotionError, OptionError
+from mcz.errors import (
+    AccessError,
+    MotionError,
+    OptionError,
+    reason_of,
+)
 from mcz.motion import POSITION_KINDS, Skeleton
 from mcz.transforms.dct import dct_matrix
 
@@ -223,7 +228,7 @@ def _read(path: str) -> Model:
     try:
         return read_bases(Path(path))
     except OSError as error:
-        raise AccessError(f"{path}: {error.strerror}") from None
+        raise AccessError(reason_of(error), path=path) from None
 
 
 def _fits(model: Model, n_points: Sequence[int]) -> bool:

@@ -40,7 +40,7 @@ def parse_frame_numbers(text: str, n_frames: int, name: str) -> NDArray[np.int64
         for (row, number), end in zip(starts, [*rows[1:], n_frames], strict=True):
             frame_numbers[row:end] += number - row
     except (ValueError, OverflowError) as error:
-        raise FormatError(f"clip {name!r}: frame-numbers {text[:80]!r}: {error}") from None
+        raise FormatError(f"frame-numbers {text[:80]!r}: {error}", clip=name) from None
     return frame_numbers
 
 

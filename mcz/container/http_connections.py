@@ -18,7 +18,7 @@ from typing import NamedTuple
 from urllib.parse import SplitResult, quote, unquote, urljoin, urlsplit
 from urllib.request import getproxies, proxy_bypass
 
-from mcz.errors import AccessError
+from mcz.errors import AccessError, reason_of
 
 TIMEOUT = 30.0  # seconds that a server may be silent
 ATTEMPTS = 3  # of a request that may do better the next time
@@ -103,7 +103,7 @@ class Connections:
             attempt += 1
 
     def error(self, text: str) -> AccessError:
-        return AccessError(f"{self.address}: {text}")
+        return AccessError(text, path=self.address)
 
     def close(self) -> None:
         """Close what is kept open."""
@@ -222,7 +222,7 @@ def _words(error: Exception) -> str:
         return f"{came + (error.expected or 0)} bytes are announced, {came} came"
     if isinstance(error, TimeoutError):
         return f"no answer within {TIMEOUT:.0f} s"
-    return getattr(error, "strerror", None) or str(error) or type(error).__name__
+    return reason_of(error)
 
 
 def _may_pass(error: Exception) -> bool:

@@ -28,9 +28,9 @@ def parse_mask(data: bytes, n_rows: int, n_channels: int, name: str) -> Mask:
     while at < len(data):
         run, after = read_varint(data, at)
         if run > size - start or (run == 0 and at > 0):  # MASK-02
-            raise FormatError(f"clip {name!r}: a mask run of {run} at {start} of {size}")
+            raise FormatError(f"a mask run of {run} at {start} of {size}", clip=name)
         flat[start : start + run] = valid
         start, at, valid = start + run, after, not valid
     if start != size:  # MASK-03
-        raise FormatError(f"clip {name!r}: a mask of {start} values, not {size}")
+        raise FormatError(f"a mask of {start} values, not {size}", clip=name)
     return flat.reshape(n_channels, n_rows).T  # MASK-01

@@ -271,7 +271,7 @@ class Container:
         listed = (row.name, row.skeleton, row.n_frames, row.rate_numerator, row.rate_denominator)
         differs = found != (*listed, row.signals)
         if differs and row.damage and not self.salvage:
-            raise FormatError(f"clip {row.name!r}: {row.damage[0]}")
+            raise FormatError(row.damage[0], clip=row.name)
         if differs and not row.damage:
             raise FormatError(f"clip {row.name!r} is {found}, but the index says {listed}")
         return fields

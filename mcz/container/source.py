@@ -10,7 +10,13 @@ from threading import Lock
 from typing import Any, BinaryIO
 
 from mcz.container.locks import is_locked
-from mcz.errors import AccessError, MczError, OptionError, TruncatedError
+from mcz.errors import (
+    AccessError,
+    MczError,
+    OptionError,
+    TruncatedError,
+    reason_of,
+)
 from mcz.extras import import_extra
 
 
@@ -103,7 +109,7 @@ class ByteSource:
                 data += more
         except MczError as error:
             if self.remote and isinstance(error, TruncatedError):
-                raise AccessError(f"{self.name}: {error}") from None
+                raise AccessError(error.message, path=self.name) from None
             raise
         except Exception as error:
             if not self.remote and not isinstance(error, OSError):
@@ -227,7 +233,7 @@ def file_system(url: str) -> tuple[Any, str]:
     try:
         fs, path = fsspec.core.url_to_fs(url)
     except (ValueError, ImportError) as error:  # no such protocol, or not installed
-        raise OptionError(f"{url}: {error}") from None
+        raise OptionError(str(error), path=url) from None
     except Exception as error:  # each file system has its own errors
         raise _no_access(url, error) from None
     return fs, str(path)
@@ -235,8 +241,8 @@ def file_system(url: str) -> tuple[Any, str]:
 
 def _no_access(name: str, error: Exception) -> AccessError:
     """That a file cannot be read, whatever its file system calls that."""
-    text = getattr(error, "strerror", None) or str(error) or type(error).__name__
-    return AccessError(text if name and name in text else f"{name}: {text}")
+    text = "no such file" if isinstance(error, FileNotFoundError) else reason_of(error)
+    return AccessError(text, path=name)
 
 
 def _is_remote(stream: Any) -> bool:

@@ -63,8 +63,8 @@ def convert(motion: Motion, to: str, rate: Fraction | float | None = None) -> Mo
     same = same or (FORMATS[to].is_table and not needs_rate(motion, to))
     if to != "amc" and not same and motion.frame_rate is None:
         raise OptionError(
-            f"motion {motion.name!r}: its frame rate is unknown, and {to.upper()} states one; "
-            "give the rate"
+            f"its frame rate is unknown, and {to.upper()} states one; give the rate",
+            clip=motion.name,
         )
     timeline = motion.timeline
     if timeline is not None and FORMATS[to].is_table:  # prints what the source prints

@@ -51,12 +51,12 @@ def _check(motion: Motion) -> None:
     """Raises MotionError for what Acclaim's files cannot hold."""
     skeleton = motion.skeleton
     if point_set(skeleton) == "markers":
-        raise MotionError(f"motion {motion.name!r}: markers have no skeleton, and AMC needs one")
+        raise MotionError("markers have no skeleton, and AMC needs one", clip=motion.name)
     roots = [joint.name for joint in skeleton.joints if joint.parent < 0]
     if len(roots) != 1:
         raise MotionError(f"ASF has one root, and the skeleton has {len(roots)}: {roots[:8]}")
     if motion.signals[0].channels is not None:
-        raise MotionError(f"motion {motion.name!r}: AMC holds the channels of a skeleton alone")
+        raise MotionError("AMC holds the channels of a skeleton alone", clip=motion.name)
     for joint in skeleton.joints:
         for channel in joint.channels:
             if channel.kind not in POSITION_KINDS + ROTATION_KINDS:

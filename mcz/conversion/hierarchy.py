@@ -122,11 +122,11 @@ def is_bvh(skeleton: Skeleton) -> bool:
 def _check(motion: Motion) -> None:
     """Raises MotionError for what no BVH can hold."""
     if point_set(motion.skeleton) == "markers":
-        raise MotionError(f"motion {motion.name!r}: markers have no skeleton, and BVH needs one")
+        raise MotionError("markers have no skeleton, and BVH needs one", clip=motion.name)
     if motion.signals[0].channels is not None:
-        raise MotionError(f"motion {motion.name!r}: BVH holds the channels of a skeleton alone")
+        raise MotionError("BVH holds the channels of a skeleton alone", clip=motion.name)
     if gap := first_gap(motion):
-        raise MotionError(f"motion {motion.name!r}: BVH cannot leave out values, but {gap}")
+        raise MotionError(f"BVH cannot leave out values, but {gap}", clip=motion.name)
     if is_bvh(motion.skeleton):
         return
     for joint in motion.skeleton.joints:

@@ -26,7 +26,7 @@ def to_c3d(motion: Motion) -> Motion:
     with np.errstate(over="ignore"):
         values = made.signals[0].values * (unit_cm * MM_PER_CM)
     if np.isinf(values).any():
-        raise MotionError(f"motion {motion.name!r}: a position in mm is beyond float64")
+        raise MotionError("a position in mm is beyond float64", clip=motion.name)
     signal = replace(made.signals[0], values=values)
     return replace(
         made,

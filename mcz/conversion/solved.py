@@ -72,8 +72,9 @@ def _check_sizes(motion: Motion) -> None:
         frame = row // motion.signals[0].samples_per_frame
         name = motion.skeleton.addresses()[column // 3]
         raise MotionError(
-            f"motion {motion.name!r}: frame {frame}, {name} is at {values[row, column]:g}, too far "
-            "off for inverse kinematics"
+            f"frame {frame}, {name} is at {values[row, column]:g}, too far "
+            "off for inverse kinematics",
+            clip=motion.name,
         )
 
 
@@ -102,7 +103,7 @@ def from_positions(motion: Motion, base: Skeleton) -> Solved:
     _check_sizes(motion)
     if point_set(base) == "markers":
         raise MotionError(
-            f"motion {motion.name!r}: the skeleton to fit, {base.name!r}, has markers alone"
+            f"the skeleton to fit, {base.name!r}, has markers alone", clip=motion.name
         )
     n_points, n_markers = len(point_names(base)), 3 * base.n_joints
     if skeleton.n_joints not in (n_points, n_points + n_markers):

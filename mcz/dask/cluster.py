@@ -34,7 +34,7 @@ class Cluster:
         """How many tasks it does at once; raises WorkerError where it has no worker."""
         n_threads = sum(self._client.nthreads().values())
         if not n_threads:
-            raise WorkerError(f"{self._client.scheduler.address}: the cluster has no worker")
+            raise WorkerError("the cluster has no worker", path=self._client.scheduler.address)
         return int(n_threads)
 
     def in_order(
@@ -136,5 +136,5 @@ def connected(client: Any) -> Iterator[Any]:
     except ValueError as error:
         raise OptionError(f"no Dask client: {error}") from None
     except OSError as error:
-        raise OptionError(f"{client}: no scheduler answers: {error}") from None
+        raise OptionError(f"no scheduler answers: {error}", path=client) from None
     yield found

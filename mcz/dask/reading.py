@@ -45,7 +45,7 @@ def map_clips(
     """
     with open(target, max_decoded=max_decoded) as file, connected(client) as used:
         if not can_be_shared(file):
-            raise OptionError(f"{file.name}: no file that the machines of a cluster can open")
+            raise OptionError("no file that the machines of a cluster can open", path=file.name)
         names = [clip.name for clip in file.chosen(where=where)]
         with using(Cluster(used)), shared_out(_mapped, file, names, function) as answers:
             return [answer() for answer in answers]

@@ -51,7 +51,7 @@ def listed(root: str, target: Any) -> tuple[list[Found], list[Outcome]]:
     if not is_url(root):
         folder = Path(root)
         if not folder.is_dir():
-            raise OptionError(f"{root}: not a folder")
+            raise OptionError("not a folder", path=root)
         paths, others = files_below(folder, target)
         found = [Found(path.relative_to(folder).as_posix(), size_of(path)) for path in paths]
         return found, others
@@ -60,14 +60,14 @@ def listed(root: str, target: Any) -> tuple[list[Found], list[Outcome]]:
     try:
         details = fs.find(base, detail=True)
     except Exception as error:  # each kind of store has errors of its own
-        raise AccessError(f"{root}: {error}") from None
+        raise AccessError(str(error), path=root) from None
     found = [
         Found(posixpath.relpath(path, base), int(entry["size"] or 0))
         for path, entry in details.items()
         if entry["type"] == "file" and path != own and not path.endswith("/")
     ]
     if not found:
-        raise OptionError(f"{root}: no file is below it")
+        raise OptionError("no file is below it", path=root)
     return sorted(found, key=lambda one: os.fsencode(one.name)), []
 
 
@@ -102,7 +102,8 @@ def coded_there(state: object, ask: FarAsk) -> Part:
         try:
             part = coded(state, Ask(Path(root, ask.name), ask.name, ask.terms, ask.profile))
         except MczError as error:
-            error.args = tuple(_named(str(word), root, ask.root) for word in error.args)
+            if error.path is not None:
+                error.path = _named(error.path, root, ask.root)
             raise
     return replace(
         part,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcz.errors import AccessError, OptionError
+from mcz.errors import AccessError, OptionError, reason_of
 
 Arrays = Mapping[str, NDArray[Any]]
 UNITS = {"": 1, "B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
@@ -87,7 +87,7 @@ class FolderCache:
             folder.mkdir(parents=True, exist_ok=True)
             self._size = sum(path.stat().st_size for path in folder.glob(f"*{self.SUFFIX}"))
         except OSError as error:
-            raise AccessError(f"{folder}: {error.strerror}") from None
+            raise AccessError(reason_of(error), path=folder) from None
 
     def get(self, key: str) -> Arrays | None:
         try:
@@ -108,7 +108,7 @@ class FolderCache:
                 file.write(data + zlib.crc32(data).to_bytes(4, "little"))
             os.replace(name, self._path(key))
         except OSError as error:
-            raise AccessError(f"{self.folder}: {error.strerror}") from None
+            raise AccessError(reason_of(error), path=self.folder) from None
         self._size += len(data) + 4
 
     def _path(self, key: str) -> Path:

@@ -131,7 +131,7 @@ def _files(target: Target | Iterable[Target], given: dict[str, File]) -> Iterato
         if Path(path).is_dir():
             paths = sorted(str(found) for found in Path(path).rglob("*.mcz"))
             if not paths:
-                raise OptionError(f"{path}: a folder without .mcz files (mcz pack makes one)")
+                raise OptionError("a folder without .mcz files (mcz pack makes one)", path=path)
         for name in paths:
             if is_source(name):
                 raise OptionError(f"{name}: a data set is made of .mcz files; mcz pack makes one")
@@ -169,7 +169,11 @@ def _resampled_frames(member: Member, part: Timeline | None, rate: Fraction) -> 
             raise too_many(part, rate)
         return len(frames)
     if member.source_rate is None:
-        raise OptionError(f"{member.label}: its frame rate is unknown; say it with source_rate=")
+        raise OptionError(
+            "its frame rate is unknown; say it with source_rate=",
+            path=member.target,
+            clip=member.clip,
+        )
     return resampled_frames(member.n_source, member.source_rate, rate)
 
 
@@ -204,7 +208,7 @@ class _Agreement:
         try:
             subject = recipe.subject(clip, member)
         except MczError as error:
-            error.args = (f"{member.label}: {error}",)
+            error.add(path=member.target, clip=member.clip)
             raise
         lengths = any(field.lengths for field in recipe.fields)
         return {

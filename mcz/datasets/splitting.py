@@ -23,15 +23,19 @@ def label_of(member: Member, clip: Clip, by: str, pattern: str | None) -> str:
             raise OptionError(f"pattern {pattern!r}: {error}") from None
         if found is None or not found.groups() or found[1] is None:
             raise OptionError(
-                f"{member.label}: pattern {pattern!r} has no group that its name matches"
+                f"pattern {pattern!r} has no group that its name matches",
+                path=member.target,
+                clip=member.clip,
             )
         return found[1]
     if by == "clip":
         return member.label
     if by not in clip.metadata:
         raise OptionError(
-            f"{member.label}: its metadata say no {by!r}; give a pattern over names, such as "
-            "pattern=r'^(\\d+)_', or by='clip'"
+            f"its metadata say no {by!r}; give a pattern over names, such as "
+            "pattern=r'^(\\d+)_', or by='clip'",
+            path=member.target,
+            clip=member.clip,
         )
     return clip.metadata[by]
 

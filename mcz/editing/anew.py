@@ -31,12 +31,11 @@ def check_anew(clip: Clip, *, whole: bool = False) -> None:
     info = clip.signals[0]
     if info.exact and not (whole and "param.lossless" in (clip.quality or {})):
         raise OptionError(
-            f"clip {clip.name!r}: some of its joints are coded exactly, and would not be any more"
+            "some of its joints are coded exactly, and would not be any more", clip=clip.name
         )
     if not info.codec.lossless and (clip.quality or {}).get("codec") != info.codec.name:
         raise OptionError(
-            f"clip {clip.name!r}: no quality record says how it was coded; decode it and encode it "
-            "anew"
+            "no quality record says how it was coded; decode it and encode it anew", clip=clip.name
         )
 
 

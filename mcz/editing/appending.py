@@ -26,6 +26,7 @@ from mcz.errors import (
     LimitError,
     TruncatedError,
     UnsupportedError,
+    reason_of,
 )
 from mcz.schema import parse
 
@@ -66,10 +67,10 @@ def growing(path: Path, *, salvage: bool, force: bool) -> Iterator[Growth]:
     try:
         stream = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below
     except (OSError, ValueError) as error:
-        raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+        raise AccessError(reason_of(error), path=path) from None
     with stream:
         if not lock(stream):
-            raise AccessError(f"{path}: another process is appending to it")
+            raise AccessError("another process is appending to it", path=path)
         container, tail = _whole_part(stream, path, salvage, force)
         end = container.directory.end  # the writer moves it
         with tempfile.SpooledTemporaryFile(IN_MEMORY, dir=str(path.parent)) as added:
@@ -85,7 +86,7 @@ def _check_place(stream: BinaryIO, path: Path) -> None:
     except OSError:
         same = False
     if not same:
-        raise AccessError(f"{path}: it was replaced by another file while its addition was coded")
+        raise AccessError("it was replaced by another file while its addition was coded", path=path)
 
 
 def _write(stream: BinaryIO, end: int, added: BinaryIO) -> None:

@@ -81,7 +81,7 @@ def pack(
     """
     root = Path(directory)
     if not root.is_dir():
-        raise OptionError(f"{root}: not a folder")
+        raise OptionError("not a folder", path=root)
     paths, others = files_below(root, target)
     if not keep_all:
         paths, left = motion_files(paths)

@@ -64,7 +64,7 @@ def delete_clips(
         if where is not None:
             gone.clips |= {clip.name: SAME for clip in file.find(where)}
         if not (gone.clips or gone.attachments or gone.aliases):
-            raise OptionError(f"{file.name}: nothing to delete; name clips or say where")
+            raise OptionError("nothing to delete; name clips or say where", path=file.name)
         _take_aliases(file, gone, allowed=aliases)
         plan = _without(file, gone)
         report = Report()
@@ -87,7 +87,7 @@ def _named(file: File, names: Iterable[str]) -> Plan:
         elif len(clips) == 1:
             found.clips[clips[0]] = SAME
         else:
-            raise OptionError(f"{file.name}: {_unknown(file, name, clips)}")
+            raise OptionError(_unknown(file, name, clips), path=file.name)
     return found
 
 
@@ -108,8 +108,9 @@ def _take_aliases(file: File, gone: Plan, *, allowed: bool) -> None:
             others.append(alias)
     if not allowed and (missed := [alias for alias in others if alias not in gone.aliases]):
         raise OptionError(
-            f"{file.name}: {listed(missed)} {'is' if len(missed) == 1 else 'are'} the same content "
-            "under another name, which would go, too; name it, or say aliases"
+            f"{listed(missed)} {'is' if len(missed) == 1 else 'are'} the same content "
+            "under another name, which would go, too; name it, or say aliases",
+            path=file.name,
         )
     gone.aliases |= {alias: alias for alias in others}
 
@@ -196,11 +197,11 @@ def _refuse_equal(file: File, plan: Plan) -> None:
     tables["aliases"] = [*plan.aliases.values()]
     for what, taken in tables.items():
         if twice := [name for name, count in Counter(taken).items() if count > 1]:
-            raise OptionError(f"{file.name}: two {what} would be called {shown(twice[0])}")
+            raise OptionError(f"two {what} would be called {shown(twice[0])}", path=file.name)
     before, after = Counter(paths_of(file, whole(file))), Counter(paths_of(file, plan))
     for path, count in after.items():
         if count > 1 and count > before[path]:
-            raise OptionError(f"{file.name}: two files would be restored as {shown(path)}")
+            raise OptionError(f"two files would be restored as {shown(path)}", path=file.name)
 
 
 def paths_of(file: File, plan: Plan) -> list[str]:
@@ -312,7 +313,7 @@ def _groups(file: File, by: str, rest: str | None) -> dict[str, list[str]]:
         left.append((sum(kind == b"SKEL" for kind, _ in others), "skeleton"))
         said = ", ".join(counted(n, word) for n, word in left if n)
         if said:
-            raise OptionError(f"{file.name}: {said} without {by}; name a file for the rest")
+            raise OptionError(f"{said} without {by}; name a file for the rest", path=file.name)
     return groups
 
 

@@ -185,7 +185,7 @@ class Carrier:
                 less += chunk.size
                 moved.append((at, less))
         if at != cend.offset + cend.size:
-            raise FormatError(f"clip {row.name!r}: {cend.label} is not where the index says")
+            raise FormatError(f"{cend.label} is not where the index says", clip=row.name)
         if not moved:
             new.keep_packed(packed or packed_segments(row), parse_segments)
             return

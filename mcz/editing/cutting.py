@@ -18,7 +18,7 @@ from mcz.container.limits import Profile
 from mcz.container.packed import parse_skel
 from mcz.container.reader import Container
 from mcz.container.segments import FRAME_NOTES, FRESH, GROUP_NOTES, MASKS, SegmentHeader
-from mcz.errors import MotionError, OptionError
+from mcz.errors import OptionError, error_context
 from mcz.motion import Skeleton
 from mcz.reading.clip import Clip
 from mcz.reading.signal_info import SignalInfo
@@ -109,8 +109,9 @@ def plan_cut(
     motion = clip.signals[0]
     if not 0 <= resolution < motion.counts.n_resolutions:
         raise OptionError(
-            f"clip {clip.name!r}: the {resolution} finest resolutions cannot be cut, "
-            f"it has {motion.counts.n_resolutions}"
+            f"the {resolution} finest resolutions cannot be cut, "
+            f"it has {motion.counts.n_resolutions}",
+            clip=clip.name,
         )
     kept = None if joints is None else _kept_joints(clip, joints)
     cut = ClipCut(clip, start, stop, kept, resolution, ())
@@ -131,11 +132,9 @@ def _kept_joints(clip: Clip, joints: Chosen) -> frozenset[int] | None:
     """The joints as indices, None where no joint with channels is left out."""
     skeleton = clip.skeleton
     if clip.signals[0].channels is not None:
-        raise OptionError(f"clip {clip.name!r}: its motion has channels of its own, no joints")
-    try:
+        raise OptionError("its motion has channels of its own, no joints", clip=clip.name)
+    with error_context(clip=clip.name):
         kept = frozenset(skeleton.find(joint) for joint in joint_list(joints))
-    except MotionError as error:
-        raise MotionError(f"clip {clip.name!r}: {error}") from None
     others = (joint for index, joint in enumerate(skeleton.joints) if index not in kept)
     return kept if any(joint.channels for joint in others) else None
 
@@ -167,8 +166,9 @@ def _kept_groups(clip: Clip, info: SignalInfo, joints: frozenset[int]) -> tuple[
         if inside and outside:
             names = clip.skeleton.addresses()
             raise OptionError(
-                f"clip {clip.name!r}: joint {names[min(inside)]} cannot be cut out, its channels "
-                f"are coded in one group with those of {names[min(outside)]}; {how}"
+                f"joint {names[min(inside)]} cannot be cut out, its channels "
+                f"are coded in one group with those of {names[min(outside)]}; {how}",
+                clip=clip.name,
             )
         if inside:
             groups.append(number)
@@ -290,8 +290,9 @@ class _Numbers(dict[int, int]):
         assert skeleton is not None
         joint = joint_of_column(skeleton)[layout.groups[group][0]]
         raise OptionError(
-            f"clip {self._name!r}: channels of the chosen joints are stored as copies of those "
-            f"of joint {skeleton.addresses()[joint]}, which must be extracted, too"
+            f"channels of the chosen joints are stored as copies of those "
+            f"of joint {skeleton.addresses()[joint]}, which must be extracted, too",
+            clip=self._name,
         )
 
 

@@ -132,7 +132,7 @@ def _check_rate(clip: Clip, rate: Fraction, force: bool) -> None:
     if states_rate(clip):
         stated = ", ".join(sorted(name for name, known in FORMATS.items() if known.states_rate))
         raise OptionError(
-            f"clip {shown(clip.name)}: its source states the rate, as {stated} do; encode it anew"
+            f"its source states the rate, as {stated} do; encode it anew", clip=clip.name
         )
     if clip.frame_rate not in (None, rate) and not force:
         raise OptionError(
@@ -149,4 +149,4 @@ def _check_sources(target: Any, names: Iterable[str]) -> None:
         for name in list(names)[:1]:
             clip = file.clips[name]
             if clip.source is not None and len(clip.source_bytes()) != clip.source.size:
-                raise ChecksumError(f"clip {shown(name)}: its source is not restored")
+                raise ChecksumError("its source is not restored", clip=name)

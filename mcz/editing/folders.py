@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mcz.editing.outcomes import Outcome
-from mcz.errors import AccessError, OptionError
+from mcz.errors import AccessError, OptionError, reason_of
 from mcz.formats import FORMATS
 from mcz.reading.names import FEW, listed
 
@@ -29,7 +29,7 @@ def files_below(root: Path, target: Any) -> tuple[list[Path], list[Outcome]]:
 
     def unreadable(error: OSError) -> None:
         if Path(error.filename) == root:
-            raise AccessError(f"{root}: {error.strerror or error}") from None
+            raise AccessError(reason_of(error), path=root) from None
         say(Path(error.filename), "failed", f"{error.filename}: {error.strerror or error}")
 
     for folder, folders, names in os.walk(root, onerror=unreadable):

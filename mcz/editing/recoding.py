@@ -115,13 +115,13 @@ def edit(clip: Clip, joint: int | str, values: Any, on_grid: bool) -> Edited:
 def _editable(clip: Clip, joint: int | str) -> int:
     """The joint's index, of a clip that may be edited."""
     if clip.container.salvage:
-        raise OptionError(f"clip {clip.name!r}: a file that is salvaged cannot be edited")
+        raise OptionError("a file that is salvaged cannot be edited", clip=clip.name)
     if clip.signals[0].channels is not None:
-        raise OptionError(f"clip {clip.name!r}: its motion has channels of its own, no joints")
+        raise OptionError("its motion has channels of its own, no joints", clip=clip.name)
     index = clip.skeleton.find(joint)
     if not clip.skeleton.joints[index].channels:
         name = clip.skeleton.addresses()[index]
-        raise OptionError(f"clip {clip.name!r}: joint {name} has no channels")
+        raise OptionError(f"joint {name} has no channels", clip=clip.name)
     return index
 
 
@@ -142,9 +142,10 @@ def _groups_of(clip: Clip, info: SignalInfo, joint: int | str) -> tuple[int, ...
         if index in joints and len(joints) > 1:
             other = next(name for name in joints if name != index)
             raise OptionError(
-                f"clip {clip.name!r}: joint {names[index]} cannot be replaced alone, codec "
+                f"joint {names[index]} cannot be replaced alone, codec "
                 f"{info.codec.name} codes its channels in one group with those of {names[other]}; "
-                f"{how_anew(info.codec)}"
+                f"{how_anew(info.codec)}",
+                clip=clip.name,
             )
         if index in joints:
             groups.append(number)
@@ -163,12 +164,12 @@ def _checked(clip: Clip, columns: Sequence[int], values: Any) -> NDArray[np.floa
     try:
         given = np.asarray(values, np.float64)
     except (TypeError, ValueError):
-        raise MotionError(f"clip {clip.name!r}: the new values are not numbers") from None
+        raise MotionError("the new values are not numbers", clip=clip.name) from None
     shape = clip.n_frames * clip.signals[0].layout.samples_per_frame, len(columns)
     if given.ndim == 1 and shape[1] == 1:
         given = given[:, None]
     if given.shape != shape:
-        raise MotionError(f"clip {clip.name!r}: new values of shape {given.shape}, not {shape}")
+        raise MotionError(f"new values of shape {given.shape}, not {shape}", clip=clip.name)
     return given
 
 
@@ -188,16 +189,17 @@ def _edited(
         row, at = np.argwhere(differs)[0].tolist()
         now = "NaN" if not valid[row, at] else repr(float(given[row, at]))
         raise MotionError(
-            f"clip {clip.name!r}: frame {row // old.samples_per_frame} of "
+            f"frame {row // old.samples_per_frame} of "
             f"{clip.skeleton.channel_addresses()[columns[at]]} is {now}; its source file says "
-            f"{'valid' if was_valid[row, columns[at]] else 'invalid'}"
+            f"{'valid' if was_valid[row, columns[at]] else 'invalid'}",
+            clip=clip.name,
         )
     new, mask = old.values.copy(), was_valid.copy()
     if new.dtype == np.int64:
         given = np.where(valid, given, 0.0)
         whole = np.rint(given)
         if (np.abs(whole) > MAX_INTEGER).any() or (not on_grid and (whole != given).any()):
-            raise MotionError(f"clip {clip.name!r}: its values are integers up to 2^53")
+            raise MotionError("its values are integers up to 2^53", clip=clip.name)
         given = whole
     new[:, columns] = np.where(valid, given, new[:, columns])
     mask[:, columns] = valid

@@ -52,8 +52,7 @@ def repair(
         with replacing(target, force=force, inputs=(source,)) as stream, rereadable(stream) as own:
             return _repaired(data, own, max_decoded, progress)
     except FormatError as error:
-        if not str(error).startswith(data.name):
-            error.args = (f"{data.name}: {error}",)
+        error.add(path=data.name)
         raise
     finally:
         data.close()
@@ -64,7 +63,7 @@ def _refuse_same(source: ByteSource, target: Any) -> None:
         with suppress(OSError):
             if Path(source.target).samefile(target):
                 raise OptionError(
-                    f"{source.name}: the damaged file is not overwritten; name another"
+                    "the damaged file is not overwritten; name another", path=source.name
                 )
 
 

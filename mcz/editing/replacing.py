@@ -30,7 +30,12 @@ from mcz.editing.anew import check_anew, settings_of, source_file
 from mcz.editing.cutting import ClipCut, add_note, cut_segment, plan_cut
 from mcz.editing.extraction import Copier, with_stated_rate
 from mcz.editing.recoding import Edited, Recoded, edit, is_coded_with_others, recode_joint
-from mcz.errors import AccessError, MotionError, OptionError
+from mcz.errors import (
+    AccessError,
+    MotionError,
+    OptionError,
+    reason_of,
+)
 from mcz.reading.clip import Clip
 from mcz.reading.file import File, open
 from mcz.schema import build, parse
@@ -123,9 +128,9 @@ def _locked(source: Any, stack: ExitStack) -> Path:
         try:
             held = builtins.open(path, "r+b", buffering=0)  # noqa: SIM115 - closed by the stack
         except (OSError, ValueError) as error:
-            raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+            raise AccessError(reason_of(error), path=path) from None
         if not lock(stack.enter_context(held)):
-            raise AccessError(f"{path}: another process is appending to it")
+            raise AccessError("another process is appending to it", path=path)
     return path
 
 

@@ -29,7 +29,12 @@ from mcz.editing.protecting import (
     protection_of,
     redundancy_of,
 )
-from mcz.errors import AccessError, FormatError, OptionError
+from mcz.errors import (
+    AccessError,
+    FormatError,
+    OptionError,
+    reason_of,
+)
 from mcz.reading.file import File, open
 from mcz.reading.sizes import models_used
 from mcz.schema import parse
@@ -166,15 +171,15 @@ def source_of(target: Any, output: Any) -> Iterator[File]:
         return
     if not isinstance(target, (str, os.PathLike)) or "://" in str(target):
         raise OptionError(
-            f"{target}: only a file on disk can be rewritten in place; name an output"
+            "only a file on disk can be rewritten in place; name an output", path=target
         )
     try:
         stream = builtins.open(target, "r+b", buffering=0)  # noqa: SIM115 - closed by the with below
     except (OSError, ValueError) as error:
-        raise AccessError(f"{target}: {getattr(error, 'strerror', None) or error}") from None
+        raise AccessError(reason_of(error), path=target) from None
     with stream:
         if not lock(stream):
-            raise AccessError(f"{target}: another process is appending to it")
+            raise AccessError("another process is appending to it", path=target)
         with open(target) as file:
             yield file
 
@@ -214,7 +219,7 @@ def protected_anew(
         with replacing_file(Path(target), force=True) as stream:
             _, left_out = _written(stream, file, whole(file), lambda name: None)
             if lost := [text for text in left_out if text != UNPROTECTED]:
-                raise FormatError(f"{file.name}: rewriting it would lose {lost[0]}")
+                raise FormatError(f"rewriting it would lose {lost[0]}", path=file.name)
             return protection_of(protect_written(stream, redundancy, progress))
 
 

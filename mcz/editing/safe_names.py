@@ -9,7 +9,7 @@ import unicodedata
 from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 
-from mcz.errors import AccessError, ExistsError
+from mcz.errors import AccessError, ExistsError, reason_of
 
 ODD = re.compile(r'[<>:"|?*\\]')
 # Controls, what turns the direction of text, line ends and other characters that are not seen; but
@@ -171,7 +171,7 @@ def _found(place: Path) -> os.stat_result | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
-        raise AccessError(f"{place}: {getattr(error, 'strerror', None) or error}") from None
+        raise AccessError(reason_of(error), path=place) from None
 
 
 def _is_junction(place: Path) -> bool:

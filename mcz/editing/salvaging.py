@@ -58,7 +58,7 @@ def write_whole(file: File, stream: BinaryIO, found: Repair, progress: Progress 
         for text in repairer.found.left_out:
             (attempt.damage if text == UNPROTECTED else attempt.lost).append(f"left out: {text}")
         if not (attempt.clips or attempt.runs or attempt.attachments or attempt.skeletons):
-            raise FormatError(f"{file.name}: no clip, skeleton or attachment in it is whole")
+            raise FormatError("no clip, skeleton or attachment in it is whole", path=file.name)
         problems = _problems(stream, attempt.size, file.container.max_decoded)
         if not problems:
             break

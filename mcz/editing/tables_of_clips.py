@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mcz.brief import among, cell_text
 from mcz.container.metadata_keys import INTERPRETED, KEYS, PRIVATE, SPELLINGS
-from mcz.errors import OptionError
+from mcz.errors import OptionError, reason_of
 from mcz.reading.file import File
 from mcz.reading.names import listed, names_of
 
@@ -50,20 +50,21 @@ def from_table(
         found = known.get(name, ())
         if len(found) > 1:
             raise OptionError(
-                f"{path}: row {number}: {name!r} may be {listed(sorted(found))}; write one of "
-                "these, or make it of more columns with match, such as {folder}/{trial}"
+                f"row {number}: {name!r} may be {listed(sorted(found))}; write one of "
+                "these, or make it of more columns with match, such as {folder}/{trial}",
+                path=path,
             )
         if not found:
             unknown.append(name)
             continue
         clip = next(iter(found))
         if clip in said:
-            raise OptionError(f"{path}: two rows are about clip {clip!r}")
+            raise OptionError(f"two rows are about clip {clip!r}", path=path)
         cells = {key: row[column].strip() for key, column in columns.items()}
         said[clip] = {key: text for key, text in cells.items() if text}
     if unknown and not skip_unknown:
         raise OptionError(
-            f"{path}: no clip for {len(unknown)} of {len(rows)} rows: {listed(unknown)}"
+            f"no clip for {len(unknown)} of {len(rows)} rows: {listed(unknown)}", path=path
         )
     return said, unknown
 
@@ -72,22 +73,24 @@ def _rows(path: Path) -> list[dict[str, str]]:
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise OptionError(f"{path}: not UTF-8: {error}") from None
+        raise OptionError(f"not UTF-8: {error}", path=path) from None
     except OSError as error:
-        raise OptionError(f"{path}: {error.strerror or error}") from None
+        raise OptionError(reason_of(error), path=path) from None
     first = text.partition("\n")[0]
     delimiter = max(DELIMITERS, key=first.count)
     reader = csv.DictReader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
     try:
         rows = list(reader)
     except csv.Error as error:
-        raise OptionError(f"{path}: line {reader.line_num}: {error}") from None
+        raise OptionError(str(error), path=path, line=reader.line_num) from None
     head = reader.fieldnames or []
     if len(set(head)) != len(head):
-        raise OptionError(f"{path}: two columns have the same name")
+        raise OptionError("two columns have the same name", path=path)
     for number, row in enumerate(rows, 2):
         if None in row or None in row.values():
-            raise OptionError(f"{path}: row {number} has not the {len(head)} columns of the head")
+            raise OptionError(
+                f"row {number} has not the {len(head)} columns of the head", path=path
+            )
     return [{cell_text(key): cell_text(value) for key, value in row.items()} for row in rows]
 
 
@@ -100,14 +103,14 @@ def _fields(match: str) -> list[str]:
 
 
 def _namer(
-    path: object, head: Sequence[str], match: str | None
+    path: str | os.PathLike[str], head: Sequence[str], match: str | None
 ) -> Callable[[Mapping[str, str]], str]:
     """What tells the name of a row's clip."""
     if match is not None:
         form = match
         for name in _fields(form):
             if name not in head:
-                raise OptionError(f"{path}: no column {name!r}; there are {among(head, name)}")
+                raise OptionError(f"no column {name!r}; there are {among(head, name)}", path=path)
 
         def formatted(row: Mapping[str, str]) -> str:
             try:
@@ -119,14 +122,15 @@ def _namer(
     column = next((name for name in NAMES if name in head), None)
     if column is None:
         raise OptionError(
-            f"{path}: no column {', '.join(NAMES)} names the clips; say how by match, such as "
-            "{subject}_{trial}"
+            f"no column {', '.join(NAMES)} names the clips; say how by match, such as "
+            "{subject}_{trial}",
+            path=path,
         )
     return lambda row: row[column].strip()
 
 
 def _columns(
-    path: object, head: Sequence[str], match: str | None, take: Sequence[str] | None
+    path: str | os.PathLike[str], head: Sequence[str], match: str | None, take: Sequence[str] | None
 ) -> dict[str, str]:
     """The columns that are taken, by the key that each is."""
     if take is not None:
@@ -137,13 +141,14 @@ def _columns(
     odd = [name for name in columns if not _is_key(name) and name not in used]
     if odd:
         raise OptionError(
-            f"{path}: {among(odd, None)}: no key of the metadata; name the columns to take, such "
-            f"as description={odd[0]}"
+            f"{among(odd, None)}: no key of the metadata; name the columns to take, such "
+            f"as description={odd[0]}",
+            path=path,
         )
     return {name: name for name in columns if _is_key(name)}
 
 
-def _taken(path: object, head: Sequence[str], text: str) -> tuple[str, str]:
+def _taken(path: str | os.PathLike[str], head: Sequence[str], text: str) -> tuple[str, str]:
     """Key and column of ``key=column``, or of a column that is called as the key."""
     key, equals, column = text.partition("=")
     if text in head:
@@ -151,7 +156,7 @@ def _taken(path: object, head: Sequence[str], text: str) -> tuple[str, str]:
     elif not equals:
         column = text
     if column not in head:
-        raise OptionError(f"{path}: no column {column!r}; there are {', '.join(head)}")
+        raise OptionError(f"no column {column!r}; there are {', '.join(head)}", path=path)
     return key, column
 
 

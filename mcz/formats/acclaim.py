@@ -143,10 +143,10 @@ def read_text(text: str, name: str) -> Skeleton:
         try:
             reader.line(line)
         except SourceError as error:
-            error.args = (f"line {number}: {error}",)
+            error.add(line=number)
             raise
     if not reader.bones and reader.section not in (":bonedata", ":hierarchy", ":root"):
-        raise SourceError("line 1: no :root or :bonedata section; not an ASF file")
+        raise SourceError("no :root or :bonedata section; not an ASF file", line=1)
     unit_cm = INCH_UNIT_CM if _is_inch_unit(reader.length) else None
     try:
         joints = _joints(reader)

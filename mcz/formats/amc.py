@@ -139,7 +139,7 @@ class _Frames:
         return [(*word.span(), column + k) for k, word in enumerate(words[1:])]
 
     def _error(self, at: int, message: str) -> SourceError:
-        return SourceError(f"line {line_of(self.data, at)}: {message}")
+        return SourceError(message, line=line_of(self.data, at))
 
 
 def bones(data: bytes, *, whole: bool = False) -> dict[str, int]:

@@ -16,7 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcz.errors import AccessError, OptionError, SourceError
+from mcz.errors import (
+    AccessError,
+    OptionError,
+    SourceError,
+    reason_of,
+)
 from mcz.formats.body_trees import has_tree, tree
 
 Floats = NDArray[np.float64]
@@ -69,22 +74,22 @@ def offsets_of_model(
     """
     file = Path(path)
     if file.suffix.lower() in PICKLES:
-        raise SourceError(f"{file}: {UNPICKLED}")
+        raise SourceError(UNPICKLED, path=file)
     try:
         with zipfile.ZipFile(file) as archive:
             model = _Model(file, archive)
             parents = model.parents()
             joints = model.joints(betas)
     except OSError as error:
-        raise AccessError(f"{file}: {error.strerror or error}") from None
+        raise AccessError(reason_of(error), path=file) from None
     except UNREADABLE as error:
-        raise SourceError(f"{file}: no NPZ that can be read: {error}") from None
+        raise SourceError(f"no NPZ that can be read: {error}", path=file) from None
     if joints.shape != (len(parents), 3) or not np.isfinite(joints).all():
         raise SourceError(
-            f"{file}: joints of shape {joints.shape} for the {len(parents)} of kintree_table"
+            f"joints of shape {joints.shape} for the {len(parents)} of kintree_table", path=file
         )
     if n_joints > len(parents):
-        raise OptionError(f"{file}: a model of {len(parents)} joints, and {n_joints} are wanted")
+        raise OptionError(f"a model of {len(parents)} joints, and {n_joints} are wanted", path=file)
     _check_tree(file, parents, n_joints)
     return offsets_of_joints(joints[:n_joints], parents[:n_joints])
 
@@ -153,8 +158,9 @@ def _check_tree(file: Path, parents: list[int], n_joints: int) -> None:
     for joint, (found, due) in enumerate(zip(parents, body.parents, strict=False)):
         if found != due:
             raise OptionError(
-                f"{file}: joint {joint} hangs on joint {found}, and {body.names[joint]!r} of "
-                f"{body.title} on {due}: a model of other joints"
+                f"joint {joint} hangs on joint {found}, and {body.names[joint]!r} of "
+                f"{body.title} on {due}: a model of other joints",
+                path=file,
             )
 
 
@@ -200,12 +206,12 @@ class _Model:
     def parents(self) -> list[int]:
         table = self.array("kintree_table")
         if table.ndim != 2 or len(table) < 1 or not table.shape[1]:
-            raise SourceError(f"{self.file}: kintree_table of shape {table.shape}, not (2, n)")
+            raise SourceError(f"kintree_table of shape {table.shape}, not (2, n)", path=self.file)
         parents = [int(parent) for parent in table[0]]
         parents[0] = -1  # what stands there is 2^32 - 1, or -1
         for joint, parent in enumerate(parents[1:], 1):
             if not 0 <= parent < joint:
-                raise SourceError(f"{self.file}: joint {joint} hangs on {parent}, not before it")
+                raise SourceError(f"joint {joint} hangs on {parent}, not before it", path=self.file)
         return parents
 
     def joints(self, betas: ArrayLike | None) -> Floats:
@@ -214,13 +220,13 @@ class _Model:
             return np.asarray(self.array("J"), np.float64)
         if self.has("J") and not self.has("J_regressor"):
             if np.any(betas):
-                raise SourceError(f"{self.file}: {UNSHAPED}")
+                raise SourceError(UNSHAPED, path=self.file)
             return np.asarray(self.array("J"), np.float64)
         regressor, vertices = self.array("J_regressor"), self.array("v_template")
         if regressor.ndim != 2 or vertices.shape != (regressor.shape[1], 3):
             raise SourceError(
-                f"{self.file}: J_regressor of shape {regressor.shape} for v_template of shape "
-                f"{vertices.shape}"
+                f"J_regressor of shape {regressor.shape} for v_template of shape {vertices.shape}",
+                path=self.file,
             )
         shaped = np.asarray(vertices, np.float64)
         if betas is not None:
@@ -231,12 +237,12 @@ class _Model:
     def _shape(self, betas: Floats, n_vertices: int) -> Floats:
         directions = self.array("shapedirs")
         if directions.ndim != 3 or directions.shape[:2] != (n_vertices, 3):
-            raise SourceError(f"{self.file}: shapedirs of shape {directions.shape}")
+            raise SourceError(f"shapedirs of shape {directions.shape}", path=self.file)
         if betas.ndim != 1 or not np.isfinite(betas).all():
             raise OptionError(f"betas of shape {betas.shape}: finite numbers in a row are wanted")
         n_shapes = directions.shape[2]
         if betas[n_shapes:].any():
-            raise OptionError(f"{self.file}: {len(betas)} betas, and the model has {n_shapes}")
+            raise OptionError(f"{len(betas)} betas, and the model has {n_shapes}", path=self.file)
         betas = betas[:n_shapes]
         shape: Floats = directions[:, :, : len(betas)].astype(np.float64) @ betas
         return shape

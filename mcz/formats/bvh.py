@@ -125,10 +125,10 @@ def _motion_section(
     """Where the frame count and the frame time stand, and the offset of the first frame."""
     frames = _FRAMES.match(data, at)
     if frames is None:
-        raise SourceError(f"line {line_of(data, at)}: no 'Frames:' after MOTION")
+        raise SourceError("no 'Frames:' after MOTION", line=line_of(data, at))
     time = _FRAME_TIME.match(data, frames.end())
     if time is None:
-        raise SourceError(f"line {line_of(data, frames.end())}: no 'Frame Time:' after 'Frames:'")
+        raise SourceError("no 'Frame Time:' after 'Frames:'", line=line_of(data, frames.end()))
     blanks = _BLANKS.match(data, time.end())
     stop = blanks.end() if blanks else time.end()
     if n_columns and stop < len(data):
@@ -150,16 +150,14 @@ class _Frames:
             if match[0][:1] == b"#":
                 continue
             if not self.n_columns:
-                raise SourceError(
-                    f"line {line_of(self.data, match.start())}: no joint has channels"
-                )
+                raise SourceError("no joint has channels", line=line_of(self.data, match.start()))
             tokens.append((*match.span(), len(tokens)))
             if len(tokens) == self.n_columns:
                 return tokens, tail_end(self.data, match.end())
         if tokens:
             raise SourceError(
-                f"line {line_of(self.data, tokens[0][0])}: the last frame has {len(tokens)} of "
-                f"{self.n_columns} values"
+                f"the last frame has {len(tokens)} of {self.n_columns} values",
+                line=line_of(self.data, tokens[0][0]),
             )
         line_end = self.data.find(b"\n", at) + 1
         return ([], line_end) if line_end and not self.n_columns else None

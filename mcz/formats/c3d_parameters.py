@@ -173,7 +173,7 @@ def names_of(labels: list[str], n: int, what: str) -> list[str]:
 def find_parameters(data: bytes) -> tuple[Order, int]:
     """The byte order of a file and where its parameter section begins; raises SourceError."""
     if len(data) < BLOCK:
-        raise SourceError(f"offset {len(data)}: the file ends before the end of a C3D header")
+        raise SourceError("the file ends before the end of a C3D header", offset=len(data))
     if data[1] != 0x50:
         raise SourceError(f"offset 1: {data[1]:#04x} is not the 0x50 of a C3D file")
     start = (data[0] - 1) * BLOCK
@@ -184,7 +184,7 @@ def find_parameters(data: bytes) -> tuple[Order, int]:
     processor = data[start + 3]
     if processor not in (INTEL, DEC, SGI):
         raise SourceError(
-            f"offset {start + 3}: processor {processor} is none of 84 (Intel), 85 (DEC), 86 (SGI)"
+            f"processor {processor} is none of 84 (Intel), 85 (DEC), 86 (SGI)", offset=start + 3
         )
     return Order(processor), start
 

@@ -81,7 +81,7 @@ def read_columns_of(data: bytes, name: str = "motion") -> Motion:
     text_cells = [cells.index(text.column) for text in table.texts]
     values = [k for k in range(len(cells)) if cells[k] >= 0 and k not in (time, *text_cells)]
     if not values:
-        raise SourceError("line 1: no column of numbers beside the times")
+        raise SourceError("no column of numbers beside the times", line=1)
     at = len(values) + sum(text.n_numbers for text in table.texts)
     timed = time is not None and time not in text_cells
     rows = without_zeros(data, table.rows, (range(len(values)), [at] if timed else []))
@@ -122,8 +122,9 @@ def _check_decimals(data: bytes, rows: Rows, n_values: int, labels: Sequence[str
     start, stop = rows.start[:, :n_values][present], rows.stop[:, :n_values][present]
     if b"." not in b"".join(data[a:b] for a, b in zip(start, stop, strict=True)):
         raise SourceError(
-            f"line {line_of(data, int(start.max(initial=0)))}: column {labels[0][:40]!r} is text "
-            f"beside integers, without times or frame numbers; a list, and no motion"
+            f"column {labels[0][:40]!r} is text "
+            f"beside integers, without times or frame numbers; a list, and no motion",
+            line=line_of(data, int(start.max(initial=0))),
         )
 
 
@@ -186,7 +187,7 @@ def _rows(data: bytes, head: _Head, time: int | None) -> tuple[TableRows, list[i
         except SourceError:
             if first != FRAME_NUMBER:
                 raise
-    raise SourceError("line 1: no column of numbers beside the times")
+    raise SourceError("no column of numbers beside the times", line=1)
 
 
 def _head(data: bytes, encoding: str) -> _Head:
@@ -195,11 +196,12 @@ def _head(data: bytes, encoding: str) -> _Head:
     if found is None:
         if has_decimal_commas(lines):
             raise SourceError(
-                "line 1: the first numbers have decimal commas, which no grid prints; "
-                "save the table with points"
+                "the first numbers have decimal commas, which no grid prints; "
+                "save the table with points",
+                line=1,
             )
         hint = "no row of numbers in the first lines; no table" if lines else "an empty file"
-        raise SourceError(f"line 1: {hint}")
+        raise SourceError(hint, line=1)
     number, separator, n_cells = found
     above = [(at, line) for at, line in lines[:number] if not is_blank(line)]
     texts = [texts_of(line, separator, encoding) for _, line in above]
@@ -207,7 +209,7 @@ def _head(data: bytes, encoding: str) -> _Head:
     heads = [cells for cells in texts[-2:] if len(cells) >= n_cells]
     n_cells = count_columns(heads, data[rows:], separator)
     if n_cells > MAX_COLUMNS:
-        raise SourceError(f"line {number + 1}: {n_cells} columns, limit {MAX_COLUMNS}")
+        raise SourceError(f"{n_cells} columns, limit {MAX_COLUMNS}", line=number + 1)
     units, labels = [""] * n_cells, (0, 0)
     if len(texts) > 1 and len(texts[-2]) >= n_cells and _are_units(texts[-1]):
         units = [unit.strip("[]()") for unit in texts.pop()[:n_cells]]

@@ -89,8 +89,8 @@ def _check_line_ends(data: bytes) -> None:
         start = data.rfind(b"\n", 0, match.start()) + 1
         if data.count(b'"', start, match.start()) % 2 == 0:
             raise SourceError(
-                f"line {line_of(data, start)}: lines end with carriage returns alone; save it with "
-                f"line feeds"
+                "lines end with carriage returns alone; save it with line feeds",
+                line=line_of(data, start),
             )
 
 

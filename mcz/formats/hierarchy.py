@@ -59,14 +59,15 @@ class _Reader:
         return match[1]
 
     def error(self, message: str) -> SourceError:
-        return SourceError(f"line {line_of(self.data, self.at)}: {message}")
+        return SourceError(message, line=line_of(self.data, self.at))
 
     def check(self, what: str, number: int, most: int) -> None:
         """Raise SourceError, with the number of the line, for more than there may be."""
         try:
             check(what, number, most)
         except SourceError as error:
-            raise self.error(str(error)) from None
+            error.add(line=line_of(self.data, self.at))
+            raise
 
     def read(self) -> None:
         """Read up to and including the word MOTION."""

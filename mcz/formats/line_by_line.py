@@ -55,7 +55,7 @@ class Lines:
         return line
 
     def error(self, message: str) -> SourceError:
-        return SourceError(f"line {max(1, self.number)}: {message}")
+        return SourceError(message, line=max(1, self.number))
 
     def numbers(self, texts: Sequence[bytes]) -> Floats:
         """The values of the words of the last line, or of those that end with it."""

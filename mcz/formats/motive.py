@@ -142,10 +142,10 @@ def _head(data: bytes, encoding: str) -> _Head:
         lines.pop(0)  # of a spreadsheet
     axis = next((k for k, (_, line) in enumerate(lines) if _AXIS.match(line)), None)
     if axis is None or axis < 3:
-        raise SourceError(f"line {len(lines)}: no line Frame,Time below names; no Motive file")
+        raise SourceError("no line Frame,Time below names; no Motive file", line=len(lines))
     if axis + 1 == len(lines) or not begins_with_number(lines[axis + 1][1]):
         at = lines[axis][0]
-        raise SourceError(f"line {line_of(data, at) + 1}: no row of numbers after Frame,Time")
+        raise SourceError("no row of numbers after Frame,Time", line=line_of(data, at) + 1)
     first = texts_of(lines[0][1], separator, encoding)
     said = {key.lower(): value for key, value in zip(first[::2], first[1::2], strict=False)}
     rows = [texts_of(line, separator, encoding) for _, line in lines[1 : axis + 1]]

@@ -226,8 +226,9 @@ class _Reader:
         pattern = Pattern(runs_of(items), tail)
         if number >= MAX_PATTERNS or pattern.gap_size > MAX_ROW_GAPS:
             raise SourceError(
-                f"line {line_of(self.data, at)}: the layout is too irregular: more than "
-                f"{MAX_PATTERNS} layouts of a frame, or {MAX_ROW_GAPS} bytes beside its numbers"
+                f"the layout is too irregular: more than "
+                f"{MAX_PATTERNS} layouts of a frame, or {MAX_ROW_GAPS} bytes beside its numbers",
+                line=line_of(self.data, at),
             )
         self.patterns.append(pattern)
         self.arrays.append(pattern.arrays())

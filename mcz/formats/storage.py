@@ -98,7 +98,7 @@ def _read(data: bytes, name: str, format_name: str) -> Motion:
 def _header(data: bytes) -> _Header:
     end = _END.search(data)
     if end is None:
-        raise SourceError("line 1: no line 'endheader'; not a STO or MOT file, or cut off")
+        raise SourceError("no line 'endheader'; not a STO or MOT file, or cut off", line=1)
     values: dict[str, str] = {}
     count = (0, 0)
     for at, line in lines_from(data[: end.start()], 0):
@@ -119,9 +119,7 @@ def _header(data: bytes) -> _Header:
             if labels is None:
                 break
             return _Header(values, count, labels, at)
-    raise SourceError(
-        f"line {line_of(data, end.end())}: no names and row of numbers after endheader"
-    )
+    raise SourceError("no names and row of numbers after endheader", line=line_of(data, end.end()))
 
 
 def _columns(
@@ -139,8 +137,8 @@ def _columns(
     sizes = [cell.count(b",") + 1 for cell in cells]
     if max(sizes) > MAX_PARTS or sizes[0] != 1:
         raise SourceError(
-            f"line {line_of(data, header.rows)}: {max(sizes)} numbers in a cell, limit "
-            f"{MAX_PARTS}, and one in the first"
+            f"{max(sizes)} numbers in a cell, limit {MAX_PARTS}, and one in the first",
+            line=line_of(data, header.rows),
         )
     usual = max(set(sizes[1:]), key=sizes[1:].count, default=1)
     sizes += [usual] * (len(names) - len(sizes))

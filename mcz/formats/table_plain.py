@@ -98,7 +98,7 @@ def _times(motion: Motion) -> tuple[Clock | None, tuple[Signal, ...]]:
     """The clock that prints the times of ``motion``, or a signal of them."""
     timeline = motion.timeline
     if timeline is None:
-        raise MotionError(f"motion {motion.name!r}: its frame rate is unknown; a table has times")
+        raise MotionError("its frame rate is unknown; a table has times", clip=motion.name)
     times = timeline.times
     noise = EXACT + float(np.spacing(np.abs(times).max(initial=0.0)))
     exact = (np.abs(np.round(times, DECIMALS) - times) < noise).all()
@@ -128,7 +128,7 @@ def _clock(motion: Motion, timeline: Timeline, grid: Grid) -> Clock | None:
 
 def _rate(motion: Motion) -> Fraction:
     if motion.frame_rate is None:
-        raise MotionError(f"motion {motion.name!r}: its frame rate is unknown; a table has times")
+        raise MotionError("its frame rate is unknown; a table has times", clip=motion.name)
     return motion.frame_rate
 
 

@@ -73,7 +73,7 @@ class RowCells:
                 return None
             at = end
         if not (self.free or begins_with_number(line)):
-            raise SourceError(f"line {line_of(self.data, at)}: not a row of numbers: {line[:40]!r}")
+            raise SourceError(f"not a row of numbers: {line[:40]!r}", line=line_of(self.data, at))
         tokens: list[Token] = []
         for (start, stop), columns in zip(self._cells(at, line), self.columns, strict=False):
             tokens += self._cell(start, stop, columns)
@@ -103,7 +103,7 @@ class RowCells:
                 found.append((start, start + len(bare)))
                 at += len(cell) + len(self.separator)
         if rest:
-            raise SourceError(f"line {line_of(self.data, first)}: more than {most} cells")
+            raise SourceError(f"more than {most} cells", line=line_of(self.data, first))
         return found
 
     def _cell(self, start: int, stop: int, columns: Sequence[int]) -> list[Token]:
@@ -114,8 +114,8 @@ class RowCells:
         n_parts = self.data.count(_PART, start, stop) + 1
         if n_parts != len(columns):
             raise SourceError(
-                f"line {line_of(self.data, start)}: {n_parts} numbers in a cell, expected "
-                f"{len(columns)}"
+                f"{n_parts} numbers in a cell, expected {len(columns)}",
+                line=line_of(self.data, start),
             )
         parts = self.data[start:stop].split(_PART)
         tokens, at = [], start
@@ -167,7 +167,7 @@ def read_table(
 
     rows = attempt(True)
     if not rows.n_rows:
-        raise SourceError(f"line {line_of(data, min(at, len(data)))}: no row of numbers")
+        raise SourceError("no row of numbers", line=line_of(data, min(at, len(data))))
     blank = (rows.stop > 0) & (rows.start == rows.stop)
     odd = odd_cells(data, rows)
     texts = odd.text_columns() if numbers_at is not None else []

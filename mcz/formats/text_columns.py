@@ -154,8 +154,9 @@ def split_text(
     if len(layouts) > MAX_PATTERNS:
         most = max(zip(columns, shapes, strict=True), key=lambda entry: len(entry[1][1]))[0]
         raise SourceError(
-            f"line {line_of(data, int(rows.start[:, most].max()))}: the texts of column "
-            f"{columns[most]} differ in more than {MAX_PATTERNS} ways beside their digits"
+            f"the texts of column "
+            f"{columns[most]} differ in more than {MAX_PATTERNS} ways beside their digits",
+            line=line_of(data, int(rows.start[:, most].max())),
         )
     of_row = of_row.ravel()
     order = np.argsort(-np.bincount(of_row), kind="stable")

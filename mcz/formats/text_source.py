@@ -48,7 +48,7 @@ def check_text(data: bytes) -> None:
     """Raise SourceError for UTF-16 and UTF-32, whose bytes no template restores."""
     wide = _wide_encoding(data)
     if wide is not None:
-        raise SourceError(f"line 1: the text is {wide}; save it as UTF-8 or ASCII")
+        raise SourceError(f"the text is {wide}; save it as UTF-8 or ASCII", line=1)
 
 
 def check_first_line(data: bytes, ignored: tuple[bytes, ...]) -> None:
@@ -60,7 +60,7 @@ def check_first_line(data: bytes, ignored: tuple[bytes, ...]) -> None:
     line = data[len(BOM) :].split(b"\n", 1)[0].strip().lower()
     if data.startswith(BOM) and line and not line.startswith(ignored):
         raise SourceError(
-            f"line 1: a byte order mark of UTF-8 hides {line[:40]!r}; save the file without it"
+            f"a byte order mark of UTF-8 hides {line[:40]!r}; save the file without it", line=1
         )
 
 

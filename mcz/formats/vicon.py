@@ -133,17 +133,17 @@ def _parts(data: bytes, encoding: str) -> list[_Part]:
                 break
             rows = data.find(b"\n", rows) + 1 or len(data)
         if not begins_with_number(data[rows : rows + 64]):
-            raise SourceError(f"line {line_of(data, end)}: no row of numbers below Frame,Sub Frame")
+            raise SourceError("no row of numbers below Frame,Sub Frame", line=line_of(data, end))
         stop = _END.search(data, rows)
         if len(parts) == MAX_SECTIONS:
             raise SourceError(
-                f"line {line_of(data, end)}: more sections than {MAX_SECTIONS}, the limit"
+                f"more sections than {MAX_SECTIONS}, the limit", line=line_of(data, end)
             )
         lines = (match[1], match.start(), match.end(), rows)
         parts.append(_part(data, at, lines, stop.start() if stop else len(data), encoding))
         at = parts[-1].stop
     if not parts:
-        raise SourceError("line 1: no line that begins with Frame,Sub Frame; no file of Vicon")
+        raise SourceError("no line that begins with Frame,Sub Frame; no file of Vicon", line=1)
     return parts
 
 
@@ -195,8 +195,9 @@ def _read(data: bytes, part: _Part) -> _Read:
     )
     if not counted:
         raise SourceError(
-            f"line {line_of(data, part.rows)}: section {part.title[:40]!r}: its {rows.n_rows} rows "
-            f"are not as many a frame in all frames"
+            f"section {part.title[:40]!r}: its {rows.n_rows} rows "
+            f"are not as many a frame in all frames",
+            line=line_of(data, part.rows),
         )
     tokens = scan(data, rows.start[:, n], rows.stop[:, n])
     texts = [b"%d" % k for k in range(n_each)]
@@ -236,8 +237,9 @@ def _check_frames(data: bytes, one: _Read, numbers: Ints) -> None:
     own = one.numbers[:: one.n_each]
     if not np.array_equal(own, numbers):
         raise SourceError(
-            f"line {line_of(data, one.part.rows)}: section {one.part.title[:40]!r} has "
-            f"{len(own)} frames from {own[0]} on, another {len(numbers)} from {numbers[0]} on"
+            f"section {one.part.title[:40]!r} has "
+            f"{len(own)} frames from {own[0]} on, another {len(numbers)} from {numbers[0]} on",
+            line=line_of(data, one.part.rows),
         )
 
 

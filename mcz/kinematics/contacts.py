@@ -114,7 +114,7 @@ def contacts(
     """
     skeleton, signal = motion.skeleton, motion.signals[0]
     if signal.channels is not None:
-        raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
+        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     tracks = FootTracks(skeleton, joints, motion.n_frames)
     step = max(1, BLOCK // max(1, skeleton.n_channels + 12 * skeleton.n_joints))
     for start in range(0, motion.n_frames, step):

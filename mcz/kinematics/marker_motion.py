@@ -36,7 +36,7 @@ def in_positions(motion: Motion, *, virtual_markers: bool = False) -> Motion:
     if point_set(skeleton) == "markers":
         return motion
     if first.channels is not None:
-        raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
+        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     channels = np.asarray(motion.values, np.float64)
     values = marker_values(skeleton, channels, virtual_markers=virtual_markers)
     valid = ~np.isnan(values)

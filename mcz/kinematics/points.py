@@ -37,7 +37,7 @@ def positions(motion: Motion) -> Floats:
     its channels are plain scalars.
     """
     if motion.signals[0].channels is not None:
-        raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
+        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     return positions_of(motion.skeleton, np.asarray(motion.values, np.float64))
 
 

@@ -96,7 +96,7 @@ class StrictFrames:
         frame = row.header.first
         fresh = bool(row.header.flags & FRESH)
         if not (frame or fresh):
-            raise FormatError(f"clip {clip.clip.name!r}: the first segment needs one before it")
+            raise FormatError("the first segment needs one before it", clip=clip.clip.name)
         values = clip.decoder.push(stream, fresh)
         if clip.shown is not None:
             if frame not in clip.shown:

@@ -126,7 +126,7 @@ class Tokens:
         if (odd & loops.BAD).any():
             first = int(np.flatnonzero(odd & loops.BAD)[0])
             raise SourceError(
-                f"offset {self.start[first]}: {self.token(first)[:40]!r} is not a number"
+                f"{self.token(first)[:40]!r} is not a number", offset=self.start[first]
             )
         out, slow = scale(mantissa, power - (shape >> loops.FRACTION_DIGITS))
         slow |= (odd & loops.LONG) != 0  # TEXT-03

@@ -53,16 +53,16 @@ def joint_of(motion: Motion, joint: int | str | None) -> tuple[int, str, tuple[C
     """
     skeleton = motion.skeleton
     if motion.signals[0].channels is not None:
-        raise MotionError(f"{motion.name!r}: its channels are not those of its skeleton")
+        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
     having = [index for index, each in enumerate(skeleton.joints) if each.channels]
     if not having:
-        raise MotionError(f"{motion.name!r}: no joint has channels")
+        raise MotionError("no joint has channels", clip=motion.name)
     if len(having) > 1 and skeleton.joints[having[0]].name.lower() == "time":
         having = having[1:]
     index = having[0] if joint is None else skeleton.find(joint)
     name, channels = skeleton.addresses()[index], skeleton.joints[index].channels
     if not channels:
-        raise MotionError(f"{motion.name!r}: joint {name!r} has no channels")
+        raise MotionError(f"joint {name!r} has no channels", clip=motion.name)
     return index, name, channels
 
 
@@ -244,7 +244,7 @@ def spectrum_chart(motion: Motion, wanted: Wanted) -> Chart:
         motion = motion.cut(start, stop)
     if motion.n_frames < LEAST:
         what = f"a spectrum of {motion.n_frames} frames"
-        raise MotionError(f"{motion.name!r}: {what}; {LEAST} are needed")
+        raise MotionError(f"{what}; {LEAST} are needed", clip=motion.name)
     period = None if motion.timeline is None else motion.timeline.period
     turned = motion
     if motion.signals[0].channels is None and motion.skeleton.n_channels:
@@ -257,7 +257,7 @@ def spectrum_chart(motion: Motion, wanted: Wanted) -> Chart:
     given = [*shown.series, *([] if shown.joint is None else _speed(motion, shown.joint))]
     series = [found for each in given if (found := _spectrum(each, rate)) is not None]
     if not series:
-        raise MotionError(f"{motion.name!r}: {shown.name!r} has no known value")
+        raise MotionError(f"{shown.name!r} has no known value", clip=motion.name)
     per = "cycles a frame" if period is None else "Hz"
     heads = [f"{what}, {per}" for what in ("strongest", "half below", "99 % below")]
     rows: list[list[Any]] = [["of", "in", *heads]]

@@ -94,7 +94,7 @@ def _chart(
 ) -> Chart:
     if what == "bytes":
         if not isinstance(moving, Clip):
-            raise OptionError(f"{moving.name!r}: where the bytes go is asked of a clip of an .mcz")
+            raise OptionError("where the bytes go is asked of a clip of an .mcz", clip=moving.name)
         return bytes_chart(moving)
     motion = _motion(moving, cut, facts)
     if other is not None:

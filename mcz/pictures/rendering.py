@@ -130,9 +130,9 @@ def _kind(path: str | os.PathLike[str], sheet: int | None) -> str:
     suffix = Path(path).suffix.lower()
     if suffix not in (*FILMS, *STILLS):
         known = ", ".join((*FILMS, *STILLS))
-        raise OptionError(f"{path}: a picture is one of {known}, by its suffix")
+        raise OptionError(f"a picture is one of {known}, by its suffix", path=path)
     if sheet is not None and suffix in FILMS:
-        raise OptionError(f"{path}: a sheet is a .png or a .svg, no film")
+        raise OptionError("a sheet is a .png or a .svg, no film", path=path)
     if sheet is not None and not 1 <= sheet <= MOST_POSES:
         raise OptionError(f"a sheet of {sheet} poses: 1 to {MOST_POSES}")
     for name in NEEDED.get(suffix, ("matplotlib", "PIL")):

@@ -109,7 +109,7 @@ def track_of(moving: Moving, frames: Ints, unit: str | None, up: str | None) -> 
 
 
 def unknown(moving: Moving) -> MotionError:
-    return MotionError(f"{moving.name!r}: no position is known in these frames: nothing to draw")
+    return MotionError("no position is known in these frames: nothing to draw", clip=moving.name)
 
 
 def _measured(track: Track) -> Track:

@@ -77,11 +77,12 @@ def resample(
     others = [signal.name for signal in motion.signals[1:] if not is_time(signal)]
     if others and not drop_signals:
         raise OptionError(
-            f"motion {motion.name!r}: signals beside the motion ({', '.join(others)}) are not "
-            "resampled; leave them out with drop_signals=True"
+            f"signals beside the motion ({', '.join(others)}) are not "
+            "resampled; leave them out with drop_signals=True",
+            clip=motion.name,
         )
     if first.samples_per_frame > 1:
-        raise MotionError(f"motion {motion.name!r}: several samples a frame")
+        raise MotionError("several samples a frame", clip=motion.name)
     numbers, times = times_of(timeline, wanted, first)
     own = first.channels is not None
     old = np.asarray(motion.values, np.float64)

@@ -300,9 +300,7 @@ class Clip(StoredClip, Posed):
         check_decoded(f"clip {self.name!r}: source", info.size, self.container.max_decoded)
         motion = self._motion(frames, resolution, decimate)
         if motion.source is None and self.container.salvage:
-            raise FormatError(
-                f"clip {self.name!r}: its source file is lost; --to gives its numbers"
-            )
+            raise FormatError("its source file is lost; --to gives its numbers", clip=self.name)
         is_file = self.gives_file(frames, resolution)
         if not is_file:
             motion = stating_rate(motion, self.frame_numbers)
@@ -320,8 +318,9 @@ class Clip(StoredClip, Posed):
         digest = hashlib.sha256(data).digest()
         if len(data) != info.size or digest != info.sha256:  # SRC-01, SRC-02
             raise ChecksumError(
-                f"clip {self.name!r}: the restored {info.path} has {len(data)} bytes and hash "
-                f"{digest.hex()}, stored are {info.size} and {info.sha256.hex()}"
+                f"the restored {info.path} has {len(data)} bytes and hash "
+                f"{digest.hex()}, stored are {info.size} and {info.sha256.hex()}",
+                clip=self.name,
             )
 
 
@@ -329,5 +328,5 @@ def _reopened(container: Container, name: str) -> Clip:
     """What a pickled Clip becomes; raises OptionError where the file has changed meanwhile."""
     row = container.directory.clips.get(name)
     if row is None:
-        raise OptionError(f"{container.source.name}: the clip {name!r} is no longer there")
+        raise OptionError(f"the clip {name!r} is no longer there", path=container.source.name)
     return Clip(container, row)

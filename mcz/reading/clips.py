@@ -36,12 +36,12 @@ class Clips(Mapping[str, Clip]):
     def __getitem__(self, name: str) -> Clip:
         """The clip that ``name`` means; raises UnknownNameError, which suggests a name."""
         if not isinstance(name, str):
-            raise UnknownNameError(f"{self.file_name}: {name!r} is not the name of a clip")
+            raise UnknownNameError(f"{name!r} is not the name of a clip", path=self.file_name)
         if name not in self.rows:
             try:
                 name = clip_called(self, name)
             except OptionError as error:
-                raise UnknownNameError(f"{self.file_name}: {error}") from None
+                raise UnknownNameError(error.message, path=self.file_name) from None
         found = self._alive.get(name)
         if found is None:
             made = Clip(self._container, self.rows[name])

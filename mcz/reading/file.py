@@ -27,6 +27,7 @@ from mcz.errors import (
     MotionError,
     OptionError,
     TruncatedError,
+    reason_of,
 )
 from mcz.formats import FORMATS
 from mcz.motion import Skeleton
@@ -257,7 +258,9 @@ class File:
         found = taken(clips, where, self.clips.values())
         if not found:
             said = shown(where) if isinstance(where, str) else "what is asked for"
-            raise OptionError(f"{self.name}: none of {counted(len(clips), 'clip')} matches {said}")
+            raise OptionError(
+                f"none of {counted(len(clips), 'clip')} matches {said}", path=self.name
+            )
         return found
 
     def skeleton_ids(self, clips: Iterable[Clip]) -> set[bytes]:
@@ -300,7 +303,7 @@ def open(
         return _opened(source, options)
     except MczError as error:
         source.close()
-        error.args = (f"{source.name}: {error}",)
+        error.add(path=source.name)
         raise
     except BaseException:
         source.close()
@@ -312,8 +315,7 @@ def reached(target: Any) -> ByteSource:
     try:
         return open_source(target)
     except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
-        text = getattr(error, "strerror", None) or error
-        raise AccessError(f"{target}: {text}") from None
+        raise AccessError(reason_of(error), path=target) from None
 
 
 def file_of(container: Container) -> File:

@@ -101,5 +101,5 @@ def values_of_exceptions(texts: Sequence[bytes], name: str) -> NDArray[np.float6
     values, bad = values_of_texts(texts)  # TEXT-05
     if bad.any():
         text = texts[int(np.argmax(bad))]
-        raise FormatError(f"clip {name!r}: exception {text[:40]!r} is not a number")
+        raise FormatError(f"exception {text[:40]!r} is not a number", clip=name)
     return values

@@ -166,13 +166,15 @@ def _settings(
     """Rows a second, and the length unit in cm; raises OptionError where either is unknown."""
     if rate is None:  # FILT-03
         raise OptionError(
-            f"motion {name!r}: its frame rate is unknown, and the post filter's cutoffs are in "
-            "Hz; give the rate (--rate)"
+            "its frame rate is unknown, and the post filter's cutoffs are in "
+            "Hz; give the rate (--rate)",
+            clip=name,
         )
     if skeleton.unit_cm is None:  # FILT-03
         raise OptionError(
-            f"motion {name!r}: its length unit is unknown, and the post filter's thresholds are "
-            "20 and 120 mm; give the unit (mcz encode --unit)"
+            "its length unit is unknown, and the post filter's thresholds are "
+            "20 and 120 mm; give the unit (mcz encode --unit)",
+            clip=name,
         )
     return rate.numerator / rate.denominator * per_frame, skeleton.unit_cm  # FILT-07
 

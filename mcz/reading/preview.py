@@ -74,8 +74,9 @@ def _frames(info: SignalInfo, n_frames: int, name: str) -> tuple[NDArray[np.int6
         return frames, int(frames[1] - frames[0]) if len(frames) > 1 else 1
     if info.counts.n_resolutions == 1:
         raise OptionError(
-            f"clip {name!r}: codec {codec.name} has stored it in one resolution, so that "
-            "there is nothing to show without decoding it"
+            f"codec {codec.name} has stored it in one resolution, so that "
+            "there is nothing to show without decoding it",
+            clip=name,
         )
     step = 2 ** (info.counts.n_resolutions - 1)
     return np.arange(0, n_frames, step, dtype=np.int64), step

@@ -50,7 +50,7 @@ def quick_check(
                 return _checked(file.container.source, progress)
         return _checked(source, progress)
     except MczError as error:
-        error.args = (f"{source.name}: {error}",)
+        error.add(path=source.name)
         raise
     finally:
         source.close()

@@ -45,7 +45,7 @@ def read(
     else:
         source_format, data = load(path)
         if source_format.is_skeleton:
-            raise OptionError(f"{path}: a skeleton without motion (mcz.read_skeleton reads it)")
+            raise OptionError("a skeleton without motion (mcz.read_skeleton reads it)", path=path)
         taken = take(path, skeleton, data=data)
         if taken.remark:
             warnings.warn(f"{path}: {taken.remark}", SkeletonWarning, stacklevel=2)

@@ -341,8 +341,8 @@ class SignalReader:
         if self.info.is_integer:
             if self.info.codec.domain == "values":  # CODEC-01
                 raise FormatError(
-                    f"clip {self.name!r}: signal {self.info.name!r} is of integers, codec "
-                    f"{self.info.codec.name} decodes none"
+                    f"signal {self.info.name!r} is of integers, {self.info.codec.name} has none",
+                    clip=self.name,
                 )
             Grid(GridKind.INTEGER).magnitudes(coded)  # refuses what is out of range
         if self.info.codec.domain == "ordinals" and not self.info.is_integer:
@@ -374,7 +374,7 @@ class SignalReader:
                 notes = self._group_notes(index, group)
                 # NOTES-07
                 if self.info.is_integer and any(g.kind != GridKind.INTEGER for _, g in notes[0]):
-                    raise FormatError(f"clip {self.name!r}: another grid in a signal of integers")
+                    raise FormatError("another grid in a signal of integers", clip=self.name)
                 noted.add(shift, [column[c] for c in layout.groups[group]], notes)
         return noted.exceptions(), noted.grid_changes()
 

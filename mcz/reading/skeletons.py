@@ -152,8 +152,9 @@ class _Tried:
         """2: bones and dofs fit; 1: bones do; 0: some are lacking."""
         return 0 if self.match.lacking or self.skeleton is None else 2 - bool(self.match.differing)
 
-    def __str__(self) -> str:
-        path = self.candidate.path
+    def describe(self, folder: Path) -> str:
+        """The file, as seen from ``folder``, and how its bones match."""
+        path = _seen_from(folder, self.candidate.path)
         if self.fault:
             return f"{path} (which cannot be read)"
         if self.match.lacking:
@@ -220,7 +221,8 @@ def _with_misfits(
     match = matched(chosen.skeleton, source_format.bones(data, whole=True))
     label = _text(str(chosen.path or chosen.skeleton.name or "the skeleton"))
     if match.lacking and not asked:
-        raise SourceError(f"{path}: {label} lacks {_listed(match.lacking)}; {OPTION}")
+        found = label if chosen.path is None else _text(_seen_from(path.parent, chosen.path))
+        raise SourceError(f"{found} lacks {_listed(match.lacking)}; {OPTION}", path=path)
     remark = chosen.remark
     if match.lacking:
         remark = f"{label} lacks {_listed(match.lacking)}; they are scalars without kinematics"
@@ -243,8 +245,15 @@ def _ambiguous(path: Path, tried: Sequence[_Tried], text: str) -> AmbiguousError
 
 
 def _riddle(path: Path, tried: Sequence[_Tried], text: str) -> SourceError:
-    shown = first_of([_text(str(one)) for one in tried], SHOWN)
-    return SourceError(f"{path}: {text}: {shown}; {OPTION}")
+    shown = first_of([_text(one.describe(path.parent)) for one in tried], SHOWN)
+    return SourceError(f"{text}: {shown}; {OPTION}", path=path)
+
+
+def _seen_from(folder: Path, path: Path) -> str:
+    try:
+        return os.path.relpath(path, folder)
+    except ValueError:  # on another drive
+        return str(path)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -8,7 +8,12 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from mcz.errors import MczError, OptionError, SourceError
+from mcz.errors import (
+    MczError,
+    OptionError,
+    SourceError,
+    reason_of,
+)
 from mcz.formats import (
     FORMATS,
     HEAD_BYTES,
@@ -28,7 +33,7 @@ def read_skeleton(path: str | os.PathLike[str]) -> Skeleton:
     path = Path(path)
     source_format, data = load(path)
     if not source_format.is_skeleton:
-        raise OptionError(f"{path}: not a skeleton file")
+        raise OptionError("not a skeleton file", path=path)
     skeleton: Skeleton = _named(path, source_format.read, data, path.stem)
     if skeleton.source is None:
         return skeleton
@@ -69,19 +74,19 @@ def read_source(
 def _named(path: Path, reader: Any, data: bytes, *arguments: Any) -> Any:
     """What ``reader`` makes of ``data``; its errors say which file."""
     if not data:
-        raise SourceError(f"{path}: the file is empty")
+        raise SourceError("the file is empty", path=path)
     try:
         return reader(data, *arguments)
     except MczError as error:
-        error.args = (f"{path}: {error}{_other_content(path, data)}",)
+        error.add(path=path, note=_other_content(path, data))
         raise
 
 
-def _other_content(path: Path, data: bytes) -> str:
-    """A hint where a file that cannot be read begins as one of another suffix does."""
+def _other_content(path: Path, data: bytes) -> str | None:
+    """A note where a file that cannot be read begins as one of another suffix does."""
     formats = [FORMATS[name] for name in likely_formats(data)]
     found = [known.suffix for known in formats if known.is_motion is None or known.is_motion(data)]
-    return f"; it looks like {found[0]}" if found and path.suffix.lower() not in found else ""
+    return f"it looks like {found[0]}" if found and path.suffix.lower() not in found else None
 
 
 def _start_of(path: Path) -> bytes:
@@ -97,7 +102,7 @@ def read_bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise SourceError(f"{path}: {error.strerror or error}") from None
+        raise SourceError(reason_of(error), path=path) from None
 
 
 def with_facts(

@@ -44,7 +44,7 @@ class StoredClip:
     def _cend(self) -> Any:
         fields = self.container.cend(self._row)
         if fields is not None and len(fields.source_sha256) != len(self._fields.source):  # CEND-01
-            raise FormatError(f"clip {self.name!r}: a source without a hash, or a hash without it")
+            raise FormatError("a source without a hash, or a hash without it", clip=self.name)
         return fields
 
     @cached_property
@@ -68,7 +68,7 @@ class StoredClip:
         if not self._row.rate_numerator:
             return None
         if not self._row.rate_denominator:
-            raise FormatError(f"clip {self.name!r}: frame rate with the denominator 0")
+            raise FormatError("frame rate with the denominator 0", clip=self.name)
         return Fraction(self._row.rate_numerator, self._row.rate_denominator)
 
     @property
@@ -216,6 +216,6 @@ class StoredClip:
         hashes = tuple(bytes(each) for each in self._cend.value_sha256)
         if len(hashes) != len(self.signals):  # CEND-02
             raise FormatError(
-                f"clip {self.name!r}: {len(hashes)} hashes of {len(self.signals)} signals"
+                f"{len(hashes)} hashes of {len(self.signals)} signals", clip=self.name
             )
         return hashes

@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mcz.errors import AccessError
+from mcz.errors import AccessError, reason_of
 from mcz.recovery.code import LANE, encoded, runs_of
 from mcz.recovery.field import Ints
 from mcz.recovery.packets import Key, build_packet, short_hash
@@ -68,9 +68,11 @@ def _recovery_blocks(shape: Shape, read: READ, step: Step | None) -> Iterator[RE
                 spool.write(data)
             spool.flush()
         except OSError as error:
-            place = f"{tempfile.gettempdir()}: {error.strerror or error}"
-            text = f"{place}; recovery data take {total:,} bytes there while they are made"
-            raise AccessError(text) from error
+            raise AccessError(
+                reason_of(error),
+                path=tempfile.gettempdir(),
+                note=f"recovery data take {total:,} bytes there while they are made",
+            ) from error
 
         def block_of(index: int) -> bytes:
             spool.seek(index * shape.block_size)

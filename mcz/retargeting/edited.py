@@ -29,7 +29,7 @@ def moves(channels: tuple[Channel, ...]) -> bool:
 def check_channels(motion: Motion) -> None:
     """Raise MotionError where the motion's channels are not those of its joints."""
     if motion.signals[0].channels is not None:
-        raise MotionError(f"motion {motion.name!r}: its channels are not those of its skeleton")
+        raise MotionError("its channels are not those of its skeleton", clip=motion.name)
 
 
 def edited(motion: Motion, skeleton: Skeleton, signal: Signal) -> Motion:

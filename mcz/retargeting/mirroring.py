@@ -67,8 +67,9 @@ def _check(motion: Motion) -> None:
     if len(motion.signals) > 1:
         names = ", ".join(signal.name for signal in motion.signals[1:])
         raise MotionError(
-            f"motion {motion.name!r}: how its signals {names} look in a mirror is not known; "
-            "mirror the motion without them (dataclasses.replace, signals=motion.signals[:1])"
+            f"how its signals {names} look in a mirror is not known; "
+            "mirror the motion without them (dataclasses.replace, signals=motion.signals[:1])",
+            clip=motion.name,
         )
     for name, joint in zip(motion.skeleton.joint_names, motion.skeleton.joints, strict=True):
         if any(not channel.kind for channel in joint.channels):

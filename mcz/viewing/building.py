@@ -56,7 +56,7 @@ def _build(folder: Path, npm: str, node: str, say: Callable[[str], None]) -> Non
     (folder / "dist").mkdir(exist_ok=True)
     with (folder / "dist" / "building").open("wb") as stream:
         if not lock(stream):
-            raise AccessError(f"{folder}: another process builds the page; try again soon")
+            raise AccessError("another process builds the page; try again soon", path=folder)
         packages = folder / "node_modules" / ".package-lock.json"
         if not packages.is_file() or _is_older(packages, iter([folder / "package-lock.json"])):
             say(f"fetching what the page is built with, once: npm ci in {folder}")

@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Protocol
 
 from mcz.container.source import ByteSource
-from mcz.errors import AccessError, MczError
+from mcz.errors import AccessError, MczError, reason_of
 
 PIECE = 2**18  # bytes that are in memory at a time
 
@@ -33,8 +33,7 @@ class OnDisk:
         try:
             self._stream = open(path, "rb")  # noqa: SIM115 (closed by close)
         except (OSError, ValueError) as error:
-            text = getattr(error, "strerror", None) or error
-            raise AccessError(f"{path}: {text}") from None
+            raise AccessError(reason_of(error), path=path) from None
         found = os.fstat(self._stream.fileno())
         self.size = found.st_size
         self.tag = f'"{found.st_size:x}-{found.st_mtime_ns:x}-{found.st_ino:x}"'

@@ -89,7 +89,7 @@ def frames_read(moving: Moving) -> int:
 def _values(moving: Moving, n_read: int, every: int) -> NDArray[np.float64]:
     """Every so many frames, (n, n_channels), NaN where invalid."""
     if moving.signals[0].channels is not None:
-        raise MotionError(f"{moving.name!r}: its channels are not those of its skeleton")
+        raise MotionError("its channels are not those of its skeleton", clip=moving.name)
     if isinstance(moving, Motion):
         signal = moving.signals[0]
         values = np.asarray(signal.values[:n_read:every], np.float64)

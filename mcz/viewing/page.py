@@ -6,7 +6,7 @@ import os
 import re
 from pathlib import Path
 
-from mcz.errors import AccessError, FormatError
+from mcz.errors import AccessError, FormatError, reason_of
 from mcz.viewing.building import built
 from mcz.viewing.shelf import Say
 
@@ -47,6 +47,6 @@ def page(say: Say | None = None) -> Page:
     try:
         return Page(path.read_text("utf-8"), str(path))
     except OSError as error:
-        raise AccessError(f"{path}: {error.strerror}") from None
+        raise AccessError(reason_of(error), path=path) from None
     except UnicodeDecodeError:
-        raise FormatError(f"{path}: it is no page") from None
+        raise FormatError("it is no page", path=path) from None

@@ -12,7 +12,7 @@ from socketserver import TCPServer
 from threading import BoundedSemaphore, Thread
 from typing import Any
 
-from mcz.errors import AccessError, OptionError
+from mcz.errors import AccessError, OptionError, reason_of
 from mcz.viewing.handler import Handler
 from mcz.viewing.page import Page
 from mcz.viewing.shelf import Shelf
@@ -48,7 +48,7 @@ class Server(ThreadingHTTPServer):
     ) -> None:
         if host not in HOSTS:
             text = f"the page is served to this machine alone: one of {', '.join(HOSTS)}"
-            raise OptionError(f"{host}: {text}")
+            raise OptionError(text, path=host)
         self.address_family = socket.AF_INET6 if ":" in HOSTS[host] else socket.AF_INET
         self.site = Site(
             page,
@@ -61,8 +61,7 @@ class Server(ThreadingHTTPServer):
         try:
             super().__init__((HOSTS[host], port), Handler)
         except (OSError, OverflowError) as error:
-            said = getattr(error, "strerror", None) or error
-            raise AccessError(f"{host}:{port}: {said}") from None
+            raise AccessError(reason_of(error), path=f"{host}:{port}") from None
         self.site.port = int(self.server_address[1])
         named = f"[{host}]" if ":" in host else host
         self.url = f"http://{named}:{self.site.port}/{self.site.token}/"

@@ -16,7 +16,13 @@ from threading import Lock, RLock
 from typing import Any, BinaryIO, Protocol
 
 from mcz.container.source import ByteSource
-from mcz.errors import AccessError, LimitError, MczError, OptionError
+from mcz.errors import (
+    AccessError,
+    LimitError,
+    MczError,
+    OptionError,
+    reason_of,
+)
 from mcz.formats import FORMATS, wants_skeleton
 from mcz.formats.find import skeletons_around
 from mcz.motion import Motion
@@ -142,8 +148,7 @@ class Made:
         try:
             self._stored = Stored(self.name, self._shelf.write(self._make))
         except MczError as error:
-            if self.name not in str(error):
-                error.args = (f"{self.source}: {error}",)
+            error.add(path=self.source)
             self._error = error
             self._shelf.say(str(error))
         if before is not None:
@@ -164,7 +169,7 @@ def _state(path: Path, skeleton: Any = None) -> object:
     try:
         is_folder, own = stat.S_ISDIR(path.stat().st_mode), _stamp(path)
     except OSError as error:
-        raise AccessError(f"{path}: {error.strerror}") from None
+        raise AccessError(reason_of(error), path=path) from None
     paths = motion_files(files_below(path, None)[0])[0] if is_folder else [path]
     takes = {one.parent: one for one in paths if wants_skeleton(one)}
     around = [found.path for take in takes.values() for found in skeletons_around(take)]
@@ -301,7 +306,7 @@ def put(shelf: Shelf, path: str) -> None:
     """
     if "://" in path:
         if not path.partition("?")[0].lower().endswith(MCZ):
-            raise OptionError(f"{path}: of files far away only those called .mcz can be seen")
+            raise OptionError("of files far away only those called .mcz can be seen", path=path)
         shelf.give(Remote(path))
         return
     place = Path(path)
@@ -310,7 +315,7 @@ def put(shelf: Shelf, path: str) -> None:
         return
     if not (path and place.is_file()):
         text = "not a file" if path and place.exists() else "no such file"
-        raise AccessError(f"{path or repr(path)}: {text}")
+        raise AccessError(text, path=path or repr(path))
     kind = kind_of(place)
     if kind == "mcz":
         shelf.give(Stored(place.name, place))
@@ -324,7 +329,7 @@ def kind_of(path: Path) -> str:
     motions = [source_format for source_format in FORMATS.values() if not source_format.is_skeleton]
     known = {MCZ: "mcz"} | {s: f.name for f in reversed(motions) for s in f.suffixes}
     if suffix not in known:
-        raise OptionError(f"{path}: its suffix is none of {' '.join(sorted(known))}")
+        raise OptionError(f"its suffix is none of {' '.join(sorted(known))}", path=path)
     return known[suffix]
 
 
@@ -348,7 +353,7 @@ def _put_folder(shelf: Shelf, folder: Path) -> None:
         name = folder.resolve().name or "motions"
         shelf.give(Made(shelf, name, "folder", folder, lambda out: pack(folder, out, shelf)))
     elif not shelf.given():
-        raise OptionError(f"{folder}: there is no motion file in it")
+        raise OptionError("there is no motion file in it", path=folder)
 
 
 def pack(folder: Path, out: BinaryIO, shelf: Shelf) -> None:
@@ -362,4 +367,4 @@ def pack(folder: Path, out: BinaryIO, shelf: Shelf) -> None:
         if outcome.result == "failed":
             shelf.say(outcome.message)
     if not any(outcome.result == "parsed" for outcome in report.outcomes):
-        raise OptionError(f"{folder}: none of its motion files can be read")
+        raise OptionError("none of its motion files can be read", path=folder)

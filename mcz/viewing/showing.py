@@ -118,7 +118,7 @@ def _player_of(thing: Any, said: dict[str, Any], salvage: bool) -> str:
     with open(thing, salvage=salvage) as file:
         for clip in file:
             return player(clip)
-    raise OptionError(f"{thing}: it has no clip")
+    raise OptionError("it has no clip", path=thing)
 
 
 def _give(shelf: Shelf, thing: Any) -> None:

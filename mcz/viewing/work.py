@@ -90,7 +90,8 @@ class Work:
         except OSError as error:
             raise Refused(507, f"the files could not be kept: {error.strerror}") from None
         except MczError as error:
-            error.args = (str(error).replace(f"{folder}{os.sep}", ""),)  # which nobody knows
+            if error.path is not None:
+                error.path = error.path.removeprefix(f"{folder}{os.sep}")  # which nobody knows
             raise
         finally:
             shutil.rmtree(folder, ignore_errors=True)

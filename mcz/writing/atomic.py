@@ -16,7 +16,12 @@ from typing import Any, BinaryIO
 from mcz.container.locks import is_abandoned, lock
 from mcz.container.scan import scan
 from mcz.container.source import ByteSource, file_system
-from mcz.errors import AccessError, ExistsError, OptionError
+from mcz.errors import (
+    AccessError,
+    ExistsError,
+    OptionError,
+    reason_of,
+)
 from mcz.writing.inputs import refuse_inputs
 
 SUFFIX = ".part"
@@ -44,10 +49,10 @@ def replacing(target: Any, *, force: bool, inputs: Iterable[Any] = ()) -> Iterat
     if not isinstance(target, (str, os.PathLike)):
         raise OptionError(f"cannot write to {target!r}: neither a path nor a binary stream")
     if os.fspath(target)[-1:] in (os.sep, os.altsep):
-        raise OptionError(f"{target}: a folder; name the file in it")
+        raise OptionError("a folder; name the file in it", path=target)
     path = Path(target)
     if path.is_dir():
-        raise OptionError(f"{path}: a folder; name the file in it")
+        raise OptionError("a folder; name the file in it", path=path)
     if not force and os.path.lexists(path):
         raise ExistsError(f"{path} exists; use force to replace it")
     with _in_place(path) if _is_special(path) else _temporary(path, force) as stream:
@@ -109,7 +114,7 @@ def _in_place(path: Path) -> Iterator[BinaryIO]:
         with path.open("wb") as stream:
             stream.write(whole.getvalue())
     except OSError as error:
-        raise AccessError(f"{path}: {error.strerror or error}") from None
+        raise AccessError(reason_of(error), path=path) from None
 
 
 @contextmanager
@@ -134,7 +139,7 @@ def _temporary(path: Path, force: bool) -> Iterator[BinaryIO]:
         with suppress(OSError):
             os.unlink(name)
         if isinstance(error, OSError) and error.errno in FULL and error.filename is None:
-            raise AccessError(f"{path}: {error.strerror}") from error
+            raise AccessError(reason_of(error), path=path) from error
         raise
 
 
@@ -144,7 +149,7 @@ def _locked_file(path: Path, prefix: str) -> tuple[BinaryIO, str]:
         try:
             handle, name = tempfile.mkstemp(prefix=prefix, suffix=SUFFIX, dir=path.parent)
         except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
-            raise AccessError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+            raise AccessError(reason_of(error), path=path) from None
         stream = os.fdopen(handle, "w+b")
         if lock(stream) and Path(name).exists():  # else one has cleared it away just now
             return stream, name
@@ -173,7 +178,7 @@ def _give_name(name: str, path: Path, force: bool) -> None:
     except FileExistsError:
         raise ExistsError(f"{path} exists; use force to replace it") from None
     except OSError as error:  # a folder, perhaps
-        raise AccessError(f"{path}: {error.strerror or error}") from None
+        raise AccessError(reason_of(error), path=path) from None
 
 
 def _linked(name: str, path: Path) -> bool:

@@ -106,7 +106,9 @@ def encode(
     """
     path = Path(source)
     if up is not None and path.suffix.lower() == ".asf":
-        raise OptionError(f"{path}: a skeleton alone is kept as it is; say the up axis of its AMC")
+        raise OptionError(
+            "a skeleton alone is kept as it is; say the up axis of its AMC", path=path
+        )
     coded = chosen(codec, effort)
     said: dict[str, Any] = {"rate": rate, "unit": unit, "up": up, "arrays": arrays, "model": model}
     terms = Terms(coded, params, skeleton, verbatim=verbatim, keep_skeleton=True, **said)

@@ -51,8 +51,9 @@ def check_metadata(metadata: Mapping[str, str], name: str) -> None:
     for key in metadata:
         if key not in METADATA_KEYS and not key.startswith(PRIVATE):
             raise MotionError(
-                f"motion {name!r}: metadata key {key!r} is not registered; registered are "
-                f"{', '.join(METADATA_KEYS)}, and private keys begin with {PRIVATE!r}"
+                f"metadata key {key!r} is not registered; registered are "
+                f"{', '.join(METADATA_KEYS)}, and private keys begin with {PRIVATE!r}",
+                clip=name,
             )
 
 

@@ -65,8 +65,8 @@ def to_scene(
     motion = with_facts(motion, rate, unit, up)
     if motion.timeline is None:
         raise OptionError(
-            f"motion {motion.name!r}: its frame rate is unknown, and {to.upper()} states times; "
-            "give the rate"
+            f"its frame rate is unknown, and {to.upper()} states times; give the rate",
+            clip=motion.name,
         )
     if to == "usda" and key_error_mm:
         raise OptionError("USD has a sample in every frame: a key error is for GLB")
@@ -145,8 +145,9 @@ def _bound(scene: Scene, key_error_mm: float | None) -> float:
         raise OptionError(f"a key error of {key_error_mm} mm: a length of at least 0")
     if key_error_mm and not scene.has_unit:
         raise OptionError(
-            f"motion {scene.name!r}: its length unit is unknown, so keys cannot be "
-            f"{key_error_mm:g} mm off; give the unit (--unit), or leave out the key error"
+            f"its length unit is unknown, so keys cannot be "
+            f"{key_error_mm:g} mm off; give the unit (--unit), or leave out the key error",
+            clip=scene.name,
         )
     return key_error_mm / MM_PER_M
 

@@ -132,8 +132,9 @@ class _Keyer:
                 break
             if number > ROUNDS:
                 raise OptionError(
-                    f"motion {self.scene.name!r}: float32 numbers alone are {errors.max():.2g} m "
-                    f"off, and the keys may be {self.bound:.2g} m off; allow more (--key-error)"
+                    f"float32 numbers alone are {errors.max():.2g} m "
+                    f"off, and the keys may be {self.bound:.2g} m off; allow more (--key-error)",
+                    clip=self.scene.name,
                 )
             self._tighten(wrong, 0.0 if number == ROUNDS else TIGHTER)
             errors = self.errors()

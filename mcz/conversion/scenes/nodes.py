@@ -110,7 +110,7 @@ def scene_of(motion: Motion) -> Scene:
     rate = _rate(motion, timeline)
     check_poses(motion.name, motion.signals[0])
     if not skeleton.joints:
-        raise MotionError(f"motion {motion.name!r}: a skeleton without joints is no scene")
+        raise MotionError("a skeleton without joints is no scene", clip=motion.name)
     scale = 1.0 if skeleton.unit_cm is None else skeleton.unit_cm / CM_PER_M
     is_markers = point_set(skeleton) == "markers"
     nodes = tuple(_markers(motion, scale) if is_markers else _joints(motion, scale))
@@ -142,8 +142,9 @@ def _times(name: str, timeline: Timeline, rate: Fraction) -> Floats:
     seconds = (even - even[:1]).astype(np.float32).astype(np.float64)
     if (np.diff(seconds) <= 0).any() or not np.isfinite(seconds).all():
         raise MotionError(
-            f"motion {name!r}: {len(seconds)} frames at {float(rate):g} a second have "
-            "times that float32 cannot tell apart; write a part of them (--frames)"
+            f"{len(seconds)} frames at {float(rate):g} a second have "
+            "times that float32 cannot tell apart; write a part of them (--frames)",
+            clip=name,
         )
     return seconds
 
@@ -191,7 +192,7 @@ def _joints(motion: Motion, scale: float) -> Iterator[Node]:
     skeleton, values = motion.skeleton, np.asarray(motion.values, np.float64)
     used = [column for column, channel in enumerate(skeleton.channels) if channel.kind]
     if gap := first_gap(motion, used):
-        raise MotionError(f"motion {motion.name!r}: joints cannot be left out of frames, but {gap}")
+        raise MotionError(f"joints cannot be left out of frames, but {gap}", clip=motion.name)
     placed = _Placed(motion, values, scale)
     names = skeleton.addresses()
     starts = accumulate((1 + len(tails) for tails in placed.tails), initial=0)

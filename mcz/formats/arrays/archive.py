@@ -78,9 +78,9 @@ def read_archive(data: bytes) -> Archive:
     members = tuple(sorted(entries, key=lambda member: member.at))
     for one, other in pairwise(members):
         if one.stop > other.at:
-            raise SourceError(f"offset {other.at}: members {one.name!r} and {other.name!r} overlap")
+            raise SourceError(f"members {one.name!r} and {other.name!r} overlap", offset=other.at)
     if members and members[-1].stop > start:
-        raise SourceError(f"offset {start}: member {members[-1].name!r} overlaps the directory")
+        raise SourceError(f"member {members[-1].name!r} overlaps the directory", offset=start)
     found = (*_of_members(data, members), *_of_directory(data, start, end, tail))
     wanted = sorted(found, key=lambda field: field.at)
     sums = {
@@ -108,45 +108,45 @@ def _ends(data: bytes) -> tuple[int, int, int, int]:
     while end >= 0 and end + 22 + _number(data, end + 20, 2) != len(data):
         end = data.rfind(END, low, end)
     if end < 0:
-        raise SourceError(f"offset {len(data)}: no end of a ZIP directory; no ZIP file, or cut off")
+        raise SourceError("no end of a ZIP directory; no ZIP file, or cut off", offset=len(data))
     n_members, size, start = (_number(data, end + k, n) for k, n in ((10, 2), (12, 4), (16, 4)))
     stop = end
     locator = end - 20
     if locator >= 0 and data[locator : locator + 4] == LOCATOR64:
         stop = _number(data, locator + 8, 8)
         if data[stop : stop + 4] != END64 or stop + 56 > locator:
-            raise SourceError(f"offset {locator + 8}: no ZIP64 end of the directory at {stop}")
+            raise SourceError(f"no ZIP64 end of the directory at {stop}", offset=locator + 8)
         n_members, size, start = (_number(data, stop + k, 8) for k in (32, 40, 48))
     if start + size != stop:
         raise SourceError(
-            f"offset {end}: a directory from {start} on of {size} bytes, but it ends at {stop}"
+            f"a directory from {start} on of {size} bytes, but it ends at {stop}", offset=end
         )
     if n_members > min(MAX_MEMBERS, size // 46):
-        raise SourceError(f"offset {end}: {n_members} members in a directory of {size} bytes")
+        raise SourceError(f"{n_members} members in a directory of {size} bytes", offset=end)
     return end, stop, start, n_members
 
 
 def _entry(data: bytes, at: int, end: int) -> tuple[Member, int]:
     """The member whose entry of the directory is at ``at``, and where the next entry is."""
     if at + 46 > end or data[at : at + 4] != CENTRAL:
-        raise SourceError(f"offset {at}: no entry of the directory")
+        raise SourceError("no entry of the directory", offset=at)
     sizes = [_number(data, at + k, 2) for k in (28, 30, 32)]
     behind = at + 46 + sum(sizes)
     if behind > end:
-        raise SourceError(f"offset {at}: an entry of the directory runs past its end")
+        raise SourceError("an entry of the directory runs past its end", offset=at)
     raw = data[at + 46 : at + 46 + sizes[0]]
     name = raw.decode("utf-8" if _number(data, at + 8, 2) & 0x800 else "cp437", "replace")
     size, packed, local = (value for value, _, _ in _wide_fields(data, at, sizes))
     method, flags = _number(data, at + 10, 2), _number(data, at + 8, 2)
     if local + 30 > len(data) or data[local : local + 4] != LOCAL:
-        raise SourceError(f"offset {at}: member {name!r} has no local header at {local}")
+        raise SourceError(f"member {name!r} has no local header at {local}", offset=at)
     start = local + 30 + _number(data, local + 26, 2) + _number(data, local + 28, 2)
     if start + packed > len(data):
-        raise SourceError(f"offset {local}: member {name!r} of {packed} bytes runs past the end")
+        raise SourceError(f"member {name!r} of {packed} bytes runs past the end", offset=local)
     member = Member(name, method, flags, local, start, start + packed, at)
     if member.is_stored and size != packed:
         raise SourceError(
-            f"offset {at}: member {name!r} is stored, but {packed} bytes are said to be {size}"
+            f"member {name!r} is stored, but {packed} bytes are said to be {size}", offset=at
         )
     _check_local(data, member, raw)
     return member, behind
@@ -158,7 +158,7 @@ def _check_names(members: list[Member]) -> None:
     for member in members:
         name = member.name.partition("\0")[0].removesuffix(".npy")
         if name in seen:
-            raise SourceError(f"offset {member.entry}: member {name!r} is there twice")
+            raise SourceError(f"member {name!r} is there twice", offset=member.entry)
         seen.add(name)
 
 
@@ -166,15 +166,15 @@ def _check_local(data: bytes, member: Member, raw: bytes) -> None:
     """Raise SourceError where the local header of a member is about something else."""
     at = member.at
     if data[at + 30 : at + 30 + _number(data, at + 26, 2)] != raw:
-        raise SourceError(f"offset {at}: member {member.name!r} has another name in its header")
+        raise SourceError(f"member {member.name!r} has another name in its header", offset=at)
     if _number(data, at + 8, 2) != member.method:
-        raise SourceError(f"offset {at + 8}: member {member.name!r} has two methods")
+        raise SourceError(f"member {member.name!r} has two methods", offset=at + 8)
     packed, where, _ = _local_sizes(data, member)[1]
     is_open = packed == FULL32 or _number(data, at + 6, 2) & DESCRIBED  # said elsewhere
     if packed != member.stop - member.start and not is_open:
         raise SourceError(
-            f"offset {where}: member {member.name!r} has {packed} bytes and "
-            f"{member.stop - member.start}"
+            f"member {member.name!r} has {packed} bytes and {member.stop - member.start}",
+            offset=where,
         )
 
 

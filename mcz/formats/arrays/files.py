@@ -56,7 +56,7 @@ def npy_array(data: bytes) -> Array:
     refuse_odd(head)
     array = _array("array", data, head, len(data))
     if array.kept:
-        raise SourceError(f"offset {head.start}: the array is {array.kept}, which is no motion")
+        raise SourceError(f"the array is {array.kept}, which is no motion", offset=head.start)
     return array
 
 

@@ -10,7 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mcz.errors import AccessError, OptionError, SourceError
+from mcz.errors import (
+    AccessError,
+    OptionError,
+    SourceError,
+    reason_of,
+)
 from mcz.formats.arrays.facts import SHAPE
 from mcz.formats.arrays.header import MAGIC
 from mcz.formats.arrays.layout import parse_arrays
@@ -40,7 +45,7 @@ def with_model(motion: Motion, model: str | os.PathLike[str]) -> Motion:
     if GENDER in path:
         gender = motion.metadata.get("x-gender", "")
         if not gender.isalnum():
-            raise OptionError(f"{path}: the take states no gender, but {gender!r}")
+            raise OptionError(f"the take states no gender, but {gender!r}", path=path)
         path = path.replace(GENDER, gender)
     offsets = _offsets(path, _changed(path), skeleton.n_joints, _betas(source))
     joints = tuple(
@@ -54,7 +59,7 @@ def _changed(path: str) -> int:
     try:
         return Path(path).stat().st_mtime_ns
     except OSError as error:
-        raise AccessError(f"{path}: {error.strerror or error}") from None
+        raise AccessError(reason_of(error), path=path) from None
 
 
 @lru_cache(maxsize=64)  # the takes of a subject have the same betas, and models are large
