@@ -1,0 +1,111 @@
+"""Ordinals of every grid, and the codecs of ordinals without a container."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from unittest import mock
+
+import numpy as np
+from hypothesis import strategies as st
+
+from mcz.codecs import by_name
+from mcz.codecs.contract import Layout, Request, Span
+from mcz.codecs.lossless import best_streams
+from mcz.codecs.lossless.best_choices import choose_links
+from mcz.codecs.lossless.best_streams import LINKED, MAX_LINKS, Link
+from mcz.coding.ordinals import degrees
+from mcz.coding.ordinals.streams import build_stream, plan_stream
+from mcz.coding.quick import streams as fast_streams
+from mcz.errors import FormatError
+from mcz.numbers import Grid, GridKind
+
+GRIDS = (
+    Grid(GridKind.FIXED, 4),
+    Grid(GridKind.TRIMMED, 6),
+    Grid(GridKind.GENERAL, 1),
+    Grid(GridKind.GENERAL, 6),
+    Grid(GridKind.GENERAL, 15),
+    Grid(GridKind.TEXT64),
+    Grid(GridKind.TEXT64, 64 + 20),
+    Grid(GridKind.TEXT32),
+    Grid(GridKind.INTEGER),
+    Grid(GridKind.SCALED, scale=0.01),
+    Grid(GridKind.BINARY32),
+    Grid(GridKind.BINARY64),
+    Grid(GridKind.VAX_F),
+)
+Ordinals = np.ndarray
+
+
+@dataclass(frozen=True)
+class Coder:
+    """The streams of a codec, and its ``decode``."""
+
+    name: str
+    build: Callable[[Ordinals, list[tuple[Grid, Grid]]], bytes]
+
+    def coded(self, columns: Ordinals, grid: Grid, clip_grid: Grid | None = None) -> bytes:
+        return self.build(columns, [(grid, clip_grid or grid)] * columns.shape[1])
+
+    def decoded(self, stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> Ordinals:
+        layout = Layout(n_rows, (tuple(range(n_channels)),), grids=(grid,) * n_channels)
+        request = Request(0, n_rows, (0,))
+        decode = by_name(self.name).decode
+        return decode(b"", layout, [Span(0, n_rows)], request, lambda s, r, g: stream)
+
+    def outcome(self, stream: bytes, n_rows: int, n_channels: int, grid: Grid) -> object:
+        """Rows, or that they are refused; the same by both decoders of codec 14."""
+        found: list[object] = []
+        for lacking in (False, True) if self.name == "fast" else (False,):
+            with ExitStack() as stack:
+                for module in (degrees, fast_streams) if lacking else ():
+                    name = f"{module.__name__}.lacks_compiled_kernels"
+                    stack.enter_context(mock.patch(name, return_value=True))
+                try:
+                    found.append(self.decoded(stream, n_rows, n_channels, grid).tolist())
+                except FormatError:
+                    found.append(FormatError)
+        assert found[0] == found[-1]
+        return found[0]
+
+
+def linked(
+    columns: Ordinals, own: list[tuple[Grid, Grid]], links: list[Link] | None = None
+) -> bytes:
+    """A stream of method 1 of ``best``, whether it is the shorter one or not."""
+    head, plans, coded = plan_stream(columns, own, 0, {})
+    if not plans:
+        return best_streams.build_stream(columns, own, 0, {})
+    links = links or [Link(*link) for link in choose_links(coded, plans, MAX_LINKS)]
+    links = links[: len(plans)]
+    bits = best_streams.code(coded, plans, links)
+    return bytes((LINKED,)) + head + b"".join(link.head() for link in links) + bits
+
+
+LOSSLESS = Coder("lossless", lambda columns, own: build_stream(columns, own, 0, {}))
+FAST = Coder(
+    "fast",
+    lambda columns, own: fast_streams.build_streams(columns, own, [range(len(own))], [0], True)[0],
+)
+BEST = Coder("best", linked)
+CODERS = (LOSSLESS, FAST, BEST)
+
+
+@st.composite
+def columns(draw: st.DrawFn, grid: Grid) -> Ordinals:
+    """Ordinals of the grid: walks, noise, jumps to the ends, constants."""
+    low = -1 - grid.limit if grid.signed_magnitude else -grid.limit
+    rows = draw(st.integers(1, 40))
+    made = []
+    for _ in range(draw(st.integers(1, 4))):
+        step = draw(st.sampled_from([0, 1, 7, 1000, 10**6, 10**12, grid.limit]))
+        start = draw(st.integers(low, grid.limit))
+        steps = draw(st.lists(st.integers(-step, step), min_size=rows, max_size=rows))
+        at, column = start, []
+        for change in steps:
+            at = min(max(at + change, low), grid.limit)
+            column.append(at)
+        made.append(column)
+    return np.array(made, np.int64).T.copy()
