@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,12 +15,11 @@ from mcz.codecs.contract import SignalSource
 from mcz.codecs.wavelet import awt_choices as choice
 from mcz.codecs.wavelet.awt import CODEC
 from mcz.codecs.wavelet.shared import WAVELET_HEADER, transform_of
-from mcz.metrics import compare
 from mcz.motion import Motion
 from mcz.schema import parse
 from mcz.transforms import wavelets
 from mcz.writing.signal_source import MemorySource
-from tests.codecs.lossy import Direct, amc, bytes_of, saved, wandering
+from tests.codecs.lossy import Direct, saved, wandering
 from tests.motions import smooth
 
 KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx"]), min_size=1, max_size=5)
@@ -113,18 +111,6 @@ def test_equal_counts(most, average, counts) -> None:
 # What is coded
 
 
-@given(st.integers(1, 150), KINDS, st.floats(0.5, 200), st.sampled_from([0, 2, None]))
-def test_what_is_dropped_is_zero(n_frames, kinds, average, decimals) -> None:
-    """Decoded values are the synthesis of the coefficients that are kept, to a step."""
-    motion = wandering(n_frames, kinds)
-    settings = {} if decimals is None else {"Q": decimals}
-    coded = Direct("awt", motion, a_w=average, **settings)
-    meant = unwrap(motion.values, motion.skeleton)
-    assert np.abs(coded.read() - meant).max() <= 40 * (np.abs(meant).max() + 1)
-    fields = parse(WAVELET_HEADER, coded.header, "header")
-    assert fields.least >= 1 and (fields.decimals == 255) == (decimals is None)
-
-
 @pytest.mark.parametrize(
     "settings", [{"preset": "khan2014"}, {"distortion": "channels"}, {"N": 2, "Q": 3}]
 )
@@ -167,45 +153,3 @@ def test_long_clips_are_analyzed_in_blocks(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(choice, "BLOCK_FRAMES", 100)
     for a, b in zip(whole, choice.coefficients_of("awt", source, transform), strict=True):
         np.testing.assert_array_equal(a, b)
-
-
-# The published figures
-
-
-SIZES = {"10_03": 288_143, "05_01": 479_866}  # of the .amc with its line ends
-TABLE_4 = {"10_03": (53, 0.259, 18.46), "05_01": (41, 1.046, 41.71)}  # a_w, MSE, CR
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("name", TABLE_4)
-def test_table_4_of_khan2014(data: Path, name: str) -> None:
-    """With as many coefficients, a smaller error and at least 2.3 times the ratio."""
-    a_w, mse, ratio = TABLE_4[name]
-    motion = amc(data, name)
-    stored = saved("awt", motion, preset="khan2014", a_w=a_w)
-    with mcz.open(stored) as file:
-        found = compare(motion, file.only_clip().motion(), virtual_markers=False).mse
-    assert found < 0.5 * mse
-    assert SIZES[name] / bytes_of(stored) >= 2.3 * ratio
-    stored = saved("awt", motion, preset="khan2014", a_w=a_w, iterations=0)
-    with mcz.open(stored) as file:
-        found = compare(motion, file.only_clip().motion(), virtual_markers=False).mse
-    assert found == pytest.approx(mse, rel=0.05)
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("name", TABLE_4)
-def test_annealing_of_real_clips_ends_near_the_optimum(data: Path, name: str) -> None:
-    found, bands = chosen(amc(data, name), TABLE_4[name][0])
-    optimum = least_distortion(bands, int(found.counts.sum()))
-    assert found.after <= NEAR * optimum < found.before
-
-
-@pytest.mark.real
-def test_positions_of_a_real_clip_are_better_for_it(data: Path) -> None:
-    errors = []
-    for distortion in ("positions", "channels"):
-        stored = saved("awt", amc(data, "05_01"), a_w=60, distortion=distortion)
-        with mcz.open(stored) as file:
-            errors.append(float(file.only_clip().quality["mean_position_error_cm"]))
-    assert errors[0] < 0.5 * errors[1]

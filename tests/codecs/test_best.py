@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mcz.codecs.lossless import best_streams
-from mcz.codecs.lossless.best_streams import ECHOED, MAX_LINKS, MAX_SEEN, Link
+from mcz.codecs.lossless.best_streams import ECHOED, MAX_SEEN, Link
 from mcz.codecs.lossless.echoes import Echo, build_echoes, find_echoes
 from mcz.coding.ordinals.streams import plan_stream
 from mcz.errors import FormatError
@@ -88,28 +88,6 @@ def test_prefixes_and_longer_streams_are_refused() -> None:
     for more in (b"\0", b"\1", bytes(5)):
         with pytest.raises(FormatError, match="bytes"):
             BEST.decoded(stream + more, 30, 3, FIXED)
-
-
-@pytest.mark.parametrize(
-    ("link", "message"),
-    [
-        (b"\x2d\0", "unit"),
-        (b"\0\x09" + bytes(9), "links"),
-        (b"\0\x01\0", "looks at"),
-        (b"\0", "ends in the links"),
-    ],
-)
-def test_bad_links_are_refused(link: bytes, message: str) -> None:
-    with pytest.raises(FormatError, match=message):
-        best_streams.read_links(link, 1)
-
-
-def test_too_many_links_are_refused() -> None:
-    n_coded = MAX_LINKS // MAX_SEEN + 2
-    data = b"\0\0" + (b"\0\x08" + bytes(8)) * (n_coded - 2)
-    assert len(best_streams.read_links(data, n_coded - 1)[0]) == n_coded - 1
-    with pytest.raises(FormatError, match="4104 links"):
-        best_streams.read_links(data + b"\0\x08" + bytes(8), n_coded)
 
 
 @st.composite

@@ -129,13 +129,6 @@ def test_any_column_comes_back(
     assert decoded(coded(ordinals), n_rows) == ordinals.tolist()
 
 
-def test_counts_need_version_1() -> None:
-    stream = coded(Law(VOLT, -0.31).ordinals(signal_of()))
-    assert stream[1] == heads.COUNTS
-    with pytest.raises(FormatError, match="form 34"):
-        streams.parse_stream(stream, [BINARY32], 500, version=0)
-
-
 def test_a_signal_is_of_version_1_where_it_helps() -> None:
     skeleton = Skeleton((Joint("plate", channels=(Channel("", "force", "V"),)),))
     counts = BINARY32.values(Law(VOLT, -0.31).ordinals(signal_of(2000)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import struct
 from functools import cache
 from pathlib import Path
 
@@ -14,10 +13,8 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.coding.logistic import NODES, squash_table, stretch_table
-from mcz.coding.ordinals import heads, streams
 from mcz.coding.ordinals.degrees import DEGREE, codes_of, find_degrees, multiples_of, of_products
 from mcz.coding.ordinals.units import find_unit, of_multiples
-from mcz.errors import FormatError
 from mcz.formats import FORMATS
 from mcz.motion import Signal
 from mcz.numbers import Grid, GridKind
@@ -112,16 +109,6 @@ def test_scaled_integers_are_found_among_floats() -> None:
     assert len(as_floats) <= len(as_integers) + 12
 
 
-@pytest.mark.parametrize("unit", [0.0, -1.0, float("nan"), float("inf"), 2.0**-201])
-def test_bad_units_are_refused(unit: float) -> None:
-    ordinals = of_multiples(np.arange(1, 50) ** 2, 0.25)
-    stream = LOSSLESS.coded(ordinals[:, None], Grid(GridKind.BINARY32))
-    broken = stream.replace(struct.pack("<d", 0.25), struct.pack("<d", unit))
-    assert broken != stream
-    with pytest.raises(FormatError, match="unit"):
-        LOSSLESS.decoded(broken, 49, 1, Grid(GridKind.BINARY32))
-
-
 @given(
     st.integers(1, 15),
     st.floats(2.0**-200, 2.0**80),
@@ -166,15 +153,3 @@ def test_what_products_say_comes_back(some: list[int], digits: int) -> None:
         unit, shifts, codes = found
         assert of_products(codes, unit, shifts, grid).tolist() == some
     assert found is None or -1 not in some
-
-
-def test_products_need_version_1_and_a_decimal_grid() -> None:
-    grid = Grid(GridKind.GENERAL, 6)
-    column = of_products(np.array([[0, 1, -1, 500, -77, 3]]).T[:, 0], DEGREE * 2.0**-60, 4, grid)
-    stream = streams.build_stream(column[:, None], [(grid, grid)], 0, None, 1)
-    assert stream[1] == heads.PRODUCTS
-    assert (streams.parse_stream(stream, [grid], 6, version=1)[0][:, 0] == column).all()
-    with pytest.raises(FormatError, match="form 33"):
-        streams.parse_stream(stream, [grid], 6, version=0)
-    with pytest.raises(FormatError, match="form 33"):
-        streams.parse_stream(stream, [Grid(GridKind.FIXED, 4)], 6, version=1)

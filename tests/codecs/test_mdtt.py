@@ -11,20 +11,17 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.angles import unwrap
 from mcz.codecs import basis_models
-from mcz.codecs.contract import Model
 from mcz.codecs.space import APART, COURSES, LEARNED, MEAN, WEIGHTED
 from mcz.codecs.spatial.windows import WINDOWS_HEADER
 from mcz.kinematics import point_names
 from mcz.motion import Signal
 from mcz.reading.sizes import clip_sizes
-from mcz.schema import build, parse
+from mcz.schema import parse
 from tests.codecs.lossy import (
     Direct,
     amc,
     bytes_of,
-    clip_of,
     decoded,
     markers,
     saved,
@@ -67,17 +64,6 @@ def test_without_cuts_a_coefficient_loses_at_most_the_threshold(
     step = 2.0**power
     found = decoded(codec, motion, step=step, coder=coder, window=window, **ALL)
     assert root_mean_square(found - motion.values) <= BOUND * step + 1e-9
-
-
-@given(st.sampled_from(NAMES), st.integers(1, 150), KINDS, st.floats(-4, 2), st.integers(2, 60))
-def test_channels_without_cuts(codec, n_frames, kinds, power, window) -> None:
-    motion = wandering(n_frames, kinds)
-    step = 2.0**power
-    params = {"domain": "channels", "window": window, "threshold": 0.5}
-    found = decoded(codec, motion, step=step, **params, **ALL)
-    meant = unwrap(motion.values, motion.skeleton)
-    # Weights are relative to the average effect; the least share of it is 1/16.
-    assert root_mean_square(found - meant) <= 40 * step + 1e-9
 
 
 @given(st.sampled_from(NAMES), st.integers(1, 200), st.integers(1, 6), st.floats(-3, 6))
@@ -181,66 +167,6 @@ def test_many_channels(codec) -> None:
     with pytest.raises(mcz.MotionError, match="at most 2048"):
         saved(codec, markers(2, 2100))
     assert decoded(codec, wandering(20, ["ty", "rz"] * 100), domain="channels").shape == (20, 200)
-
-
-def test_one_matrix_has_2048_channels() -> None:
-    motion = markers(2, 700)
-    assert root_mean_square(decoded("mdtt", motion, step=0.5) - motion.values) < 1
-    with pytest.raises(mcz.MotionError, match="pca-rdo: 2100 channels, at most 2048"):
-        saved("pca-rdo", motion, step=0.5)
-
-
-# Models
-
-
-@pytest.mark.parametrize(
-    ("codec", "bases", "words"),
-    [
-        ("mdtt", [(2, 5), (2, 5)], "2 bases, 3 are due"),
-        ("mdtt", [(2, 5), (2, 5), (2, 4)], "4 entries for 5 points"),
-        ("pca-rdo", [(2, 15), (3, 20)], "2 bases, 3 are due"),
-        ("pca-rdo", [(2, 15), (3, 20), (1, 14)], r"mean of \(1, 14\) for 15 channels"),
-        ("pca-rdo", [(2, 15), (3, 20), (2, 15)], r"mean of \(2, 15\) for 15 channels"),
-        ("pca-rdo", [(2, 15), (2, 20), (1, 15)], "2 courses of 20 cosines for 3 coefficients"),
-        ("pca-rdo", [(2, 15), (3, 21), (1, 15)], "3 courses of 21 cosines .* 20 frames"),
-    ],
-)
-def test_models_of_another_shape_are_refused(codec, bases, words) -> None:
-    coded = Direct(codec, markers(60, 5), window=20, frequencies=3)
-    model = basis_models.model_of([np.eye(*shape) for shape in bases])
-    given_ = replace(coded.layout, find_model=lambda _: model)
-    with pytest.raises(mcz.FormatError, match=words):
-        coded.read(changes={"layout": given_})
-
-
-def test_a_model_of_another_kind_is_refused() -> None:
-    coded = Direct("mdtt", markers(60, 5))
-    given_ = replace(coded.layout, find_model=lambda _: Model(2, b"?"))
-    with pytest.raises(mcz.FormatError, match="kind 2"):
-        coded.read(changes={"layout": given_})
-
-
-# Bad bytes
-
-
-def test_channels_that_are_no_coordinates_are_refused() -> None:
-    """Flag APART where channels are not three each."""
-    coded = Direct("mdtt", clip_of(np.ones((9, 4))), domain="channels")
-    header = bytearray(coded.header)
-    header[2] |= APART
-    with pytest.raises(mcz.FormatError, match="4 channels are not three coordinates"):
-        coded.read(changes={"header": bytes(header)})
-
-
-@pytest.mark.parametrize("codec", ["mdtt", "lsdt-clip"])
-@pytest.mark.parametrize("flag", [MEAN, COURSES])
-def test_a_mean_and_courses_are_those_of_codec_10(codec, flag) -> None:
-    coded = Direct(codec, markers(60, 5))
-    fields = header_of(coded)
-    fields.space.flags |= flag
-    fields.space.model = fields.space.model or bytes(16)
-    with pytest.raises(mcz.FormatError, match="it has no mean or courses"):
-        coded.read(changes={"header": build(WINDOWS_HEADER, fields, "header")})
 
 
 # Real clips

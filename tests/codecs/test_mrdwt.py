@@ -1,4 +1,4 @@
-"""Codec 2, ``mrdwt``: bounds, wavelets, segments, options, headers, the published figures."""
+"""Codecs 2 and 5, ``mrdwt`` and ``dwt``: bounds, wavelets, segments, options, headers."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from mcz.schema import build, parse
 from mcz.transforms import wavelets
 from mcz.transforms.dwt import own_range
 from tests.codecs import lossy
-from tests.codecs.lossy import amc, bones, bytes_of, clip_of, gapped, wandering
+from tests.codecs.lossy import bones, clip_of, gapped, wandering
 from tests.formats.c3d_files import INTEL, SGI, made
 from tests.motions import smooth
 from tests.repair import memory_below
@@ -309,24 +309,6 @@ def test_radians_are_coded_like_degrees() -> None:
         assert sizes[0] == pytest.approx(sizes[1], rel=0.05)
 
 
-@pytest.mark.parametrize("size", [2, 4])
-def test_c3d_keeps_analog_and_residuals(tmp_path: Path, size: int) -> None:
-    source, target, back = (tmp_path / name for name in ("a.c3d", "a.mcz", "back.c3d"))
-    source.write_bytes(made(40, n_points=3, channels=2, subframes=3, size=size).build())
-    mcz.encode(source, target, codec="mrdwt", params={"T_g": 5}, unit="mm")
-    with mcz.open(target) as file:
-        clip = file.only_clip()
-        assert [s.codec.name for s in clip.signals] == ["mrdwt", "lossless", "lossless"]
-        back.write_bytes(clip.source_bytes())
-    original, again = mcz.read(source), mcz.read(back)
-    assert back.stat().st_size == source.stat().st_size
-    for before, after in zip(original.signals[1:], again.signals[1:], strict=True):
-        assert before.name == after.name
-        np.testing.assert_array_equal(before.values, after.values)
-    error = np.abs(again.values - original.values)
-    assert 0 < error.max() < 100
-
-
 @pytest.mark.parametrize("processor", [INTEL, SGI])
 def test_c3d_keeps_gaps_that_only_nan_marks(tmp_path: Path, processor: int) -> None:
     """Their residuals say that they are valid: what fills them must not be taken for points."""
@@ -370,15 +352,10 @@ def test_presets() -> None:
     same = {"T_g": 12, "Q": 1, "N": 4, "wavelet": "db3", "threshold_rule": "depth"}
     assert saved(smooth(100), preset="khan2016", **same) != b""
     assert Direct(smooth(100), preset="khan2016", **same).segments == coded.segments
+    assert Direct(smooth(3), preset="khan2016").fields.levels == 4
     default = Direct(smooth(400)).fields
     assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)
     assert default.unit == 0.2 / 0.8
-
-
-def test_khan2016_keeps_its_levels_and_one_segment() -> None:
-    assert Direct(smooth(3), preset="khan2016").fields.levels == 4
-    long = Direct(clip_of(np.random.default_rng(0).normal(0, 500, (9000, 8))), preset="khan2016")
-    assert len(long.segments) == 1
 
 
 def test_default_levels_fit_the_clip() -> None:
@@ -403,66 +380,6 @@ def test_random_streams_of_many_coefficients() -> None:
         for form in range(256):
             data = bytes([form, 128, 2]) + random.integers(0, 256, 200, "u1").tobytes()
             outcome(coded, **coded.with_stream((0, 0, 0), data))
-
-
-def with_header(coded: Direct, **changes: object) -> bytes:
-    return build(WAVELET_HEADER, {**coded.fields, **changes}, "header")
-
-
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
-        ({"coded_frames": 2**53 - 1}, ("decoded", "FormatError")),
-        ({"coded_frames": 19}, ("FormatError",)),
-        ({"coded_frames": 0}, ("FormatError",)),
-        ({"levels": 16}, ("FormatError",)),  # segments of 12 frames
-        ({"levels": 0}, ("FormatError",)),  # three resolutions
-        ({"least": 2**39}, ("decoded", "FormatError")),
-        ({"wavelet": 10}, ("decoded", "FormatError")),
-        ({"unit": 2.0**100}, ("decoded",)),
-        ({"unit": 2.0**-100}, ("decoded",)),
-    ],
-)
-def test_crafted_headers(changes, expected) -> None:
-    coded = small()
-    with memory_below(MEMORY):
-        assert outcome(coded, header=with_header(coded, **changes)) in expected
-
-
-def raw_header(**changes: object) -> bytes:
-    """A header without the checks of the schema; 20 frames, two levels."""
-    taps = changes.get("taps", ())
-    packed = b""
-    if taps:
-        one = bytes([len(taps)]) + np.array(taps, "<f8").tobytes()
-        packed = one + one
-    unit = np.array([changes["unit"]], "<f8").tobytes() if "unit" in changes else b""
-    start = bytes([changes.get("wavelet", 0 if taps else 2)]) + packed
-    tail = bytes([changes.get("levels", 2), 20, changes.get("decimals", 255 if unit else 1)])
-    return start + tail + unit + bytes(changes.get("least", b"\x01"))
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        *({"unit": unit} for unit in (0.0, -1.0, math.nan, math.inf, 2.0**101, 2.0**-101)),
-        *({"taps": (tap, 1.0)} for tap in (math.nan, math.inf, -math.inf, 16.1, 1e300)),
-        {"taps": (1.0,)},
-        {"taps": (1.0, 1.0, 1.0)},
-        {"taps": (0.5,) * 66},
-        {"levels": 17},
-        {"levels": 255},
-        {"decimals": 16},
-        {"decimals": 254},
-        {"least": b"\x00"},
-        {"least": b"\x81\x80\x80\x80\x80\x10"},  # 2^39 + 1
-        {"least": b"\x81\x00"},
-        {"wavelet": 11},
-        {"wavelet": 255},
-    ],
-)
-def test_bad_headers_are_refused(changes: dict[str, object]) -> None:
-    assert outcome(small(), header=raw_header(**changes)) == "FormatError"
 
 
 def test_the_greatest_that_a_header_allows_is_finite() -> None:
@@ -492,7 +409,7 @@ def test_the_greatest_that_a_header_allows_is_finite() -> None:
 def test_frames_that_no_segment_holds_are_not_allocated() -> None:
     coded = small()
     far = {
-        "header": with_header(coded, coded_frames=2**50),
+        "header": build(WAVELET_HEADER, {**coded.fields, "coded_frames": 2**50}, "header"),
         "layout": replace(coded.layout, n_frames=2**50),
         "spans": [Span(0, 12), Span(12, 2**50 - 32, 6), Span(2**50 - 20, 20, 6)],
         "fetch": lambda *_: b"",
@@ -510,73 +427,25 @@ def test_a_cut_file_refuses_what_it_no_longer_holds() -> None:
     assert coded.read(0, 4, changes=cut).tobytes() == coded.read(0, 4).tobytes()
 
 
-@pytest.mark.parametrize(
-    ("spans", "words"),
-    [
-        ([Span(0, 10), Span(10, 10, 6)], "do not fit"),
-        ([Span(0, 12), Span(12, 12, 6)], "do not fit"),
-        ([Span(0, 12), Span(12, 8)], "bears upon 0 frames before"),
-        ([Span(0, 12), Span(12, 8, 12)], "bears upon 12 frames before"),
-        ([Span(0, 12), Span(12, 8, 6, 1)], "and 1 after"),
-        ([Span(0, 12), Span(12, 8, 6, fresh=False)], "fresh"),
-        ([Span(0, 10)], "inside a coefficient"),
-    ],
-)
-def test_segments_that_do_not_fit(spans: list[Span], words: str) -> None:
-    with pytest.raises(mcz.FormatError, match=words):
-        small().read(changes={"spans": spans})
+# Codec 5, which has its streams
 
 
-# The published figures
+def test_dwt_is_mrdwt_with_a_flat_threshold() -> None:
+    motion = wandering(300, ["tx", "rx", "ry"])
+    for settings in ({}, {"Q": 2, "N": 3, "wavelet": "db4"}, {"segment_frames": 64}):
+        own = lossy.Direct("dwt", motion, t_w=0.7, **settings)
+        other = lossy.Direct("mrdwt", motion, T_g=0.7, threshold_rule="flat", **settings)
+        assert own.segments == other.segments and own.header == other.header
+        assert own.read().tobytes() == other.read().tobytes()
 
 
-PUBLISHED = {  # T_g: rms_coordinate_error of the published implementation, CR of the paper
-    10: (0.1948, 61.6),
-    11: (0.1992, 63.3),
-    12: (0.2041, 64.5),
-    15: (0.2086, 67.7),
-    20: (0.2216, 71.0),
-    30: (0.2338, 74.6),
-    45: (0.2424, 76.5),
-    50: (0.2567, 76.9),
-}
-SIZE_OF_17_10 = 2_214_137
-
-
-@pytest.mark.real
-def test_table_4_of_khan2016(data: Path) -> None:
-    motion = amc(data, "17_10")
-    for T_g, (error, ratio) in PUBLISHED.items():
-        stored = saved(motion, preset="khan2016", T_g=T_g)
-        with mcz.open(stored) as file:
-            found = file.only_clip().motion()
-        measured = compare(motion, found, virtual_markers=False).rms_coordinate_error
-        assert measured == pytest.approx(error, abs=0.0005), T_g
-        times = SIZE_OF_17_10 / bytes_of(stored) / ratio
-        print(f"T_g {T_g}: {measured:.4f}, CR {times * ratio:.1f}, {times:.2f} times the paper's")
-        assert times >= (2.1 if T_g <= 30 else 2.0), T_g
-
-
-@pytest.mark.real
-def test_figure_8_of_khan2016(data: Path) -> None:
-    motion = amc(data, "09_01")
-    column = motion.skeleton.columns(motion.skeleton.find("rfoot"))[0]
-    meant = unwrap(motion.values, motion.skeleton)[:, column]
-    stored = saved(motion, preset="khan2016", threshold_rule="flat", T_g=1)
-    with mcz.open(stored) as file:
-        for resolution, mse in ((0, 0.103), (2, 0.658), (3, 4.699)):
-            found = file.only_clip().read(resolution=resolution)[:, column]
-            assert np.mean((found - meant) ** 2) == pytest.approx(mse, abs=0.01)
-
-
-@pytest.mark.real
-def test_defaults_need_fewer_bytes_than_the_preset(data: Path) -> None:
-    motion = amc(data, "05_01")
-    published = saved(motion, preset="khan2016")
-    with mcz.open(published) as file:
-        limit = float(file.only_clip().quality["mean_position_error_cm"])
-    own = saved(motion, mean_error_cm=limit)
-    with mcz.open(own) as file:
-        assert float(file.only_clip().quality["mean_position_error_cm"]) <= limit
-    print(f"preset {bytes_of(published)} bytes, defaults {bytes_of(own)} at {limit:.3f} cm")
-    assert bytes_of(own) < 0.75 * bytes_of(published)
+def test_presets_of_dwt() -> None:
+    published = lossy.Direct("dwt", smooth(100), preset="khan2014")
+    fields = parse(WAVELET_HEADER, published.header, "header")
+    assert (fields.wavelet, fields.levels, fields.decimals) == (wavelets.IDS["db2"], 4, 2)
+    assert fields.least == 300 and len(published.segments) == 1
+    few = lossy.Direct("dwt", smooth(3), preset="khan2014")
+    assert parse(WAVELET_HEADER, few.header, "header").levels == 4
+    default = parse(WAVELET_HEADER, lossy.Direct("dwt", smooth(400)).header, "header")
+    assert (default.wavelet, default.levels, default.decimals) == (10, 4, 255)
+    assert default.unit == 0.2 / 0.8

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import by_name
-from mcz.codecs.contract import Layout, Request, Span, model_finder
+from mcz.codecs.contract import model_finder
 from mcz.codecs.online.choices import gaussian, laplacian, rates
 from mcz.codecs.online.units import INTRA, LTR, STR, Unit, build_units, parse_units
 from mcz.errors import LostFrameError
 from mcz.writing.signal_source import MemorySource
-from tests.codecs.lossy import Direct, amc, gapped, markers
+from tests.codecs.lossy import Direct, amc, markers
 
 ONLINE = by_name("online")
 PRESETS = ("default", "mod", "rc", "rca")
@@ -67,14 +67,6 @@ def test_errors_do_not_add_up(n_frames, n_markers, preset, coder, order, gof, pe
     assert kinds == [
         INTRA if i == 0 or (period and i % period == 0) else LTR for i in range(len(kinds))
     ]
-
-
-def test_gaps_stay_and_what_lies_beneath_is_not_coded() -> None:
-    motion = gapped()
-    coded = Direct("online", motion, step=0.5)
-    mask = motion.signals[0].mask
-    assert np.abs(coded.read() - motion.values)[mask].max() < 2
-    assert sum(len(unit.data) for unit in units_of(coded)) < 2000
 
 
 @pytest.mark.parametrize(
@@ -256,39 +248,6 @@ def test_an_intra_coded_ltr_is_never_empty(preset, rate, gof, period) -> None:
 # Live
 
 
-@settings(max_examples=settings.default.max_examples // 2)
-@given(
-    st.integers(1, 60),
-    st.integers(1, 4),
-    st.sampled_from(PRESETS),
-    st.integers(1, 20),
-    st.integers(0, 3),
-)
-def test_frame_by_frame_gives_the_values_of_the_whole(
-    n_frames, n_markers, preset, gof, period
-) -> None:
-    """With a fixed step; a rate counts bits that differ by what ends each frame's data."""
-    motion = markers(n_frames, n_markers)
-    params = {"preset": preset, "rate_control": "mod", "step": 0.3, "basis": "cosines"}
-    params |= {"gof": gof, "intra_period": period}
-    whole = Direct("online", motion, **params)
-    encoder = ONLINE.live(replace(whole.layout, n_frames=0), ONLINE.options(params))
-    decoder = ONLINE.follow(encoder.header, whole.layout)
-    pushed = [encoder.push(row) for row in motion.values]
-    found = np.array([decoder.push(*packet) for packet in pushed])
-    np.testing.assert_array_equal(found, whole.read())
-    spans = [Span(i, 1, fresh=fresh) for i, (_, fresh) in enumerate(pushed)]
-    for start in {0, n_frames // 2, n_frames - 1}:
-        again = ONLINE.decode(
-            encoder.header,
-            whole.layout,
-            spans,
-            Request(start, n_frames, (0,)),
-            lambda i, _, __: pushed[i][0],
-        )
-        np.testing.assert_array_equal(again, found[start:])
-
-
 def parsed(params):
     """Parameters as an encoder is given them."""
     options = ONLINE.options(params)
@@ -300,31 +259,6 @@ def live_pair(motion, **params):
     encoder = ONLINE.live(replace(layout, n_frames=0), ONLINE.options(params))
     known = replace(layout, find_model=model_finder(encoder.models))
     return encoder, ONLINE.follow(encoder.header, known)
-
-
-@given(st.sets(st.integers(0, 39), max_size=6), st.integers(1, 9), st.integers(0, 3))
-@settings(max_examples=30)  # of 40 frames each; test_online_losses.py has damage, too
-def test_what_is_decoded_after_a_loss_is_right(lost, gof, period) -> None:
-    """A lost STR spoils its group, a lost LTR all up to the next intra coded one."""
-    motion = markers(40, 2)
-    encoder, decoder = live_pair(motion, step=0.5, gof=gof, intra_period=period)
-    _, whole = live_pair(motion, step=0.5, gof=gof, intra_period=period)
-    ltr = before = False
-    for at, row in enumerate(motion.values):
-        packet = encoder.push(row)
-        meant = whole.push(*packet)
-        first, intra = at % gof == 0, packet[1]
-        able = intra or (ltr if first else before)
-        if at in lost:
-            decoder.skip(1)
-            able = False
-        elif able:
-            np.testing.assert_array_equal(decoder.push(*packet), meant)
-        else:
-            with pytest.raises(LostFrameError):
-                decoder.push(*packet)
-        before = able
-        ltr = able if first else ltr
 
 
 def test_a_predicted_ltr_is_not_decoded_from_the_wrong_one() -> None:
@@ -367,17 +301,6 @@ def test_what_cannot_change_is_refused(options) -> None:
     encoder, _ = live_pair(markers(10, 2), step=0.5)
     with pytest.raises(mcz.OptionError):
         encoder.change(parsed(options))
-
-
-def test_what_needs_all_frames_is_refused_live() -> None:
-    layout = Layout(0, ((0, 1, 2),), skeleton=markers(1, 1).skeleton)
-    for options, words in (
-        ({}, "step or bitrate"),
-        ({"step": 1, "basis": "learned"}, "train"),
-        ({"bitrate": 4}, "frame rate"),
-    ):
-        with pytest.raises(mcz.OptionError, match=words):
-            ONLINE.live(layout, ONLINE.options(options))
 
 
 # Bad bytes

@@ -26,28 +26,6 @@ def encoded(motion: mcz.Motion, **params: object) -> bytes:
     return out.getvalue()
 
 
-def test_decodes_to_what_was_encoded() -> None:
-    motion = smooth(47)
-    with mcz.open(encoded(motion)) as file:
-        clip = file.clips["smooth"]
-        np.testing.assert_allclose(clip.read(), motion.values, rtol=0, atol=1e-12)
-        assert clip.codec == "overlap"
-
-
-@pytest.mark.parametrize("frames", [(0, 47), (9, 11), (19, 20), (10, 10), (46, 47), (0, 1)])
-@pytest.mark.parametrize("joints", [None, ["knee"], ["spine", "hips"], []])
-@pytest.mark.parametrize("resolution", [0, 1])
-def test_part_equals_whole(frames, joints, resolution) -> None:
-    with mcz.open(encoded(smooth(47))) as file:
-        clip = file.clips["smooth"]
-        whole = clip.read(resolution=resolution)
-        columns = [c for j in joints or [] for c in clip.skeleton.columns(clip.skeleton.find(j))]
-        if joints is None:
-            columns = list(range(10))
-        part = clip.read(frames, joints, resolution)
-        np.testing.assert_array_equal(part, whole[frames[0] : frames[1]][:, columns])
-
-
 def test_lower_resolution_leaves_streams_unread() -> None:
     data = encoded(smooth(400), length=100)
     with mcz.open(data, unverified=True) as file:
@@ -63,19 +41,6 @@ def test_lower_resolution_leaves_streams_unread() -> None:
         assert costs[0] - costs[1] >= detail - counts.n_groups * 256
 
 
-def test_decimate_returns_every_second_frame() -> None:
-    with mcz.open(encoded(smooth(47))) as file:
-        clip = file.clips["smooth"]
-        np.testing.assert_array_equal(
-            clip.read(resolution=1, decimate=True), clip.read(resolution=1)[::2]
-        )
-
-
-def test_resolution_out_of_range() -> None:
-    with mcz.open(encoded(smooth())) as file, pytest.raises(mcz.OptionError, match="resolutions 0"):
-        file.clips["smooth"].read(resolution=2)
-
-
 def test_lossy_hash_is_that_of_the_decoded_values() -> None:
     data = bytearray(encoded(smooth(47)))
     with mcz.open(bytes(data)) as file:
@@ -84,17 +49,6 @@ def test_lossy_hash_is_that_of_the_decoded_values() -> None:
     data[row.offset + row.size - 1] ^= 1
     with mcz.open(bytes(data)) as file, pytest.raises(mcz.ChecksumError):
         file.clips["smooth"].read()
-
-
-@pytest.mark.parametrize("value", [1, "many", 2**40])
-def test_bad_parameter(value) -> None:
-    with pytest.raises(mcz.OptionError, match="length"):
-        encoded(smooth(), length=value)
-
-
-def test_unknown_parameter_names_the_known_ones() -> None:
-    with pytest.raises(mcz.OptionError, match="no parameter 'size'; it has length"):
-        encoded(smooth(), size=4)
 
 
 def test_unknown_codec_makes_only_that_clip_unsupported(monkeypatch: pytest.MonkeyPatch) -> None:

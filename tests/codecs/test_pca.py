@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -16,8 +14,7 @@ from mcz.codecs.pca import streams
 from mcz.codecs.pca.choices import components_of, principal
 from mcz.codecs.pca.pca import CODEC
 from mcz.codecs.pca.streams import Components
-from mcz.metrics import compare
-from tests.codecs.lossy import Direct, amc, bytes_of, clip_of, decoded, saved, wandering
+from tests.codecs.lossy import Direct, clip_of, decoded, wandering
 from tests.motions import smooth
 
 KINDS = st.lists(st.sampled_from(["rx", "ry", "tx", "sx"]), min_size=1, max_size=8)
@@ -144,28 +141,6 @@ def test_integers_beyond_the_limit_are_refused() -> None:
             streams.build_stream(Components(0, parts[0], none, parts[1], parts[2]), scaled=False)
 
 
-@pytest.mark.parametrize(
-    ("head", "words"),
-    [
-        (b"\x80", "ends in its head"),
-        (b"\x80\x00\x04", "4 components of 3 channels"),
-        (b"\x80\x00\x01\x00", "ends in its head"),
-        (b"\x80\x3f\x01\x00\x00", "scale of 63"),
-        (b"\x80\x00\x01\x29\x00", "out of range"),
-        (b"\x80\x00\x01\x00\x3f", "scale 63"),
-        (b"\x80\x00\x01\x00\xff", "scale 63"),
-    ],
-)
-def test_bad_heads(head: bytes, words: str) -> None:
-    with pytest.raises(mcz.FormatError, match=words):
-        streams.parse_stream(head, 3, 9, 9, scaled=True)
-
-
-def test_components_are_no_more_than_frames_and_one() -> None:
-    with pytest.raises(mcz.FormatError, match="3 components of 5 channels, 1 frames"):
-        streams.parse_stream(b"\x80\x00\x03" + bytes(6), 5, 1, 1, scaled=True)
-
-
 def test_the_greatest_values_are_finite() -> None:
     """The greatest step, mean, basis and coefficient that bits can spell."""
     most = np.full((1, 1), 2**40, np.int64)
@@ -200,31 +175,3 @@ def test_presets() -> None:
     assert Direct("pca", smooth(100), preset="khan2014").header == b"\x02"
     assert Direct("pca", smooth(100)).header == b"\xff"
     assert Direct("pca", smooth(100), Q=3).header == b"\x03"
-
-
-# The published figures
-
-
-SIZES = {"10_03": 288_143, "05_01": 479_866}  # of the .amc with its line ends
-TABLE_4 = {"10_03": (22, 0.258, 7.919), "05_01": (13, 1.042, 14.37)}  # q, MSE, CR
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("name", TABLE_4)
-def test_table_4_of_khan2014(data: Path, name: str) -> None:
-    """The published error, at least 1.5 times the published ratio."""
-    q, mse, ratio = TABLE_4[name]
-    motion = amc(data, name)
-    stored = saved("pca", motion, preset="khan2014", q=q)
-    with mcz.open(stored) as file:
-        found = compare(motion, file.only_clip().motion(), virtual_markers=False).mse
-    assert found == pytest.approx(mse, abs=0.001)
-    assert SIZES[name] / bytes_of(stored) >= 3 * ratio
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("name", TABLE_4)
-def test_all_components_of_a_real_clip(data: Path, name: str) -> None:
-    motion = amc(data, name)
-    found = decoded("pca", motion, q=62, Q=4)
-    assert np.abs(found - unwrap(motion.values, motion.skeleton)).max() < 5e-4

@@ -12,13 +12,12 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.codecs import basis_models
-from mcz.codecs.contract import id_of, model_finder
 from mcz.codecs.space import COURSES
 from mcz.codecs.spatial.window_kernels import synthesize_courses
 from mcz.codecs.spatial.windows import WINDOWS_HEADER
 from mcz.motion import Signal
 from mcz.reading.sizes import clip_sizes
-from mcz.schema import build, parse
+from mcz.schema import parse
 from mcz.transforms.dct import dct_matrix
 from tests.codecs.lossy import Direct, amc, bytes_of, decoded, markers, saved
 
@@ -82,9 +81,9 @@ def test_a_short_window_has_cosines() -> None:
     assert error[240:].mean() < 1.5 * error[:240].mean()
 
 
-@pytest.mark.parametrize("window", [1023, 1024, 1025, 2048])
+@pytest.mark.parametrize("window", [1024, 1025])
 def test_long_windows_have_all_courses_or_none(window) -> None:
-    motion = markers(2 * window + 3, 1)
+    motion = markers(window + 3, 1)
     coded = Direct(NAME, motion, step=0.01, window=window)
     flags = parse(WINDOWS_HEADER, coded.header, "header").space.flags
     assert bool(flags & COURSES) == (window <= 1024)
@@ -102,18 +101,6 @@ def test_places_far_away() -> None:
     values = motion.values + 1e6
     found = decoded(NAME, replace(motion, signals=(Signal(values),)), step=1e-6)
     assert np.abs(found - values).max() < 1e-5
-
-
-def test_courses_that_take_too_long_are_refused() -> None:
-    model = basis_models.model_of([np.eye(1, 6), np.eye(600, 2000), np.zeros((1, 6))], 1)
-    coded = Direct(NAME, markers(9, 2))
-    fields = parse(WINDOWS_HEADER, coded.header, "header")
-    fields.window, fields.n_frequencies = 2000, 600
-    fields.space.model = id_of(model)
-    header = build(WINDOWS_HEADER, fields, "header")
-    layout = replace(coded.layout, find_model=model_finder([model]))
-    with pytest.raises(mcz.FormatError, match="600 courses of 2000 frames are too many"):
-        coded.read(changes={"header": header, "layout": layout})
 
 
 @pytest.mark.real

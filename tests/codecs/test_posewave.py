@@ -12,10 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mcz
-from mcz.codecs.posewave.header import POSEWAVE_HEADER
 from mcz.motion import Motion, Signal
 from mcz.numbers import Grid, GridKind
-from mcz.schema import build, parse
 from tests.codecs.lossy import (
     Array,
     Direct,
@@ -64,16 +62,6 @@ def test_errors_follow_the_step(step: float, seed: int) -> None:
     assert mean_error_cm(motion, values) < 2 * step
 
 
-def test_a_finer_step_is_nearer_and_larger() -> None:
-    motion = smooth(300)
-    sizes, errors = [], []
-    for step in (1.0, 0.1, 0.01):
-        coded = Direct(NAME, motion, step=step)
-        sizes.append(coded.n_bytes)
-        errors.append(mean_error_cm(motion, coded.read()))
-    assert sizes == sorted(sizes) and errors == sorted(errors, reverse=True)
-
-
 @pytest.mark.parametrize("levels", [0, 1, 3, 8])
 def test_resolutions(levels: int) -> None:
     motion = smooth(200)
@@ -82,10 +70,6 @@ def test_resolutions(levels: int) -> None:
     errors = [mean_error_cm(motion, coded.read(resolution=k)) for k in range(levels + 1)]
     assert errors[0] < 0.05
     assert all(a <= 1.05 * b for a, b in zip(errors, errors[1:], strict=False))
-
-
-def _segmented() -> Direct:
-    return Direct(NAME, wandering(150, KINDS, 3), step=0.1, levels=3, segment_frames=40)
 
 
 def test_channels_that_stand_still_cost_nothing() -> None:
@@ -113,20 +97,6 @@ def test_angle_units(angle_unit: str) -> None:
     missed = decoded(NAME, motion, step=0.01) - motion.values
     missed -= full * np.rint(missed / full)
     assert np.abs(missed).max() < {"deg": 1.0, "rad": 0.5, "": 6.0}[angle_unit]
-
-
-def changed(coded: Direct, **fields: Any) -> dict[str, Any]:
-    header = parse(POSEWAVE_HEADER, coded.header, "header")
-    return {"header": build(POSEWAVE_HEADER, {**header, **fields}, "header")}
-
-
-@pytest.mark.parametrize(
-    "fields", [{"plain": [128]}, {"weights": [128]}, {"levels": 1, "borrowing": 0}]
-)
-def test_headers_that_do_not_fit(fields: dict[str, Any]) -> None:
-    coded = _segmented()
-    with pytest.raises(mcz.FormatError, match=f"{next(iter(fields))}"):
-        coded.read(changes=changed(coded, **fields))
 
 
 def test_a_bound_is_met_by_refining_frames() -> None:

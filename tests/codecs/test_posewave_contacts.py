@@ -151,19 +151,6 @@ def test_real_clips(name: str, data: Path) -> None:
     assert off.mean() < before.mean() and off.max() <= 1.25 * before.max()
 
 
-@pytest.mark.real
-def test_a_straight_leg_is_not_bent(data: Path) -> None:
-    """Of this clip a knee once went out by centimeters."""
-    motion = mcz.read(data / "cmu/bvh/05_01.bvh", unit="in")
-    found = [Direct("posewave", motion, step=0.05, contacts=c).read() for c in ((), "auto")]
-    source = positions_of(motion.skeleton, np.asarray(motion.values))
-    without, with_contacts = (
-        np.linalg.norm(positions_of(motion.skeleton, values) - source, axis=2).max()
-        for values in found
-    )
-    assert with_contacts < 1.1 * without
-
-
 def test_contacts_are_found_of_joints_by_name() -> None:
     motion = walking(1100)
     values = np.array(motion.values)
@@ -282,18 +269,6 @@ def test_points_without_angles_do_nothing() -> None:
     values = np.zeros((2, n))
     shifted(plan, held, values, np.ones(3))
     assert not values.any()
-
-
-def test_points_that_no_skeleton_has() -> None:
-    skeleton = biped()
-    for joint, tail in ((99, 0), (4, 2), (3, 1)):
-        with pytest.raises(FormatError, match="test: contacts of point"):
-            contacts_of(skeleton, (joint, tail))
-    with pytest.raises(FormatError, match="no point"):
-        contacts_of(skeleton)
-    points = [Named(joint=3, tail=0, step=1.0, follows=1)]
-    with pytest.raises(FormatError, match="point 1 follows point 1"):
-        parse_contacts([Named(rounds=1, ramp=0, points=points)], skeleton, "test")
 
 
 def test_runs_that_cannot_be() -> None:

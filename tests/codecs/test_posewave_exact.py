@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import io
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 import mcz
 from mcz.cli.common import run
@@ -161,40 +158,6 @@ def test_an_exact_joint_needs_its_stream_alone(coded: Coded) -> None:
     np.testing.assert_array_equal(knee, coded.read(0, 2)[:, 6:])
 
 
-@pytest.mark.parametrize("exact", [[3], [1, 1], [1, 0], []])
-def test_headers_that_do_not_fit(coded: Coded, exact: list[int]) -> None:
-    with pytest.raises(mcz.FormatError, match="group"):
-        coded.read(0, header=coded.with_header(exact=exact))
-
-
-@pytest.mark.parametrize(
-    ("place", "groups", "stream"),
-    [
-        ((0, 1, 1), (1,), b"\0"),  # a detail of what is exact
-        ((0, 0, 2), (0, 2), b"\0"),  # rows of another group
-        ((1, 2, 2), (0, 2), b"\0"),
-        ((0, 0, 1), (1,), bytes((1, 2, 1, 0, 1))),  # a copy
-    ],
-)
-def test_streams_that_cannot_be(
-    coded: Coded, place: tuple[int, int, int], groups: tuple[int, ...], stream: bytes
-) -> None:
-    coded.changed = {place: stream}
-    with pytest.raises(mcz.FormatError, match="group"):
-        coded.read(*groups)
-    coded.changed = {}
-
-
-@given(data=st.data())
-def test_any_change_of_an_exact_stream_decodes_or_is_refused(data: st.DataObject) -> None:
-    coded = Coded(smooth(30), step=0.2, levels=1, lossless="spine")
-    stream = bytearray(coded.stream(0, 0, 1))
-    stream[data.draw(st.integers(0, len(stream) - 1))] ^= 1 << data.draw(st.integers(0, 7))
-    coded.changed = {(0, 0, 1): bytes(stream[: data.draw(st.integers(0, len(stream)))])}
-    with suppress(mcz.MczError):
-        assert coded.read(1).shape == (30, 3)
-
-
 def test_streams_are_those_of_codec_1(coded: Coded) -> None:
     ordinals = FOUR.ordinals(np.ascontiguousarray(smooth(100).values[:60, SPINE]))[0]
     assert coded.stream(0, 0, 1) == build_stream(ordinals, [(FOUR, FOUR)] * 3, 1, None)
@@ -229,14 +192,6 @@ def test_targets_and_quality(target: dict[str, Any]) -> None:
 def test_words_that_mean_nothing(words: object) -> None:
     with pytest.raises(mcz.OptionError, match="lossless"):
         saved(NAME, smooth(20), step=0.1, lossless=words)
-
-
-def test_a_live_encoder_has_none() -> None:
-    codec = by_name(NAME)
-    layout = replace(Coded(smooth(5), step=0.1).layout, n_frames=0)
-    assert codec.live is not None
-    with pytest.raises(mcz.OptionError, match="lossless"):
-        codec.live(layout, codec.options({"lossless": "spine", "levels": 0}))
 
 
 @pytest.mark.real

@@ -18,7 +18,7 @@ from mcz.codecs.contract import Layout
 from mcz.codecs.posewave.chain import Chain
 from mcz.codecs.posewave.choices import PRESETS, live_choice
 from mcz.codecs.posewave.header import parse_header
-from mcz.errors import LostFrameError, OptionError
+from mcz.errors import OptionError
 from mcz.motion import Motion
 from mcz.writing.signal_source import MemorySource
 from tests.codecs.lossy import Array, clip_of
@@ -64,26 +64,6 @@ def test_where_segments_end_does_not_bear_upon_values(cuts: set[int], exponent: 
     np.testing.assert_array_equal(coded([0, *sorted(cuts), 30]), coded([0, 30]))
 
 
-@given(lost=st.sets(st.integers(0, 29), max_size=6), every=st.integers(1, 9))
-@settings(max_examples=20)
-def test_what_is_decoded_after_a_loss_is_right(lost: set[int], every: int) -> None:
-    motion = turning(30)
-    encoder, decoder = pair(motion, step=0.5, segment_frames=every)
-    _, whole = pair(motion, step=0.5, segment_frames=every)
-    able = False
-    for at, row in enumerate(motion.values):
-        packet = encoder.push(row)
-        meant = whole.push(*packet)
-        able = at not in lost and (able or packet[1])
-        if at in lost:
-            decoder.skip(1)
-        elif able:
-            np.testing.assert_array_equal(decoder.push(*packet), meant)
-        else:
-            with pytest.raises(LostFrameError):
-                decoder.push(*packet)
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_preset_holds_in_every_frame(preset: str) -> None:
     motion = turning(60)
@@ -98,18 +78,6 @@ def test_a_preset_holds_in_every_frame(preset: str) -> None:
         error = mcz.compare(motion, file.clips["live"].motion(), virtual_markers=False)
     assert error.max_position_error_cm is not None
     assert error.max_position_error_cm <= PRESETS[preset] * (1 + 1e-9)
-
-
-@pytest.mark.parametrize(
-    ("params", "message"),
-    [
-        ({"levels": 3, "step": 0.1}, "levels 3 needs frames"),
-        ({"quality": "head=1mm", "step": 0.1}, "quality needs all frames"),
-    ],
-)
-def test_what_needs_all_frames_is_refused(params: dict[str, Any], message: str) -> None:
-    with pytest.raises(OptionError, match=message):
-        pair(turning(1), **params)
 
 
 def test_a_preset_needs_a_unit_of_length() -> None:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import mcz
 from mcz.codecs.posewave.apply_kernels import into_metric, out_of_metric
 from mcz.codecs.posewave.metric_kernels import factor, inverse_root
 from mcz.codecs.posewave.skeleton_plan import MAX_PATH, PLAIN, Plan, make_plan
@@ -142,16 +140,6 @@ def test_the_exponential_of_the_metric(square: float) -> None:
         assert c == pytest.approx(1 / 6 - square / 120, abs=1e-7)
 
 
-@given(skeletons(), st.integers(0, 1000))
-def test_kept_channels_alone(skeleton: Skeleton, seed: int) -> None:
-    random = np.random.default_rng(seed)
-    values = values_for(skeleton, 1, seed)[0]
-    kept = random.integers(0, 2, skeleton.n_channels).astype(np.bool_)
-    added = random.uniform(0.01, 2, int(kept.sum()))
-    plan = make_plan(skeleton, kept, added, radius=RADIUS, kappa=KAPPA)
-    assert_near(metric_of(plan, values), numeric(skeleton, values)[kept][:, kept])
-
-
 @given(skeletons(), st.integers(1, 20), st.integers(0, 1000))
 def test_rows_come_back(skeleton: Skeleton, n_poses: int, seed: int) -> None:
     plan = plan_of(skeleton, 1e-4)
@@ -161,35 +149,6 @@ def test_rows_come_back(skeleton: Skeleton, n_poses: int, seed: int) -> None:
     expected = [dense(plan, factors, pose) @ row for pose, row in enumerate(rows)]
     assert_near(inside, np.array(expected), 1e-12)
     assert_near(out_of(plan, factors, inside), rows, 1e-9)
-
-
-@given(skeletons(), st.integers(2, 20), st.integers(1, 3), st.integers(0, 1000))
-def test_batches_are_singles_to_the_bit(
-    skeleton: Skeleton, n_poses: int, repeat: int, seed: int
-) -> None:
-    plan, values = plan_of(skeleton), values_for(skeleton, n_poses, seed)
-    factors = factor(plan, values)
-    assert np.array_equal(factors, np.concatenate([factor(plan, pose[None]) for pose in values]))
-    which = np.arange(n_poses * repeat) // repeat
-    rows = np.random.default_rng(seed).normal(size=(len(which), plan.n_kept))
-    for action in (into_metric, out_of_metric):
-        alone = [
-            action(plan, factors, row[None], n) for row, n in zip(rows, which[:, None], strict=True)
-        ]
-        assert np.array_equal(action(plan, factors, rows, which), np.concatenate(alone))
-
-
-def test_shapes_that_do_not_fit() -> None:
-    skeleton = chain(3)
-    plan = plan_of(skeleton)
-    factors = factor(plan, values_for(skeleton, 19))
-    for action in (into, out_of):
-        with pytest.raises(ValueError, match="rows of 8 values for 9 channels"):
-            action(plan, factors, np.zeros((19, 8)))
-    with pytest.raises(ValueError, match=r"poses of shape \(2, 8\) for 9 channels"):
-        factor(plan, np.zeros((2, 8)))
-    with pytest.raises(ValueError, match="8 of 9 channels are kept"):
-        make_plan(skeleton, np.ones(9, np.bool_), np.zeros(8), radius=1.0)
 
 
 def test_worked_example() -> None:
@@ -232,25 +191,6 @@ def test_a_joint_that_would_exceed_the_path_begins_a_block() -> None:
     assert np.diff(plan.starts).tolist() == [*range(1, 92), *range(1, 40)]
     plan = plan_of(chain(1, TURNING * 70))
     assert np.diff(plan.starts).tolist() == [*range(1, 97), *range(1, 97), *range(1, 19)]
-
-
-def test_cost_is_linear() -> None:
-    """A channel has at most 96 entries, so a factor takes at most 96 * 96 products of it."""
-    for n_joints in (43, 683):
-        plan = plan_of(chain(n_joints))
-        assert len(plan.path) <= 96 * plan.n_kept
-
-
-def test_nothing_to_do() -> None:
-    empty = Skeleton(())
-    plan = plan_of(empty)
-    factors = factor(plan, np.zeros((3, 0)))
-    assert factors.shape == (3, 0)
-    assert into(plan, factors, np.zeros((3, 0))).shape == (3, 0)
-    skeleton = chain(2)
-    plan = make_plan(skeleton, np.zeros(6, np.bool_), np.zeros(0), radius=1.0)
-    assert plan.n_entries == 0
-    assert out_of(plan, factor(plan, np.zeros((1, 6))), np.zeros((1, 0))).shape == (1, 0)
 
 
 def test_plain_channels_stand_alone() -> None:
@@ -376,29 +316,3 @@ EXAMPLE_ROW = [
     147.34927163563896,
     136.22591855143898,
 ]
-
-REAL = (
-    "cmu/amc/49_18.amc",
-    "cmu/bvh/05_01.bvh",
-    "cmu/bvh-3dsmax/131_01.bvh",
-    "cmu/bvh-blender/02_01.bvh",
-    "cmu/bvh-daz/01_01.bvh",
-    "cmu/bvh-iclone/001_01.bvh",
-    "cmu/c3d/01_01.c3d",
-    "other/bandai-namco/dataset-1_bow_active_001.bvh",
-)
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("name", REAL)
-def test_real_clips(name: str, data: Path) -> None:
-    motion = mcz.read(data / name)
-    skeleton, values = motion.skeleton, np.asarray(motion.values, np.float64)
-    pose = np.nan_to_num(values[len(values) // 2])
-    plan = plan_of(skeleton, 1e-2)
-    expected = numeric(skeleton, pose)
-    assert_near(metric_of(plan, pose), expected)
-    assert np.abs(expected).max() > 0
-    rows = np.random.default_rng(0).normal(size=(1, plan.n_kept))
-    factors = factor(plan, pose[None])
-    assert_near(out_of(plan, factors, into(plan, factors, rows)), rows, 1e-9)

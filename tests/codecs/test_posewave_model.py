@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -79,7 +78,7 @@ def some_levels(seed: int, n: int, scale: float) -> list[Ints]:
 @settings(max_examples=40, deadline=None)
 @given(st.data())
 def test_any_integers(data: st.DataObject) -> None:
-    n = data.draw(st.integers(1, 70), "channels")
+    n = data.draw(st.integers(1, 70) | st.just(130), "channels")
     most = data.draw(st.sampled_from([0, 1, 3, 60, 1 << 14, MAX_INDEX]), "most")
     seed = data.draw(st.integers(0, 2**32), "seed")
     rng = np.random.default_rng(seed)
@@ -88,14 +87,6 @@ def test_any_integers(data: st.DataObject) -> None:
     classes = rng.integers(0, N_CLASSES, n)
     streams = encode([q.copy() for q in levels], classes)
     for q, found in zip(levels, decode(streams, lengths, classes), strict=True):
-        np.testing.assert_array_equal(q, found)
-
-
-@pytest.mark.parametrize("n", [1, 62, 64, 65, 130])
-def test_channels_and_blocks(n: int) -> None:
-    levels, classes = some_levels(n, n, 20.0), np.arange(n) % N_CLASSES
-    streams = encode(levels, classes)
-    for q, found in zip(levels, decode(streams, list(LENGTHS), classes), strict=True):
         np.testing.assert_array_equal(q, found)
 
 
@@ -118,41 +109,6 @@ def test_choices() -> None:
     again = decode(streams, list(LENGTHS), np.arange(n) % N_CLASSES)
     for q, found in zip(levels, again, strict=True):
         np.testing.assert_array_equal(q, found)
-
-
-def test_rows_one_at_a_time() -> None:
-    """An encoder may code level 0 row by row, as each of its rows depends on those decoded."""
-    q, n = some_levels(1, 9, 30.0)[0], 9
-    together = encode([q.copy()], np.zeros(n, np.int64))[0]
-    model, none, here = (
-        make_model(np.zeros(n, np.int64), start_tables()[0]),
-        no_rows(n),
-        new_rows(len(q), n),
-    )
-    data, means = np.zeros(1 << 14, np.uint8), np.zeros(q.shape)
-    mixing.start(model.coder, data, 1)
-    begin_level(model, 0)
-    for row in range(len(q)):
-        y = np.zeros((1, n))
-        assert (
-            code_rows(
-                model,
-                data,
-                q,
-                y,
-                means,
-                here,
-                none,
-                none,
-                0,
-                row,
-                row + 1,
-                NO_CHOICE,
-                *NO_EXPONENTS,
-            )
-            == -1
-        )
-    assert data[: mixing.finish(model.coder, data)].tobytes() == together
 
 
 def test_too_large() -> None:

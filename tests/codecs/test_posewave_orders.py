@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-import mcz
 from mcz.angles import FULL_TURN, unwrap
 from mcz.codecs.posewave.arc import arc
 from mcz.codecs.posewave.choices import choose
@@ -168,20 +166,6 @@ def test_wild_notes(data: bytes, n_frames: int) -> None:
     assert np.isfinite(orders.values(wild, told)).all()
 
 
-@pytest.mark.parametrize(
-    ("data", "message"),
-    [
-        (b"\x01\x14", "a note 20 of 20"),
-        (b"\x01\x01\x00", "0 for turns"),
-        (b"\x01\x01\x80\x80\x80\x80\x80\x80\x01", "4398046511104 for turns"),
-        (b"\x02\x00", "runs past the end"),
-    ],
-)
-def test_bad_notes(data: bytes, message: str) -> None:
-    with pytest.raises(FormatError, match=message):
-        Orders([4], single((0, 1, 2), "deg")).take_notes(data, 5, "here")
-
-
 def test_joints_that_have_no_order() -> None:
     skeleton = single((0, 1, 2), "deg")
     channels = skeleton.joints[0].channels
@@ -243,28 +227,6 @@ def test_codec() -> None:
         encode_segment(header, skeleton, wild, choice.weights)
 
 
-@pytest.mark.parametrize(
-    ("orders", "message"),
-    [
-        ([3, 3], "2 of orders, 1 are due"),
-        ([7], "orders"),
-        ([1], "order 1 of joint 0"),
-    ],
-)
-def test_bad_headers(orders: list[int], message: str) -> None:
-    skeleton, values = turning(n_frames=100)
-    channels = skeleton.joints[0].channels[:3]
-    if orders == [1]:  # two rotations only
-        skeleton = replace(skeleton, joints=(replace(skeleton.joints[0], channels=channels),))
-        values = values[:, :3]
-    source = source_of(skeleton, values)
-    data = choose(source, PARAMETERS).header
-    fields = parse_header(data, source.layout)
-    rest = data[: -3 - len(fields.orders)]  # behind them: nothing is exact, no contacts
-    with pytest.raises(FormatError, match=message):
-        parse_header(rest + bytes([len(orders), *orders, 0, 0]), source.layout)
-
-
 @given(SEQUENCE, CODES, st.integers(0, 100))
 def test_metric_of_coded_angles(own: tuple[int, ...], code: int, seed: int) -> None:
     """It is that of a skeleton whose channels have the coded order."""
@@ -282,18 +244,3 @@ def test_metric_of_coded_angles(own: tuple[int, ...], code: int, seed: int) -> N
             plan = make_plan(one, kept, added, radius=1.0, orders=orders)
             found.append(factor(plan, pose))
         assert np.array_equal(found[0], found[1])
-
-
-@pytest.mark.real
-def test_real_clips(data: Path) -> None:
-    for name in ("cmu/amc/135_02.amc", "cmu/amc/14_08.amc"):
-        motion = mcz.read(data / name)
-        skeleton, values = motion.skeleton, unwrap(np.asarray(motion.values), motion.skeleton)
-        codes = [
-            1 + j % 6 if own_sequence(x, skeleton) else 0 for j, x in enumerate(skeleton.joints)
-        ]
-        orders = Orders(codes, skeleton)
-        _, found = orders.notes_and_values(values, orders.coded(values))
-        assert np.abs(found - values).max() < 1e-7
-        off = positions_of(skeleton, found) - positions_of(skeleton, values)
-        assert np.abs(off).max() < 1e-9

@@ -1,4 +1,4 @@
-"""The pose metric in JavaScript, written from SPEC.md alone, gives the same bits."""
+"""The pose metric and axis orders in JavaScript, written from SPEC.md, give the same bits."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import mcz
+from mcz.angles import unwrap
 from mcz.codecs.posewave.apply_kernels import out_of_metric
 from mcz.codecs.posewave.metric_kernels import factor
-from mcz.codecs.posewave.orders import own_sequence
+from mcz.codecs.posewave.orders import SEQUENCES, Orders, own_sequence
 from mcz.codecs.posewave.skeleton_plan import make_plan
-from mcz.motion import CHANNEL_KINDS, Skeleton
-from tests.codecs.test_posewave_metric import REAL, chain
+from mcz.motion import CHANNEL_KINDS, Channel, Joint, Skeleton
+from tests.codecs.test_posewave_metric import chain
+from tests.codecs.test_posewave_orders import single, wandering
 from tests.skeletons import skeletons, values_for
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="there is no node")
 
 FOLDER = Path(__file__).parents[2] / "tools" / "js"
-PROGRAM = """
+METRIC = """
 import { readFileSync } from "node:fs";
 import { PoseMetric } from "./pose-metric.js";
 
@@ -38,8 +39,23 @@ for (const line of readFileSync(0, "utf8").trim().split("\\n")) {
   console.log(JSON.stringify([factors.map(hex), back.map(hex)]));
 }
 """
+AXIS_ORDERS = """
+import { readFileSync } from "node:fs";
+import { AxisOrders } from "./axis-orders.js";
+import { ByteReader } from "./bytes.js";
+
+for (const line of readFileSync(0, "utf8").trim().split("\\n")) {
+  const { skeleton, codes, stream, values } = JSON.parse(line);
+  const orders = new AxisOrders(skeleton, codes);
+  const reader = new ByteReader(Buffer.from(stream, "hex"), "stream");
+  const notes = orders.takeNotes(reader, values.length);
+  const all = Float64Array.from(values.flat());
+  orders.restore(all, values[0].length, notes);
+  console.log(JSON.stringify([Buffer.from(all.buffer).toString("hex"), reader.left]));
+}
+"""
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
-Case = tuple[list[list[str]], dict[str, Any]]
+Case = tuple[list[Any], dict[str, Any]]
 
 
 def as_javascript(skeleton: Skeleton) -> dict[str, Any]:
@@ -98,9 +114,9 @@ def case(skeleton: Skeleton, values: np.ndarray, seed: int) -> Case:
     }
 
 
-def check(cases: list[Case]) -> None:
+def check(program: str, cases: list[Case]) -> None:
     done = subprocess.run(
-        ["node", "--input-type=module", "-e", PROGRAM],
+        ["node", "--input-type=module", "-e", program],
         cwd=FOLDER,
         input="\n".join(json.dumps(asked) for _, asked in cases),
         capture_output=True,
@@ -123,17 +139,49 @@ def test_generated_skeletons() -> None:
     for size in (0, 1, 40):  # 120 channels on a path of at most 96
         skeleton = chain(size) if size else Skeleton(())
         cases.append(case(skeleton, values_for(skeleton, 2), size))
-    check(cases)
+    check(METRIC, cases)
 
 
-@pytest.mark.real
-def test_real_clips(data: Path) -> None:
+def orders_case(skeleton: Skeleton, codes: list[int], source: np.ndarray, noise: float) -> Case:
+    """What Python makes of coded angles that are off by ``noise`` turns; what is asked."""
+    orders = Orders(codes, skeleton)
+    coded = orders.coded(source)
+    coded += np.random.default_rng(len(source)).normal(0, noise, coded.shape) * orders.full
+    notes, decoded = orders.notes_and_values(source, coded)
+    return [decoded.tobytes().hex(), 2], {
+        "skeleton": as_javascript(skeleton),
+        "codes": codes,
+        "stream": notes.hex() + "abcd",
+        "values": coded.tolist(),
+    }
+
+
+def test_every_order() -> None:
     cases = []
-    for seed, name in enumerate(REAL):
-        motion = mcz.read(data / name)
-        values = np.nan_to_num(np.asarray(motion.values, np.float64))
-        random = np.random.default_rng(seed)
-        chosen = values[random.integers(0, len(values), 20)]
-        chosen[10:] += random.normal(0, 90, (10, chosen.shape[1]))
-        cases.append(case(motion.skeleton, chosen, seed))
-    check(cases)
+    for unit in ("deg", "rad"):
+        for number, own in enumerate(SEQUENCES):
+            for code in range(1, 7):
+                skeleton = single(own, unit, intrinsic=bool(code % 2))
+                source = unwrap(wandering(unit, 60, 10 * number + code, 0.5), skeleton)
+                source[:9, 2] = np.arange(9) * Orders([], skeleton).full / 4
+                cases.append(orders_case(skeleton, [code], source, (0, 1e-3, 0.1)[code % 3]))
+    check(AXIS_ORDERS, cases)
+
+
+def test_several_joints() -> None:
+    kinds = ("rz", "tx", "ry", "rx")
+    channels = tuple(Channel(kind) for kind in kinds)
+    joints = tuple(Joint(f"{n}", n - 1, (0.0, 1.0, 0.0), channels=channels) for n in range(3))
+    skeleton = Skeleton(joints, angle_unit="deg", intrinsic=False)
+    source = unwrap(np.concatenate([wandering("deg", 200, n) for n in range(3)], 1), skeleton)
+    check(
+        AXIS_ORDERS,
+        [orders_case(skeleton, [3, 0, 5], source, 1e-3), orders_case(skeleton, [], source, 0.0)],
+    )
+
+
+def test_huge_angles() -> None:
+    skeleton = single((2, 1, 0), "deg")
+    source = unwrap(wandering("deg", 50, 5), skeleton) * 1e7
+    source[3:9] = 2.0**39 * np.array([1, 0.3, -1, 0.7])
+    check(AXIS_ORDERS, [orders_case(skeleton, [4], source, 1e12)])

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,16 +12,14 @@ from hypothesis import strategies as st
 
 import mcz
 from mcz.angles import unwrap
-from mcz.codecs import by_name
 from mcz.codecs.curves import qbc, streams
 from mcz.codecs.curves.choices import STEP_SHARE
 from mcz.codecs.parameters import SCALED
 from mcz.kinematics import reach
 from mcz.motion import Channel, Joint, Motion, Signal, Skeleton
 from mcz.schema import parse
-from mcz.writing.signal_source import MemorySource
 from tests.codecs import lossy
-from tests.codecs.lossy import Direct, bones, bytes_of, clip_of, wandering
+from tests.codecs.lossy import Direct, clip_of
 from tests.motions import smooth
 
 Array = np.ndarray
@@ -280,24 +276,6 @@ def test_streams_of_any_integers(data) -> None:
     np.testing.assert_array_equal(found.mids, mids)
 
 
-def test_memory_limits_of_a_segment_are_kept() -> None:
-    codec = by_name("qbc")
-    for settings, meant in (
-        ({"delta": 16}, 48),
-        ({"delta": 50}, 50),
-        ({"delta": 16, "segment_frames": 500}, 48),
-        ({"delta": 40, "preset": "khan2014"}, 40),
-    ):
-        source = MemorySource(clip_of(np.zeros((500, 3))), 0, codec, 24 * 50)
-        found = codec.encode(source, codec.options(settings))
-        assert {segment.n_frames for segment in found.segments} <= {meant, 500 % meant}
-    with pytest.raises(mcz.OptionError, match="delta 51 is more than the 50 frames that a segment"):
-        codec.encode(source, codec.options({"delta": 51})).segments.__next__()
-    short = MemorySource(clip_of(np.zeros((50, 3))), 0, codec, 24 * 50)
-    found = codec.encode(short, codec.options({"delta": 51}))
-    assert [segment.n_frames for segment in found.segments] == [50]
-
-
 # Parameters
 
 
@@ -324,66 +302,3 @@ def test_presets() -> None:
     assert (default.delta, default.decimals, default.step) == (40, SCALED, 0.75)
     lever = reach(smooth(1).skeleton) * math.pi / 180
     assert default.position_step == 0.75 * lever
-
-
-# Hostile bytes
-
-
-def test_random_streams_of_many_points() -> None:
-    """The greatest integers that bits can spell."""
-    clip = coded(jointed(2000, [3]), segment_frames=2000, delta=500)
-    random = np.random.default_rng(5)
-    for scale in range(64):
-        data = bytes([scale, 63 - scale]) + random.integers(0, 256, 200, "u1").tobytes()
-        for resolution in range(2):
-            with suppress(mcz.MczError):
-                clip.read(resolution=resolution, changes=clip.with_stream((0, resolution, 0), data))
-
-
-# Published figures
-
-
-def mse_of(motion: Motion, found: Array) -> float:
-    return float(((found - unwrap(motion.values, motion.skeleton)) ** 2).mean())
-
-
-@pytest.mark.real
-@pytest.mark.parametrize(
-    ("name", "limit", "published", "least_squares", "size", "ratio"),
-    [("10_03", 5, 0.2552, 0.2497, 288_143, 26.60), ("05_01", 24, 1.0875, 1.029, 479_866, 67.07)],
-)
-def test_figures_of_the_papers(
-    data: Path,
-    name: str,
-    limit: float,
-    published: float,
-    least_squares: float,
-    size: int,
-    ratio: float,
-) -> None:
-    """MSE of the published implementation, and 2.3 times the papers' compression ratio."""
-    motion = lossy.amc(data, name)
-    settings: dict[str, object] = {"preset": "khan2014", "d2_lmt": limit}
-    file = saved(motion, **settings)
-    with mcz.open(file) as opened:
-        assert mse_of(motion, opened.only_clip().read()) == pytest.approx(published, abs=5e-4)
-    assert size / bytes_of(file) >= 2.3 * ratio
-    found = decoded(motion, **settings, middle="least-squares")
-    assert mse_of(motion, found) == pytest.approx(least_squares, abs=5e-4)
-
-
-@pytest.mark.real
-@pytest.mark.parametrize("name", ["10_03", "05_01"])
-@pytest.mark.parametrize("breaks", ["split", "fewest"])
-def test_the_bound_holds_for_real_clips(data: Path, name: str, breaks: str) -> None:
-    motion = lossy.amc(data, name)
-    for limit in (0.05, 1.0, 24.0):
-        check_bound(motion, limit, coded(motion, d2_lmt=limit, breaks=breaks), closed=True)
-
-
-def test_chain_of_single_channels() -> None:
-    """A joint of one channel is a curve in one dimension."""
-    motion = Motion(bones(["rx"] * 3), (Signal(wandering(60, ["rx"] * 3).values),), name="chain")
-    clip = coded(motion, d2_lmt=1.0)
-    assert clip.layout.groups == ((0,), (1,), (2,))
-    check_bound(motion, 1.0, clip, closed=True)

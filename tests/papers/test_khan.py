@@ -15,7 +15,7 @@ from mcz.bench import cache
 from mcz.bench.cases import Case, Variant
 from mcz.bench.measure import point
 from mcz.bench.tables import Table
-from mcz.bench.tasks import Runner, perform
+from mcz.bench.tasks import Runner
 from mcz.cli.common import run as run_command
 from mcz.codecs import CODECS, by_name
 from mcz.errors import OptionError
@@ -83,17 +83,6 @@ def _tables(data: Path, module: Any, clip: str, thresholds: list[int]) -> Table:
     every = {task: {} for task in module.tasks({clip: case})} | known
     found = [t for t in module.tables({clip: case}, every) if "Fig. 7" in t.title]
     return found[0]
-
-
-@pytest.mark.real
-def test_khan_2014_figures(data: Path) -> None:
-    case = named([str(data)], None)["10_03"]
-    for codec, mse, within in (("qbc", 0.2552, 0.0005), ("dwt", 0.265, 0.002)):
-        if codec in khan2014.here():
-            row = khan2014._Row("10_03", case, codec)
-            assert perform(row.preset, KINDS[row.preset.kind])["mse"] == pytest.approx(
-                mse, abs=within
-            )
 
 
 # The whole run

@@ -98,6 +98,6 @@ VECTORS: dict[str, tuple[str, ...]] = {
 }
 
 ARGUED: dict[str, str] = {
-    "PWAVE-31": "A rule for who goes on after a loss; shown by tests/codecs/test_posewave_live.py::"
-    "test_what_is_decoded_after_a_loss_is_right",
+    "PWAVE-31": "A rule for who goes on after a loss; shown by "
+    "tests/codecs/test_contract_live.py::test_after_a_loss_no_frame_is_wrong",
 }
